@@ -1,0 +1,124 @@
+"""`excite compare-random`: optimised motions beside the best of many random ones."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from excite_cli.cli import options
+from excite_cli.cli.console import Terminal
+
+
+def compare_random(
+    config: options.Config,
+    candidates: Annotated[
+        int, typer.Option("--candidates", min=1, help="Least number of random motions.")
+    ] = 300,
+    output: options.Output = None,
+    optimized: Annotated[
+        Path | None,
+        typer.Option("--optimized", help="Result of `excite optimize` to compare with."),
+    ] = None,
+    motions: Annotated[
+        int | None, typer.Option("--motions", min=1, help="Override sequence.motions.")
+    ] = None,
+    seed: options.Seed = None,
+    overrides: options.Set = None,
+    overwrite: options.Overwrite = False,
+    threads: options.Threads = 1,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
+) -> None:
+    """Compare with random motions under the same constraints, as in the paper's Tables I and II.
+
+    The problem is optimised first (or taken from --optimized); then at least --candidates random
+    motions are drawn, and more until as much time has passed as the optimiser took.
+
+    Example:  excite compare-random configs/talos_arms.yaml --candidates 300
+    """
+    from dataclasses import replace
+
+    from rich.table import Table
+
+    from excite_cli.cli.setup import load_problem, output_path, single_threaded
+    from excite_cli.cli.tables import comparison_table, motion_data
+    from excite_cli.errors import FileError
+    from excite_cli.excitation.motion import Progress, ProgressCallback
+    from excite_cli.excitation.random_baseline import random_baseline
+    from excite_cli.excitation.result import matches
+    from excite_cli.excitation.run import continue_run, new_result
+    from excite_cli.store.result_file import read_result, write_result
+    from excite_cli.store.versions import versions
+
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    path = output_path(output, config, overwrite) if output else None
+    extra = [f"sequence.motions={motions}"] if motions is not None else []
+    extra += [f"seed={seed}"] if seed is not None else []
+    with single_threaded(threads):
+        problem = load_problem(terminal, config, overrides, extra)
+        if optimized is not None:
+            result = read_result(optimized)
+            reason = matches(problem, result)
+            if reason:
+                raise FileError(f"--optimized {optimized} does not belong to {config}: {reason}.")
+        else:
+            with terminal.live("optimising", problem.spec.optimizer.max_iterations) as show:
+
+                def report(index: int) -> ProgressCallback:
+                    def tell(progress: Progress) -> None:
+                        show(
+                            f"motion {index}  iteration {progress.iteration}  "
+                            f"cond {progress.condition_number:.2f}",
+                            progress.iteration,
+                        )
+
+                    return tell
+
+                result = continue_run(
+                    problem,
+                    new_result(problem, [], versions()),
+                    report,
+                    lambda step, current: None,
+                )
+        seconds = sum(motion.seconds for motion in result.motions)
+        with terminal.live("random motions", candidates) as show:
+            baseline = random_baseline(
+                problem,
+                len(result.motions),
+                problem.spec.seed,
+                candidates,
+                seconds,
+                lambda drawn, best: show(f"{drawn} drawn, best {best:.1f}", drawn),
+            )
+    result = replace(
+        result,
+        random=baseline.motions,
+        random_candidates=(baseline.candidates, baseline.admissible),
+    )
+    if path is not None:
+        write_result(path, result, problem)
+    summary = (
+        f"{baseline.candidates} candidates in {baseline.seconds:.1f} s, {baseline.admissible} "
+        f"admissible; the optimiser took {seconds:.1f} s"
+    )
+    answer: list[Table | str] = [comparison_table(result.motions, baseline.motions), summary]
+    terminal.answer(
+        [*answer, str(path)] if path is not None else answer,
+        {
+            "random": [
+                {
+                    "index": m.index,
+                    "condition_number": m.condition_number,
+                    "stacked_condition_number": m.stacked_condition_number,
+                }
+                for m in baseline.motions
+            ],
+            "optimized": [motion_data(m) for m in result.motions],
+            "candidates": baseline.candidates,
+            "admissible": baseline.admissible,
+            "seconds": {"optimized": seconds, "random": baseline.seconds},
+            "output": str(path) if path is not None else None,
+        },
+    )

@@ -1,0 +1,93 @@
+"""`excite optimize`: motions one after the other, each with all earlier ones stacked."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from excite_cli.cli import options
+from excite_cli.cli.console import Terminal
+
+
+def optimize(
+    config: options.Config,
+    output: options.Output = None,
+    motions: Annotated[
+        int | None, typer.Option("--motions", min=1, help="Override sequence.motions.")
+    ] = None,
+    prior: Annotated[
+        list[Path] | None,
+        typer.Option("--prior", help="Result file stacked as earlier data (may be repeated)."),
+    ] = None,
+    seed: options.Seed = None,
+    overrides: options.Set = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with an existing file.")] = False,
+    overwrite: options.Overwrite = False,
+    threads: options.Threads = 1,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
+) -> None:
+    """Find motions that make the inertial parameters visible.
+
+    Every stored motion keeps all constraints. Exit status 1: no admissible motion exists or was
+    found, and the message names what stands in the way.
+
+    Example:  excite optimize configs/talos_arms.yaml -o arms.h5 --motions 3
+    """
+    from rich.table import Table
+
+    from excite_cli.cli.setup import load_problem, output_path, single_threaded
+    from excite_cli.cli.tables import margin_table, motion_data, motion_table
+    from excite_cli.excitation.motion import Progress, ProgressCallback
+    from excite_cli.excitation.result import Result
+    from excite_cli.excitation.run import continue_run, new_result, resumed_result
+    from excite_cli.excitation.sequence import Step
+    from excite_cli.store.result_file import read_result, write_result
+    from excite_cli.store.versions import versions
+
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    path = output_path(output, config, overwrite, resume)
+    extra = [f"sequence.motions={motions}"] if motions is not None else []
+    extra += [f"seed={seed}"] if seed is not None else []
+    with single_threaded(threads):
+        problem = load_problem(terminal, config, overrides, extra)
+        priors = [(str(name), read_result(name)) for name in prior or []]
+        if resume and path.exists():
+            result = resumed_result(problem, read_result(path), path)
+            terminal.say(f"resuming after motion {len(result.motions)} of {path}")
+        else:
+            result = new_result(problem, priors, versions())
+        total = problem.spec.sequence.motions
+        with terminal.live("", problem.spec.optimizer.max_iterations) as show:
+
+            def report(index: int) -> ProgressCallback:
+                def tell(progress: Progress) -> None:
+                    show(
+                        f"motion {index}/{total}  iteration {progress.iteration}  "
+                        f"cond {progress.condition_number:.2f}  {progress.worst_name} "
+                        f"{progress.worst_margin:.3g} {progress.worst_unit}  "
+                        f"stage {progress.stage}",
+                        progress.iteration,
+                    )
+
+                return tell
+
+            def store(step: Step, current: Result) -> None:
+                write_result(path, current, problem)
+                motion = step.motion
+                note = "" if motion.improved else "; it brings no improvement"
+                terminal.say(
+                    f"motion {motion.index}: condition number {motion.condition_number:.2f}, "
+                    f"stacked {motion.stacked_condition_number:.2f} "
+                    f"({motion.seconds:.1f} s, {motion.status}{note})"
+                )
+
+            result = continue_run(problem, result, report, store)
+    tables: list[Table | str] = [motion_table(result.motions), f"{path}"]
+    if problem.constraints:
+        tables.insert(1, margin_table(result.motions, problem.constraints))
+    terminal.answer(
+        tables, {"motions": [motion_data(m) for m in result.motions], "output": str(path)}
+    )

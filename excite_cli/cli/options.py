@@ -1,0 +1,26 @@
+"""Options that several commands share, written once."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Config = Annotated[Path, typer.Argument(help="The problem, a YAML file.", show_default=False)]
+ResultFile = Annotated[Path, typer.Argument(help="A result file.", show_default=False)]
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", help="Result file. Default: <config name>.h5 here."),
+]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a value of the config."),
+]
+Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Override the config's seed.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Only errors.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="More detail.")]
+NoProgress = Annotated[bool, typer.Option("--no-progress", help="No progress display.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing file.")]
+Threads = Annotated[
+    int, typer.Option("--threads", min=1, help="Threads of the linear algebra library.")
+]

@@ -1,0 +1,70 @@
+"""From command-line arguments to a problem, with what is worth saying about it."""
+
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from excite_cli.cli.console import Terminal
+from excite_cli.config.load import load_spec
+from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.errors import FileError
+from excite_cli.excitation.problem import Problem, build_problem
+
+
+def single_threaded(threads: int = 1) -> AbstractContextManager[object]:
+    """Limit the linear algebra library: its matrices here are too small for many threads."""
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(limits=threads)
+
+
+def load_problem(
+    terminal: Terminal, config: Path, overrides: list[str] | None, extra: list[str] | None = None
+) -> Problem:
+    """Load, override, build; tell what was understood."""
+    spec = load_spec(config, [*(overrides or []), *(extra or [])])
+    problem = build_problem(spec, config.resolve().parent)
+    robot = problem.robot
+    terminal.say(
+        f"{robot.name}: {robot.n} joints, {problem.base.rank} base parameters, "
+        f"{problem.variables} variables, {len(problem.cost_basis.times)} cost and "
+        f"{len(problem.constraint_basis.times)} constraint samples"
+    )
+    names = ", ".join(constraint.name for constraint in problem.constraints) or "none"
+    terminal.say(f"constraints: {names}")
+    for constraint in problem.constraints:
+        if isinstance(constraint, SelfCollision):
+            pairs = constraint.pairs
+            terminal.say(
+                f"self-collision: {len(constraint.capsules)} capsules, {len(pairs.checked)} pairs "
+                f"checked, {len(pairs.dropped)} dropped (--verbose lists them)"
+            )
+            for label in constraint.labels:
+                terminal.detail(f"  checked  {label}")
+            for pair in pairs.dropped:
+                terminal.detail(f"  dropped  {pair.first} – {pair.second}: {pair.reason}")
+    for name, words in zip(_symbols(problem), problem.base.in_words(), strict=True):
+        terminal.detail(f"  base parameter {name}: {words}")
+    return problem
+
+
+def _symbols(problem: Problem) -> list[str]:
+    return [problem.base.names[index] for index in problem.base.selection]
+
+
+def output_path(output: Path | None, config: Path, overwrite: bool, resume: bool = False) -> Path:
+    """Where the result goes.
+
+    Raises
+    ------
+    FileError
+        It exists already and nothing says to replace or resume it.
+    """
+    path = output or Path(f"{config.stem}.h5")
+    if path.is_dir():
+        raise FileError(f"{path} is a folder. Give a file name with -o.")
+    if path.exists() and not overwrite and not resume:
+        raise FileError(
+            f"{path} exists already. Give another name with -o, go on with --resume, or replace "
+            "it with --overwrite."
+        )
+    return path

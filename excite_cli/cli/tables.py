@@ -1,0 +1,96 @@
+"""Tables that can be read: condition numbers beside each other, margins, gradients."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.table import Table
+
+from excite_cli.constraints.base import Constraint, Worst
+from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.random_baseline import RandomMotion
+
+
+def motion_table(motions: Sequence[Motion]) -> Table:
+    """Condition numbers of each motion and of the stack (the paper's Table I), status, effort."""
+    table = Table(title="Condition numbers", title_justify="left")
+    for name in ("motion", "own", "stacked", "status", "iterations", "seconds"):
+        table.add_column(name, justify="left" if name == "status" else "right")
+    for motion in motions:
+        status = motion.status if motion.improved else f"{motion.status}; no improvement"
+        table.add_row(
+            str(motion.index),
+            f"{motion.condition_number:.2f}",
+            f"{motion.stacked_condition_number:.2f}",
+            status,
+            str(motion.iterations),
+            f"{motion.seconds:.1f}",
+        )
+    return table
+
+
+def margin_table(motions: Sequence[Motion], constraints: Sequence[Constraint]) -> Table:
+    """The worst margin of every constraint over all motions, at controller rate."""
+    table = Table(title="Worst margins at 1 kHz", title_justify="left")
+    for name in ("constraint", "margin", "unit", "where", "motion", "time [s]"):
+        table.add_column(name, justify="right" if name in ("margin", "time [s]") else "left")
+    for constraint in constraints:
+        motion = min(motions, key=lambda m: m.margins[constraint.name].margin)
+        worst = motion.margins[constraint.name]
+        table.add_row(
+            constraint.name,
+            f"{worst.margin:.4f}",
+            constraint.unit,
+            worst.label,
+            str(motion.index),
+            f"{worst.time:.3f}",
+        )
+    return table
+
+
+def comparison_table(optimized: Sequence[Motion], random: Sequence[RandomMotion]) -> Table:
+    """The paper's Tables I and II side by side."""
+    table = Table(title="Condition numbers, Table I and II", title_justify="left")
+    for name in ("motion", "optimised own", "optimised stacked", "random own", "random stacked"):
+        table.add_column(name, justify="right")
+    table.add_column("stacked, random / optimised", justify="right")
+    for index in range(max(len(optimized), len(random))):
+        first = optimized[index] if index < len(optimized) else None
+        second = random[index] if index < len(random) else None
+        ratio = (
+            f"{second.stacked_condition_number / first.stacked_condition_number:.2f}"
+            if first and second
+            else ""
+        )
+        table.add_row(str(index + 1), *_pair(first), *_pair(second), ratio)
+    return table
+
+
+def _pair(motion: Motion | RandomMotion | None) -> tuple[str, str]:
+    if motion is None:
+        return "", ""
+    return f"{motion.condition_number:.1f}", f"{motion.stacked_condition_number:.1f}"
+
+
+def motion_data(motion: Motion) -> dict[str, Any]:
+    """A motion for `--json`."""
+    return {
+        "index": motion.index,
+        "condition_number": motion.condition_number,
+        "stacked_condition_number": motion.stacked_condition_number,
+        "improved": motion.improved,
+        "status": motion.status,
+        "seconds": motion.seconds,
+        "iterations": motion.iterations,
+        "evaluations": motion.evaluations,
+        "margins": {name: worst_data(worst) for name, worst in motion.margins.items()},
+    }
+
+
+def worst_data(worst: Worst) -> dict[str, Any]:
+    """A worst margin for `--json`."""
+    return {
+        "margin": worst.margin,
+        "where": worst.label,
+        "time": worst.time,
+        "violations": worst.violations,
+    }

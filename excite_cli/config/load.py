@@ -1,0 +1,176 @@
+"""From a YAML file and `--set` overrides to a checked `Spec`, and back to text.
+
+YAML is read with the safe loader, within limits of size and depth and without aliases, so that a
+foreign file can neither run code nor grow in memory. Errors name the key's path, what is allowed
+and the nearest known key.
+"""
+
+from pathlib import Path
+from typing import Any, get_args
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from excite_cli.config.spec import Section, Spec
+from excite_cli.errors import ConfigError, nearest
+
+MAX_BYTES = 1_000_000
+MAX_DEPTH = 30
+_TAGS = {"fourier", "bspline", "disc", "polygon"}
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """Safe loader that refuses aliases and duplicate keys."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """Refuse aliases: they make small files huge."""
+        if self.check_event(yaml.AliasEvent):
+            event = self.peek_event()
+            raise yaml.MarkedYAMLError(None, None, "aliases (*) are not allowed", event.start_mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+        """Refuse a key given twice."""
+        seen = set()
+        for key_node, _ in node.value:
+            key = key_node.value
+            if key in seen:
+                mark = key_node.start_mark
+                raise yaml.MarkedYAMLError(None, None, f"key '{key}' is given twice", mark)
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def load_spec(path: Path, overrides: list[str] | None = None) -> Spec:
+    """Read a problem from `path`, with `key.path=value` overrides applied.
+
+    Raises
+    ------
+    ConfigError
+        The file is missing, too large, not YAML, or says something that is not allowed.
+    """
+    if not path.is_file():
+        raise ConfigError(f"There is no config file {path}. `ls configs` shows those shipped.")
+    if path.stat().st_size > MAX_BYTES:
+        raise ConfigError(f"{path} is larger than {MAX_BYTES // 1000} kB: not a config.")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path} cannot be read as text: {error}") from error
+    return parse_spec(text, str(path), overrides)
+
+
+def parse_spec(text: str, source: str = "config", overrides: list[str] | None = None) -> Spec:
+    """As `load_spec`, from YAML text; `source` is named in messages."""
+    tree = _load(text, source)
+    if not isinstance(tree, dict):
+        raise ConfigError(f"{source}: a problem is a mapping with at least the key 'robot'.")
+    for override in overrides or []:
+        _apply(tree, override)
+    try:
+        return Spec.model_validate(tree)
+    except ValidationError as error:
+        raise ConfigError(_explain(error, source)) from error
+
+
+def spec_as_yaml(spec: Spec) -> str:
+    """The full resolved problem as YAML text; loading it gives the same `Spec`."""
+    return yaml.safe_dump(spec.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+
+
+def _load(text: str, source: str) -> Any:
+    if _too_deep(text):
+        raise ConfigError(f"{source}: nested deeper than {MAX_DEPTH} levels.")
+    try:
+        return yaml.load(text, Loader=_StrictLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f", line {mark.line + 1}" if mark else ""
+        raise ConfigError(f"{source}{where}: not valid YAML: {error.problem}") from error
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise ConfigError(f"{source}: not valid YAML: {error}") from error
+
+
+def _too_deep(text: str) -> bool:
+    depth = 0
+    try:
+        for event in yaml.parse(text, Loader=yaml.SafeLoader):
+            if isinstance(event, yaml.CollectionStartEvent):
+                depth += 1
+                if depth > MAX_DEPTH:
+                    return True
+            elif isinstance(event, yaml.CollectionEndEvent):
+                depth -= 1
+    except (yaml.YAMLError, RecursionError):
+        return False  # told with its line by the loader
+    return False
+
+
+def _apply(tree: dict[str, Any], override: str) -> None:
+    """Set one `key.path=value`; the value is YAML."""
+    key, separator, text = override.partition("=")
+    if not separator or not key.strip():
+        raise ConfigError(
+            f"--set {override}: write key.path=value, for example optimizer.max_seconds=20."
+        )
+    parts = [part.strip() for part in key.split(".")]
+    node: Any = tree
+    for part in parts[:-1]:
+        if node.get(part) is None:
+            node[part] = {}
+        node = node[part]
+        if not isinstance(node, dict):
+            raise ConfigError(f"--set {override}: '{part}' holds a value, not further keys.")
+    node[parts[-1]] = _load(text, f"--set {key}")
+
+
+def _explain(error: ValidationError, source: str) -> str:
+    lines = []
+    for item in error.errors(include_url=False):
+        path = [part for part in item["loc"] if part not in _TAGS]
+        where = ".".join(str(part) for part in path) or "the file"
+        lines.append(f"{source}: {where}: {_reason(item, path)}")
+    return "\n".join(dict.fromkeys(lines))
+
+
+def _reason(item: Any, path: list[Any]) -> str:
+    kind = item["type"]
+    if kind == "extra_forbidden":
+        allowed = _keys_at(path[:-1])
+        return f"unknown key.{nearest(str(path[-1]), allowed)} Allowed here: {', '.join(allowed)}."
+    if kind == "missing":
+        return "this key is required."
+    if kind == "union_tag_not_found":
+        return f"give {item['ctx']['discriminator']} to say which kind."
+    if kind == "union_tag_invalid":
+        tag, expected = item["ctx"]["tag"], item["ctx"]["expected_tags"].replace("'", "")
+        return f"unknown kind '{tag}'.{nearest(tag, expected.split(', '))} Allowed: {expected}."
+    message = item["msg"].removeprefix("Value error, ")
+    value = item.get("input")
+    if isinstance(value, str | int | float | bool | None):
+        options = item.get("ctx", {}).get("expected")
+        hint = (
+            nearest(str(value), options.replace("'", "").replace(" or ", ", ").split(", "))
+            if (isinstance(options, str))
+            else ""
+        )
+        return f"{message} (given: {value!r}).{hint}"
+    return f"{message}."
+
+
+def _keys_at(path: list[Any]) -> list[str]:
+    """Field names of the section at `path`, following the models."""
+    models: list[type[BaseModel]] = [Spec]
+    for part in path:
+        found: list[type[BaseModel]] = []
+        for model in models:
+            if part in model.model_fields:
+                found += _models_in(model.model_fields[part].annotation)
+        models = found or models
+    return sorted({name for model in models for name in model.model_fields})
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return [annotation]
+    return [model for inner in get_args(annotation) for model in _models_in(inner)]

@@ -1,0 +1,53 @@
+"""The family of constraints: margins that must not be negative.
+
+Every member has columns (a joint side, a capsule pair, an edge of the support) and gives, for each
+instant and column, the margin in its own unit, and derivatives for those the optimiser asks for.
+Members neither know the optimiser nor the trajectory.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.robot.states import States
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The smallest margin of a constraint over a motion, with where and when it occurs."""
+
+    margin: float
+    label: str
+    time: float
+    violations: int
+
+
+class Constraint(ABC):
+    """Margins (T, m), one column per label; admissible where none is negative."""
+
+    name: str
+    unit: str
+    labels: tuple[str, ...]
+    scale: Array
+    """Size (m,) by which the optimiser divides each column's margin."""
+
+    @abstractmethod
+    def margins(self, states: States) -> Array:
+        """Margins (T, m) in `unit`."""
+
+    @abstractmethod
+    def gradients(
+        self, states: States, times: Indices, columns: Indices
+    ) -> tuple[Array | None, Array | None, Array | None]:
+        """Derivatives (K, n) of K margins with respect to q, v, a; None where identically zero."""
+
+    def worst(self, margins: Array, times: Array) -> Worst:
+        """Smallest margin of all, ties and all instants included."""
+        t, column = np.unravel_index(int(np.argmin(margins)), margins.shape)
+        broken = int(np.count_nonzero(margins < 0))
+        return Worst(float(margins[t, column]), self.labels[column], float(times[t]), broken)

@@ -1,0 +1,72 @@
+"""Bounds on joint positions, velocities or accelerations (Eq. 51): linear, one joint a row."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.robot.states import States
+
+_ORDERS = ("position", "velocity", "acceleration")
+_UNITS = ("rad", "rad/s", "rad/s²")
+
+
+@dataclass(frozen=True)
+class JointBound(Constraint):
+    """lower ≤ x_j ≤ upper for the derivative of the given order (0, 1, 2) of q.
+
+    `joints`, `signs`, `bounds` (m,): margin = bound − sign·x_joint. `scale` is half the range.
+    """
+
+    order: int
+    joints: Indices
+    signs: Array
+    bounds: Array
+    scale: Array
+    labels: tuple[str, ...]
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """`joint_position`, `joint_velocity` or `joint_acceleration`."""
+        return f"joint_{_ORDERS[self.order]}"
+
+    @property
+    def unit(self) -> str:  # type: ignore[override]
+        """Unit for revolute joints; prismatic ones have m instead of rad."""
+        return _UNITS[self.order]
+
+    @classmethod
+    def between(
+        cls, order: int, lower: Array, upper: Array, names: tuple[str, ...]
+    ) -> "JointBound":
+        """Bounds (n,) of all joints; infinite ones are left out."""
+        low, high = np.flatnonzero(np.isfinite(lower)), np.flatnonzero(np.isfinite(upper))
+        half = np.where(np.isfinite(upper - lower), (upper - lower) / 2, 1.0)
+        joints = np.concatenate([low, high])
+        return cls(
+            order=order,
+            joints=joints,
+            signs=np.concatenate([-np.ones(len(low)), np.ones(len(high))]),
+            bounds=np.concatenate([-lower[low], upper[high]]),
+            scale=half[joints],
+            labels=tuple(f"{names[j]} lower" for j in low)
+            + tuple(f"{names[j]} upper" for j in high),
+        )
+
+    def values(self, states: States) -> Array:
+        """The bounded quantity (T, n)."""
+        return (states.q, states.v, states.a)[self.order]
+
+    def margins(self, states: States) -> Array:
+        """Distance to each bound (T, m)."""
+        return self.bounds - self.signs * self.values(states)[:, self.joints]
+
+    def gradients(
+        self, states: States, times: Indices, columns: Indices
+    ) -> tuple[Array | None, Array | None, Array | None]:
+        """−sign at the joint, zero elsewhere."""
+        rows = np.zeros((len(times), states.q.shape[1]))
+        rows[np.arange(len(times)), self.joints[columns]] = -self.signs[columns]
+        parts: list[Array | None] = [None, None, None]
+        parts[self.order] = rows
+        return parts[0], parts[1], parts[2]

@@ -1,0 +1,38 @@
+"""Distances between capsules (Eq. 53 with its sign mended): d_ij ≥ r_i + r_j + margin."""
+
+import numpy as np
+
+from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.clearance import Clearance
+from excite_cli.robot.collision_pairs import CollisionPairs
+from excite_cli.robot.model import Robot
+from excite_cli.robot.states import States
+
+# Distances beyond this many metres above the margin do not concern the optimiser.
+_NEAR = 0.1
+
+
+class SelfCollision(Constraint):
+    """One column per checked pair of capsules."""
+
+    name = "self_collision"
+    unit = "m"
+
+    def __init__(
+        self, robot: Robot, capsules: tuple[Capsule, ...], pairs: CollisionPairs, margin: float
+    ) -> None:
+        self.capsules, self.pairs, self.margin = capsules, pairs, margin
+        self._clearance = Clearance(robot, capsules, pairs)
+        self.labels = tuple(f"{capsules[i].name} – {capsules[j].name}" for i, j in pairs.checked)
+        self.scale = np.full(len(self.labels), _NEAR)
+
+    def margins(self, states: States) -> Array:
+        """Distance less the margin (T, m) [m]."""
+        return self._clearance.distances(states.q) - self.margin
+
+    def gradients(
+        self, states: States, times: Indices, columns: Indices
+    ) -> tuple[Array | None, Array | None, Array | None]:
+        """Witness normal times the difference of the witness points' Jacobians."""
+        return self._clearance.gradients(states.q, times, columns), None, None

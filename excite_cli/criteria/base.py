@@ -1,0 +1,45 @@
+"""The family of criteria: functions of the singular values of the stacked regressor.
+
+A member gives the value f(σ) that is minimised and its derivative ∂f/∂σ. With Eq. 16 the
+derivative with respect to the matrix is Σ_k (∂f/∂σ_k) u_k v_kᵀ, so one adjoint serves them all.
+"""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Criterion(ABC):
+    """Minimised function of the singular values, in descending order."""
+
+    name: str
+
+    @abstractmethod
+    def value(self, sigma: Array) -> float:
+        """f(σ) for σ (r,) in descending order."""
+
+    @abstractmethod
+    def derivative(self, sigma: Array) -> Array:
+        """∂f/∂σ (r,)."""
+
+    @property
+    def smooth(self) -> bool:
+        """Whether f is differentiable where singular values meet."""
+        return True
+
+    def continuation(self) -> tuple["Criterion", ...]:
+        """Criteria to minimise one after the other, each a closer stand-in for this one."""
+        return (self,)
+
+
+def singular_values(matrix: Array) -> Array:
+    """Singular values of `matrix` (m, r) in descending order."""
+    return np.asarray(np.linalg.svd(matrix, compute_uv=False), dtype=float)
+
+
+def condition_number(sigma: Array) -> float:
+    """σ_max / σ_min (Eq. 5); infinite when the matrix has lost rank."""
+    return float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else float("inf")

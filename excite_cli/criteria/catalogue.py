@@ -1,0 +1,26 @@
+"""All criteria by their name in the YAML file."""
+
+from collections.abc import Callable
+
+from excite_cli.config.spec import CriterionSpec
+from excite_cli.criteria.base import Criterion
+from excite_cli.criteria.condition_and_sigma_min import ConditionAndSigmaMin
+from excite_cli.criteria.condition_number import ConditionNumber
+from excite_cli.criteria.log_det import LogDet
+from excite_cli.criteria.sigma_min import SigmaMin
+from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
+from excite_cli.criteria.trace_inverse import TraceInverse
+
+CRITERIA: dict[str, Callable[[CriterionSpec], Criterion]] = {
+    "condition_number": lambda spec: ConditionNumber(),
+    "smooth_condition_number": lambda spec: SmoothConditionNumber(spec.smoothing),
+    "log_det": lambda spec: LogDet(),
+    "sigma_min": lambda spec: SigmaMin(),
+    "trace_inverse": lambda spec: TraceInverse(),
+    "condition_and_sigma_min": lambda spec: ConditionAndSigmaMin(),
+}
+
+
+def build_criterion(spec: CriterionSpec) -> Criterion:
+    """The criterion that `spec` asks for."""
+    return CRITERIA[spec.kind](spec)

@@ -1,0 +1,143 @@
+"""One admissible motion: start, solve, look between the instants, mend, judge."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from excite_cli.constraints.base import Array
+from excite_cli.criteria.base import condition_number, singular_values
+from excite_cli.errors import NoAdmissibleMotionError
+from excite_cli.excitation.admissible import fine_margins, fine_times, worst_margins
+from excite_cli.excitation.motion import Motion, Outcome, Progress, ProgressCallback
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.solvers.base import Effort, Solver
+from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.start import Start, clear_posture, random_start
+from excite_cli.excitation.task import MotionTask
+
+_GUARD_ROUNDS = 6
+_GUARD_GROWTH = 1.3
+# A motion counts as an improvement of the stack from this relative change on.
+_IMPROVEMENT = 1e-3
+
+
+def generate_motion(
+    problem: Problem,
+    solver: Solver,
+    stack: Stack,
+    index: int,
+    seed: int,
+    report: ProgressCallback,
+) -> Motion:
+    """Motion `index` on top of `stack`, the best of `optimizer.restarts` starts.
+
+    Raises
+    ------
+    NoAdmissibleMotionError
+        No start is admissible, or the result cannot be kept admissible between the instants.
+    """
+    began = time.perf_counter()
+    spec = problem.spec.optimizer
+    effort = Effort(spec.max_iterations, spec.max_seconds, spec.tolerance)
+    task = MotionTask(problem, stack)
+    start = clear_posture(task, seed)
+    best: tuple[float, Array, Outcome] | None = None
+    iterations = evaluations = 0
+    for restart in range(spec.restarts):
+        run = MotionTask(problem, stack)
+        x0 = random_start(run, start, (seed, index, restart))
+        outcome = solver.solve(run, x0, effort, _labelled(report, restart, spec.restarts))
+        outcome = kept_between_instants(run, solver, start, outcome, effort, report)
+        iterations += outcome.iterations
+        evaluations += outcome.evaluations
+        coefficients = run.coefficients(outcome.x)
+        value = run.objective.value(coefficients, problem.criterion)
+        if best is None or value < best[0]:
+            best = (value, coefficients, outcome)
+    assert best is not None
+    _, coefficients, outcome = best
+    stacked = task.objective.stacked_condition_number(coefficients)
+    return Motion(
+        index=index,
+        coefficients=coefficients,
+        condition_number=task.objective.own_condition_number(coefficients),
+        stacked_condition_number=stacked,
+        improved=is_improvement(stack, stacked),
+        status=outcome.status,
+        seconds=time.perf_counter() - began,
+        iterations=iterations,
+        evaluations=evaluations,
+        margins=worst_margins(problem, coefficients),
+    )
+
+
+def is_improvement(stack: Stack, stacked: float) -> bool:
+    """Whether the condition number fell noticeably below that of the earlier data."""
+    if stack.rows == 0:
+        return True
+    before = condition_number(singular_values(stack.factor))
+    return stacked < (1.0 - _IMPROVEMENT) * before
+
+
+def kept_between_instants(
+    task: MotionTask,
+    solver: Solver,
+    start: Start,
+    outcome: Outcome,
+    effort: Effort,
+    report: ProgressCallback,
+) -> Outcome:
+    """The outcome, mended until no constraint is broken at controller rate.
+
+    Where the finer grid shows a negative margin, the guard of that column is raised by it, and the
+    solver goes on from the nearest point towards standing still that has the new guards.
+    """
+    problem = task.problem
+    times = fine_times(problem)
+    short = replace(effort, max_iterations=max(10, effort.max_iterations // 8))
+    for _ in range(_GUARD_ROUNDS):
+        margins = fine_margins(problem, task.coefficients(outcome.x), times)
+        lacking = [np.maximum(-margin.min(axis=0), 0.0) for margin in margins]
+        if not any(lack.any() for lack in lacking):
+            return outcome
+        guards = [
+            guard + _GUARD_GROWTH * lack for guard, lack in zip(task.guards, lacking, strict=True)
+        ]
+        tighter = task.with_guards(guards)
+        inside = _drawn_inside(tighter, outcome.x, start)
+        again = solver.solve(tighter, inside, short, report)
+        outcome = Outcome(
+            again.x,
+            outcome.status,
+            outcome.iterations + again.iterations,
+            outcome.evaluations + again.evaluations,
+        )
+        task = tighter
+    raise NoAdmissibleMotionError(
+        "The motion could not be kept admissible between the instants of sampling.constraints. "
+        "Take a smaller sampling.constraints.step."
+    )
+
+
+def _drawn_inside(task: MotionTask, x: Array, start: Start) -> Array:
+    """The point nearest to x on the way to standing still whose residuals are all positive."""
+    standing = task.variables(task.problem.still(start.posture))
+    for share in np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 60)]):
+        candidate = x + share * (standing - x)
+        if all(value.min() > 0 for value in task.values(task.states(candidate))):
+            return candidate
+    raise NoAdmissibleMotionError(
+        "The posture no longer has room once the motion is kept clear between instants. Take a "
+        "smaller sampling.constraints.step."
+    )
+
+
+def _labelled(report: ProgressCallback, restart: int, restarts: int) -> ProgressCallback:
+    if restarts == 1:
+        return report
+
+    def labelled(progress: Progress) -> None:
+        report(replace(progress, stage=f"start {restart + 1}/{restarts}, {progress.stage}"))
+
+    return labelled

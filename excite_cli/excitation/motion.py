@@ -1,0 +1,55 @@
+"""Records that travel from the optimiser to the file and the terminal."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from excite_cli.constraints.base import Array, Worst
+
+Status = Literal["converged", "iteration limit", "time limit", "stalled"]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a solver tells while it runs; `worst` is the smallest margin, in its own unit."""
+
+    iteration: int
+    condition_number: float
+    worst_name: str
+    worst_margin: float
+    worst_unit: str
+    seconds: float
+    stage: str
+
+
+ProgressCallback = Callable[[Progress], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a solver returns: the best admissible point it saw, as free variables x."""
+
+    x: Array
+    status: Status
+    iterations: int
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One generated motion that keeps all constraints.
+
+    `condition_number` is that of the motion alone, `stacked_condition_number` that of the motion
+    with all earlier data; `improved` tells whether the stack became better by it.
+    """
+
+    index: int
+    coefficients: Array
+    condition_number: float
+    stacked_condition_number: float
+    improved: bool
+    status: str
+    seconds: float
+    iterations: int
+    evaluations: int
+    margins: dict[str, Worst]

@@ -1,0 +1,148 @@
+"""Constraints as an optimiser wants them: dimensionless, guarded, and fast to pull back.
+
+A residual is (margin − guard) / scale, admissible where not negative. The guard keeps what lies
+between the instants of the grid: exact for bounds on a Fourier series (its sampling factor), an
+estimate for the others, raised when a finer grid shows it to be too small.
+
+Derivatives with respect to q at one instant reach the coefficients through the same basis row, so
+weighted sums over thousands of rows collapse to one matrix product per pair of derivative orders:
+Σ_t (b_t b_tᵀ) ⊗ G_t.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.robot.states import States
+from excite_cli.trajectory.base import Basis
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Derivatives of K near residuals of one constraint, at `times` and `columns`."""
+
+    times: Indices
+    columns: Indices
+    parts: tuple[Array | None, Array | None, Array | None]
+
+
+class GridProducts:
+    """Products of basis functions on the constraint grid, reduced to the free directions."""
+
+    def __init__(self, basis: Basis, free: Array) -> None:
+        self.orders = tuple(
+            np.ascontiguousarray(order @ free)
+            for order in (basis.position, basis.velocity, basis.acceleration)
+        )
+        self.samples, self.size = self.orders[0].shape
+
+    @cached_property
+    def squares(self) -> dict[tuple[int, int], Array]:
+        """b_t b_t'ᵀ flattened, (T, K²), for every pair of orders."""
+        return {
+            (i, j): (self.orders[i][:, :, None] * self.orders[j][:, None, :]).reshape(
+                self.samples, -1
+            )
+            for i in range(3)
+            for j in range(i, 3)
+        }
+
+    def add_gradient(self, gradient: Array, per_instant: list[Array | None]) -> None:
+        """Add Σ_t b_t g_tᵀ to `gradient` (K, n), `per_instant` being (T, n) per order."""
+        for order, part in zip(self.orders, per_instant, strict=True):
+            if part is not None:
+                gradient += order.T @ part
+
+    def add_joint_curvature(self, hessian: Array, order: int, weights: Array) -> None:
+        """Add the blocks of separate joints: weights (T, n) on the squared basis."""
+        k, n = self.size, weights.shape[1]
+        blocks = (self.squares[order, order].T @ weights).reshape(k, k, n)
+        joints = np.arange(n)
+        hessian[joints, :, joints, :] += blocks.transpose(2, 0, 1)
+
+    def add_curvature(self, hessian: Array, i: int, j: int, weights: Array) -> None:
+        """Add Σ_t (b_t^i b_t^jᵀ) ⊗ G_t, weights G (T, n, n), to `hessian` (n, K, n, K)."""
+        k, n = self.size, weights.shape[1]
+        blocks = (self.squares[i, j].T @ weights.reshape(self.samples, -1)).reshape(k, k, n, n)
+        hessian += blocks.transpose(2, 0, 3, 1)
+        if i != j:
+            hessian += blocks.transpose(3, 1, 2, 0)
+
+
+class Residuals:
+    """All constraints of a problem on its grid, with their guards."""
+
+    def __init__(
+        self, constraints: tuple[Constraint, ...], basis: Basis, free: Array, guards: list[Array]
+    ) -> None:
+        self.constraints, self.guards = constraints, guards
+        self.basis = basis
+        self.grid = GridProducts(basis, free)
+
+    def values(self, states: States) -> list[Array]:
+        """Residuals (T, m) of every constraint."""
+        return [
+            (constraint.margins(states) - guard) / constraint.scale
+            for constraint, guard in zip(self.constraints, self.guards, strict=True)
+        ]
+
+    def rows(self, states: States, index: int, near: Mask) -> Rows:
+        """Derivatives of the residuals of one constraint where `near` (T, m) is true."""
+        constraint = self.constraints[index]
+        times, columns = np.nonzero(near)
+        parts = constraint.gradients(states, times, columns)
+        scale = constraint.scale[columns][:, None]
+        scaled = [None if part is None else part / scale for part in parts]
+        return Rows(times, columns, (scaled[0], scaled[1], scaled[2]))
+
+
+def summed_per_instant(rows: Rows, weights: Array, samples: int) -> list[Array | None]:
+    """Σ over the rows of each instant of weight·derivative, (T, n) per order."""
+    found: list[Array | None] = []
+    for part in rows.parts:
+        if part is None:
+            found.append(None)
+            continue
+        total = np.zeros((samples, part.shape[1]))
+        if len(rows.times):
+            starts, instants = _groups(rows.times)
+            total[instants] = np.add.reduceat(weights[:, None] * part, starts, axis=0)
+        found.append(total)
+    return found
+
+
+def squared_per_instant(rows: Rows, weights: Array, samples: int) -> dict[tuple[int, int], Array]:
+    """Σ over the rows of each instant of weight·(gᵢ gⱼᵀ), (T, n, n) per pair of orders."""
+    found = {}
+    present = [i for i, part in enumerate(rows.parts) if part is not None]
+    starts, instants = _groups(rows.times)
+    for i in present:
+        for j in (j for j in present if j >= i):
+            left, right = rows.parts[i], rows.parts[j]
+            assert left is not None
+            assert right is not None
+            total = np.zeros((samples, left.shape[1], left.shape[1]))
+            if len(rows.times):
+                outer = (weights[:, None] * left)[:, :, None] * right[:, None, :]
+                total[instants] = np.add.reduceat(outer, starts, axis=0)
+            found[i, j] = total
+    return found
+
+
+def _groups(times: Indices) -> tuple[Indices, Indices]:
+    """Starts of runs of equal times (rows come sorted by time), and those times."""
+    if not len(times):
+        return np.zeros(0, int), np.zeros(0, int)
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(times)) + 1])
+    return starts, times[starts]
+
+
+def is_joint_bound(constraint: Constraint) -> bool:
+    """Whether every row of the constraint touches one joint, linearly."""
+    return isinstance(constraint, JointBound)

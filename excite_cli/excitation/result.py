@@ -1,0 +1,55 @@
+"""The record of a whole run: what was asked, what was found, and on what."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.random_baseline import RandomMotion
+from excite_cli.excitation.sequence import Step
+from excite_cli.excitation.stack import Stack
+from excite_cli.robot.model import Array
+
+
+@dataclass(frozen=True)
+class Result:
+    """Motions of one problem so far, with the stack that includes them and the priors.
+
+    `config` is the full resolved problem as YAML text, `fingerprint` the robot's.
+    """
+
+    config: str
+    fingerprint: str
+    seed: int
+    joint_names: tuple[str, ...]
+    base_selection: NDArray[np.intp]
+    base_words: tuple[str, ...]
+    row_weights: Array
+    column_scales: Array
+    motions: tuple[Motion, ...]
+    stack: Stack
+    random: tuple[RandomMotion, ...] = ()
+    random_candidates: tuple[int, int] = (0, 0)
+    priors: tuple[str, ...] = ()
+    versions: dict[str, str] = field(default_factory=dict)
+    checked_pairs: tuple[str, ...] = ()
+    dropped_pairs: tuple[str, ...] = ()
+
+    def with_step(self, step: Step) -> "Result":
+        """The result with one more motion."""
+        return replace(self, motions=(*self.motions, step.motion), stack=step.stack)
+
+
+def matches(problem: Problem, result: Result) -> str | None:
+    """None when stacks of `result` fit `problem`; otherwise what differs, in words."""
+    if result.fingerprint != problem.robot.fingerprint():
+        return "it was made for another robot, other moved joints, posture or rows"
+    if not np.array_equal(result.base_selection, problem.base.selection):
+        return "its base parameters differ"
+    same_rows = np.allclose(result.row_weights, problem.weighting.rows, rtol=1e-12)
+    same_columns = np.allclose(result.column_scales, problem.weighting.columns, rtol=1e-12)
+    if not (same_rows and same_columns):
+        return "its row weights or column scaling differ"
+    return None

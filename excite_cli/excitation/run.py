@@ -1,0 +1,111 @@
+"""A run over a whole problem: fresh, on top of earlier results, or resumed."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from excite_cli.config.load import parse_spec, spec_as_yaml
+from excite_cli.config.spec import Spec
+from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.errors import FileError
+from excite_cli.excitation.motion import ProgressCallback
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.result import Result, matches
+from excite_cli.excitation.sequence import Step, generate_sequence
+from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.stack import Stack
+
+
+def new_result(
+    problem: Problem, priors: list[tuple[str, Result]], versions: dict[str, str]
+) -> Result:
+    """A result without motions, its stack made of the priors.
+
+    Raises
+    ------
+    FileError
+        A prior does not fit the problem.
+    """
+    stack = Stack.empty(problem.base.rank)
+    for name, prior in priors:
+        reason = matches(problem, prior)
+        if reason:
+            raise FileError(
+                f"--prior {name} cannot be stacked: {reason}. A prior must come from the same "
+                "robot section and weighting."
+            )
+        stack = Stack(stack.with_rows(prior.stack.factor).factor, stack.rows + prior.stack.rows)
+    checked, dropped = _pairs(problem)
+    return Result(
+        config=spec_as_yaml(problem.spec),
+        fingerprint=problem.robot.fingerprint(),
+        seed=problem.spec.seed,
+        joint_names=problem.robot.joint_names,
+        base_selection=problem.base.selection,
+        base_words=problem.base.in_words(),
+        row_weights=problem.weighting.rows,
+        column_scales=problem.weighting.columns,
+        motions=(),
+        stack=stack,
+        priors=tuple(name for name, _ in priors),
+        versions=versions,
+        checked_pairs=checked,
+        dropped_pairs=dropped,
+    )
+
+
+def resumed_result(problem: Problem, result: Result, path: Path) -> Result:
+    """The stored result, once it is sure that it belongs to this problem.
+
+    Raises
+    ------
+    FileError
+        The stored config differs in more than the number of motions.
+    """
+    stored = parse_spec(result.config, f"the config stored in {path}")
+    if _without_count(stored) != _without_count(problem.spec) or matches(problem, result):
+        keys = _differing(stored, problem.spec)
+        raise FileError(
+            f"--resume: {path} was made with another config (different: {', '.join(keys)}). "
+            "Resume with the config it was made with, or give another -o."
+        )
+    return replace(result, config=spec_as_yaml(problem.spec))
+
+
+def continue_run(
+    problem: Problem,
+    result: Result,
+    report: Callable[[int], ProgressCallback],
+    on_motion: Callable[[Step, Result], None],
+) -> Result:
+    """Generate the motions that are still missing, calling `on_motion` after each."""
+    solver = build_solver(problem.spec.optimizer)
+    remaining = range(len(result.motions) + 1, problem.spec.sequence.motions + 1)
+    for step in generate_sequence(
+        problem, solver, result.stack, remaining, problem.spec.seed, report
+    ):
+        result = result.with_step(step)
+        on_motion(step, result)
+    return result
+
+
+def _without_count(spec: Spec) -> Spec:
+    return spec.model_copy(update={"sequence": spec.sequence.model_copy(update={"motions": 1})})
+
+
+def _differing(first: Spec, second: Spec) -> list[str]:
+    return [
+        name
+        for name in type(first).model_fields
+        if getattr(first, name) != getattr(second, name) and name != "sequence"
+    ] or ["the URDF or the library versions"]
+
+
+def _pairs(problem: Problem) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    for constraint in problem.constraints:
+        if isinstance(constraint, SelfCollision):
+            dropped = tuple(
+                f"{pair.first} – {pair.second}: {pair.reason}" for pair in constraint.pairs.dropped
+            )
+            return constraint.labels, dropped
+    return (), ()

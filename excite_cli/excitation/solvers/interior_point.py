@@ -1,0 +1,255 @@
+"""Feasible interior point with a structured Hessian (the default).
+
+Minimises f(x) + μ/T Σ b(c_i(x)) for falling μ, f being the smooth criterion with p rising at the
+same time, and c_i > 0 the residuals. Every iterate is strictly admissible, so the run may be cut
+off anywhere.
+
+    b(c) = −log u + (u − 1) − (u − 1)²/2,  u = c/ĉ < 1,    b = 0 beyond ĉ
+
+is a logarithmic barrier that ends at ĉ with two continuous derivatives: only near rows count, the
+others need no derivative at all. The Hessian is B + μ/T Σ b''(c_i) ∇c_i ∇c_iᵀ, with B a damped
+BFGS estimate for the criterion alone, while the barrier's part, which changes fast, is exact but
+for the curvature of the constraints. Its sums over thousands of rows collapse because a row at
+one instant is a Kronecker product of a basis row and a joint-space gradient (`residuals`), so an
+iteration costs one Cholesky factor of the number of variables, and no quadratic program.
+"""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from excite_cli.constraints.base import Array
+from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.criteria.base import Criterion
+from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
+from excite_cli.excitation.objective import Spectrum
+from excite_cli.excitation.residuals import (
+    Rows,
+    squared_per_instant,
+    summed_per_instant,
+)
+from excite_cli.excitation.solvers.base import Effort, Solver
+from excite_cli.excitation.task import MotionTask
+from excite_cli.robot.states import States
+
+# μ and the share of the criterion's continuation for each stage, and when a stage is done: the
+# merit fell by less than this over the last `_WINDOW` iterations.
+_STAGES = ((1.0, 0, 5e-2), (0.3, 0, 2e-2), (0.1, 0, 1e-2), (0.03, 1, 5e-3), (0.01, 1, 2e-3),
+           (0.003, 2, 1e-3))  # fmt: skip
+_WINDOW = 8
+_REACH_LINEAR, _REACH_OTHER = 0.5, 1.0
+_SUFFICIENT = 1e-4
+_HALVINGS = 14
+_TO_BOUNDARY = 0.98
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A strictly admissible point with all that was computed at it."""
+
+    x: Array
+    states: States
+    values: list[Array]
+    cost: float
+    gradient: Array
+    spectrum: Spectrum
+    merit: float
+
+
+class InteriorPoint(Solver):
+    """Primal barrier with falling μ; see the module."""
+
+    name = "interior_point"
+
+    def solve(
+        self, task: MotionTask, x: Array, effort: Effort, report: ProgressCallback
+    ) -> Outcome:
+        """Run all stages from the strictly admissible `x`."""
+        return _Run(task, effort, report).all_stages(x)
+
+
+class _Run:
+    def __init__(self, task: MotionTask, effort: Effort, report: ProgressCallback) -> None:
+        self.task, self.effort, self.report = task, effort, report
+        self.began = time.perf_counter()
+        self.iterations = 0
+        self.best_x: Array | None = None
+        self.best = float("inf")
+        self.hessian: Array | None = None
+        self.reach = [
+            _REACH_LINEAR if isinstance(c, JointBound) else _REACH_OTHER
+            for c in task.problem.constraints
+        ]
+        self.samples = task.residuals.grid.samples
+
+    def all_stages(self, x: Array) -> Outcome:
+        steps = self.task.problem.criterion.continuation()
+        status: Status = "converged"
+        for number, (mu, step, change) in enumerate(_STAGES):
+            criterion = steps[min(step, len(steps) - 1)]
+            change = max(change, self.effort.tolerance)
+            stage = f"{number + 1}/{len(_STAGES)}"
+            x, status = self.stage(x, criterion, mu, change, stage)
+            if status in ("iteration limit", "time limit"):
+                break
+        assert self.best_x is not None
+        return Outcome(self.best_x, status, self.iterations, self.task.evaluations)
+
+    def stage(
+        self, x: Array, criterion: Criterion, mu: float, change: float, stage: str
+    ) -> tuple[Array, Status]:
+        point = self.point(x, criterion, mu)
+        assert point is not None, "the start of a stage is admissible"
+        self.remember(point)
+        merits = [point.merit]
+        while True:
+            if self.iterations >= self.effort.max_iterations:
+                return point.x, "iteration limit"
+            if time.perf_counter() - self.began > self.effort.max_seconds:
+                return point.x, "time limit"
+            found = self.iterate(point, criterion, mu)
+            if found is None:
+                return point.x, "stalled"
+            self.update(found.x - point.x, found.gradient - point.gradient)
+            point = found
+            self.iterations += 1
+            self.remember(point)
+            seconds = time.perf_counter() - self.began
+            self.report(
+                self.task.progress(self.iterations, point.spectrum, point.values, seconds, stage)
+            )
+            merits.append(point.merit)
+            if len(merits) > _WINDOW and merits[-1 - _WINDOW] - merits[-1] < change:
+                return point.x, "converged"
+
+    def remember(self, point: _Point) -> None:
+        """Keep the best admissible point by the criterion asked for, not its stand-in."""
+        value = self.task.problem.criterion.value(point.spectrum.sigma)
+        if value < self.best:
+            self.best, self.best_x = value, point.x
+
+    def point(self, x: Array, criterion: Criterion, mu: float) -> _Point | None:
+        """Everything at x, or None where x is not strictly admissible."""
+        states = self.task.states(x)
+        values = self.task.values(states)
+        if any(value.min() <= 0 for value in values):
+            return None
+        cost, gradient, spectrum = self.task.cost(x, criterion)
+        barrier = sum(
+            float(_barrier(value, reach).sum())
+            for value, reach in zip(values, self.reach, strict=True)
+        )
+        merit = cost + mu / self.samples * barrier
+        return _Point(x, states, values, cost, gradient, spectrum, merit)
+
+    def iterate(self, point: _Point, criterion: Criterion, mu: float) -> _Point | None:
+        """One Newton step with a backtracking search that stays inside; None if it fails."""
+        barrier_gradient, curvature = self.barrier_derivatives(point, mu)
+        gradient = point.gradient + barrier_gradient
+        if self.hessian is None:
+            size = np.linalg.norm(point.gradient) + 1e-12
+            self.hessian = self.task.metric * size
+        direction = _descent(self.hessian + curvature, gradient)
+        slope = float(gradient @ direction)
+        step = self.longest_step(point, direction)
+        for _ in range(_HALVINGS):
+            found = self.point(point.x + step * direction, criterion, mu)
+            if found is not None and found.merit <= point.merit + _SUFFICIENT * step * slope:
+                return found
+            step *= 0.5
+        return None
+
+    def longest_step(self, point: _Point, direction: Array) -> float:
+        """Share of the step that keeps every joint bound, at most 1."""
+        task, step = self.task, 1.0
+        change = task.problem.constraint_basis.states(task.coefficients(direction))
+        for constraint, value in zip(task.problem.constraints, point.values, strict=True):
+            if not isinstance(constraint, JointBound):
+                continue
+            rate = constraint.signs * change[constraint.order][:, constraint.joints]
+            rate /= constraint.scale
+            closing = rate > 0
+            if closing.any():
+                step = min(step, _TO_BOUNDARY * float((value[closing] / rate[closing]).min()))
+        return step
+
+    def barrier_derivatives(self, point: _Point, mu: float) -> tuple[Array, Array]:
+        """Gradient (size,) and Gauss–Newton Hessian (size, size) of the barrier."""
+        task, grid = self.task, self.task.residuals.grid
+        gradient = np.zeros((task.k, task.n))
+        hessian = np.zeros((task.n, task.k, task.n, task.k))
+        for index, constraint in enumerate(task.problem.constraints):
+            value, reach = point.values[index], self.reach[index]
+            weight = mu / self.samples
+            first, second = weight * _first(value, reach), weight * _second(value, reach)
+            if isinstance(constraint, JointBound):
+                pull, bend = _per_joint(constraint, first, second, task.n)
+                parts: list[Array | None] = [None, None, None]
+                parts[constraint.order] = pull
+                grid.add_gradient(gradient, parts)
+                grid.add_joint_curvature(hessian, constraint.order, bend)
+                continue
+            near = value < reach
+            if not near.any():
+                continue
+            rows: Rows = task.residuals.rows(point.states, index, near)
+            grid.add_gradient(gradient, summed_per_instant(rows, first[near], self.samples))
+            squares = squared_per_instant(rows, second[near], self.samples)
+            for (i, j), weights in squares.items():
+                grid.add_curvature(hessian, i, j, weights)
+        return task.flat(gradient), hessian.reshape(task.size, task.size)
+
+    def update(self, step: Array, change: Array) -> None:
+        """Powell-damped BFGS update of the criterion's Hessian; the first also sets its size."""
+        assert self.hessian is not None
+        if self.iterations == 0:
+            size = float(step @ change) / float(step @ self.task.metric @ step)
+            if size > 0:
+                self.hessian = self.task.metric * size
+        image = self.hessian @ step
+        curvature, bend = float(step @ change), float(step @ image)
+        if bend <= 1e-14:
+            return
+        if curvature < 0.1 * bend:
+            share = 0.9 * bend / (bend - curvature)
+            change = share * change + (1 - share) * image
+            curvature = float(step @ change)
+        self.hessian = (
+            self.hessian - np.outer(image, image) / bend + np.outer(change, change) / curvature
+        )
+
+
+def _descent(hessian: Array, gradient: Array) -> Array:
+    """−H⁻¹ g, with the diagonal raised until H is positive definite."""
+    diagonal = np.diag_indices_from(hessian)
+    shift = 1e-9 * float(np.trace(hessian)) / len(hessian)
+    while True:
+        hessian[diagonal] += shift
+        try:
+            return -cho_solve(cho_factor(hessian, check_finite=False), gradient)
+        except LinAlgError:
+            shift *= 100.0
+
+
+def _per_joint(bound: JointBound, first: Array, second: Array, joints: int) -> tuple[Array, Array]:
+    """Weights (T, n) per joint of the gradient and of the curvature of a joint bound."""
+    select = np.zeros((len(bound.joints), joints))
+    select[np.arange(len(bound.joints)), bound.joints] = 1.0
+    return -(first * (bound.signs / bound.scale)) @ select, (second / bound.scale**2) @ select
+
+
+def _barrier(value: Array, reach: float) -> Array:
+    u = np.minimum(value / reach, 1.0)
+    return -np.log(u) + (u - 1.0) - 0.5 * (u - 1.0) ** 2
+
+
+def _first(value: Array, reach: float) -> Array:
+    u = np.minimum(value / reach, 1.0)
+    return -((1.0 - u) ** 2) / (u * reach)
+
+
+def _second(value: Array, reach: float) -> Array:
+    u = np.minimum(value / reach, 1.0)
+    return (1.0 / u**2 - 1.0) / reach**2

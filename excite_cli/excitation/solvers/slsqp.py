@@ -1,0 +1,171 @@
+"""SciPy's SLSQP on working sets: slow for many rows, but it needs nothing beyond SciPy.
+
+SLSQP solves a dense least-squares problem with every row it is given, so it is run in short
+rounds on few rows: the dips (smallest in time) of residuals near zero. After a round the rows
+that its result breaks, or has come near to, are added; rows are never dropped, which rules out
+cycles. Every point that SLSQP visits and that is admissible on the whole grid is a candidate for
+the outcome.
+"""
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from excite_cli.constraints.base import Array
+from excite_cli.criteria.base import Criterion
+from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
+from excite_cli.excitation.objective import Spectrum
+from excite_cli.excitation.solvers.base import Effort, Solver
+from excite_cli.excitation.solvers.sqp import (
+    BestAdmissible,
+    Linearised,
+    Mask,
+    dips,
+    gathered,
+    lowest,
+)
+from excite_cli.excitation.task import MotionTask
+from excite_cli.robot.states import States
+
+# Residuals kept by the program, and below which a dip joins the working set.
+_AIM, _NEAR = 1e-4, 0.1
+# Iterations of one round, and what a stage may still gain in it when it counts as done.
+_ROUND = 12
+_CHANGES = (3e-2, 1e-2, 1e-3)
+
+
+class _Stopped(Exception):
+    """Raised out of SciPy's loop when an effort is used up."""
+
+    def __init__(self, status: Status) -> None:
+        super().__init__(status)
+        self.status: Status = status
+
+
+class ScipySlsqp(Solver):
+    """SLSQP in short rounds with growing working sets; see the module."""
+
+    name = "slsqp"
+
+    def solve(
+        self, task: MotionTask, x: Array, effort: Effort, report: ProgressCallback
+    ) -> Outcome:
+        """Minimise one continuation step after the other from the admissible `x`."""
+        return _Run(task, effort, report).all_stages(x)
+
+
+@dataclass(frozen=True)
+class _Point:
+    x: Array
+    states: States
+    values: list[Array]
+    cost: float
+    gradient: Array
+    spectrum: Spectrum
+
+
+class _Run:
+    def __init__(self, task: MotionTask, effort: Effort, report: ProgressCallback) -> None:
+        self.task, self.effort, self.report = task, effort, report
+        self.began = time.perf_counter()
+        self.iterations = 0
+        self.best = BestAdmissible(task)
+        self.last: _Point | None = None
+        self.criterion: Criterion = task.problem.criterion
+        self.stage = ""
+        self.reached = np.zeros(0)
+        # SLSQP's first Hessian is the identity: variables are scaled to make that a good guess.
+        self.factor = np.linalg.cholesky(
+            task.metric + 1e-9 * np.trace(task.metric) / task.size * np.eye(task.size)
+        )
+        self.inverse = np.linalg.inv(self.factor).T
+
+    def all_stages(self, x: Array) -> Outcome:
+        steps = self.task.problem.criterion.continuation()
+        status: Status = "converged"
+        self.reached = x
+        try:
+            for number, criterion in enumerate(steps):
+                self.criterion, self.last = criterion, None
+                self.stage = f"{number + 1}/{len(steps)}"
+                change = _CHANGES[max(number - len(steps), -len(_CHANGES))]
+                self.rounds(max(change, self.effort.tolerance))
+        except _Stopped as stopped:
+            status = stopped.status
+        self.best.offer_restored(self.reached)
+        return Outcome(self.best.kept(), status, self.iterations, self.task.evaluations)
+
+    def rounds(self, change: float) -> None:
+        """Rounds of one criterion until nothing is broken and little was gained."""
+        chosen = [np.zeros_like(value, dtype=bool) for value in self.point(self.reached).values]
+        while True:
+            before = self.point(self.reached)
+            chosen = [
+                mask | ((value < _NEAR) & dips(value))
+                for mask, value in zip(chosen, before.values, strict=True)
+            ]
+            self.round(chosen)
+            after = self.point(self.reached)
+            if lowest(after.values) > -change and before.cost - after.cost < change:
+                return
+            if self.task.problem.criterion.value(after.spectrum.sigma) < self.best.cost:
+                self.best.offer_restored(self.reached)
+
+    def round(self, chosen: list[Mask]) -> None:
+        """A few iterations of SLSQP on the chosen rows, in y with x = L⁻ᵀ y."""
+
+        def residuals(y: Array) -> Array:
+            return gathered(self.point(self.inverse @ y).values, chosen) - _AIM
+
+        def jacobian(y: Array) -> Array:
+            point = self.point(self.inverse @ y)
+            rows = Linearised(self.task, point.states, point.values, chosen).dense(chosen)
+            return np.asarray(rows @ self.inverse)
+
+        def cost(y: Array) -> tuple[float, Array]:
+            point = self.point(self.inverse @ y)
+            return point.cost, self.inverse.T @ point.gradient
+
+        constraints: list[Any] = []
+        if any(mask.any() for mask in chosen):
+            constraints = [{"type": "ineq", "fun": residuals, "jac": jacobian}]
+        result = minimize(
+            cost,
+            self.factor.T @ self.reached,
+            jac=True,
+            method="SLSQP",
+            constraints=constraints,
+            callback=self.iterated,
+            options={"maxiter": _ROUND, "ftol": 0.1 * self.effort.tolerance},
+        )
+        x = self.inverse @ np.asarray(result.x)
+        if np.all(np.isfinite(x)):
+            self.reached = x
+
+    def iterated(self, y: Array) -> None:
+        """Count, report, and stop when the effort is used up."""
+        self.reached = self.inverse @ y
+        point = self.point(self.reached)
+        self.iterations += 1
+        seconds = time.perf_counter() - self.began
+        self.report(
+            self.task.progress(self.iterations, point.spectrum, point.values, seconds, self.stage)
+        )
+        if self.iterations >= self.effort.max_iterations:
+            raise _Stopped("iteration limit")
+
+    def point(self, x: Array) -> _Point:
+        """All about x; the last point is kept, as SciPy asks for its parts one by one."""
+        if self.last is not None and np.array_equal(self.last.x, x):
+            return self.last
+        if time.perf_counter() - self.began > self.effort.max_seconds:
+            raise _Stopped("time limit")
+        states = self.task.states(x)
+        values = self.task.values(states)
+        cost, gradient, spectrum = self.task.cost(x, self.criterion)
+        self.best.offer(x, values, spectrum)
+        self.last = _Point(x.copy(), states, values, cost, gradient, spectrum)
+        return self.last

@@ -1,0 +1,171 @@
+"""Admissible starts by construction: a small motion about a clear posture.
+
+The posture of the config is taken if it is clear; otherwise the nearest clear one is sought by
+maximising the smallest residual of standing still. About it a random motion with amplitudes
+falling as 1/k is shrunk until every residual is clear.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from excite_cli.constraints.base import Array
+from excite_cli.errors import NoAdmissibleMotionError
+from excite_cli.excitation.task import MotionTask
+from excite_cli.robot.description import UNBOUNDED
+from excite_cli.robot.states import States
+
+# Residuals a start must have: inside, so that a barrier is finite, yet little is given away.
+_CLEAR_POSTURE, _CLEAR_MOTION = 0.03, 0.02
+_SHRINK, _SMALLEST = 0.7, 1e-4
+_TRIES = 40
+# Columns whose residual is beyond this do not bind a posture.
+_FAR = 2.0
+
+
+@dataclass(frozen=True)
+class Start:
+    """A posture (n,) with room around it, and whether it is that of the config."""
+
+    posture: Array
+    as_configured: bool
+
+
+def random_start(task: MotionTask, start: Start, seed: tuple[int, ...]) -> Array:
+    """Free variables of a random admissible motion about `start`.
+
+    Raises
+    ------
+    NoAdmissibleMotionError
+        Not even a tiny motion about the posture is admissible.
+    """
+    rng = np.random.default_rng(seed)
+    standing = task.variables(task.problem.still(start.posture))
+    direction = random_direction(task, rng)
+    amplitude = 1.0
+    while amplitude > _SMALLEST:
+        x = standing + amplitude * direction
+        values = task.values(task.states(x))
+        if all(value.min() > _CLEAR_MOTION for value in values):
+            return x
+        amplitude *= _SHRINK
+    label = _blocking(task, task.values(task.states(standing + amplitude * direction)))
+    raise NoAdmissibleMotionError(
+        f"No admissible motion: even a tiny one about the posture breaks {label}. Loosen that "
+        "constraint or give another robot.posture."
+    )
+
+
+def random_direction(task: MotionTask, rng: np.random.Generator) -> Array:
+    """A random motion (size,) whose states have about the size of their bounds.
+
+    Low harmonics (or any coefficients) are drawn in the metric of the task, so that no derivative
+    dominates.
+    """
+    problem = task.problem
+    k = problem.trajectory.n_coefficients
+    raw = rng.normal(size=(k, task.n))
+    x = task.variables(raw)
+    length = np.sqrt(np.einsum("jk,jk->j", *_by_joint(task, x)))
+    return (x.reshape(task.n, task.k) / length[:, None]).ravel()
+
+
+def _by_joint(task: MotionTask, x: Array) -> tuple[Array, Array]:
+    """x and M x as (n, K'), for lengths joint by joint."""
+    return x.reshape(task.n, task.k), (task.metric @ x).reshape(task.n, task.k)
+
+
+def clear_posture(task: MotionTask, seed: int) -> Start:
+    """A posture at which standing still keeps every residual clear.
+
+    Raises
+    ------
+    NoAdmissibleMotionError
+        None was found; the message names the constraint that stands in the way.
+    """
+    configured = task.problem.robot.posture
+    if _standing(task, configured).min() > _CLEAR_POSTURE:
+        return Start(configured, True)
+    rng = np.random.default_rng((seed, 7))
+    best, best_clearance = configured, -np.inf
+    for attempt in range(_TRIES):
+        spread = attempt / (_TRIES - 1)
+        guess = _blend(task, configured, rng, spread)
+        found = _pushed_clear(task, guess)
+        clearance = float(_standing(task, found).min())
+        if clearance > _CLEAR_POSTURE:
+            return Start(found, False)
+        if clearance > best_clearance:
+            best, best_clearance = found, clearance
+    label = _blocking(task, [row[None] for row in _standing_parts(task, best)])
+    raise NoAdmissibleMotionError(
+        f"No admissible motion: no posture found that is clear of all constraints; {label} stands "
+        f"in the way ({_TRIES} postures tried from robot.posture). Give a clear robot.posture or "
+        "loosen that constraint."
+    )
+
+
+def _blend(task: MotionTask, posture: Array, rng: np.random.Generator, spread: float) -> Array:
+    limits = task.problem.robot.limits
+    lower = np.where(limits.lower > -UNBOUNDED, limits.lower, posture - np.pi)
+    upper = np.where(limits.upper < UNBOUNDED, limits.upper, posture + np.pi)
+    inner = 0.05 * (upper - lower)
+    centred = np.clip(posture, lower + inner, upper - inner)
+    return centred + spread * (rng.uniform(lower + inner, upper - inner) - centred)
+
+
+def _still(task: MotionTask, posture: Array) -> States:
+    zero = np.zeros((1, task.n))
+    return States(task.problem.kinematics, posture[None], zero, zero)
+
+
+def _standing_parts(task: MotionTask, posture: Array) -> list[Array]:
+    return [value[0] for value in task.values(_still(task, posture))]
+
+
+def _standing(task: MotionTask, posture: Array) -> Array:
+    parts = _standing_parts(task, posture)
+    return np.concatenate(parts) if parts else np.array([np.inf])
+
+
+def _pushed_clear(task: MotionTask, guess: Array) -> Array:
+    """Maximise s with every residual at least s, from `guess` (SLSQP, exact derivatives)."""
+
+    def residuals(z: Array) -> Array:
+        return np.minimum(_standing(task, z[:-1]), _FAR) - z[-1]
+
+    def jacobian(z: Array) -> Array:
+        states, rows = _still(task, z[:-1]), []
+        for index, value in enumerate(task.values(states)):
+            near = np.ones_like(value, dtype=bool)
+            by_q = task.residuals.rows(states, index, near).parts[0]
+            part = np.zeros((value.shape[1], task.n)) if by_q is None else by_q
+            rows.append(np.where(value[0][:, None] < _FAR, part, 0.0))
+        stacked = np.vstack(rows)
+        return np.hstack([stacked, -np.ones((len(stacked), 1))])
+
+    slope = np.zeros(task.n + 1)
+    slope[-1] = -1.0
+    room = float(_standing(task, guess).min())
+    result = minimize(
+        lambda z: -z[-1],
+        np.append(guess, room),
+        jac=lambda z: slope,
+        method="SLSQP",
+        bounds=[(None, None)] * task.n + [(None, 0.25)],
+        constraints=[{"type": "ineq", "fun": residuals, "jac": jacobian}],
+        options={"maxiter": 60},
+    )
+    return np.asarray(result.x[:-1]) if np.all(np.isfinite(result.x)) else guess
+
+
+def _blocking(task: MotionTask, values: list[Array]) -> str:
+    """The constraint and column with the smallest residual, in words."""
+    smallest, words = np.inf, "nothing"
+    for constraint, value in zip(task.problem.constraints, values, strict=True):
+        column = int(np.argmin(value.min(axis=0)))
+        if value[:, column].min() < smallest:
+            smallest = float(value[:, column].min())
+            words = f"{constraint.name} ({constraint.labels[column]})"
+    return words

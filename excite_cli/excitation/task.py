@@ -1,0 +1,132 @@
+"""One motion to be found, as a nonlinear program in free variables.
+
+x (n·K',) holds, joint after joint, the coordinates of the coefficients in the trajectory's free
+directions N: α = N Xᵀ with X = x as (n, K'). Equalities (start and end at rest) are gone with N.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from excite_cli.constraints.base import Array
+from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.criteria.base import Criterion
+from excite_cli.excitation.motion import Progress
+from excite_cli.excitation.objective import Spectrum
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.residuals import Residuals
+from excite_cli.excitation.stack import Stack
+from excite_cli.robot.states import States
+
+# First guess of what happens between the instants of the grid, as a share of a constraint's scale.
+_FIRST_GUARD = 0.01
+
+
+class MotionTask:
+    """Cost and residuals of one motion on top of a stack."""
+
+    def __init__(
+        self, problem: Problem, stack: Stack | None = None, guards: list[Array] | None = None
+    ) -> None:
+        self.problem = problem
+        self.stack = stack or Stack.empty(problem.base.rank)
+        self.objective = problem.objective(self.stack)
+        self.free = problem.trajectory.free_directions
+        self.guards = guards or first_guards(problem)
+        self.residuals = Residuals(
+            problem.constraints, problem.constraint_basis, self.free, self.guards
+        )
+        self.n = problem.robot.n
+        self.k = self.free.shape[1]
+        self.evaluations = 0
+
+    def with_guards(self, guards: list[Array]) -> "MotionTask":
+        """The same task with other guards."""
+        return MotionTask(self.problem, self.stack, guards)
+
+    @property
+    def size(self) -> int:
+        """Number of free variables."""
+        return self.n * self.k
+
+    def coefficients(self, x: Array) -> Array:
+        """α (K, n) of the free variables."""
+        return self.free @ x.reshape(self.n, self.k).T
+
+    def variables(self, coefficients: Array) -> Array:
+        """Free variables of α (its part within the free directions)."""
+        return (np.linalg.pinv(self.free) @ coefficients).T.ravel()
+
+    def flat(self, reduced: Array) -> Array:
+        """(K', n) as the ordering of x."""
+        return reduced.T.ravel()
+
+    def cost(self, x: Array, criterion: Criterion) -> tuple[float, Array, Spectrum]:
+        """Criterion, its gradient (size,), and the spectrum of the stack."""
+        self.evaluations += 1
+        value, gradient, spectrum = self.objective.value_and_gradient(
+            self.coefficients(x), criterion
+        )
+        return value, self.flat(self.free.T @ gradient), spectrum
+
+    def states(self, x: Array) -> States:
+        """Joint states on the constraint grid."""
+        return self.problem.states(self.coefficients(x))
+
+    def values(self, states: States) -> list[Array]:
+        """Residuals (T, m) of every constraint; admissible where none is negative."""
+        return self.residuals.values(states)
+
+    def progress(
+        self, iteration: int, spectrum: Spectrum, values: list[Array], seconds: float, stage: str
+    ) -> Progress:
+        """The record that is shown while a solver runs."""
+        name, margin, unit = "", float("inf"), ""
+        smallest = float("inf")
+        for constraint, value, guard in zip(
+            self.problem.constraints, values, self.guards, strict=True
+        ):
+            at = int(np.argmin(value.min(axis=0)))
+            if value[:, at].min() < smallest:
+                smallest = float(value[:, at].min())
+                margin = smallest * float(constraint.scale[at]) + float(guard[at])
+                name, unit = constraint.name, constraint.unit
+        return Progress(iteration, spectrum.condition_number, name, margin, unit, seconds, stage)
+
+    @cached_property
+    def metric(self) -> Array:
+        """M (size, size): xᵀ M x is the mean square of q, v, a in units of their bounds.
+
+        The natural length of a change of a motion; joints without bounds count in rad.
+        """
+        grid = self.residuals.grid
+        metric = np.zeros((self.n, self.k, self.n, self.k))
+        weights = np.zeros((3, self.n))
+        for constraint in self.problem.constraints:
+            if isinstance(constraint, JointBound):
+                inverse = np.zeros(self.n)
+                inverse[constraint.joints] = 1.0 / constraint.scale**2
+                weights[constraint.order] += inverse
+        weights[0] += 1e-3
+        weights[2, weights[2] == 0] += 1e-3
+        for order in range(3):
+            per_instant = np.tile(weights[order] / grid.samples, (grid.samples, 1))
+            grid.add_joint_curvature(metric, order, per_instant)
+        return metric.reshape(self.size, self.size)
+
+
+def first_guards(problem: Problem) -> list[Array]:
+    """Guards (m,) per constraint before anything is known about the motion.
+
+    Joint bounds on a Fourier series get the exact amount (Ehlich and Zeller); others an estimate.
+    """
+    factor = problem.trajectory.sampling_factor(
+        len(problem.constraint_basis.times), problem.spec.sampling.constraints.step
+    )
+    guards = []
+    for constraint in problem.constraints:
+        if isinstance(constraint, JointBound) and factor is not None:
+            guards.append((1.0 - factor) * constraint.scale)
+        else:
+            guards.append(_FIRST_GUARD * constraint.scale)
+    return guards

@@ -1,0 +1,196 @@
+"""From a URDF's name to checked XML with every mesh found.
+
+`RobotDescription` proves that the file exists, is XML without a document type (no entity tricks),
+is of a sane size, and that every path it names stays inside the folders it may read: its own
+folder tree, the packages of `package_dirs`, and the example-robot-data package.
+Continuous joints become revolute ones without bounds, so that one coordinate is one velocity.
+"""
+
+import hashlib
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from excite_cli.errors import RobotError, nearest
+
+EXAMPLE_PREFIX = "example-robot-data:"
+MAX_URDF_BYTES = 20_000_000
+UNBOUNDED = 1e9
+
+# The file meant by a short name where the package holds several of the same robot.
+_PREFERRED = {
+    "talos": "talos_data/robots/talos_reduced.urdf",
+    "talos_full": "talos_data/robots/talos_full_v2.urdf",
+    "ur3": "ur_description/urdf/ur3_robot.urdf",
+    "ur5": "ur_description/urdf/ur5_robot.urdf",
+    "ur10": "ur_description/urdf/ur10_robot.urdf",
+    "panda": "panda_description/urdf/panda.urdf",
+    "anymal": "anymal_b_simple_description/robots/anymal.urdf",
+    "anymal_c": "anymal_c_simple_description/urdf/anymal.urdf",
+    "g1": "g1_description/urdf/g1_29dof_rev_1_0.urdf",
+    "hyq": "hyq_description/robots/hyq_no_sensors.urdf",
+    "tiago": "tiago_description/robots/tiago.urdf",
+    "icub": "icub_description/robots/icub.urdf",
+    "romeo": "romeo_description/urdf/romeo.urdf",
+}
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """A URDF as text, where it came from, and where its packages lie."""
+
+    name: str
+    source: str
+    path: Path
+    xml: str
+    package_dirs: tuple[str, ...]
+    sha256: str
+
+
+def example_robots_folder() -> Path:
+    """Folder of the robots of the example-robot-data package.
+
+    Raises
+    ------
+    RobotError
+        The package is not installed or is laid out differently.
+    """
+    try:
+        distribution = metadata.distribution("example-robot-data")
+    except metadata.PackageNotFoundError as error:
+        raise RobotError(
+            "The package example-robot-data is not installed. Run: pip install example-robot-data"
+        ) from error
+    folder = Path(str(distribution.locate_file("cmeel.prefix/share/example-robot-data/robots")))
+    if not folder.is_dir():
+        raise RobotError(f"example-robot-data is installed, but its robots are not in {folder}.")
+    return folder
+
+
+def example_robots() -> dict[str, Path]:
+    """Short names of all robots of example-robot-data with the URDF each stands for."""
+    folder = example_robots_folder()
+    names = {path.stem: path for path in sorted(folder.glob("*/*/*.urdf"))}
+    names.update({name: folder / relative for name, relative in _PREFERRED.items()})
+    return {name: path for name, path in sorted(names.items()) if path.is_file()}
+
+
+def load_description(
+    urdf: str, package_dirs: tuple[str, ...] = (), relative_to: Path | None = None
+) -> RobotDescription:
+    """Read and check a URDF given by path or as `example-robot-data:<name>`.
+
+    Parameters
+    ----------
+    urdf: path (relative to `relative_to`) or `example-robot-data:<name>`
+    package_dirs: folders that hold the packages named by `package://`
+    relative_to: folder that relative paths start from; default the working directory
+
+    Raises
+    ------
+    RobotError
+        Unknown name, missing or unreadable file, not a URDF, or larger than 20 MB.
+    """
+    root = relative_to or Path.cwd()
+    extra = tuple(str((root / folder).resolve()) for folder in package_dirs)
+    for given, folder in zip(package_dirs, extra, strict=True):
+        if not Path(folder).is_dir():
+            raise RobotError(f"robot.package_dirs: there is no folder {given} ({folder}).")
+    if urdf.startswith(EXAMPLE_PREFIX):
+        known = example_robots()
+        name = urdf.removeprefix(EXAMPLE_PREFIX)
+        if name not in known:
+            raise RobotError(
+                f"robot.urdf: example-robot-data has no robot '{name}'."
+                f"{nearest(name, known)} `excite robots` lists all {len(known)}."
+            )
+        path = known[name]
+    else:
+        path = (root / urdf).resolve()
+        if not path.is_file():
+            raise RobotError(
+                f"robot.urdf: there is no file {path}. Give a path relative to the YAML file, or "
+                f"{EXAMPLE_PREFIX}<name>."
+            )
+    xml = _read(path)
+    packages = (*extra, str(_share_folder(path)), str(path.parent))
+    return RobotDescription(
+        name=path.stem,
+        source=urdf,
+        path=path,
+        xml=_without_continuous_joints(path, xml),
+        package_dirs=tuple(dict.fromkeys(packages)),
+        sha256=hashlib.sha256(xml.encode()).hexdigest(),
+    )
+
+
+def _share_folder(path: Path) -> Path:
+    """Folder above the ROS package that the URDF lies in, else the URDF's own folder."""
+    for folder in path.parents:
+        if (folder / "package.xml").is_file():
+            return folder.parent
+    return path.parent
+
+
+def _read(path: Path) -> str:
+    try:
+        if path.stat().st_size > MAX_URDF_BYTES:
+            raise RobotError(f"{path} is larger than {MAX_URDF_BYTES // 10**6} MB: not a URDF.")
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RobotError(f"{path} cannot be read as text: {error}") from error
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise RobotError(f"{path} declares a document type or entities; a URDF needs neither.")
+    return text
+
+
+def _without_continuous_joints(path: Path, xml: str) -> str:
+    try:
+        root = ElementTree.fromstring(xml)
+    except ElementTree.ParseError as error:
+        raise RobotError(f"{path} is not well-formed XML: {error}") from error
+    if root.tag != "robot":
+        raise RobotError(f"{path} is not a URDF: its root is <{root.tag}>, not <robot>.")
+    for joint in root.findall("joint"):
+        if joint.get("type") != "continuous":
+            continue
+        joint.set("type", "revolute")
+        limit = joint.find("limit")
+        if limit is None:
+            limit = ElementTree.SubElement(joint, "limit", {"effort": "0", "velocity": "0"})
+        limit.set("lower", str(-UNBOUNDED))
+        limit.set("upper", str(UNBOUNDED))
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def check_mesh_paths(description: RobotDescription) -> None:
+    """Raise unless every collision mesh exists inside a folder that the URDF may read.
+
+    Raises
+    ------
+    RobotError
+        A mesh is missing, or its path leaves the URDF's folder and packages.
+    """
+    allowed = [Path(folder).resolve() for folder in description.package_dirs]
+    for mesh in ElementTree.fromstring(description.xml).findall("link/collision/geometry/mesh"):
+        name = mesh.get("filename", "")
+        candidates = _candidates(name, description, allowed)
+        found = next((path for path in candidates if path.is_file()), None)
+        if found is None:
+            raise RobotError(
+                f"{description.path.name}: the collision mesh '{name}' was not found. Looked in "
+                f"{', '.join(str(folder) for folder in allowed)}. Add the folder that holds the "
+                "package to robot.package_dirs, or drop constraints.self_collision."
+            )
+        if not any(found.resolve().is_relative_to(folder) for folder in allowed):
+            raise RobotError(
+                f"{description.path.name}: the mesh path '{name}' leaves the robot's own folders. "
+                "If that is meant, add its folder to robot.package_dirs."
+            )
+
+
+def _candidates(name: str, description: RobotDescription, allowed: list[Path]) -> list[Path]:
+    if name.startswith("package://"):
+        return [folder / name.removeprefix("package://") for folder in allowed]
+    return [description.path.parent / name.removeprefix("file://")]

@@ -1,0 +1,269 @@
+"""The robot as the mathematics sees it: moved joints, measured rows, limits.
+
+Locked and fixed joints are lumped into their parents by Pinocchio. With a floating base the base
+pose is held at its reference (a stand or hoist carries the robot): the base adds six rows and its
+body to the regressor, but no variable to the motion.
+"""
+
+import hashlib
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from excite_cli.config.spec import JointLimits, RobotSpec
+from excite_cli.errors import ConfigError, RobotError, nearest
+from excite_cli.robot.description import UNBOUNDED, RobotDescription, load_description
+
+Array = NDArray[np.float64]
+
+# Where a robot has no bound of its own, samples are drawn from these.
+_FREE_POSITION, _FREE_VELOCITY = np.pi, 2.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds of the moved joints, each of shape (n,); infinite where there is none."""
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    effort: Array
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A rigid-body model with `n` moved joints.
+
+    `rows` are the rows of the inverse dynamics that are measured; `moved` the velocity indices of
+    the moved joints; `reference` the configuration (nq,) at which everything else stands.
+    """
+
+    name: str
+    description: RobotDescription
+    model: pin.Model
+    joint_names: tuple[str, ...]
+    posture: Array
+    reference: Array
+    rows: NDArray[np.intp]
+    moved: NDArray[np.intp]
+    floating: bool
+    limits: Limits
+    locked: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def n(self) -> int:
+        """Number of moved joints."""
+        return len(self.joint_names)
+
+    @property
+    def n_bodies(self) -> int:
+        """Number of bodies that carry inertial parameters."""
+        return int(self.model.njoints) - 1
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Name of each measured row."""
+        base = ("base_fx", "base_fy", "base_fz", "base_mx", "base_my", "base_mz")
+        names = (*base, *self.joint_names) if self.floating else self.joint_names
+        return tuple(names[row] for row in self.rows)
+
+    def configurations(self, q: Array) -> Array:
+        """Pinocchio configurations (T, nq) for moved-joint positions (T, n)."""
+        if not self.floating:
+            return np.ascontiguousarray(q)
+        full = np.tile(self.reference, (len(q), 1))
+        full[:, 7:] = q
+        return full
+
+    def velocities(self, v: Array) -> Array:
+        """Pinocchio velocities (or accelerations) (T, nv) for those of the moved joints (T, n)."""
+        if not self.floating:
+            return np.ascontiguousarray(v)
+        return np.hstack([np.zeros((len(v), 6)), v])
+
+    def draw_states(self, count: int, seed: int) -> tuple[Array, Array, Array]:
+        """`count` random positions, velocities and accelerations (count, n) within the limits."""
+        rng = np.random.default_rng(seed)
+        lower = np.where(self.limits.lower > -UNBOUNDED, self.limits.lower, -_FREE_POSITION)
+        upper = np.where(self.limits.upper < UNBOUNDED, self.limits.upper, _FREE_POSITION)
+        speed = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, _FREE_VELOCITY)
+        q = rng.uniform(lower, upper, (count, self.n))
+        v = rng.uniform(-speed, speed, (count, self.n))
+        a = rng.uniform(-3 * speed, 3 * speed, (count, self.n))
+        return q, v, a
+
+    def fingerprint(self) -> str:
+        """Hash of what decides the regressor: URDF, moved joints, posture, base and rows."""
+        text = "|".join(
+            [
+                self.description.sha256,
+                ",".join(self.joint_names),
+                ",".join(f"{joint}={value!r}" for joint, value in sorted(self.locked.items())),
+                f"floating={self.floating}",
+                ",".join(map(str, self.rows)),
+                np.array2string(self.reference[:7]) if self.floating else "",
+                np.array2string(np.asarray(self.model.gravity.linear)),
+            ]
+        )
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
+    """Build the robot that `spec` describes.
+
+    Raises
+    ------
+    RobotError
+        The URDF is missing or wrong, or uses a joint type that is not supported.
+    ConfigError
+        A joint is unknown, the posture leaves the limits, or limits cross.
+    """
+    description = load_description(spec.urdf, spec.package_dirs, relative_to)
+    full = _parse(description, spec)
+    names = [str(name) for name in full.names[1:] if str(name) != "root_joint"]
+    _check_types(full, names, description)
+    chosen = _chosen(spec, names)
+    limits_full = {name: _limits_of(full, name, spec.limits.get(name)) for name in names}
+    posture = _posture(spec, names, limits_full)
+    reference = pin.neutral(full)
+    for name in names:
+        reference[full.joints[full.getJointId(name)].idx_q] = posture[name]
+    if spec.base == "floating":
+        rotation = pin.rpy.rpyToMatrix(*spec.base_orientation)
+        reference[3:7] = pin.Quaternion(rotation).coeffs()
+    locked = [full.getJointId(name) for name in names if name not in chosen]
+    model = pin.buildReducedModel(full, locked, reference) if locked else full
+    model.gravity.linear = np.array(spec.gravity)
+    moved_names = tuple(n for n in map(str, model.names[1:]) if n != "root_joint")
+    floating = spec.base == "floating"
+    moved = np.arange(6, model.nv) if floating else np.arange(model.nv)
+    rows = np.concatenate(
+        ([np.arange(6)] if "base" in spec.rows else []) + ([moved] if "joints" in spec.rows else [])
+    )
+    start = np.array([posture[name] for name in moved_names])
+    reduced = np.array(pin.neutral(model))
+    if floating:
+        reduced[3:7] = reference[3:7]
+        reduced[7:] = start
+    else:
+        reduced = start.copy()
+    _check_limits(moved_names, limits_full)
+    columns = np.array([limits_full[name] for name in moved_names]).T
+    return Robot(
+        name=description.name,
+        description=description,
+        model=model,
+        joint_names=moved_names,
+        posture=start,
+        reference=reduced,
+        rows=rows,
+        moved=moved,
+        floating=floating,
+        limits=Limits(*columns),
+        locked={name: posture[name] for name in names if name not in chosen},
+    )
+
+
+def _parse(description: RobotDescription, spec: RobotSpec) -> pin.Model:
+    try:
+        if spec.base == "floating":
+            model = pin.buildModelFromXML(description.xml, pin.JointModelFreeFlyer())
+        else:
+            rotation = pin.rpy.rpyToMatrix(*spec.base_orientation)
+            model = pin.buildModelFromXML(description.xml)
+            if any(spec.base_orientation):
+                _turn_base(model, rotation)
+    except (RuntimeError, ValueError) as error:
+        first = str(error).strip().splitlines()[0] if str(error).strip() else "no reason given"
+        raise RobotError(f"{description.path} is not a URDF that can be used: {first}") from error
+    if model.nv - (6 if spec.base == "floating" else 0) < 1:
+        raise RobotError(f"{description.path} has no movable joint.")
+    return model
+
+
+def _turn_base(model: pin.Model, rotation: Array) -> None:
+    turn = pin.SE3(rotation, np.zeros(3))
+    for joint in range(1, model.njoints):
+        if model.parents[joint] == 0:
+            model.jointPlacements[joint] = turn * model.jointPlacements[joint]
+    model.inertias[0] = model.inertias[0].se3Action(turn)
+    for frame in model.frames:
+        if frame.parentJoint == 0:
+            frame.placement = turn * frame.placement
+
+
+def _check_types(model: pin.Model, names: list[str], description: RobotDescription) -> None:
+    for name in names:
+        joint = model.joints[model.getJointId(name)]
+        if joint.nv != 1 or joint.nq != 1:
+            raise RobotError(
+                f"{description.path.name}: joint '{name}' is of type {joint.shortname()}; only "
+                "revolute, continuous, prismatic and fixed joints can be used."
+            )
+
+
+def _chosen(spec: RobotSpec, names: list[str]) -> list[str]:
+    if spec.joints == "all":
+        return names
+    for joint in spec.joints:
+        _known(joint, names, "robot.joints")
+    return [name for name in names if name in spec.joints]
+
+
+def _known(joint: str, names: list[str], where: str) -> None:
+    if joint not in names:
+        raise ConfigError(
+            f"{where}: the robot has no joint '{joint}'.{nearest(joint, names)} "
+            f"Its joints: {', '.join(names)}."
+        )
+
+
+def _limits_of(model: pin.Model, name: str, given: JointLimits | None) -> list[float]:
+    joint = model.joints[model.getJointId(name)]
+    lower = float(model.lowerPositionLimit[joint.idx_q])
+    upper = float(model.upperPositionLimit[joint.idx_q])
+    velocity = float(model.velocityLimit[joint.idx_v]) or np.inf
+    effort = float(model.effortLimit[joint.idx_v]) or np.inf
+    acceleration = np.inf
+    if given is not None:
+        lower, upper = given.position or (lower, upper)
+        velocity = given.velocity or velocity
+        acceleration = given.acceleration or acceleration
+        effort = given.effort or effort
+    return [lower, upper, velocity, acceleration, effort]
+
+
+def _check_limits(names: tuple[str, ...], limits: dict[str, list[float]]) -> None:
+    for name in names:
+        lower, upper = limits[name][:2]
+        if not lower < upper:
+            raise ConfigError(
+                f"robot: joint '{name}' has crossed or empty position limits "
+                f"[{lower:g}, {upper:g}]. Give sensible ones under robot.limits.{name}.position, "
+                "or leave the joint out of robot.joints."
+            )
+
+
+def _posture(spec: RobotSpec, names: list[str], limits: dict[str, list[float]]) -> dict[str, float]:
+    for joint in spec.posture:
+        _known(joint, names, "robot.posture")
+    for joint in spec.limits:
+        _known(joint, names, "robot.limits")
+    posture = {}
+    for name in names:
+        lower, upper = limits[name][:2]
+        if name in spec.posture:
+            value = float(spec.posture[name])
+            if not lower <= value <= upper:
+                raise ConfigError(
+                    f"robot.posture.{name}: {value:g} is outside its limits "
+                    f"[{lower:g}, {upper:g}]. Give a value between them."
+                )
+        else:
+            value = 0.0 if lower <= 0.0 <= upper else (lower + upper) / 2
+        posture[name] = value
+    return posture

@@ -1,0 +1,151 @@
+"""Distances between capsules along a motion, and their derivatives by the joint positions.
+
+The distance of two capsules is that of their segments less both radii, negative inside and
+continuous through contact. With n the unit vector between the witness points p1 and p2,
+    dd/dq = n . (J_2 - J_1)
+and, because n is parallel to p2 - p1, both velocities may be taken at either point: a joint that
+carries both bodies drops out, one that carries only the second adds n . (v + w x p) for its twist
+(v, w) about the world origin, one that carries only the first subtracts it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.forward_kinematics import BatchKinematics
+from excite_cli.robot.model import Robot
+from excite_cli.robot.segments import Nearest, nearest_points, normals
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+_BLOCK = 8000
+
+
+class PairDistances:
+    """Signed distances of pairs of capsules, for whole arrays of positions.
+
+    The placements of the last positions are kept, so `gradients` after `distances` at the same
+    positions does not compute them again.
+    """
+
+    def __init__(
+        self, robot: Robot, capsules: Sequence[Capsule], pairs: Sequence[tuple[int, int]]
+    ) -> None:
+        self._robot = robot
+        self._kinematics = BatchKinematics(robot)
+        checked = np.array(pairs, dtype=np.intp).reshape(-1, 2)
+        used, place = np.unique(checked, return_inverse=True)
+        self._first, self._second = place.reshape(-1, 2).T
+        kept = [capsules[index] for index in used]
+        self._joints = np.array([capsule.joint for capsule in kept], dtype=np.intp)
+        self._start = np.array([capsule.start for capsule in kept]).reshape(-1, 3)
+        self._along = np.array([c.end - c.start for c in kept]).reshape(-1, 3)
+        radius = np.array([capsule.radius for capsule in kept])
+        self._radii = radius[self._first] + radius[self._second]
+        carried = carried_bodies(robot)[self._joints]  # (C, n)
+        self._sign = carried[self._second] - carried[self._first]
+        self._last: tuple[Array, _World] | None = None
+
+    @property
+    def n_pairs(self) -> int:
+        """Number of pairs P."""
+        return len(self._first)
+
+    def distances(self, q: Array) -> Array:
+        """Signed distances (T, P) [m] at moved-joint positions q (T, n)."""
+        world = self._world(q)
+        result = np.empty((self.n_pairs, world.start.shape[2]))
+        size = max(1, _BLOCK // max(result.shape[1], 1))
+        for k in range(0, self.n_pairs, size):  # blocks that stay in the processor's cache
+            first, second = self._first[k : k + size], self._second[k : k + size]
+            gap = nearest_points(
+                world.start[:, first],
+                world.along[:, first],
+                world.start[:, second],
+                world.along[:, second],
+            ).gap
+            result[k : k + size] = _length(gap)
+        result -= self._radii[:, None]
+        return result.T
+
+    def distances_at(self, q: Array, rows: Indices, cols: Indices) -> Array:
+        """Signed distances (K,) [m] at instant rows[k] of pair cols[k] only."""
+        world = self._world(q)
+        return _length(self._nearest_at(world, rows, cols)[0].gap) - self._radii[cols]
+
+    def gradients(self, q: Array, rows: Indices, cols: Indices) -> Array:
+        """Derivatives (K, n) of the distance at instant rows[k] of pair cols[k] by q."""
+        world = self._world(q)
+        nearest, start, along, along_second = self._nearest_at(world, rows, cols)
+        normal = normals(nearest, along, along_second).T
+        point = (start + nearest.share_first * along + 0.5 * nearest.gap).T
+        wrench = np.hstack([normal, np.cross(point, normal)])
+        twists = world.axes(self._kinematics)[rows][:, self._robot.moved]  # (K, n, 6)
+        return self._sign[cols] * (twists @ wrench[..., None])[..., 0]
+
+    def _nearest_at(
+        self, world: "_World", rows: Indices, cols: Indices
+    ) -> tuple[Nearest, Array, Array, Array]:
+        first, second = self._first[cols], self._second[cols]
+        start, along = world.start[:, first, rows], world.along[:, first, rows]
+        along_second = world.along[:, second, rows]
+        nearest = nearest_points(start, along, world.start[:, second, rows], along_second)
+        return nearest, start, along, along_second
+
+    def _world(self, q: Array) -> "_World":
+        q = np.asarray(q, dtype=float).reshape(-1, self._robot.n)
+        if self._last is not None and np.array_equal(self._last[0], q):
+            return self._last[1]
+        rotations, translations = self._kinematics.placements(q)
+        world = _World(rotations, translations, self._joints, self._start, self._along)
+        self._last = (q.copy(), world)
+        return world
+
+
+class _World:
+    """Segments of all capsules in the world, (3, C, T), and the placements they came from."""
+
+    def __init__(
+        self, rotations: Array, translations: Array, joints: Indices, start: Array, along: Array
+    ) -> None:
+        self._placements = (rotations, translations)
+        self._axes: Array | None = None
+        count = len(rotations)
+        self.start = np.empty((3, len(joints), count))
+        self.along = np.empty((3, len(joints), count))
+        still = joints == 0
+        self.start[:, still] = start[still].T[:, :, None]
+        self.along[:, still] = along[still].T[:, :, None]
+        moving = ~still
+        turn = rotations.swapaxes(0, 1)[joints[moving] - 1]  # (C, T, 3, 3)
+        shift = translations.swapaxes(0, 1)[joints[moving] - 1]
+        local = np.stack([start[moving], along[moving]], axis=-1)[:, None]
+        both = turn @ local  # (C, T, 3, 2)
+        self.start[:, moving] = np.moveaxis(both[..., 0] + shift, -1, 0)
+        self.along[:, moving] = np.moveaxis(both[..., 1], -1, 0)
+
+    def axes(self, kinematics: BatchKinematics) -> Array:
+        """Jacobian columns (T, nv, 6) in the world."""
+        if self._axes is None:
+            self._axes = kinematics.axes(*self._placements)
+        return self._axes
+
+
+def _length(gap: Array) -> Array:
+    return np.sqrt(gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2])
+
+
+def carried_bodies(robot: Robot) -> Array:
+    """(njoints, n) of 0 and 1: does moved joint k carry what is attached to joint j?"""
+    model = robot.model
+    carried = np.zeros((model.njoints, robot.n))
+    first = int(robot.moved[0])
+    for joint in range(1, model.njoints):
+        carried[joint] = carried[model.parents[joint]]
+        column = model.joints[joint].idx_v - first
+        if column >= 0:
+            carried[joint, column] = 1.0
+    return carried

@@ -1,0 +1,55 @@
+"""The regressor Y(q, v, a) of Eq. 1: Y φ = τ, ten standard parameters per body.
+
+φ has Pinocchio's order per body: m, m c (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the joint frame.
+"""
+
+import numpy as np
+import pinocchio as pin
+
+from excite_cli.robot.model import Array, Robot
+
+PARAMETERS_PER_BODY = 10
+PARAMETER_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+
+
+class Regressor:
+    """Evaluates Y for many samples; not to be shared between threads."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._data = robot.model.createData()
+        self._all_rows = len(robot.rows) == robot.model.nv
+
+    def evaluate(self, q: Array, v: Array, a: Array) -> Array:
+        """Y for the measured rows.
+
+        Parameters
+        ----------
+        q, v, a: (T, n) of the moved joints
+
+        Returns
+        -------
+        (T, R, 10·n_bodies) with R measured rows
+        """
+        robot = self.robot
+        model, data, compute = robot.model, self._data, pin.computeJointTorqueRegressor
+        qs, vs, accelerations = map(
+            list, (robot.configurations(q), robot.velocities(v), robot.velocities(a))
+        )
+        full = np.empty((len(q), model.nv, PARAMETERS_PER_BODY * robot.n_bodies))
+        for t, (qt, vt, at) in enumerate(zip(qs, vs, accelerations, strict=True)):
+            full[t] = compute(model, data, qt, vt, at)
+        return full if self._all_rows else full[:, robot.rows]
+
+
+def standard_parameters(robot: Robot) -> Array:
+    """φ (10·n_bodies,) of the URDF's inertias."""
+    return np.concatenate(
+        [robot.model.inertias[body].toDynamicParameters() for body in range(1, robot.model.njoints)]
+    )
+
+
+def standard_parameter_names(robot: Robot) -> tuple[str, ...]:
+    """Names such as `m[arm_left_1_joint]`, in the order of φ."""
+    bodies = [str(name) for name in robot.model.names[1:]]
+    return tuple(f"{symbol}[{body}]" for body in bodies for symbol in PARAMETER_NAMES)

@@ -1,0 +1,193 @@
+"""Results as HDF5: `/motions/<i>`, `/tables`, `/stack`, `/base_parameters`, `/collision_pairs`.
+
+The file is written anew and put in place after every finished motion, so that it is whole at any
+time. Reading trusts nothing: a foreign or damaged file gives one message.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from excite_cli.constraints.base import Worst
+from excite_cli.errors import FileError
+from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.random_baseline import RandomMotion
+from excite_cli.excitation.result import Result
+from excite_cli.excitation.stack import Stack
+from excite_cli.store.atomic import write_atomically
+
+SCHEMA = 1
+PROGRAM = "excite"
+_TABLE = [("motion", "i8"), ("own", "f8"), ("stacked", "f8")]
+
+
+def write_result(path: Path, result: Result, problem: Problem) -> None:
+    """Write `result`; trajectories are sampled on the constraint grid of `problem`."""
+    write_atomically(path, lambda temporary: _write(temporary, result, problem))
+
+
+def _write(path: Path, result: Result, problem: Problem) -> None:
+    with h5py.File(path, "w") as file:
+        file.attrs.update(
+            {
+                "program": PROGRAM,
+                "schema": SCHEMA,
+                "versions": json.dumps(result.versions),
+                "seed": result.seed,
+                "config": result.config,
+                "robot_hash": result.fingerprint,
+                "joint_names": list(result.joint_names),
+                "priors": list(result.priors),
+                "random_candidates": list(result.random_candidates),
+                "units": "rad, s, N·m, kg, m",
+            }
+        )
+        for motion in result.motions:
+            _write_motion(file.create_group(f"motions/{motion.index}"), motion, problem)
+        for chosen in result.random:
+            group = file.create_group(f"random/{chosen.index}")
+            _write_states(group, chosen.coefficients, problem)
+            group.attrs["condition_number"] = chosen.condition_number
+            group.attrs["stacked_condition_number"] = chosen.stacked_condition_number
+        file["tables/condition_number"] = _table(result.motions)
+        file["tables/random"] = _table(result.random)
+        file["stack/R"] = result.stack.factor
+        file["stack"].attrs["rows"] = result.stack.rows
+        group = file.create_group("base_parameters")
+        group["selection"] = result.base_selection
+        group["words"] = list(result.base_words)
+        group["row_weights"] = result.row_weights
+        group["column_scales"] = result.column_scales
+        file["collision_pairs/checked"] = _texts(result.checked_pairs)
+        file["collision_pairs/dropped"] = _texts(result.dropped_pairs)
+
+
+def _texts(words: tuple[str, ...]) -> Any:
+    return np.array(list(words), dtype=h5py.string_dtype())
+
+
+def _table(motions: tuple[Motion, ...] | tuple[RandomMotion, ...]) -> Any:
+    rows = [(m.index, m.condition_number, m.stacked_condition_number) for m in motions]
+    return np.array(rows, dtype=_TABLE)
+
+
+def _write_states(group: Any, coefficients: Any, problem: Problem) -> None:
+    q, v, a = problem.constraint_basis.states(coefficients)
+    arrays = {"t": problem.constraint_basis.times, "q": q, "v": v, "a": a}
+    for name, array in {**arrays, "coefficients": coefficients}.items():
+        group[name] = array
+
+
+def _write_motion(group: Any, motion: Motion, problem: Problem) -> None:
+    _write_states(group, motion.coefficients, problem)
+    group.attrs.update(
+        {
+            "condition_number": motion.condition_number,
+            "stacked_condition_number": motion.stacked_condition_number,
+            "improved": motion.improved,
+            "status": motion.status,
+            "seconds": motion.seconds,
+            "iterations": motion.iterations,
+            "evaluations": motion.evaluations,
+            "margins": json.dumps(
+                {
+                    name: {"margin": w.margin, "label": w.label, "time": w.time,
+                           "violations": w.violations}
+                    for name, w in motion.margins.items()
+                }
+            ),
+        }
+    )  # fmt: skip
+
+
+def read_result(path: Path) -> Result:
+    """Read a result file.
+
+    Raises
+    ------
+    FileError
+        The file is missing, unreadable, not ours, damaged, or of a newer schema.
+    """
+    if not path.is_file():
+        raise FileError(f"There is no file {path}.")
+    try:
+        with h5py.File(path, "r") as file:
+            return _read(file, path)
+    except OSError as error:
+        raise FileError(f"{path} is not a readable HDF5 file ({error}).") from error
+    except (KeyError, ValueError, TypeError, json.JSONDecodeError) as error:
+        raise FileError(
+            f"{path} is damaged or not a result of this program: {error}. Result files are "
+            "written by `excite optimize` and `excite compare-random`."
+        ) from error
+
+
+def _read(file: Any, path: Path) -> Result:
+    attributes = file.attrs
+    if attributes.get("program") != PROGRAM:
+        raise FileError(
+            f"{path} is HDF5, but not a result of this program. Result files are written by "
+            "`excite optimize` and `excite compare-random`."
+        )
+    if int(attributes["schema"]) > SCHEMA:
+        raise FileError(
+            f"{path} has schema {int(attributes['schema'])}; this version reads up to {SCHEMA}. "
+            "Update the program."
+        )
+    base = file["base_parameters"]
+    factor = np.asarray(file["stack/R"], dtype=float)
+    if factor.ndim != 2 or factor.shape[0] != factor.shape[1] or not np.isfinite(factor).all():
+        raise ValueError("/stack/R is not a finite square matrix")
+    return Result(
+        config=str(attributes["config"]),
+        fingerprint=str(attributes["robot_hash"]),
+        seed=int(attributes["seed"]),
+        joint_names=tuple(str(name) for name in attributes["joint_names"]),
+        base_selection=np.asarray(base["selection"]),
+        base_words=tuple(text.decode() for text in base["words"][()]),
+        row_weights=np.asarray(base["row_weights"]),
+        column_scales=np.asarray(base["column_scales"]),
+        motions=tuple(
+            _read_motion(file[f"motions/{index}"], index)
+            for index in sorted(int(name) for name in file.get("motions", {}))
+        ),
+        stack=Stack(factor, int(file["stack"].attrs["rows"])),
+        random=tuple(
+            RandomMotion(
+                index,
+                np.asarray(file[f"random/{index}/coefficients"]),
+                float(file[f"random/{index}"].attrs["condition_number"]),
+                float(file[f"random/{index}"].attrs["stacked_condition_number"]),
+            )
+            for index in sorted(int(name) for name in file.get("random", {}))
+        ),
+        random_candidates=(
+            int(attributes["random_candidates"][0]),
+            int(attributes["random_candidates"][1]),
+        ),
+        priors=tuple(str(name) for name in attributes["priors"]),
+        versions=json.loads(attributes["versions"]),
+        checked_pairs=tuple(text.decode() for text in file["collision_pairs/checked"][()]),
+        dropped_pairs=tuple(text.decode() for text in file["collision_pairs/dropped"][()]),
+    )
+
+
+def _read_motion(group: Any, index: int) -> Motion:
+    attributes = group.attrs
+    margins = json.loads(attributes["margins"])
+    return Motion(
+        index=index,
+        coefficients=np.asarray(group["coefficients"], dtype=float),
+        condition_number=float(attributes["condition_number"]),
+        stacked_condition_number=float(attributes["stacked_condition_number"]),
+        improved=bool(attributes["improved"]),
+        status=str(attributes["status"]),
+        seconds=float(attributes["seconds"]),
+        iterations=int(attributes["iterations"]),
+        evaluations=int(attributes["evaluations"]),
+        margins={name: Worst(**worst) for name, worst in margins.items()},
+    )

@@ -1,0 +1,16 @@
+"""Versions of the program and of the libraries that decide its numbers."""
+
+from importlib import metadata
+
+_LIBRARIES = ("excite-cli", "pin", "coal", "numpy", "scipy", "h5py", "example-robot-data")
+
+
+def versions() -> dict[str, str]:
+    """Installed version of each library, `missing` where there is none."""
+    found = {}
+    for name in _LIBRARIES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "missing"
+    return found

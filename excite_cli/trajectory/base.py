@@ -1,0 +1,77 @@
+"""The family of trajectories: positions, velocities and accelerations linear in coefficients.
+
+x(t) = B(t) α with α of shape (K, n), one column per joint and the same basis for all joints. So
+the derivative of anything with respect to α is Bᵀ times its derivative with respect to x (Eq. 49).
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Basis functions at T instants and their first two time derivatives, each (T, K)."""
+
+    times: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    def states(self, coefficients: Array) -> tuple[Array, Array, Array]:
+        """q, v, a, each (T, n), for coefficients (K, n)."""
+        return (
+            self.position @ coefficients,
+            self.velocity @ coefficients,
+            self.acceleration @ coefficients,
+        )
+
+    def pull_back(self, gq: Array, gv: Array, ga: Array) -> Array:
+        """Derivative (K, n) by the coefficients, from those by q, v, a (T, n)."""
+        return self.position.T @ gq + self.velocity.T @ gv + self.acceleration.T @ ga
+
+
+class Trajectory(ABC):
+    """A family member with its shape fixed (number of functions, duration), coefficients free."""
+
+    duration: float
+    at_rest: bool
+
+    @property
+    @abstractmethod
+    def n_coefficients(self) -> int:
+        """K, the number of coefficients per joint."""
+
+    @abstractmethod
+    def basis(self, times: Array) -> Basis:
+        """Evaluate the basis at `times` (T,) [s]."""
+
+    @abstractmethod
+    def constant(self, q: Array) -> Array:
+        """Coefficients (K, n) of standing still at `q` (n,)."""
+
+    @abstractmethod
+    def sampling_factor(self, samples: int, step: float) -> float | None:
+        """Largest share of a bound that proves it at every instant when kept on the grid.
+
+        None where the samples prove nothing.
+        """
+
+    def rest_rows(self) -> Array:
+        """Rows E (4, K): E α = 0 puts velocity and acceleration to zero at start and end."""
+        ends = self.basis(np.array([0.0, self.duration]))
+        return np.vstack([ends.velocity, ends.acceleration])
+
+    @cached_property
+    def free_directions(self) -> Array:
+        """N (K, K'): every admissible α is N β; the identity unless the motion starts at rest."""
+        if not self.at_rest:
+            return np.eye(self.n_coefficients)
+        rows = self.rest_rows()
+        return null_space(rows / np.linalg.norm(rows, axis=1, keepdims=True), rcond=1e-10)

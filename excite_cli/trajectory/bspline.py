@@ -1,0 +1,46 @@
+"""Clamped B-splines with uniform inner knots: q(t) = Σ_i c_i N_i(t), c_i the control points."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from excite_cli.trajectory.base import Array, Basis, Trajectory
+
+
+@dataclass(frozen=True)
+class BSplineTrajectory(Trajectory):
+    """`control_points` per joint, of the given polynomial degree, over `duration` [s]."""
+
+    duration: float
+    control_points: int
+    degree: int = 5
+    at_rest: bool = True
+
+    @property
+    def n_coefficients(self) -> int:
+        """One per control point."""
+        return self.control_points
+
+    @cached_property
+    def _splines(self) -> tuple[BSpline, BSpline, BSpline]:
+        inner = np.linspace(0.0, self.duration, self.control_points - self.degree + 1)
+        knots = np.concatenate([np.zeros(self.degree), inner, np.full(self.degree, self.duration)])
+        spline = BSpline(knots, np.eye(self.control_points), self.degree)
+        return spline, spline.derivative(1), spline.derivative(2)
+
+    def basis(self, times: Array) -> Basis:
+        """Basis splines; instants beyond the end are evaluated at the end."""
+        times = np.asarray(times, dtype=float)
+        inside = np.clip(times, 0.0, self.duration)
+        position, velocity, acceleration = (spline(inside) for spline in self._splines)
+        return Basis(times, position, velocity, acceleration)
+
+    def constant(self, q: Array) -> Array:
+        """All control points equal (the splines sum to one)."""
+        return np.tile(np.asarray(q, dtype=float), (self.control_points, 1))
+
+    def sampling_factor(self, samples: int, step: float) -> float | None:
+        """Samples of a spline alone prove nothing between them."""
+        return None
