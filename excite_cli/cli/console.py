@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -20,6 +20,7 @@ from rich.table import Table
 from excite_cli.errors import ExciteError
 
 BUG, INTERRUPTED = 70, 130
+PLAIN_WIDTH = 140
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,12 @@ class Terminal:
     @property
     def out(self) -> Console:
         """The answer."""
-        return Console(file=sys.stdout, soft_wrap=not sys.stdout.isatty(), highlight=False)
+        return _console(sys.stdout)
 
     @property
     def err(self) -> Console:
         """Progress and messages."""
-        return Console(file=sys.stderr, highlight=False, soft_wrap=not sys.stderr.isatty())
+        return _console(sys.stderr)
 
     def say(self, text: str) -> None:
         """A message for people, unless quiet."""
@@ -80,6 +81,11 @@ class Terminal:
         with Progress(*columns, console=self.err, transient=True) as bar:
             task = bar.add_task(title, total=total, text="")
             yield lambda text, done: bar.update(task, completed=done, text=text)
+
+
+def _console(file: TextIO) -> Console:
+    """Coloured and as wide as the terminal; plain and wide enough for our tables elsewhere."""
+    return Console(file=file, highlight=False, width=None if file.isatty() else PLAIN_WIDTH)
 
 
 def _sparse(title: str) -> Callable[[str, int], None]:

@@ -2,9 +2,9 @@
 
 SLSQP solves a dense least-squares problem with every row it is given, so it is run in short
 rounds on few rows: the dips (smallest in time) of residuals near zero. After a round the rows
-that its result breaks, or has come near to, are added; rows are never dropped, which rules out
-cycles. Every point that SLSQP visits and that is admissible on the whole grid is a candidate for
-the outcome.
+that its result breaks, or has come near to, are added; none is dropped before the next criterion
+of the continuation. Every point that SLSQP visits and that is admissible on the whole grid is a
+candidate for the outcome, and so is the result of every round once it is restored.
 """
 
 import time
@@ -25,15 +25,15 @@ from excite_cli.excitation.solvers.sqp import (
     Mask,
     dips,
     gathered,
-    lowest,
 )
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.states import States
 
 # Residuals kept by the program, and below which a dip joins the working set.
 _AIM, _NEAR = 1e-4, 0.1
-# Iterations of one round, and what a stage may still gain in it when it counts as done.
-_ROUND = 12
+# Iterations of a round: few at first, when it is not known yet what will bind; and what a stage
+# may still gain in a round (on the criterion asked for) when it counts as done.
+_FIRST_ROUND, _LONGEST_ROUND = 2, 12
 _CHANGES = (3e-2, 1e-2, 1e-3)
 
 
@@ -77,6 +77,7 @@ class _Run:
         self.criterion: Criterion = task.problem.criterion
         self.stage = ""
         self.reached = np.zeros(0)
+        self.length = _FIRST_ROUND
         # SLSQP's first Hessian is the identity: variables are scaled to make that a good guess.
         self.factor = np.linalg.cholesky(
             task.metric + 1e-9 * np.trace(task.metric) / task.size * np.eye(task.size)
@@ -99,20 +100,19 @@ class _Run:
         return Outcome(self.best.kept(), status, self.iterations, self.task.evaluations)
 
     def rounds(self, change: float) -> None:
-        """Rounds of one criterion until nothing is broken and little was gained."""
+        """Rounds of one criterion until one hardly improves the best admissible point."""
         chosen = [np.zeros_like(value, dtype=bool) for value in self.point(self.reached).values]
         while True:
-            before = self.point(self.reached)
             chosen = [
                 mask | ((value < _NEAR) & dips(value))
-                for mask, value in zip(chosen, before.values, strict=True)
+                for mask, value in zip(chosen, self.point(self.reached).values, strict=True)
             ]
+            before = self.best.cost
             self.round(chosen)
-            after = self.point(self.reached)
-            if lowest(after.values) > -change and before.cost - after.cost < change:
+            self.length = min(self.length + 1, _LONGEST_ROUND)
+            self.best.offer_restored(self.reached)
+            if before - self.best.cost < change:
                 return
-            if self.task.problem.criterion.value(after.spectrum.sigma) < self.best.cost:
-                self.best.offer_restored(self.reached)
 
     def round(self, chosen: list[Mask]) -> None:
         """A few iterations of SLSQP on the chosen rows, in y with x = L⁻ᵀ y."""
@@ -139,7 +139,7 @@ class _Run:
             method="SLSQP",
             constraints=constraints,
             callback=self.iterated,
-            options={"maxiter": _ROUND, "ftol": 0.1 * self.effort.tolerance},
+            options={"maxiter": self.length, "ftol": 0.1 * self.effort.tolerance},
         )
         x = self.inverse @ np.asarray(result.x)
         if np.all(np.isfinite(x)):

@@ -24,7 +24,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.optimize import nnls
 
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_bound import JointBound
@@ -51,7 +52,7 @@ _AIM, _NEAR, _REACH = 1e-4, 0.05, 1.0
 _MENDED_SHARES = (1.0, 0.3, 0.0)
 _CUTS = 8
 _SUFFICIENT, _HALVINGS = 1e-4, 10
-_RESTORATIONS = 20
+_RESTORATIONS = 10
 
 
 class Linearised:
@@ -135,6 +136,24 @@ def lowest(values: list[Array]) -> float:
     return min((float(value.min()) for value in values), default=np.inf)
 
 
+def least_distance(rows: Array, bounds: Array) -> Array | None:
+    """The shortest y with rows·y ≥ bounds; None if there is none.
+
+    Dual of a non-negative least-squares problem (Lawson and Hanson 1974, algorithm LDP), so it
+    needs no library for quadratic programs.
+    """
+    system = np.vstack([rows.T, bounds])
+    target = np.append(np.zeros(rows.shape[1]), 1.0)
+    try:
+        weights, _ = nnls(system, target)
+    except RuntimeError:  # its iteration limit
+        return None
+    residual = system @ weights - target
+    if residual[-1] > -1e-12:
+        return None
+    return np.asarray(-residual[:-1] / residual[-1])
+
+
 class BestAdmissible:
     """The best strictly admissible point seen, by the criterion asked for."""
 
@@ -166,24 +185,25 @@ class BestAdmissible:
         self.offer(candidate, values, objective.spectrum(block))
 
     def _corrected(self, x: Array) -> Array | None:
-        """Gauss–Newton on the broken dips, of least length in the metric of the task."""
+        """Least corrections, in the metric of the task, to the linearised residuals."""
         task, aim = self.task, _AIM
-        factor = cho_factor(task.metric + 1e-12 * np.eye(task.size) * np.trace(task.metric))
+        eye = np.eye(task.size)
+        factor = np.linalg.cholesky(task.metric + 1e-9 * np.trace(task.metric) / task.size * eye)
+        chosen: list[Mask] | None = None
         for _ in range(_RESTORATIONS):
             states = task.states(x)
             values = task.values(states)
             if lowest(values) > 0:
                 return x
-            broken = [(value < aim) & dips(value) for value in values]
-            rows = Linearised(task, states, values, broken).dense(broken)
-            spread = cho_solve(factor, rows.T)
-            gram = rows @ spread
-            gram[np.diag_indices_from(gram)] += 1e-8 * np.trace(gram) / len(gram)
-            try:
-                x = x + spread @ cho_solve(cho_factor(gram), aim - gathered(values, broken))
-            except LinAlgError:
+            near = [(value < _NEAR) & dips(value) for value in values]
+            chosen = [a | b for a, b in zip(chosen or near, near, strict=True)]
+            rows = Linearised(task, states, values, chosen).dense(chosen)
+            scaled = solve_triangular(factor, rows.T, lower=True).T
+            correction = least_distance(scaled, aim - gathered(values, chosen))
+            if correction is None:
                 return None
-            aim *= 1.3
+            x = x + solve_triangular(factor, correction, lower=True, trans="T")
+            aim *= 1.5
         return None
 
     def _retreated(self, x: Array) -> Array:
