@@ -2,11 +2,13 @@
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 from scipy.stats import qmc
+from threadpoolctl import threadpool_limits
 
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.capsule_fit import (
@@ -35,6 +37,11 @@ _SPHERE = sphere_points(100)
 
 def cover(shapes: Iterable[LinkShape], apart: Collection[str] = ()) -> list[Capsule]:
     """Capsules that contain all shapes; links named in `apart` share theirs with no other."""
+    with threadpool_limits(1):  # products of small matrices only wait for other threads
+        return _cover(shapes, apart)
+
+
+def _cover(shapes: Iterable[LinkShape], apart: Collection[str]) -> list[Capsule]:
     by_joint: dict[int, list[LinkShape]] = {}
     for shape in shapes:
         by_joint.setdefault(shape.joint, []).append(shape)
@@ -146,11 +153,15 @@ class _Outside:
             self._faces = np.unique(ConvexHull(points).equations.round(6), axis=0)
         except (QhullError, ValueError):  # flat: too small to matter
             self._faces = np.zeros((0, 4))
-        start, end, radius = fit
+        self._fit = fit
+
+    @cached_property
+    def _sample(self) -> tuple[Array, Array, float]:
+        """Places (M, 3) around the capsule, their heights (M,) and the volume of each."""
+        start, end, radius = self._fit
         low, high = np.minimum(start, end) - 1.2 * radius, np.maximum(start, end) + 1.2 * radius
-        self._places = low + (high - low) * _BOX
-        self._depths = self._heights(self._places)
-        self._room = float(np.prod(high - low)) / len(_BOX)
+        places = low + (high - low) * _BOX
+        return places, self._heights(places), float(np.prod(high - low)) / len(_BOX)
 
     def _heights(self, places: Array) -> Array:
         """Height [m] of places above the hull: that above the face that sees them highest."""
@@ -167,10 +178,11 @@ class _Outside:
 
     def waste(self, cover: list[Fit]) -> float:
         """Integral [m^4] over the union of the capsules of the height above the hull and 1 cm."""
-        inside = np.zeros(len(self._places), dtype=bool)
+        places, heights, room = self._sample
+        inside = np.zeros(len(places), dtype=bool)
         for start, end, radius in cover:
-            inside |= _distance(self._places, start, end) <= radius
-        return self._room * float((self._depths + 0.01)[inside].sum())
+            inside |= _distance(places, start, end) <= radius
+        return room * float((heights + 0.01)[inside].sum())
 
 
 def _divisions(shape: LinkShape) -> list[list[LinkShape]]:

@@ -87,7 +87,9 @@ def hull_points(points: Array) -> Array:
 def _flat_hull(points: Array) -> Array:
     centred = points - points.mean(axis=0)
     _, spread, axes = np.linalg.svd(centred, full_matrices=False)
-    flat = centred @ axes[spread > 1e-9 * spread[0]].T
+    flat = centred @ axes[spread > 1e-9 * max(spread[0], 1e-12)].T
+    if flat.shape[1] == 0:  # one and the same point
+        return points[:1]
     if flat.shape[1] == 1:
         return points[[int(flat.argmin()), int(flat.argmax())]]
     try:

@@ -146,14 +146,15 @@ def _by_sampling(
         target = margin + _ALLOWANCE
         nearest[clear] = _descend(robot, measure, q[starts], clear, target)
     reasons = [""] * len(pairs)
-    for k in np.flatnonzero(nearest > margin + _ALLOWANCE):
+    for k in np.flatnonzero(nearest > margin + _ALLOWANCE).tolist():
         reasons[k] = f"never near (at least {nearest[k]:.2f} m found)"
     start = measure.distances(robot.posture[None])[0]
     doubtful = ~always & (nearest <= margin + _ALLOWANCE)
     doubtful &= (touching > _DOUBTFUL) | (start < 2 * margin)
-    for k, reason in _by_meshes(robot, capsules, pairs, doubtful, q, distances, margin):
+    wanted = {k: pairs[k] for k in np.flatnonzero(doubtful).tolist()}
+    for k, reason in _by_meshes(robot, capsules, wanted, (q, distances), margin):
         reasons[k] = reason
-    for k in np.flatnonzero(always):
+    for k in np.flatnonzero(always).tolist():
         reasons[k] = "always in contact"
     return reasons
 
@@ -161,18 +162,20 @@ def _by_sampling(
 def _by_meshes(
     robot: Robot,
     capsules: tuple[Capsule, ...],
-    pairs: list[tuple[int, int]],
-    doubtful: NDArray[np.bool_],
-    q: Array,
-    distances: Array,
+    doubtful: dict[int, tuple[int, int]],
+    sample: tuple[Array, Array],
     margin: float,
 ) -> Iterator[tuple[int, str]]:
-    """Doubtful pairs few joints apart whose meshes never come as near as the margin."""
+    """Those of the doubtful pairs, few joints apart, whose meshes never come near the margin.
+
+    doubtful: pair of capsules by column of the sample, which is positions and their distances.
+    """
     carried = carried_bodies(robot)
     meshes: MeshDistances | None = None
     known: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = {}
-    for k in np.flatnonzero(doubtful):
-        first, second = (capsules[index] for index in pairs[k])
+    q, distances = sample
+    for k, pair in doubtful.items():
+        first, second = (capsules[index] for index in pair)
         moved = np.flatnonzero(carried[first.joint] != carried[second.joint])
         if len(moved) > _FEW_JOINTS:
             continue
@@ -184,7 +187,7 @@ def _by_meshes(
             starts = np.vstack([robot.posture, q[np.argsort(distances[:, k])[:_MESH_SAMPLES]]])
             known[links] = meshes.least_distance(*links, starts, moved, stop=margin)
         if known[links] > margin:
-            yield int(k), f"meshes never near (at least {known[links]:.3f} m found)"
+            yield k, f"meshes never near (at least {known[links]:.3f} m found)"
 
 
 def _descend(

@@ -12,6 +12,7 @@ from excite_cli.robot.link_shapes import collision_model
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 _FIRST_STEP, _LAST_STEP = 0.2, 0.01  # [rad or m]
 
@@ -50,7 +51,12 @@ class MeshDistances:
         return float(least)
 
     def least_distance(
-        self, first: Iterable[str], second: Iterable[str], starts: Array, moved: Array, stop: float
+        self,
+        first: Iterable[str],
+        second: Iterable[str],
+        starts: Array,
+        moved: Indices,
+        stop: float,
     ) -> float:
         """Least distance [m] found at `starts` (S, n) and by a search from the best three.
 
@@ -64,7 +70,7 @@ class MeshDistances:
                 return found[-1]
         least = np.inf
         for index in np.argsort(found)[:3]:
-            value = self._search(first, second, starts[index].copy(), moved, found[index], stop)
+            value = self._search((first, second), starts[index], moved, found[index], stop)
             least = min(least, value)
             if least < stop:
                 break
@@ -72,10 +78,9 @@ class MeshDistances:
 
     def _search(
         self,
-        first: tuple[str, ...],
-        second: tuple[str, ...],
+        links: tuple[tuple[str, ...], tuple[str, ...]],
         q: Array,
-        moved: Array,
+        moved: Indices,
         value: float,
         stop: float,
     ) -> float:
@@ -88,7 +93,7 @@ class MeshDistances:
                     trial[joint] = np.clip(
                         q[joint] + change, self._lower[joint], self._upper[joint]
                     )
-                    distance = self.distance(first, second, trial)
+                    distance = self.distance(*links, trial)
                     if distance < value - 1e-6:
                         q, value, better = trial, distance, True
                         break

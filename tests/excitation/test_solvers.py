@@ -202,8 +202,10 @@ def test_linearised_residuals_match_differences(problem: Problem) -> None:
 def test_least_distance_is_the_projection_onto_the_rows() -> None:
     rows = np.array([[1.0, 0.0], [1.0, 1.0], [0.0, -1.0]])
     found = least_distance(rows, np.array([0.5, 1.0, -2.0]))
+    assert found is not None
     np.testing.assert_allclose(found, [0.5, 0.5], atol=1e-12)
     inside = least_distance(rows, np.array([-1.0, -1.0, -1.0]))
+    assert inside is not None
     np.testing.assert_allclose(inside, 0.0, atol=1e-12)
     assert least_distance(np.array([[1.0, 0.0], [-1.0, 0.0]]), np.ones(2)) is None
 

@@ -33,7 +33,7 @@ from excite_cli.robot.states import States
 _AIM, _NEAR = 1e-4, 0.1
 # Iterations of a round: few at first, when it is not known yet what will bind; and what a stage
 # may still gain in a round (on the criterion asked for) when it counts as done.
-_FIRST_ROUND, _LONGEST_ROUND = 2, 12
+_FIRST_ROUND, _LONGEST_ROUND, _IDLE = 2, 12, 3
 _CHANGES = (3e-2, 1e-2, 1e-3)
 
 
@@ -100,19 +100,36 @@ class _Run:
         return Outcome(self.best.kept(), status, self.iterations, self.task.evaluations)
 
     def rounds(self, change: float) -> None:
-        """Rounds of one criterion until one hardly improves the best admissible point."""
+        """Rounds of one criterion until `_IDLE` in a row hardly improve the best point."""
+        idle = 0
         chosen = [np.zeros_like(value, dtype=bool) for value in self.point(self.reached).values]
         while True:
-            chosen = [
-                mask | ((value < _NEAR) & dips(value))
-                for mask, value in zip(chosen, self.point(self.reached).values, strict=True)
-            ]
-            before = self.best.cost
+            chosen = self.joined(chosen)
+            before, known = self.best.cost, self.iterations
             self.round(chosen)
             self.length = min(self.length + 1, _LONGEST_ROUND)
             self.best.offer_restored(self.reached)
-            if before - self.best.cost < change:
+            if before - self.best.cost >= change:
+                idle = 0
+                continue
+            spectrum = self.point(self.reached).spectrum
+            lost = self.task.problem.criterion.value(spectrum.sigma) < self.best.cost - change
+            if lost and self.iterations > known:
+                # Better but beyond restoration: go back, with the rows that this has shown.
+                chosen = self.joined(chosen)
+                self.reached = self.best.kept()
+                continue
+            idle += 1
+            if idle == _IDLE:
                 return
+
+    def joined(self, chosen: list[Mask]) -> list[Mask]:
+        """The working set with the dips of the point reached."""
+        values = self.point(self.reached).values
+        return [
+            mask | ((value < _NEAR) & dips(value))
+            for mask, value in zip(chosen, values, strict=True)
+        ]
 
     def round(self, chosen: list[Mask]) -> None:
         """A few iterations of SLSQP on the chosen rows, in y with x = L⁻ᵀ y."""

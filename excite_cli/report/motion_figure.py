@@ -1,0 +1,238 @@
+"""Figures of one motion over time: every joint against its limits, and every other margin."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from excite_cli.constraints.base import Constraint
+from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.constraints.joint_torque import JointTorque
+from excite_cli.excitation.admissible import fine_margins, fine_times
+from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.problem import Problem
+from excite_cli.report.style import (
+    BLUE,
+    FORBIDDEN,
+    GREEN,
+    GREY,
+    VERMILION,
+    WIDTH,
+    matplotlib_part,
+    new_figure,
+    styled,
+)
+from excite_cli.robot.model import Array, Robot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_POINTS = 600  # per joint and line, over the whole motion
+_LIMIT_LINE: dict[str, Any] = {"color": GREY, "linestyle": (0, (4, 2)), "linewidth": 1.0}
+_DOTTED = (0, (1, 1))
+# Page layout of the joint grid [in].
+_LEFT, _RIGHT, _TOP, _BOTTOM = 0.6, 0.1, 0.95, 0.45
+_WORDS = {
+    "joint_torque": ("Joint torque left", "share of limit [–]"),
+    "balance": ("Centre of mass to the edge of its region", "distance [m]"),
+    "self_collision": ("Nearest pair of links, less the margin", "distance [m]"),
+}
+
+
+@dataclass(frozen=True)
+class _Bounds:
+    """Bounds (3, n) on position, velocity and acceleration that the problem keeps."""
+
+    lower: Array
+    upper: Array
+
+
+@styled
+def draw_motion(motion: Motion, problem: Problem) -> "Figure":
+    """Position of every joint within its limits; below, velocity and acceleration as shares.
+
+    A velocity or acceleration that the problem does not bound is drawn dotted, as a share of its
+    own peak.
+    """
+    robot = problem.robot
+    times = fine_times(problem, _POINTS / problem.trajectory.duration)
+    states = problem.trajectory.basis(times).states(motion.coefficients)
+    bounds, units = _bounds(problem), _position_units(robot)
+    columns = _columns(robot.n)
+    rows = -(-robot.n // columns)
+    height = _TOP + _BOTTOM + rows * (2.5 if columns <= 3 else 2.15)
+    figure = new_figure(height, constrained=False)
+    outer = figure.add_gridspec(
+        rows,
+        columns,
+        left=_LEFT / WIDTH,
+        right=1 - _RIGHT / WIDTH,
+        top=1 - _TOP / height,
+        bottom=_BOTTOM / height,
+        wspace=0.36 if columns <= 3 else 0.45,
+        hspace=0.27 if columns <= 3 else 0.32,
+    )
+    unbounded = False
+    for joint, name in enumerate(robot.joint_names):
+        inner = outer[divmod(joint, columns)].subgridspec(2, 1, height_ratios=(5, 3), hspace=0.1)
+        upper = figure.add_subplot(inner[0])
+        lower = figure.add_subplot(inner[1], sharex=upper)
+        upper.set_title(name, fontsize=8.5)
+        _draw_position(upper, times, states[0][:, joint], bounds, joint)
+        upper.set_ylabel(f"q [{units[joint]}]", labelpad=1)
+        for order, colour in ((2, GREEN), (1, VERMILION)):
+            limit = bounds.upper[order, joint]
+            unbounded |= not np.isfinite(limit)
+            _draw_share(lower, times, states[order][:, joint], limit, colour)
+        _finish_band(lower, times, last=joint + columns >= robot.n)
+    _head(figure, motion, problem, height, unbounded)
+    return figure
+
+
+def _columns(joints: int) -> int:
+    if joints <= 9:
+        return min(joints, 3) if joints != 4 else 2
+    return 4 if joints <= 16 else 5
+
+
+def _draw_position(axes: "Axes", times: Array, q: Array, bounds: _Bounds, joint: int) -> None:
+    limits = [bounds.lower[0, joint], bounds.upper[0, joint]]
+    for limit in limits:
+        if np.isfinite(limit):
+            axes.axhline(limit, **_LIMIT_LINE)
+    axes.plot(times, q, color=BLUE)
+    seen = np.array([q.min(), q.max(), *(limit for limit in limits if np.isfinite(limit))])
+    pad = 0.08 * max(float(np.ptp(seen)), 1e-3)
+    axes.set_ylim(seen.min() - pad, seen.max() + pad)
+    axes.yaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(4))
+    axes.tick_params(labelbottom=False, bottom=False, pad=2)
+
+
+def _draw_share(axes: "Axes", times: Array, values: Array, limit: float, colour: str) -> None:
+    if np.isfinite(limit):
+        axes.plot(times, values / limit, color=colour, linewidth=1.1)
+        return
+    peak = float(np.abs(values).max()) or 1.0
+    axes.plot(times, values / peak, color=colour, linewidth=1.1, linestyle=_DOTTED)
+
+
+def _finish_band(axes: "Axes", times: Array, last: bool) -> None:
+    for side in (-1.0, 1.0):
+        axes.axhline(side, **_LIMIT_LINE)
+    axes.set_ylim(-1.2, 1.2)
+    axes.set_yticks([-1, 0, 1])
+    axes.set_xlim(times[0], times[-1])
+    axes.xaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(5))
+    axes.tick_params(pad=2, labelbottom=last)
+    axes.set_ylabel("share [–]", labelpad=1)
+    if last:
+        axes.set_xlabel("time [s]", labelpad=1)
+
+
+def _head(
+    figure: "Figure", motion: Motion, problem: Problem, height: float, unbounded: bool
+) -> None:
+    """Title with the condition numbers, and one legend for all panels."""
+    figure.suptitle(
+        f"{problem.robot.name}, motion {motion.index}: condition number "
+        f"{motion.condition_number:.2f} alone, {motion.stacked_condition_number:.2f} stacked",
+        x=_LEFT / WIDTH,
+        y=1 - 0.12 / height,
+        ha="left",
+        va="top",
+    )
+    line = matplotlib_part("lines").Line2D
+    handles = [
+        line([], [], color=BLUE, label="position q"),
+        line([], [], color=VERMILION, label="velocity, share of limit"),
+        line([], [], color=GREEN, label="acceleration, share of limit"),
+        line([], [], label="limit", **_LIMIT_LINE),
+    ]
+    if unbounded:
+        handles.append(
+            line([], [], color="black", linestyle=_DOTTED, label="no limit: share of peak")
+        )
+    figure.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=((_LEFT - 0.1) / WIDTH, 1 - 0.38 / height),
+        ncols=len(handles),
+        columnspacing=1.4,
+        handlelength=1.8,
+    )
+
+
+def _bounds(problem: Problem) -> _Bounds:
+    lower = np.full((3, problem.robot.n), -np.inf)
+    upper = -lower
+    for constraint in problem.constraints:
+        if isinstance(constraint, JointBound):
+            low = constraint.signs < 0
+            lower[constraint.order, constraint.joints[low]] = -constraint.bounds[low]
+            upper[constraint.order, constraint.joints[~low]] = constraint.bounds[~low]
+    return _Bounds(lower, upper)
+
+
+def _position_units(robot: Robot) -> list[str]:
+    joints = ElementTree.fromstring(robot.description.xml).findall("joint")
+    sliding = {joint.get("name") for joint in joints if joint.get("type") == "prismatic"}
+    return ["m" if name in sliding else "rad" for name in robot.joint_names]
+
+
+def watched_constraints(problem: Problem) -> tuple[Constraint, ...]:
+    """Constraints other than the bounds of single joints: those that `draw_margins` shows."""
+    return tuple(c for c in problem.constraints if not isinstance(c, JointBound))
+
+
+@styled
+def draw_margins(motion: Motion, problem: Problem) -> "Figure":
+    """Smallest margin over the columns of each watched constraint, at controller rate.
+
+    Torque margins are divided by their limits, so that joints, rotating or sliding, compare.
+    """
+    times = fine_times(problem)
+    all_margins = fine_margins(problem, motion.coefficients, times)
+    parts = [
+        (constraint, margins)
+        for constraint, margins in zip(problem.constraints, all_margins, strict=True)
+        if not isinstance(constraint, JointBound)
+    ]
+    figure = new_figure(0.8 + 1.75 * len(parts))
+    figure.suptitle(
+        f"{problem.robot.name}, motion {motion.index}: margins of the constraints",
+        x=0.01,
+        ha="left",
+    )
+    stacked = figure.subplots(len(parts), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (constraint, margins) in zip(stacked, parts, strict=True):
+        _draw_margin(axes, constraint, margins, times)
+    stacked[-1].set_xlabel("time [s]")
+    stacked[-1].set_xlim(times[0], times[-1])
+    return figure
+
+
+def _draw_margin(axes: "Axes", constraint: Constraint, margins: Array, times: Array) -> None:
+    torque = isinstance(constraint, JointTorque)
+    values = margins / constraint.scale if torque else margins
+    words, label = _WORDS.get(constraint.name, (constraint.name, f"margin [{constraint.unit}]"))
+    smallest = values.min(axis=1)
+    worst = int(np.argmin(smallest))
+    where = constraint.labels[int(np.argmin(values[worst]))]
+    top = max(float(smallest.max()), 1e-6)
+    bottom = min(float(smallest.min()), 0.0) - 0.12 * top
+    axes.axhspan(bottom, 0.0, color=FORBIDDEN, linewidth=0)
+    axes.axhline(0.0, **_LIMIT_LINE)
+    axes.plot(times, smallest, color=BLUE)
+    axes.plot(times[worst], smallest[worst], "o", color=VERMILION, markersize=5, clip_on=False)
+    axes.set_ylim(bottom, 1.08 * top)
+    unit = "" if torque else f" {constraint.unit}"
+    axes.set_title(words)
+    axes.set_title(
+        f"worst: {smallest[worst]:.3g}{unit} at {times[worst]:.2f} s, {where}",
+        loc="right",
+        color=VERMILION,
+        fontsize=8.5,
+    )
+    axes.set_ylabel(label)

@@ -1,0 +1,121 @@
+"""Gradients of every constraint against differences, on random and real robots."""
+
+import numpy as np
+import pytest
+
+from excite_cli.config.spec import (
+    ConstraintsSpec,
+    DiscSpec,
+    JointLimitsSpec,
+    PolygonSpec,
+    RobotSpec,
+    SelfCollisionSpec,
+    TorqueSpec,
+)
+from excite_cli.constraints.base import Constraint
+from excite_cli.constraints.catalogue import build_constraints
+from excite_cli.errors import ConfigError
+from excite_cli.excitation.differences import central_differences
+from excite_cli.robot.center_of_mass import CenterOfMass
+from excite_cli.robot.forward_kinematics import BatchKinematics
+from excite_cli.robot.model import Robot, build_robot
+from excite_cli.robot.states import States
+from tests.robot.random_robots import random_robot
+
+
+def _all(balance: DiscSpec | PolygonSpec, collision: bool) -> ConstraintsSpec:
+    return ConstraintsSpec(
+        joint_limits=JointLimitsSpec(acceleration=8.0),
+        torque=TorqueSpec(scale=0.7),
+        balance=balance,
+        self_collision=SelfCollisionSpec() if collision else None,
+    )
+
+
+def _check(robot: Robot, constraint: Constraint, seed: int, tolerance: float) -> None:
+    kinematics = BatchKinematics(robot)
+    q, v, a = robot.draw_states(3, seed)
+    states = States(kinematics, q, v, a)
+    margins = constraint.margins(states)
+    assert margins.shape == (3, len(constraint.labels)) == (3, len(constraint.scale))
+    columns = np.random.default_rng(seed).permutation(margins.shape[1])[:4]
+    times = np.repeat(np.arange(3), len(columns))
+    every = np.tile(columns, 3)
+    parts = constraint.gradients(states, times, every)
+    for row, (t, column) in enumerate(zip(times, every, strict=True)):
+        for order, part in enumerate(parts):
+
+            def margin(x: np.ndarray, t: int = t, c: int = column, order: int = order) -> float:
+                moved = [q[t : t + 1], v[t : t + 1], a[t : t + 1]]
+                moved[order] = x[None]
+                return float(constraint.margins(States(kinematics, *moved))[0, c])
+
+            expected = central_differences(margin, (q, v, a)[order][t], 1e-6)
+            found = np.zeros(robot.n) if part is None else part[row]
+            size = 1.0 + np.abs(expected).max()
+            assert np.abs(found - expected).max() < tolerance * size, constraint.labels[column]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_gradients_on_random_robots(seed: int) -> None:
+    robot = random_robot(seed, joints=4, floating=seed % 2 == 1)
+    polygon = PolygonSpec(kind="polygon", vertices=((1, 1), (-1, 1), (-1, -1), (1, -1)))
+    for constraint in build_constraints(_all(polygon, collision=False), robot):
+        _check(robot, constraint, seed, 1e-6)
+
+
+def test_gradients_on_a_real_arm_with_capsules() -> None:
+    robot = build_robot(RobotSpec(urdf="example-robot-data:panda"))
+    for constraint in build_constraints(_all(DiscSpec(radius=0.3), collision=True), robot):
+        _check(robot, constraint, 1, 1e-5)
+
+
+def test_disc_margin_is_inside_the_circle() -> None:
+    robot = random_robot(2, joints=4)
+    spec = ConstraintsSpec(joint_limits=None, balance=DiscSpec(radius=0.05, center=(0.1, -0.2)))
+    (disc,) = build_constraints(spec, robot)
+    q, v, a = robot.draw_states(200, 0)
+    margins = disc.margins(States(BatchKinematics(robot), q, v, a))
+    center = CenterOfMass(robot).position(States(BatchKinematics(robot), q, v, a))[:, :2]
+    radial = 0.05 - np.linalg.norm(center - [0.1, -0.2], axis=1)
+    admissible = margins.min(axis=1) >= 0
+    assert admissible.any()
+    assert np.all(radial[admissible] >= 0)
+    # The inscribed polygon of 16 sides gives away less than 2 % of the radius.
+    assert np.all(margins.min(axis=1)[radial > 0] >= radial[radial > 0] - 0.02 * 0.05)
+
+
+def test_polygon_takes_vertices_in_any_order_and_its_margin() -> None:
+    robot = random_robot(2, joints=3)
+    corners = ((0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.0))
+    spec = ConstraintsSpec(
+        joint_limits=None, balance=PolygonSpec(kind="polygon", vertices=corners, margin=0.1)
+    )
+    (polygon,) = build_constraints(spec, robot)
+    states = States(BatchKinematics(robot), *robot.draw_states(50, 1))
+    x, y = CenterOfMass(robot).position(states)[:, :2].T
+    expected = np.minimum.reduce([x, 2 - x, y, 2 - y]) - 0.1
+    assert np.allclose(polygon.margins(states).min(axis=1), expected)
+
+
+@pytest.mark.parametrize(
+    ("balance", "message"),
+    [
+        (PolygonSpec(kind="polygon", vertices=((0, 0), (1, 1), (2, 2))), "lie on a line"),
+        (
+            PolygonSpec(kind="polygon", vertices=((0, 0), (1, 0), (0, 1)), margin=0.6),
+            "leaves nothing of the polygon",
+        ),
+    ],
+)
+def test_useless_polygons_are_refused(balance: PolygonSpec, message: str) -> None:
+    spec = ConstraintsSpec(joint_limits=None, balance=balance)
+    with pytest.raises(ConfigError, match=message):
+        build_constraints(spec, random_robot(1, joints=2))
+
+
+def test_limits_that_cannot_be_asked_for_are_refused() -> None:
+    robot = random_robot(1, joints=2)
+    wide = ConstraintsSpec(joint_limits=JointLimitsSpec(position_margin=3.0))
+    with pytest.raises(ConfigError, match="position_margin: 3 leaves no range for joint_"):
+        build_constraints(wide, robot)

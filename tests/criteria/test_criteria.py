@@ -1,0 +1,79 @@
+"""Every criterion: right value, right derivative, honest bounds of the smooth forms."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from excite_cli.config.spec import CriterionSpec
+from excite_cli.criteria.catalogue import CRITERIA, build_criterion
+from excite_cli.criteria.condition_number import ConditionNumber
+from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
+from excite_cli.excitation.differences import central_differences, relative_error
+
+
+def _all_members() -> list:
+    members = []
+    for kind in CRITERIA:
+        criterion = build_criterion(CriterionSpec(kind=kind))
+        members += [criterion, *criterion.continuation()]
+    return members
+
+
+def _spectrum(seed: int, size: int) -> np.ndarray:
+    return np.sort(np.exp(np.random.default_rng(seed).uniform(-3, 3, size)))[::-1]
+
+
+@settings(max_examples=30, derandomize=True, deadline=None)
+@given(seed=st.integers(0, 9999), size=st.integers(2, 12))
+def test_derivative_agrees_with_differences(seed: int, size: int) -> None:
+    sigma = _spectrum(seed, size)
+    for criterion in _all_members():
+        expected = central_differences(criterion.value, sigma, 1e-7 * sigma[-1])
+        assert relative_error(criterion.derivative(sigma), expected) < 1e-5, criterion
+
+
+def test_values_against_their_definitions() -> None:
+    matrix = np.random.default_rng(0).normal(size=(30, 5))
+    sigma = np.linalg.svd(matrix, compute_uv=False)
+    gram = matrix.T @ matrix
+
+    def value(kind: str) -> float:
+        return build_criterion(CriterionSpec(kind=kind)).value(sigma)
+
+    assert np.exp(value("condition_number")) == pytest.approx(np.linalg.cond(matrix))
+    assert value("log_det") == pytest.approx(-np.linalg.slogdet(gram)[1] / 5)
+    assert np.exp(value("trace_inverse")) == pytest.approx(np.trace(np.linalg.inv(gram)))
+    assert np.exp(-value("sigma_min")) == pytest.approx(sigma[-1])
+    both = np.linalg.cond(matrix) + 1 / sigma[-1]
+    assert np.exp(value("condition_and_sigma_min")) == pytest.approx(both)
+
+
+@settings(max_examples=30, derandomize=True, deadline=None)
+@given(seed=st.integers(0, 9999), size=st.integers(2, 40), p=st.floats(2.0, 200.0))
+def test_smooth_form_bounds_the_condition_number(seed: int, size: int, p: float) -> None:
+    sigma = _spectrum(seed, size)
+    exact, smooth = ConditionNumber().value(sigma), SmoothConditionNumber(p).value(sigma)
+    assert exact - 1e-12 <= smooth <= exact + 2 * np.log(size) / p + 1e-12
+
+
+def test_smooth_form_does_not_overflow() -> None:
+    sigma = np.array([1e150, 1.0, 1e-150])
+    criterion = SmoothConditionNumber(500.0)
+    assert criterion.value(sigma) == pytest.approx(np.log(1e300))
+    assert np.all(np.isfinite(criterion.derivative(sigma)))
+
+
+def test_continuation_ends_at_or_near_what_was_asked() -> None:
+    for kind in CRITERIA:
+        criterion = build_criterion(CriterionSpec(kind=kind, smoothing=32.0))
+        steps = criterion.continuation()
+        assert all(step.smooth for step in steps)
+        if criterion.smooth:
+            assert steps[-1] == criterion or steps[-1] is criterion
+
+
+def test_scaling_the_regressor_leaves_the_condition_number() -> None:
+    sigma = _spectrum(5, 9)
+    for criterion in (ConditionNumber(), SmoothConditionNumber(16.0)):
+        assert criterion.value(7.0 * sigma) == pytest.approx(criterion.value(sigma))

@@ -1,0 +1,111 @@
+import numpy as np
+import pytest
+
+from excite_cli.config.spec import SelfCollisionSpec
+from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.clearance import Clearance
+from excite_cli.robot.collision_pairs import CollisionPairs, choose_pairs
+
+from .fitted_robots import capsules_of, pairs_of, robot_of
+
+NAMES = ["talos", "ur10", "panda"]
+
+
+def reasons(pairs: CollisionPairs) -> dict[frozenset[str], str]:
+    return {frozenset((pair.first, pair.second)): pair.reason for pair in pairs.dropped}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_pair_is_either_checked_or_dropped(name: str) -> None:
+    capsules, pairs = capsules_of(name), pairs_of(name)
+    count = len(capsules)
+    assert len(pairs.checked) + len(pairs.dropped) == count * (count - 1) // 2
+    checked = {frozenset((capsules[i].name, capsules[j].name)) for i, j in pairs.checked}
+    assert not checked & set(reasons(pairs))
+
+
+@pytest.mark.parametrize(("name", "least"), [("talos", 0.01), ("ur10", 0.01), ("panda", 0.005)])
+def test_the_posture_is_clear(name: str, least: float) -> None:
+    robot = robot_of(name)
+    distances = Clearance(robot, capsules_of(name), pairs_of(name)).distances(robot.posture[None])
+    assert distances.min() > least
+
+
+def test_reasons() -> None:
+    found = reasons(pairs_of("panda"))
+    assert found[frozenset(("panda_link7", "panda_hand"))] == "same body"
+    assert found[frozenset(("panda_link2", "panda_link3"))] == "adjacent"
+    assert found[frozenset(("panda_link0", "panda_link2"))].startswith("never near")
+    found = reasons(pairs_of("ur10"))
+    # The base plate and the upper arm pass at 2 cm, which capsules do not resolve.
+    assert found[frozenset(("base_link", "upper_arm_link"))].startswith("meshes never near")
+    found = reasons(pairs_of("talos"))
+    assert found[frozenset(("arm_left_5_link", "arm_left_7_link"))] == "always in contact"
+
+
+def test_what_can_really_meet_is_checked() -> None:
+    capsules = capsules_of("talos")
+    checked = {
+        frozenset((capsules[i].name, capsules[j].name)) for i, j in pairs_of("talos").checked
+    }
+    assert frozenset(("arm_left_5_link", "arm_right_5_link")) in checked
+    assert frozenset(("torso_2_link", "arm_right_4_link")) in checked
+    capsules = capsules_of("panda")
+    checked = {
+        frozenset((capsules[i].name, capsules[j].name)) for i, j in pairs_of("panda").checked
+    }
+    assert frozenset(("panda_link0", "panda_hand")) in checked
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_pairs_dropped_as_never_near_stay_apart(name: str) -> None:
+    robot, capsules = robot_of(name), capsules_of(name)
+    number = {capsule.name: index for index, capsule in enumerate(capsules)}
+    never = [
+        (number[pair.first], number[pair.second])
+        for pair in pairs_of(name).dropped
+        if pair.reason.startswith("never near")
+    ]
+    q, _, _ = robot.draw_states(1500, seed=99)  # not the sample that the choice was made from
+    distances = Clearance(robot, capsules, CollisionPairs(tuple(never), ())).distances(q)
+    assert distances.min() > 0.03
+
+
+def test_ignored_pairs() -> None:
+    robot, capsules = robot_of("panda"), capsules_of("panda")
+    spec = SelfCollisionSpec(ignore=(("panda_hand", "panda_link0"),))
+    assert (
+        reasons(choose_pairs(robot, capsules, spec, samples=200))[
+            frozenset(("panda_link0", "panda_hand"))
+        ]
+        == "ignored in the config"
+    )
+
+
+def test_the_choice_depends_on_the_margin() -> None:
+    robot, capsules = robot_of("panda"), capsules_of("panda")
+    wide = choose_pairs(robot, capsules, SelfCollisionSpec(margin=0.2), samples=500)
+    assert any(pair.reason == "always in contact" for pair in wide.dropped)
+    assert (0, 3) in wide.checked  # nearer than 25 cm at times, never nearer than 6 cm
+    assert (0, 3) not in pairs_of("panda").checked
+
+
+def test_a_pair_that_random_postures_miss_is_found_by_descent() -> None:
+    """Two small balls far out on the Panda meet only in a tiny share of all postures."""
+    robot = robot_of("panda")
+    ball = np.array([0.0, 0.0, 0.25])
+    fixed = np.array([0.55, 0.1, 0.35])
+    capsules = (
+        Capsule("far", 0, fixed, fixed, 0.005, ("far",), by_hand=True),
+        Capsule("tip", 7, ball, ball, 0.005, ("tip",), by_hand=True),
+    )
+    pairs = CollisionPairs(((0, 1),), ())
+    q, _, _ = robot.draw_states(60, seed=0)
+    assert Clearance(robot, capsules, pairs).distances(q).min() > 0.06
+    chosen = choose_pairs(robot, capsules, SelfCollisionSpec(), samples=60, seed=0)
+    assert chosen.checked == ((0, 1),)
+
+
+def test_same_seed_same_pairs() -> None:
+    robot, capsules = robot_of("ur10"), capsules_of("ur10")
+    assert choose_pairs(robot, capsules, SelfCollisionSpec()) == pairs_of("ur10")
