@@ -76,35 +76,41 @@ def _draw_sequence(
     stacked, own = (np.where(np.isfinite(part), part, np.nan) for part in (stacked, own))
     axes.plot(indices, stacked, "o-", color=colour, label=f"{word}, stacked")
     axes.plot(
-        indices, own, "o", color=colour, markerfacecolor="white", markersize=7, zorder=1.9,
+        indices, own, "o", color=colour, markerfacecolor="white", markersize=10, zorder=1.9,
         label=f"{word}, motion alone",
     )  # fmt: skip
     if len(motions) > _MOST_LABELLED:
         return
     for index, alone, together in zip(indices, own, stacked, strict=True):
-        same = np.isclose(alone, together)
-        for number, lower in ((alone, False), (together, below)):
-            if np.isnan(number) or (same and number is alone):
-                continue
-            axes.annotate(
-                f"{number:.1f}",
-                (index, number),
-                xytext=(0, -7 if lower else 6),
-                textcoords="offset points",
-                ha="center",
-                va="top" if lower else "bottom",
-                color=colour,
-                fontsize=8.5,
-            )
+        if np.isclose(alone, together):
+            _label(axes, index, together, colour, below)
+            continue
+        _label(axes, index, alone, colour, below=bool(alone < together))
+        _label(axes, index, together, colour, below=not alone < together)
+
+
+def _label(axes: "Axes", index: int, number: float, colour: str, below: bool) -> None:
+    if not np.isfinite(number):
+        return
+    axes.annotate(
+        f"{number:.1f}" if number < 1000 else f"{number:.0f}",
+        (index, number),
+        xytext=(0, -9 if below else 9),
+        textcoords="offset points",
+        ha="center",
+        va="top" if below else "bottom",
+        color=colour,
+        fontsize=8.5,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+    )
 
 
 def _title(result: Result, infinite: int) -> str:
     drawn, admissible = result.random_candidates
     title = "Condition numbers"
     if result.priors:
-        title += f", stacked on {len(result.priors)} earlier result" + "s" * (
-            len(result.priors) > 1
-        )
+        earlier = len(result.priors)
+        title += f", stacked on {earlier} earlier result{'s' if earlier > 1 else ''}"
     if result.random:
         title += f"; random: the best of {admissible} admissible out of {drawn} drawn"
     if infinite:

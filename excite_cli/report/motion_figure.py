@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 _POINTS = 600  # per joint and line, over the whole motion
 _LIMIT_LINE: dict[str, Any] = {"color": GREY, "linestyle": (0, (4, 2)), "linewidth": 1.0}
+_STEPS = (1, 2, 5, 10)
 _DOTTED = (0, (1, 1))
 # Page layout of the joint grid [in].
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.6, 0.1, 0.95, 0.45
@@ -81,7 +82,7 @@ def draw_motion(motion: Motion, problem: Problem) -> "Figure":
         lower = figure.add_subplot(inner[1], sharex=upper)
         upper.set_title(name, fontsize=8.5)
         _draw_position(upper, times, states[0][:, joint], bounds, joint)
-        upper.set_ylabel(f"q [{units[joint]}]", labelpad=1)
+        upper.set_ylabel(f"q [{units[joint]}]", labelpad=2)
         for order, colour in ((2, GREEN), (1, VERMILION)):
             limit = bounds.upper[order, joint]
             unbounded |= not np.isfinite(limit)
@@ -106,7 +107,7 @@ def _draw_position(axes: "Axes", times: Array, q: Array, bounds: _Bounds, joint:
     seen = np.array([q.min(), q.max(), *(limit for limit in limits if np.isfinite(limit))])
     pad = 0.08 * max(float(np.ptp(seen)), 1e-3)
     axes.set_ylim(seen.min() - pad, seen.max() + pad)
-    axes.yaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(4))
+    axes.yaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(4, steps=_STEPS))
     axes.tick_params(labelbottom=False, bottom=False, pad=2)
 
 
@@ -124,11 +125,11 @@ def _finish_band(axes: "Axes", times: Array, last: bool) -> None:
     axes.set_ylim(-1.2, 1.2)
     axes.set_yticks([-1, 0, 1])
     axes.set_xlim(times[0], times[-1])
-    axes.xaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(5))
+    axes.xaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(5, steps=_STEPS))
     axes.tick_params(pad=2, labelbottom=last)
-    axes.set_ylabel("share [–]", labelpad=1)
+    axes.set_ylabel("share [–]", labelpad=2)
     if last:
-        axes.set_xlabel("time [s]", labelpad=1)
+        axes.set_xlabel("time [s]", labelpad=2)
 
 
 def _head(

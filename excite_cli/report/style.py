@@ -77,7 +77,8 @@ def styled(draw: Callable[P, T]) -> Callable[P, T]:
     @functools.wraps(draw)
     def inner(*args: P.args, **kwargs: P.kwargs) -> T:
         library = matplotlib_part("")
-        with library.rc_context({**library.rcParamsDefault, "backend": "agg", **_SETTINGS}):
+        defaults = {k: v for k, v in library.rcParamsDefault.items() if "backend" not in k}
+        with library.rc_context({**defaults, **_SETTINGS}):
             return draw(*args, **kwargs)
 
     return inner
@@ -97,10 +98,11 @@ def logarithmic(axes: "Axes", values: Iterable[float]) -> None:
     ticker = matplotlib_part("ticker")
     shown = list(values)
     low, high = (min(shown), max(shown)) if shown else (1.0, 10.0)
+    pad = max((high / low) ** 0.14, 1.5)
     axes.set_yscale("log")
-    axes.set_ylim(low / 1.5, high * 1.6)
-    decades = high / low < 1e3
-    axes.yaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0) if decades else (1.0,)))
+    axes.set_ylim(low / pad, high * pad)
+    subs = (1.0, 2.0, 5.0) if high / low < 1e3 else (1.0,)
+    axes.yaxis.set_major_locator(ticker.LogLocator(subs=subs, numticks=50))
     axes.yaxis.set_minor_locator(ticker.NullLocator())
     axes.yaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
 

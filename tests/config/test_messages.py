@@ -1,0 +1,271 @@
+"""What a config that is wrong is told: where, what, the nearest word, and what is allowed."""
+
+from pathlib import Path
+
+import pytest
+
+from excite_cli.config import spec as sections
+from excite_cli.config.load import MAX_BYTES, MAX_DEPTH, load_spec, parse_spec
+from excite_cli.errors import ConfigError
+
+ROBOT = "robot: {urdf: arm.urdf}"
+CAPSULE = "{start: [0, 0, 0], end: [0, 0, 1], radius: 0.1}"
+
+# path of the section, YAML with one unknown key @, the section's class
+LEVELS: dict[str, tuple[str, type[sections.Section]]] = {
+    "": (f"{ROBOT}\n@: 1", sections.Spec),
+    "robot": ("robot: {urdf: arm.urdf, @: 1}", sections.RobotSpec),
+    "robot.limits.elbow": (
+        "robot: {urdf: arm.urdf, limits: {elbow: {@: 1}}}",
+        sections.JointLimits,
+    ),
+    "trajectory": (f"{ROBOT}\ntrajectory: {{@: 1}}", sections.FourierSpec),
+    "sampling": (f"{ROBOT}\nsampling: {{@: 1}}", sections.SamplingSpec),
+    "sampling.cost": (
+        f"{ROBOT}\nsampling: {{cost: {{samples: 9, step: 0.1, @: 1}}}}",
+        sections.GridSpec,
+    ),
+    "sampling.constraints": (
+        f"{ROBOT}\nsampling: {{constraints: {{samples: 9, step: 0.1, @: 1}}}}",
+        sections.GridSpec,
+    ),
+    "criterion": (f"{ROBOT}\ncriterion: {{@: 1}}", sections.CriterionSpec),
+    "constraints": (f"{ROBOT}\nconstraints: {{@: 1}}", sections.ConstraintsSpec),
+    "constraints.joint_limits": (
+        f"{ROBOT}\nconstraints: {{joint_limits: {{@: 1}}}}",
+        sections.JointLimitsSpec,
+    ),
+    "constraints.torque": (f"{ROBOT}\nconstraints: {{torque: {{@: 1}}}}", sections.TorqueSpec),
+    "constraints.balance": (
+        f"{ROBOT}\nconstraints: {{balance: {{kind: disc, radius: 0.1, @: 1}}}}",
+        sections.DiscSpec,
+    ),
+    "constraints.self_collision": (
+        f"{ROBOT}\nconstraints: {{self_collision: {{@: 1}}}}",
+        sections.SelfCollisionSpec,
+    ),
+    "constraints.self_collision.capsules.hand": (
+        f"{ROBOT}\nconstraints: {{self_collision: {{capsules: {{hand: "
+        "{start: [0, 0, 0], end: [0, 0, 1], radius: 0.1, @: 1}}}}",
+        sections.CapsuleSpec,
+    ),
+    "optimizer": (f"{ROBOT}\noptimizer: {{@: 1}}", sections.OptimizerSpec),
+    "sequence": (f"{ROBOT}\nsequence: {{@: 1}}", sections.SequenceSpec),
+}
+
+
+def told(text: str, *overrides: str) -> str:
+    """The message that `text` leads to, which must not speak of our classes."""
+    with pytest.raises(ConfigError) as caught:
+        parse_spec(text, "arm.yaml", list(overrides))
+    message = str(caught.value)
+    for inner in ("literal[", "dict[", "tuple[", "constrained", "instance of", ".bool:", "Spec"):
+        assert inner not in message, f"'{inner}' means nothing to a user: {message}"
+    return message
+
+
+@pytest.mark.parametrize("path", LEVELS)
+def test_unknown_key_names_path_nearest_word_and_allowed_keys(path: str) -> None:
+    text, section = LEVELS[path]
+    keys = sorted(section.model_fields)
+    longest = max(keys, key=len)
+    wrong = longest[:-2] + longest[-1]  # a letter forgotten
+    message = told(text.replace("@", wrong))
+    where = f"{path}.{wrong}" if path else wrong
+    assert message.startswith(f"arm.yaml: {where}: unknown key.")
+    assert f"Did you mean '{longest}'?" in message
+    assert message.endswith(f"Allowed here: {', '.join(keys)}.")
+    assert len(message.splitlines()) == 1
+
+
+def test_every_section_is_covered() -> None:
+    known = {section for _, section in LEVELS.values()}
+    defined = set(sections.Section.__subclasses__())
+    assert defined - known == {sections.BSplineSpec, sections.PolygonSpec}  # tested below
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "foreign", "section"),
+    [
+        ("trajectory: {family: bspline, duration: 3, harmonics: 3}",
+         "trajectory.harmonics", "base_frequency", sections.BSplineSpec),
+        ("trajectory: {duration: 3}", "trajectory.duration", "control_points",
+         sections.FourierSpec),
+        ("constraints: {balance: {kind: polygon, vertices: [[0, 0], [0, 1], [1, 0]], radius: 1}}",
+         "constraints.balance.radius", "center", sections.PolygonSpec),
+    ],
+)  # fmt: skip
+def test_keys_of_another_kind_are_not_offered(
+    text: str, path: str, foreign: str, section: type[sections.Section]
+) -> None:
+    message = told(f"{ROBOT}\n{text}")
+    assert message.startswith(f"arm.yaml: {path}: unknown key.")
+    assert f"Did you mean '{path.split('.')[-1]}'" not in message
+    allowed = message.split("Allowed here: ")[1].rstrip(".").split(", ")
+    assert allowed == sorted(section.model_fields)
+    assert foreign not in allowed
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "words"),
+    [
+        ("optimizer: {restarts: many}", "optimizer.restarts", "integer (given: 'many')"),
+        ("sequence: {motions: 1.5}", "sequence.motions", "(given: 1.5)"),
+        ("sequence: {motions: 0}", "sequence.motions", "greater than or equal to 1"),
+        ("seed: -1", "seed", "greater than or equal to 0 (given: -1)"),
+        ("seed: 4294967296", "seed", "less than or equal to"),
+        ("seed: true", "seed", "(given: True)"),
+        ("trajectory: {base_frequency: -0.7}", "trajectory.base_frequency", "greater than 0"),
+        ("trajectory: {harmonics: true}", "trajectory.harmonics", "(given: True)"),
+        ("trajectory: 3", "trajectory", "(given: 3)"),
+        ("trajectory: [1]", "trajectory", ""),
+        ("trajectory: fourier", "trajectory", "(given: 'fourier')"),
+        ("sampling: {cost: {samples: 1, step: 0.1}}", "sampling.cost.samples", "equal to 2"),
+        ("sampling: {cost: {samples: 9}}", "sampling.cost.step", "required"),
+        ("optimizer: {max_seconds: .inf}", "optimizer.max_seconds", "finite"),
+        ("optimizer: {tolerance: .nan}", "optimizer.tolerance", "finite"),
+        ("constraints: {torque: {scale: 1.5}}", "constraints.torque.scale", "or equal to 1"),
+        ("constraints: {joint_limits: {velocity: -1}}", "constraints.joint_limits.velocity",
+         "greater than 0"),
+        ("constraints: {joint_limits: {velocity: 0}}", "constraints.joint_limits.velocity",
+         "greater than 0"),
+        ("constraints: {joint_limits: {acceleration: true}}",
+         "constraints.joint_limits.acceleration", "(given: True)"),
+        ("constraints: {balance: {radius: 0.1}}", "constraints.balance", "kind"),
+        ("constraints: {balance: {kind: polygon, vertices: [[0, 0], [1, 1]]}}",
+         "constraints.balance.vertices", "at least 3"),
+        ("constraints: {self_collision: {margin: -0.01}}", "constraints.self_collision.margin",
+         "greater than or equal to 0"),
+        ("constraints: {self_collision: {capsules: {hand: {start: [0, 0, 0], radius: 1}}}}",
+         "constraints.self_collision.capsules.hand.end", "required"),
+        ("criterion: {row_weights: {elbow: -1}}", "criterion.row_weights.elbow",
+         "greater than 0 (given: -1)"),
+        ("sequence: []", "sequence", ""),
+        ("sequence: null", "sequence", "(given: None)"),
+        ("1: 2", "1", "strings"),
+    ],
+)  # fmt: skip
+def test_wrong_type_or_sign_names_the_path(text: str, path: str, words: str) -> None:
+    message = told(f"{ROBOT}\n{text}")
+    assert message.startswith(f"arm.yaml: {path}: ")
+    assert words in message
+
+
+@pytest.mark.parametrize(
+    ("inside", "path", "words"),
+    [
+        ("joints: []", "robot.joints", "at least one joint"),
+        ("joints: [elbow, elbow]", "robot.joints", "named twice: elbow"),
+        ("joints: 3", "robot.joints", "'all'"),
+        ("joints: al", "robot.joints", "Did you mean 'all'?"),
+        ("rows: [base]", "robot", "needs base: floating"),
+        ("rows: [joint]", "robot.rows", "Did you mean 'joints'?"),
+        ("base: flaoting", "robot.base", "Did you mean 'floating'?"),
+        ("posture: {elbow: up}", "robot.posture.elbow", "number (given: 'up')"),
+        ("posture: {elbow: true}", "robot.posture.elbow", "(given: True)"),
+        ("gravity: [0, -9.81]", "robot.gravity", "required"),
+        ("limits: {elbow: {position: [1, 0]}}", "robot.limits.elbow.position", "not below"),
+        ("limits: {elbow: {velocity: 0}}", "robot.limits.elbow.velocity", "greater than 0"),
+    ],
+)
+def test_robot_section_messages(inside: str, path: str, words: str) -> None:
+    message = told(f"robot: {{urdf: arm.urdf, {inside}}}")
+    assert message.startswith(f"arm.yaml: {path}")
+    assert words in message
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "nearest"),
+    [
+        ("trajectory: {family: furier}", "trajectory", "fourier"),
+        ("constraints: {balance: {kind: dics, radius: 1}}", "constraints.balance", "disc"),
+        ("criterion: {kind: condition_numbre}", "criterion.kind", "condition_number"),
+        ("criterion: {row_weights: efort}", "criterion.row_weights", "effort"),
+        ("optimizer: {method: slspq}", "optimizer.method", "slsqp"),
+        ("constraints: {self_collision: {capsules: atuo}}",
+         "constraints.self_collision.capsules", "auto"),
+    ],
+)  # fmt: skip
+def test_wrong_kind_suggests_the_nearest(text: str, path: str, nearest: str) -> None:
+    message = told(f"{ROBOT}\n{text}")
+    assert message.startswith(f"arm.yaml: {path}: ")
+    assert f"Did you mean '{nearest}'?" in message
+
+
+@pytest.mark.parametrize("text", ["robot: {}", "robot: {joints: all}"])
+def test_missing_urdf(text: str) -> None:
+    assert told(text) == "arm.yaml: robot.urdf: this key is required."
+
+
+@pytest.mark.parametrize("text", ["seed: 1", "trajectory: {}"])
+def test_missing_robot(text: str) -> None:
+    assert "arm.yaml: robot: this key is required." in told(text)
+
+
+def test_all_mistakes_are_told_at_once() -> None:
+    message = told("robot: {urdf: a.urdf, bas: fixed}\nsead: 1\nsequence: {motions: 0}")
+    assert len(message.splitlines()) == 3
+
+
+@pytest.mark.parametrize("text", ["", "[]", "3", "robot", "- robot: {urdf: a.urdf}"])
+def test_not_a_mapping(text: str) -> None:
+    assert "mapping" in told(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (f"{ROBOT}\nseed: [", 2),
+        (f"{ROBOT}\n\tseed: 1", 2),
+        (f"{ROBOT}: 3", 1),
+        (f"{ROBOT}\n---\nseed: 2", 2),
+        (f"{ROBOT}\nseed: 1\nseed: 2", 3),
+        ("robot:\n  urdf: a.urdf\n  urdf: b.urdf", 3),
+        (f"{ROBOT}\nseed: &one 1\nsequence: {{motions: *one}}", 3),
+        (f"{ROBOT}\nseed: !!python/object:collections.OrderedDict {{}}", 2),
+        (f"{ROBOT}\nseed: !!python/name:os.system", 2),
+        (f"{ROBOT}\n? [1]\n: 2", 2),
+        (f"{ROBOT}\n? {{a: 1}}\n: 2", 2),
+    ],
+)
+def test_what_is_not_plain_yaml_is_refused_with_its_line(text: str, line: int) -> None:
+    message = told(text)
+    assert message.startswith(f"arm.yaml, line {line}: ")
+
+
+def test_duplicate_key_and_alias_are_named() -> None:
+    assert "key 'seed' is given twice" in told(f"{ROBOT}\nseed: 1\nseed: 1")
+    assert "aliases" in told(f"{ROBOT}\nseed: &one 1\nsequence: {{motions: *one}}")
+
+
+@pytest.mark.parametrize("value", ["2020-13-45", "9" * 5000, "\x00"], ids=["date", "long", "nul"])
+def test_values_that_yaml_cannot_make_are_refused(value: str) -> None:
+    assert told(f"{ROBOT}\nseed: {value}").startswith("arm.yaml: ")
+
+
+def test_a_python_tag_runs_nothing(tmp_path: Path) -> None:
+    trace = tmp_path / "trace"
+    told(f"{ROBOT}\nseed: !!python/object/apply:os.mkdir ['{trace}']")
+    assert not trace.exists()
+
+
+@pytest.mark.parametrize("opening", ["[", "{a: "])
+def test_too_deep(opening: str) -> None:
+    assert f"deeper than {MAX_DEPTH}" in told(opening * 2000)
+    assert "deeper" not in told(f"{ROBOT}\nseed: " + "[" * (MAX_DEPTH - 1) + "]" * (MAX_DEPTH - 1))
+
+
+def test_file_messages(tmp_path: Path) -> None:
+    path = tmp_path / "arm.yaml"
+    with pytest.raises(ConfigError, match="There is no config file"):
+        load_spec(path)
+    with pytest.raises(ConfigError, match="There is no config file"):
+        load_spec(tmp_path)
+    path.write_bytes(b"robot: {urdf: \xff\xfe}")
+    with pytest.raises(ConfigError, match="cannot be read as text"):
+        load_spec(path)
+    path.write_text(f"{ROBOT}\n#" + "x" * MAX_BYTES, encoding="utf-8")
+    with pytest.raises(ConfigError, match="larger than"):
+        load_spec(path)
+    path.write_text(f"{ROBOT}\n#" + "x" * (MAX_BYTES // 2), encoding="utf-8")
+    assert load_spec(path).robot.urdf == "arm.urdf"

@@ -1,0 +1,82 @@
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from excite_cli.config.load import load_spec, parse_spec, spec_as_yaml
+from excite_cli.config.spec import (
+    ConstraintsSpec,
+    FourierSpec,
+    JointLimits,
+    JointLimitsSpec,
+    RobotSpec,
+    Spec,
+)
+
+CONFIGS = sorted((Path(__file__).resolve().parents[2] / "configs").glob("*.yaml"))
+
+
+def assert_same(first: Spec, second: Spec) -> None:
+    """Equal, and of equal types: 1.0 and True are equal in Python, but not as a limit."""
+    assert first == second
+    assert first.model_dump_json() == second.model_dump_json()
+
+
+def test_there_are_configs() -> None:
+    assert "smoke.yaml" in [path.name for path in CONFIGS]
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+def test_every_shipped_config_loads_and_round_trips(path: Path) -> None:
+    spec = load_spec(path)
+    assert_same(parse_spec(spec_as_yaml(spec)), spec)
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+def test_the_resolved_text_names_every_default(path: Path) -> None:
+    bare = parse_spec("robot: {urdf: a.urdf}")
+    text = spec_as_yaml(load_spec(path))
+    for section in type(bare).model_fields:
+        assert f"\n{section}:" in f"\n{text}"
+    for key in type(bare.optimizer).model_fields:
+        assert f"  {key}: " in text
+
+
+@pytest.mark.parametrize("velocity", [True, False, 1.0, 2.5])
+def test_a_velocity_bound_of_one_is_not_the_word_yes(velocity: bool | float) -> None:
+    limits = ConstraintsSpec(joint_limits=JointLimitsSpec(velocity=velocity))
+    spec = Spec(robot=RobotSpec(urdf="a.urdf"), constraints=limits)
+    assert_same(parse_spec(spec_as_yaml(spec)), spec)
+    again = parse_spec(spec_as_yaml(spec)).constraints.joint_limits
+    assert again is not None
+    assert type(again.velocity) is type(velocity)
+
+
+numbers = st.floats(1e-12, 1e12)
+# Whatever a URDF may call a joint, with words that YAML reads as something else.
+words = st.one_of(
+    st.sampled_from(["yes", "null", "1", "1e3", "0x10", "2020-01-01", "~", "a: b", "- a", "*a"]),
+    st.text(st.characters(categories=("L", "N", "P")), min_size=1, max_size=12),
+)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(
+    st.lists(words, min_size=1, max_size=4, unique=True),
+    numbers,
+    numbers,
+    st.integers(0, 2**32 - 1),
+)
+def test_any_problem_round_trips(names: list[str], x: float, y: float, seed: int) -> None:
+    spec = Spec(
+        robot=RobotSpec(
+            urdf=names[0],
+            joints=tuple(names),
+            posture=dict.fromkeys(names, -x),
+            limits={names[-1]: JointLimits(position=(-x, y), velocity=y)},
+        ),
+        trajectory=FourierSpec(base_frequency=x),
+        seed=seed,
+    )
+    assert_same(parse_spec(spec_as_yaml(spec)), spec)
