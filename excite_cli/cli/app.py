@@ -1,9 +1,9 @@
 """The program `excite`: its commands, and the way out."""
 
+import inspect
 import sys
 from collections.abc import Callable
 
-import click
 import typer
 
 from excite_cli import __version__
@@ -11,6 +11,7 @@ from excite_cli.cli.check import check
 from excite_cli.cli.compare_random import compare_random
 from excite_cli.cli.console import run_guarded
 from excite_cli.cli.optimize import optimize
+from excite_cli.cli.report import report
 from excite_cli.cli.robots import robots
 from excite_cli.cli.schema import schema
 from excite_cli.cli.verify_gradient import verify_gradient
@@ -25,16 +26,25 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _unwrapped(docstring: str) -> str:
+    """Paragraphs on one line each: the terminal wraps them to its own width."""
+    paragraphs = inspect.cleandoc(docstring).split("\n\n")
+    return "\n\n".join(" ".join(paragraph.split("\n")) for paragraph in paragraphs)
+
+
 _COMMANDS: dict[str, Callable[..., None]] = {
     "optimize": optimize,
     "verify-gradient": verify_gradient,
     "compare-random": compare_random,
     "check": check,
+    "report": report,
     "robots": robots,
     "schema": schema,
 }
 for _name, _command in _COMMANDS.items():
-    app.command(_name)(_command)
+    app.command(_name, help=_unwrapped(_command.__doc__ or ""))(_command)
 
 
 def _version(value: bool) -> None:
@@ -52,6 +62,22 @@ def _options(
     """Plan robot motions that make inertial parameters visible."""
 
 
+# Typer brings its own copy of click in some versions: take the base from one of its errors.
+_USAGE_ERROR: type[Exception] = next(
+    c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"
+)
+
+
+def _mistyped(error: Exception, words: list[str]) -> ConfigError | None:
+    """A helpful error when the first word is no command, else None."""
+    word = next((word for word in words if not word.startswith("-")), None)
+    if word is None or word in _COMMANDS or "ommand" not in str(error):
+        return None
+    return ConfigError(
+        f"there is no command '{word}'.{nearest(word, _COMMANDS)} Commands: {', '.join(_COMMANDS)}."
+    )
+
+
 def main() -> None:
     """Entry point of the console script."""
     command = typer.main.get_command(app)
@@ -59,18 +85,15 @@ def main() -> None:
     def act() -> None:
         try:
             status = command.main(standalone_mode=False)
-        except click.exceptions.Abort as error:
+        except typer.Abort as error:
             raise KeyboardInterrupt from error
-        except click.exceptions.ClickException as error:
-            known = getattr(command, "commands", {})
-            text = error.format_message()
-            if text.startswith("No such command"):
-                wrong = text.split("'")[1]
-                raise ConfigError(
-                    f"there is no command '{wrong}'.{nearest(wrong, known)} "
-                    f"Commands: {', '.join(known)}."
-                ) from error
-            error.show()
+        except _USAGE_ERROR as error:
+            better = _mistyped(error, sys.argv[1:])
+            if better is not None:
+                raise better from error
+            show = getattr(error, "show", None)
+            if show is not None:
+                show()
             raise SystemExit(2) from error
         if isinstance(status, int) and status:
             raise SystemExit(status)

@@ -70,7 +70,7 @@ def check(
                     str(motion.index),
                     constraint.name,
                     f"{worst.margin:.5f}",
-                    constraint.unit,
+                    worst.unit,
                     worst.label,
                     f"{worst.time:.3f}",
                     verdict,

@@ -44,6 +44,7 @@ def compare_random(
 
     from excite_cli.cli.setup import load_problem, output_path, single_threaded
     from excite_cli.cli.tables import comparison_table, motion_data
+    from excite_cli.config.load import parse_spec
     from excite_cli.errors import FileError
     from excite_cli.excitation.motion import Progress, ProgressCallback
     from excite_cli.excitation.random_baseline import random_baseline
@@ -63,6 +64,15 @@ def compare_random(
             reason = matches(problem, result)
             if reason:
                 raise FileError(f"--optimized {optimized} does not belong to {config}: {reason}.")
+            stored = parse_spec(result.config, f"the config stored in {optimized}")
+            if (stored.trajectory, stored.sampling) != (
+                problem.spec.trajectory,
+                problem.spec.sampling,
+            ):
+                raise FileError(
+                    f"--optimized {optimized} has another trajectory or sampling section than "
+                    f"{config}. Compare with the config it was made with."
+                )
         else:
             with terminal.live("optimising", problem.spec.optimizer.max_iterations) as show:
 
@@ -78,7 +88,7 @@ def compare_random(
 
                 result = continue_run(
                     problem,
-                    new_result(problem, [], versions()),
+                    new_result(problem, [], versions(), config.resolve().parent),
                     report,
                     lambda step, current: None,
                 )
@@ -91,6 +101,7 @@ def compare_random(
                 candidates,
                 seconds,
                 lambda drawn, best: show(f"{drawn} drawn, best {best:.1f}", drawn),
+                result.prior_stack,
             )
     result = replace(
         result,

@@ -58,7 +58,7 @@ def optimize(
             result = resumed_result(problem, read_result(path), path)
             terminal.say(f"resuming after motion {len(result.motions)} of {path}")
         else:
-            result = new_result(problem, priors, versions())
+            result = new_result(problem, priors, versions(), config.resolve().parent)
         total = problem.spec.sequence.motions
         with terminal.live("", problem.spec.optimizer.max_iterations) as show:
 

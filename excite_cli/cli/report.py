@@ -154,7 +154,7 @@ def _rebuilt(file: Path, result: "Result", config: Path | None) -> "Problem":
     if not result.motions:
         raise FileError(f"{file} holds no motion yet. Go on with `excite optimize --resume`.")
     spec = parse_spec(result.config, f"the config stored in {file}")
-    folder = (config or file).resolve().parent
+    folder = config.resolve().parent if config is not None else Path(result.config_folder)
     if config is not None:
         given = load_spec(config).robot
         found = {"urdf": given.urdf, "package_dirs": given.package_dirs}

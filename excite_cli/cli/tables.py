@@ -39,7 +39,7 @@ def margin_table(motions: Sequence[Motion], constraints: Sequence[Constraint]) -
         table.add_row(
             constraint.name,
             f"{worst.margin:.4f}",
-            constraint.unit,
+            worst.unit,
             worst.label,
             str(motion.index),
             f"{worst.time:.3f}",
@@ -90,6 +90,7 @@ def worst_data(worst: Worst) -> dict[str, Any]:
     """A worst margin for `--json`."""
     return {
         "margin": worst.margin,
+        "unit": worst.unit,
         "where": worst.label,
         "time": worst.time,
         "violations": worst.violations,

@@ -1,7 +1,8 @@
 """Centre of mass above a convex region of the ground (Eq. 52), as half-planes.
 
 A disc is taken as its inscribed regular polygon: linear in the centre of mass, whereas the
-quadratic form has no gradient at the centre. The polygon has 16 sides and gives away 2 % of the radius.
+quadratic form has no gradient at the centre. The polygon has 16 sides and gives away 2 % of the
+radius.
 """
 
 import numpy as np

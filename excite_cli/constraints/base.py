@@ -22,6 +22,7 @@ class Worst:
     """The smallest margin of a constraint over a motion, with where and when it occurs."""
 
     margin: float
+    unit: str
     label: str
     time: float
     violations: int
@@ -46,8 +47,13 @@ class Constraint(ABC):
     ) -> tuple[Array | None, Array | None, Array | None]:
         """Derivatives (K, n) of K margins with respect to q, v, a; None where identically zero."""
 
+    def unit_of(self, column: int) -> str:
+        """Unit of one column; prismatic joints differ from the others."""
+        return self.unit
+
     def worst(self, margins: Array, times: Array) -> Worst:
         """Smallest margin of all, ties and all instants included."""
-        t, column = np.unravel_index(int(np.argmin(margins)), margins.shape)
+        t, column = divmod(int(np.argmin(margins)), margins.shape[1])
+        margin = float(margins[t, column])
         broken = int(np.count_nonzero(margins < 0))
-        return Worst(float(margins[t, column]), self.labels[column], float(times[t]), broken)
+        return Worst(margin, self.unit_of(column), self.labels[column], float(times[t]), broken)

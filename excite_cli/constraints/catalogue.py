@@ -54,17 +54,17 @@ def _joint_bounds(spec: JointLimitsSpec, robot: Robot) -> list[Constraint]:
                 f"constraints.joint_limits.position_margin: {spec.position_margin:g} leaves no "
                 f"range for {', '.join(crossed)}."
             )
-        found.append(JointBound.between(0, lower, upper, names))
+        found.append(JointBound.between(0, lower, upper, robot))
     if spec.velocity is not False:
         given = None if spec.velocity is True else float(spec.velocity)
         speed = limits.velocity if given is None else np.minimum(limits.velocity, given)
         speed = spec.scale * speed
-        found.append(JointBound.between(1, -speed, speed, names))
+        found.append(JointBound.between(1, -speed, speed, robot))
     acceleration = limits.acceleration
     if spec.acceleration is not None:
         acceleration = np.minimum(acceleration, spec.acceleration)
     if np.isfinite(acceleration).any():
-        found.append(JointBound.between(2, -acceleration, acceleration, names))
+        found.append(JointBound.between(2, -acceleration, acceleration, robot))
     return found
 
 

@@ -3,12 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.robot.model import Robot
 from excite_cli.robot.states import States
+
+Mask = NDArray[np.bool_]
 
 _ORDERS = ("position", "velocity", "acceleration")
 _UNITS = ("rad", "rad/s", "rad/s²")
+_SLIDING_UNITS = ("m", "m/s", "m/s²")
 
 
 @dataclass(frozen=True)
@@ -24,6 +29,7 @@ class JointBound(Constraint):
     bounds: Array
     scale: Array
     labels: tuple[str, ...]
+    sliding: Mask
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -32,14 +38,18 @@ class JointBound(Constraint):
 
     @property
     def unit(self) -> str:  # type: ignore[override]
-        """Unit for revolute joints; prismatic ones have m instead of rad."""
+        """Unit of revolute joints; see `unit_of`."""
         return _UNITS[self.order]
 
+    def unit_of(self, column: int) -> str:
+        """Metres instead of radians for a prismatic joint."""
+        units = _SLIDING_UNITS if self.sliding[self.joints[column]] else _UNITS
+        return units[self.order]
+
     @classmethod
-    def between(
-        cls, order: int, lower: Array, upper: Array, names: tuple[str, ...]
-    ) -> "JointBound":
-        """Bounds (n,) of all joints; infinite ones are left out."""
+    def between(cls, order: int, lower: Array, upper: Array, robot: Robot) -> "JointBound":
+        """Bounds (n,) of all joints of `robot`; infinite ones are left out."""
+        names = robot.joint_names
         low, high = np.flatnonzero(np.isfinite(lower)), np.flatnonzero(np.isfinite(upper))
         half = np.where(np.isfinite(upper - lower), (upper - lower) / 2, 1.0)
         joints = np.concatenate([low, high])
@@ -51,6 +61,7 @@ class JointBound(Constraint):
             scale=half[joints],
             labels=tuple(f"{names[j]} lower" for j in low)
             + tuple(f"{names[j]} upper" for j in high),
+            sliding=robot.sliding,
         )
 
     def values(self, states: States) -> Array:

@@ -21,9 +21,14 @@ class JointTorque(Constraint):
         self._signs = np.concatenate([-np.ones(len(bounded)), np.ones(len(bounded))])
         self._limits = limits[self._joints]
         self.scale = self._limits
+        self._sliding = robot.sliding
         self.labels = tuple(
             f"{robot.joint_names[j]} {side}" for side in ("lower", "upper") for j in bounded
         )
+
+    def unit_of(self, column: int) -> str:
+        """Newtons for a prismatic joint."""
+        return "N" if self._sliding[self._joints[column]] else self.unit
 
     def margins(self, states: States) -> Array:
         """limit − |τ| on either side (T, m) [N·m or N]."""

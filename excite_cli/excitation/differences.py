@@ -33,7 +33,10 @@ def fourth_order_differences(
     """Central differences on five points: truncation h⁴ allows a large step, hence little noise."""
     return _each(
         lambda at, h: (
-            (8 * (function(at(h)) - function(at(-h))) - (function(at(2 * h)) - function(at(-2 * h))))
+            (
+                8 * (function(at(h)) - function(at(-h)))
+                - (function(at(2 * h)) - function(at(-2 * h)))
+            )
             / (12 * h)
         ),
         x,

@@ -56,7 +56,7 @@ class Objective:
         self.stack = stack or Stack.empty(base.rank)
         self._gram_0 = self.stack.factor.T @ self.stack.factor
         self._regressor = Regressor(robot)
-        self._few = FictitiousInertiaAdjoint(robot)
+        self._few = FictitiousInertiaAdjoint(robot, base.silent_direction())
         self._many = SpatialAdjoint(robot)
         self._plain = weighting.plain
 

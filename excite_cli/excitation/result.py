@@ -17,10 +17,12 @@ from excite_cli.robot.model import Array
 class Result:
     """Motions of one problem so far, with the stack that includes them and the priors.
 
-    `config` is the full resolved problem as YAML text, `fingerprint` the robot's.
+    `config` is the full resolved problem as YAML text, `config_folder` where its relative paths
+    start, `fingerprint` the robot's. `prior_stack` holds what was there before motion 1.
     """
 
     config: str
+    config_folder: str
     fingerprint: str
     seed: int
     joint_names: tuple[str, ...]
@@ -30,6 +32,7 @@ class Result:
     column_scales: Array
     motions: tuple[Motion, ...]
     stack: Stack
+    prior_stack: Stack
     random: tuple[RandomMotion, ...] = ()
     random_candidates: tuple[int, int] = (0, 0)
     priors: tuple[str, ...] = ()

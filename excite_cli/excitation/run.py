@@ -17,9 +17,12 @@ from excite_cli.excitation.stack import Stack
 
 
 def new_result(
-    problem: Problem, priors: list[tuple[str, Result]], versions: dict[str, str]
+    problem: Problem,
+    priors: list[tuple[str, Result]],
+    versions: dict[str, str],
+    folder: Path | None = None,
 ) -> Result:
-    """A result without motions, its stack made of the priors.
+    """A result without motions, its stack made of the priors; `folder` is that of the config.
 
     Raises
     ------
@@ -38,6 +41,7 @@ def new_result(
     checked, dropped = _pairs(problem)
     return Result(
         config=spec_as_yaml(problem.spec),
+        config_folder=str((folder or Path.cwd()).resolve()),
         fingerprint=problem.robot.fingerprint(),
         seed=problem.spec.seed,
         joint_names=problem.robot.joint_names,
@@ -47,6 +51,7 @@ def new_result(
         column_scales=problem.weighting.columns,
         motions=(),
         stack=stack,
+        prior_stack=stack,
         priors=tuple(name for name, _ in priors),
         versions=versions,
         checked_pairs=checked,

@@ -90,7 +90,7 @@ class MotionTask:
             if value[:, at].min() < smallest:
                 smallest = float(value[:, at].min())
                 margin = smallest * float(constraint.scale[at]) + float(guard[at])
-                name, unit = constraint.name, constraint.unit
+                name, unit = constraint.name, constraint.unit_of(at)
         return Progress(iteration, spectrum.condition_number, name, margin, unit, seconds, stage)
 
     @cached_property

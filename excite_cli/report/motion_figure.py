@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -72,10 +71,9 @@ def draw_motion(motion: Motion, problem: Problem) -> "Figure":
         right=1 - _RIGHT / WIDTH,
         top=1 - _TOP / height,
         bottom=_BOTTOM / height,
-        wspace=0.36 if columns <= 3 else 0.45,
+        wspace=0.36 if columns <= 3 else 0.48,
         hspace=0.27 if columns <= 3 else 0.32,
     )
-    unbounded = False
     for joint, name in enumerate(robot.joint_names):
         inner = outer[divmod(joint, columns)].subgridspec(2, 1, height_ratios=(5, 3), hspace=0.1)
         upper = figure.add_subplot(inner[0])
@@ -84,11 +82,10 @@ def draw_motion(motion: Motion, problem: Problem) -> "Figure":
         _draw_position(upper, times, states[0][:, joint], bounds, joint)
         upper.set_ylabel(f"q [{units[joint]}]", labelpad=2)
         for order, colour in ((2, GREEN), (1, VERMILION)):
-            limit = bounds.upper[order, joint]
-            unbounded |= not np.isfinite(limit)
-            _draw_share(lower, times, states[order][:, joint], limit, colour)
-        _finish_band(lower, times, last=joint + columns >= robot.n)
-    _head(figure, motion, problem, height, unbounded)
+            _draw_share(lower, times, states[order][:, joint], bounds.upper[order, joint], colour)
+        bounded = bool(np.isfinite(bounds.upper[1:, joint]).any())
+        _finish_band(lower, times, bounded, last=joint + columns >= robot.n)
+    _head(figure, motion, problem, height, bool(np.isinf(bounds.upper[1:]).any()))
     return figure
 
 
@@ -116,13 +113,15 @@ def _draw_share(axes: "Axes", times: Array, values: Array, limit: float, colour:
         axes.plot(times, values / limit, color=colour, linewidth=1.1)
         return
     peak = float(np.abs(values).max()) or 1.0
-    axes.plot(times, values / peak, color=colour, linewidth=1.1, linestyle=_DOTTED)
+    axes.plot(times, values / peak, color=colour, linewidth=1.4, linestyle=_DOTTED)
 
 
-def _finish_band(axes: "Axes", times: Array, last: bool) -> None:
-    for side in (-1.0, 1.0):
-        axes.axhline(side, **_LIMIT_LINE)
-    axes.set_ylim(-1.2, 1.2)
+def _finish_band(axes: "Axes", times: Array, bounded: bool, last: bool) -> None:
+    if bounded:
+        for side in (-1.0, 1.0):
+            axes.axhline(side, **_LIMIT_LINE)
+    peak = max(float(np.abs(line.get_ydata()).max()) for line in axes.lines)
+    axes.set_ylim(-1.2 * max(1.0, peak), 1.2 * max(1.0, peak))
     axes.set_yticks([-1, 0, 1])
     axes.set_xlim(times[0], times[-1])
     axes.xaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(5, steps=_STEPS))
@@ -177,9 +176,7 @@ def _bounds(problem: Problem) -> _Bounds:
 
 
 def _position_units(robot: Robot) -> list[str]:
-    joints = ElementTree.fromstring(robot.description.xml).findall("joint")
-    sliding = {joint.get("name") for joint in joints if joint.get("type") == "prismatic"}
-    return ["m" if name in sliding else "rad" for name in robot.joint_names]
+    return ["m" if slides else "rad" for slides in robot.sliding]
 
 
 def watched_constraints(problem: Problem) -> tuple[Constraint, ...]:

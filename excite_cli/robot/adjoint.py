@@ -6,10 +6,15 @@ of the regressor, only one RNEA-derivatives pass per pair:
 
     ∂/∂x = Σ_k u_kᵀ ∂ID(x; φ_k)/∂x.
 
-Pinocchio stores a body as (m, c, I_c), which breaks down for m ≈ 0; ID is linear in φ, hence
-ID(·; φ) = ID(·; φ + s φ_ref) − s ID(·; φ_ref) with a fixed unit inertia φ_ref. The second pass is
-shared by all pairs. Exact.
+Pinocchio stores a body as (m, c, I_c), which breaks down for m ≈ 0. ID is linear in φ, so a shift
+is free of error where it can be told apart or does not show:
+- a direction d of the standard parameters that no torque shows (Y d = 0, masses all non-zero, from
+  the base parameters' grouping) may be added outright: ID(·; φ + s d) = ID(·; φ);
+- without one, ID(·; φ) = ID(·; φ + s φ_ref) − s ID(·; φ_ref) with a fixed unit inertia φ_ref, the
+  second pass being shared by all pairs.
 """
+
+from collections.abc import Iterator
 
 import numpy as np
 import pinocchio as pin
@@ -22,10 +27,12 @@ _REFERENCE = np.array([1.0, 0, 0, 0, 1.0, 0, 1.0, 0, 0, 1.0])
 class FictitiousInertiaAdjoint:
     """Pull-back for few pairs (the condition number has two); not to be shared between threads."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, silent: Array | None = None) -> None:
+        """`silent`: a direction (P,) with Y d = 0 (`BaseParameters.silent_direction`), if any."""
         self.robot = robot
         self._model = robot.model.copy()
         self._data = self._model.createData()
+        self._silent = silent if silent is not None and _shifts_every_mass(silent) else None
 
     def pull_back(
         self, q: Array, v: Array, a: Array, left: Array, right: Array
@@ -46,17 +53,23 @@ class FictitiousInertiaAdjoint:
         states = list(
             zip(robot.configurations(q), robot.velocities(v), robot.velocities(a), strict=True)
         )
-        # Twice the largest entry: the shifted masses stay well away from zero.
-        shift = 2.0 * np.abs(right).max(axis=1) + 1e-300
-        weights = np.zeros((len(right) + 1, len(q), self._model.nv))
-        weights[:-1, :, robot.rows] = left
-        weights[-1, :, robot.rows] = -np.einsum("k,ktr->rt", shift, left)
-        bodies = right.reshape(len(right), -1, 10) + shift[:, None, None] * _REFERENCE
         total = np.zeros((3, len(q), self._model.nv))
-        for weight, inertias in zip(weights[:-1], bodies, strict=True):
-            self._add_pass(total, states, weight, inertias)
-        self._add_pass(total, states, weights[-1], np.tile(_REFERENCE, (robot.n_bodies, 1)))
+        for weight, inertias in self._passes(left, right):
+            self._add_pass(total, states, weight, inertias.reshape(-1, 10))
         return total[0][:, robot.moved], total[1][:, robot.moved], total[2][:, robot.moved]
+
+    def _passes(self, left: Array, right: Array) -> Iterator[tuple[Array, Array]]:
+        """Weights (T, nv) and standard parameters (P,) of each RNEA-derivatives pass."""
+        reference = np.tile(_REFERENCE, self.robot.n_bodies)
+        direction = reference if self._silent is None else self._silent
+        # Twice the largest entry: the shifted masses stay well away from zero.
+        least = np.abs(direction[::10]).min()
+        shift = (2.0 * np.abs(right).max(axis=1) + 1e-300) / least
+        weights = np.zeros((*left.shape[:2], self._model.nv))
+        weights[:, :, self.robot.rows] = left
+        yield from zip(weights, right + shift[:, None] * direction, strict=True)
+        if self._silent is None:
+            yield -np.einsum("k,ktr->tr", shift, weights), reference
 
     def _add_pass(self, total: Array, states: list, weight: Array, inertias: Array) -> None:
         model, data, compute = self._model, self._data, pin.computeRNEADerivatives
@@ -77,3 +90,8 @@ class FictitiousInertiaAdjoint:
         upper = np.triu(by_a)
         total[2] += (row @ upper)[:, 0] + (upper @ weight[:, :, None])[:, :, 0]
         total[2] -= weight * np.einsum("tii->ti", by_a)
+
+
+def _shifts_every_mass(direction: Array) -> bool:
+    masses = np.abs(direction[::10])
+    return bool(masses.min() > 0.05 * np.abs(direction).max())

@@ -44,6 +44,17 @@ class BaseParameters:
         """Number of base parameters."""
         return len(self.selection)
 
+    def silent_direction(self) -> Array:
+        """A change d (P,) of the standard parameters that no torque shows: Y d = 0.
+
+        Every mass that is grouped into others is one, the kept parameters make up for it.
+        """
+        direction = np.zeros(self.mapping.shape[1])
+        direction[::10] = 1.0
+        direction[self.selection] = 0.0
+        direction[self.selection] = -self.mapping @ direction
+        return direction
+
     def in_words(self, digits: int = 3) -> tuple[str, ...]:
         """For every base parameter the standard parameters it groups, `m[a] + 0.4·mz[b] …`."""
         return tuple(_sum_in_words(row, self.names, digits) for row in self.mapping)

@@ -65,6 +65,13 @@ class Robot:
         return int(self.model.njoints) - 1
 
     @property
+    def sliding(self) -> NDArray[np.bool_]:
+        """Which moved joints (n,) are prismatic."""
+        first = self.model.njoints - self.n
+        names = [self.model.joints[first + j].shortname() for j in range(self.n)]
+        return np.array(["JointModelP" in name for name in names])
+
+    @property
     def row_names(self) -> tuple[str, ...]:
         """Name of each measured row."""
         base = ("base_fx", "base_fy", "base_fz", "base_mx", "base_my", "base_mz")

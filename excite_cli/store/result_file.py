@@ -5,6 +5,7 @@ time. Reading trusts nothing: a foreign or damaged file gives one message.
 """
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ def _write(path: Path, result: Result, problem: Problem) -> None:
                 "versions": json.dumps(result.versions),
                 "seed": result.seed,
                 "config": result.config,
+                "config_folder": result.config_folder,
                 "robot_hash": result.fingerprint,
                 "joint_names": list(result.joint_names),
                 "priors": list(result.priors),
@@ -57,6 +59,8 @@ def _write(path: Path, result: Result, problem: Problem) -> None:
         file["tables/random"] = _table(result.random)
         file["stack/R"] = result.stack.factor
         file["stack"].attrs["rows"] = result.stack.rows
+        file["stack/R_0"] = result.prior_stack.factor
+        file["stack/R_0"].attrs["rows"] = result.prior_stack.rows
         group = file.create_group("base_parameters")
         group["selection"] = result.base_selection
         group["words"] = list(result.base_words)
@@ -95,9 +99,7 @@ def _write_motion(group: Any, motion: Motion, problem: Problem) -> None:
             "evaluations": motion.evaluations,
             "margins": json.dumps(
                 {
-                    name: {"margin": w.margin, "label": w.label, "time": w.time,
-                           "violations": w.violations}
-                    for name, w in motion.margins.items()
+                    name: asdict(worst) for name, worst in motion.margins.items()
                 }
             ),
         }
@@ -139,11 +141,9 @@ def _read(file: Any, path: Path) -> Result:
             "Update the program."
         )
     base = file["base_parameters"]
-    factor = np.asarray(file["stack/R"], dtype=float)
-    if factor.ndim != 2 or factor.shape[0] != factor.shape[1] or not np.isfinite(factor).all():
-        raise ValueError("/stack/R is not a finite square matrix")
     return Result(
         config=str(attributes["config"]),
+        config_folder=str(attributes["config_folder"]),
         fingerprint=str(attributes["robot_hash"]),
         seed=int(attributes["seed"]),
         joint_names=tuple(str(name) for name in attributes["joint_names"]),
@@ -155,7 +155,8 @@ def _read(file: Any, path: Path) -> Result:
             _read_motion(file[f"motions/{index}"], index)
             for index in sorted(int(name) for name in file.get("motions", {}))
         ),
-        stack=Stack(factor, int(file["stack"].attrs["rows"])),
+        stack=_read_stack(file["stack/R"], int(file["stack"].attrs["rows"])),
+        prior_stack=_read_stack(file["stack/R_0"], int(file["stack/R_0"].attrs["rows"])),
         random=tuple(
             RandomMotion(
                 index,
@@ -174,6 +175,13 @@ def _read(file: Any, path: Path) -> Result:
         checked_pairs=tuple(text.decode() for text in file["collision_pairs/checked"][()]),
         dropped_pairs=tuple(text.decode() for text in file["collision_pairs/dropped"][()]),
     )
+
+
+def _read_stack(dataset: Any, rows: int) -> Stack:
+    factor = np.asarray(dataset, dtype=float)
+    if factor.ndim != 2 or factor.shape[0] != factor.shape[1] or not np.isfinite(factor).all():
+        raise ValueError(f"{dataset.name} is not a finite square matrix")
+    return Stack(factor, rows)
 
 
 def _read_motion(group: Any, index: int) -> Motion:

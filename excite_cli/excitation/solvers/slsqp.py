@@ -1,10 +1,11 @@
 """SciPy's SLSQP on working sets: slow for many rows, but it needs nothing beyond SciPy.
 
 SLSQP solves a dense least-squares problem with every row it is given, so it is run in short
-rounds on few rows: the dips (smallest in time) of residuals near zero. After a round the rows
-that its result breaks, or has come near to, are added; none is dropped before the next criterion
-of the continuation. Every point that SLSQP visits and that is admissible on the whole grid is a
-candidate for the outcome, and so is the result of every round once it is restored.
+rounds, each within a box, on few rows: the dips (smallest in time) of residuals near zero. After
+a round the rows that its result breaks, or has come near to, are added; none is dropped before
+the next criterion of the continuation. Every point that SLSQP visits and that is admissible on
+the whole grid is a candidate for the outcome, and so is the result of every round once it is
+restored.
 """
 
 import time
@@ -25,6 +26,7 @@ from excite_cli.excitation.solvers.sqp import (
     Mask,
     dips,
     gathered,
+    lowest,
 )
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.states import States
@@ -34,6 +36,9 @@ _AIM, _NEAR = 1e-4, 0.1
 # Iterations of a round: few at first, when it is not known yet what will bind; and what a stage
 # may still gain in a round (on the criterion asked for) when it counts as done.
 _FIRST_ROUND, _LONGEST_ROUND, _IDLE = 2, 12, 3
+# How far a round may move each variable: it grows with success. A round whose result breaks a
+# residual by more than `_LOST` and cannot be restored is undone and the box made smaller.
+_FIRST_RADIUS, _NARROWEST, _WIDEST, _LOST = 0.1, 1e-3, 10.0, 0.05
 _CHANGES = (3e-2, 1e-2, 1e-3)
 
 
@@ -78,6 +83,7 @@ class _Run:
         self.stage = ""
         self.reached = np.zeros(0)
         self.length = _FIRST_ROUND
+        self.radius = _FIRST_RADIUS
         # SLSQP's first Hessian is the identity: variables are scaled to make that a good guess.
         self.factor = np.linalg.cholesky(
             task.metric + 1e-9 * np.trace(task.metric) / task.size * np.eye(task.size)
@@ -105,19 +111,15 @@ class _Run:
         chosen = [np.zeros_like(value, dtype=bool) for value in self.point(self.reached).values]
         while True:
             chosen = self.joined(chosen)
-            before, known = self.best.cost, self.iterations
+            before = self.best.cost
             self.round(chosen)
             self.length = min(self.length + 1, _LONGEST_ROUND)
             self.best.offer_restored(self.reached)
             if before - self.best.cost >= change:
-                idle = 0
+                idle, self.radius = 0, min(2.0 * self.radius, _WIDEST)
                 continue
-            spectrum = self.point(self.reached).spectrum
-            lost = self.task.problem.criterion.value(spectrum.sigma) < self.best.cost - change
-            if lost and self.iterations > known:
-                # Better but beyond restoration: go back, with the rows that this has shown.
-                chosen = self.joined(chosen)
-                self.reached = self.best.kept()
+            if lowest(self.point(self.reached).values) < -_LOST and self.radius > _NARROWEST:
+                self.reached, self.radius = self.best.kept(), 0.3 * self.radius
                 continue
             idle += 1
             if idle == _IDLE:
@@ -149,9 +151,11 @@ class _Run:
         constraints: list[Any] = []
         if any(mask.any() for mask in chosen):
             constraints = [{"type": "ineq", "fun": residuals, "jac": jacobian}]
+        y0 = self.factor.T @ self.reached
         result = minimize(
             cost,
-            self.factor.T @ self.reached,
+            y0,
+            bounds=np.column_stack([y0 - self.radius, y0 + self.radius]),
             jac=True,
             method="SLSQP",
             constraints=constraints,

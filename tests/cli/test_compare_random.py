@@ -1,0 +1,44 @@
+from excite_cli.store.result_file import read_result
+from tests.cli.conftest import Run
+from tests.cli.program import BRIEF, SMOKE, Program
+
+
+def test_random_beside_optimised(excite: Program, two_motions: Run) -> None:
+    answer = excite.answer(
+        "compare-random", SMOKE, *BRIEF, "--candidates", "4", "--optimized", two_motions.path,
+        "-o", "both.h5",
+    )  # fmt: skip
+    assert set(answer) >= {"random", "optimized", "candidates", "admissible"}
+    assert answer["candidates"] >= 4
+    assert 0 < answer["admissible"] <= answer["candidates"]
+    stored = read_result(two_motions.path)
+    assert [m["condition_number"] for m in answer["optimized"]] == [
+        m.condition_number for m in stored.motions
+    ]
+    random = answer["random"]
+    assert [m["index"] for m in random] == [1, 2]
+    for motion in random:
+        assert set(motion) >= {"index", "condition_number", "stacked_condition_number"}
+    assert random[1]["stacked_condition_number"] < random[0]["stacked_condition_number"]
+    both = read_result(excite.folder / "both.h5")
+    assert [m.condition_number for m in both.random] == [m["condition_number"] for m in random]
+    assert both.random_candidates == (answer["candidates"], answer["admissible"])
+    assert len(both.motions) == 2
+
+
+def test_it_optimises_first_where_there_is_no_result(excite: Program, two_motions: Run) -> None:
+    answer = excite.answer("compare-random", SMOKE, *BRIEF, "--candidates", "2", "--motions", "1")
+    (motion,) = answer["optimized"]
+    first = read_result(two_motions.path).motions[0]
+    assert motion["condition_number"] == first.condition_number
+    assert len(answer["random"]) == 1
+    assert list(excite.folder.iterdir()) == []  # no -o, no file
+
+
+def test_a_result_of_another_robot_is_refused(excite: Program, two_motions: Run) -> None:
+    run = excite(
+        "compare-random", SMOKE, "--optimized", two_motions.path,
+        "--set", "robot.joints=[shoulder_pitch, elbow, wrist_roll, slide]",
+    )  # fmt: skip
+    assert run.returncode == 2
+    assert "does not belong to" in run.stderr

@@ -1,0 +1,209 @@
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from excite_cli.store.result_file import read_result
+from tests.cli.conftest import Run
+from tests.cli.program import BRIEF, SMOKE, Program
+
+KEYS = {"index", "condition_number", "stacked_condition_number", "status", "seconds", "iterations",
+        "evaluations"}  # fmt: skip
+
+
+def test_json_is_all_of_stdout_and_has_the_keys_of_the_contract(two_motions: Run) -> None:
+    answer = json.loads(two_motions.process.stdout)  # fails on any word beside it
+    assert two_motions.process.stdout.count("\n") == 1
+    assert answer["output"] == str(two_motions.path)
+    assert [motion["index"] for motion in answer["motions"]] == [1, 2]
+    for motion in answer["motions"]:
+        assert set(motion) >= KEYS
+        assert motion["iterations"] > 0
+        assert motion["evaluations"] > 0
+        assert all(worst["margin"] >= 0 for worst in motion["margins"].values())
+
+
+def test_json_is_what_the_file_says(two_motions: Run) -> None:
+    answer = json.loads(two_motions.process.stdout)
+    for told, stored in zip(answer["motions"], read_result(two_motions.path).motions, strict=True):
+        for key in KEYS:
+            assert told[key] == getattr(stored, key)
+
+
+def test_the_second_motion_lowers_the_condition_number_of_the_stack(two_motions: Run) -> None:
+    first, second = read_result(two_motions.path).motions
+    assert first.condition_number == pytest.approx(first.stacked_condition_number, rel=1e-9)
+    assert second.stacked_condition_number < first.stacked_condition_number
+    assert second.stacked_condition_number < second.condition_number
+
+
+def test_people_are_told_on_stderr_what_was_understood(two_motions: Run) -> None:
+    told = two_motions.process.stderr
+    assert "smoke_arm: 5 joints" in told
+    assert "self_collision" in told
+    assert "motion 2: condition number" in told
+
+
+def test_tables_on_stdout_and_the_default_name(excite: Program) -> None:
+    run = excite("optimize", SMOKE, *BRIEF, "--motions", "1", "--no-progress")
+    assert run.returncode == 0
+    assert (excite.folder / "smoke.h5").is_file()
+    condition = read_result(excite.folder / "smoke.h5").motions[0].condition_number
+    assert f"{condition:.2f}" in run.stdout
+    for word in ("joint_torque", "self_collision", "rad/s²", "smoke.h5"):
+        assert word in run.stdout
+
+
+def test_quiet_is_silent_and_seed_and_set_count(excite: Program, two_motions: Run) -> None:
+    run = excite("optimize", SMOKE, *BRIEF, "--motions", "1", "--seed", "9", "--quiet")
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
+    result = read_result(excite.folder / "smoke.h5")
+    assert result.seed == 9
+    assert "seed: 9" in result.config
+    assert "max_iterations: 6" in result.config
+    other = read_result(two_motions.path).motions[0]
+    assert not np.allclose(result.motions[0].coefficients, other.coefficients)
+
+
+def test_the_same_seed_gives_the_same_numbers(excite: Program, two_motions: Run) -> None:
+    excite("optimize", SMOKE, *BRIEF, "--motions", "1", "--quiet")
+    again = read_result(excite.folder / "smoke.h5").motions[0]
+    np.testing.assert_array_equal(
+        again.coefficients, read_result(two_motions.path).motions[0].coefficients
+    )
+
+
+def test_verbose_lists_pairs_and_base_parameters(excite: Program) -> None:
+    run = excite("optimize", SMOKE, "--motions", "1", *BRIEF, "--verbose")
+    assert run.returncode == 0
+    dropped = [line for line in run.stderr.splitlines() if line.startswith("  dropped")]
+    checked = [line for line in run.stderr.splitlines() if line.startswith("  checked")]
+    assert f"{len(checked)} pairs checked, {len(dropped)} dropped" in run.stderr
+    assert "base parameter" in run.stderr
+
+
+def test_an_existing_file_is_refused_and_left_alone(excite: Program, two_motions: Run) -> None:
+    path = excite.folder / "arm.h5"
+    path.write_bytes(two_motions.path.read_bytes())
+    run = excite("optimize", SMOKE, "-o", path, *BRIEF)
+    assert run.returncode == 2
+    assert f"{path} exists already" in run.stderr
+    for way in ("-o", "--resume", "--overwrite"):
+        assert way in run.stderr
+    assert path.read_bytes() == two_motions.path.read_bytes()
+    assert run.stdout == ""
+
+
+def test_overwrite(excite: Program) -> None:
+    (excite.folder / "arm.h5").write_text("to be replaced", encoding="utf-8")
+    run = excite("optimize", SMOKE, "-o", "arm.h5", *BRIEF, "--motions", "1", "--overwrite")
+    assert run.returncode == 0
+    assert len(read_result(excite.folder / "arm.h5").motions) == 1
+
+
+def test_overwrite_leaves_the_old_file_where_nothing_replaces_it(excite: Program) -> None:
+    path = excite.folder / "arm.h5"
+    path.write_text("kept", encoding="utf-8")
+    run = excite("optimize", SMOKE, "-o", path, "--overwrite", "--set", "optimizer.max_itertions=1")
+    assert run.returncode == 2
+    assert path.read_text(encoding="utf-8") == "kept"
+
+
+def test_a_folder_is_no_output(excite: Program) -> None:
+    run = excite("optimize", SMOKE, "-o", excite.folder)
+    assert run.returncode == 2
+    assert "is a folder" in run.stderr
+
+
+def test_a_prior_makes_the_stack_better_than_the_motion(excite: Program, two_motions: Run) -> None:
+    prior = read_result(two_motions.path)
+    answer = excite.answer(
+        "optimize", SMOKE, "-o", "more.h5", *BRIEF, "--motions", "1", "--seed", "3",
+        "--prior", two_motions.path,
+    )  # fmt: skip
+    (motion,) = answer["motions"]
+    assert motion["index"] == 1
+    assert motion["stacked_condition_number"] < motion["condition_number"]
+    result = read_result(excite.folder / "more.h5")
+    assert result.priors == (str(two_motions.path),)
+    assert result.stack.rows == 3 * prior.stack.rows / 2
+    gram = result.stack.factor.T @ result.stack.factor
+    less = np.linalg.eigvalsh(gram - prior.stack.factor.T @ prior.stack.factor)
+    assert less.min() > 0  # what remains is the motion's own, and it shows every parameter
+    squares = np.linalg.eigvalsh(gram)
+    assert motion["stacked_condition_number"] == pytest.approx(
+        np.sqrt(squares[-1] / squares[0]), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "robot.joints=[shoulder_pitch, elbow, wrist_roll, slide]",
+        "robot.gravity=[0, 0, -1.62]",
+        "criterion.row_weights=effort",
+    ],
+)
+def test_a_prior_of_another_problem_is_refused(
+    excite: Program, two_motions: Run, change: str
+) -> None:
+    run = excite("optimize", SMOKE, "--set", change, *BRIEF, "--prior", two_motions.path)
+    assert run.returncode == 2
+    assert f"--prior {two_motions.path} cannot be stacked" in run.stderr
+    assert list(excite.folder.iterdir()) == []
+
+
+def test_a_prior_that_is_no_result(excite: Program) -> None:
+    run = excite("optimize", SMOKE, "--prior", SMOKE)
+    assert run.returncode == 2
+    assert "is not a readable HDF5 file" in run.stderr
+    with h5py.File(excite.folder / "foreign.h5", "w") as file:
+        file["tau"] = np.zeros(3)
+    run = excite("optimize", SMOKE, "--prior", "foreign.h5")
+    assert run.returncode == 2
+    assert "not a result of this program" in run.stderr
+
+
+INFEASIBLE = {
+    "balance": "constraints.balance={kind: disc, radius: 0.001, center: [9, 9]}",
+    "balance polygon": "constraints.balance={kind: polygon, vertices: [[9, 9], [10, 9], [9, 10]]}",
+    "torque": "constraints.torque.scale=0.01",
+    "self_collision": "constraints.self_collision.margin=10",
+}
+
+
+@pytest.mark.parametrize("kind", INFEASIBLE)
+def test_an_impossible_constraint_is_named_and_nothing_is_written(
+    excite: Program, kind: str
+) -> None:
+    run = excite("optimize", SMOKE, *BRIEF, "--set", INFEASIBLE[kind])
+    assert run.returncode == 1, run.stderr
+    reason = run.stderr.splitlines()[-1]
+    assert reason.startswith("excite: No admissible motion")
+    assert kind.split()[0] in reason
+    assert run.stdout == ""
+    assert list(excite.folder.iterdir()) == []
+
+
+def test_more_samples_than_the_trajectory_lasts(excite: Program) -> None:
+    run = excite("optimize", SMOKE, "--set", "sampling.cost.step=0.2")
+    assert run.returncode == 2
+    assert "sampling.cost" in run.stderr
+    assert "last longer than the trajectory" in run.stderr
+
+
+def test_a_robot_beside_the_config(excite: Program) -> None:
+    """Paths in a config start from the config, wherever the program is started."""
+    place = excite.folder / "place"
+    place.mkdir()
+    text = SMOKE.read_text(encoding="utf-8").replace("../data/smoke_arm.urdf", "arm.urdf")
+    (place / "arm.yaml").write_text(text, encoding="utf-8")
+    run = excite("optimize", "place/arm.yaml", *BRIEF, "--motions", "1")
+    assert run.returncode == 2
+    assert f"there is no file {Path(place / 'arm.urdf').resolve()}" in run.stderr
+    urdf = (SMOKE.parent / "../data/smoke_arm.urdf").read_text(encoding="utf-8")
+    (place / "arm.urdf").write_text(urdf, encoding="utf-8")
+    assert excite("optimize", "place/arm.yaml", *BRIEF, "--motions", "1").returncode == 0
+    assert (excite.folder / "arm.h5").is_file()

@@ -1,0 +1,279 @@
+"""What is told about a URDF that is wrong, and what is refused for safety."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from excite_cli.config.spec import (
+    ConstraintsSpec,
+    GridSpec,
+    JointLimits,
+    RobotSpec,
+    SamplingSpec,
+    SelfCollisionSpec,
+    Spec,
+)
+from excite_cli.errors import ConfigError, RobotError
+from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.robot.description import UNBOUNDED
+from excite_cli.robot.model import Robot, build_robot
+
+LIMIT = '<limit lower="-1" upper="1" velocity="2" effort="10"/>'
+CYLINDER = '<collision><geometry><cylinder radius="0.05" length="0.2"/></geometry></collision>'
+# A mesh of one tetrahedron.
+OBJ = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+
+
+def link(name: str, collision: str = CYLINDER) -> str:
+    return (
+        f'<link name="{name}"><inertial><origin xyz="0.1 0 0.1"/><mass value="1"/><inertia '
+        f'ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>{collision}</link>'
+    )
+
+
+def joint(name: str, parent: str, child: str, kind: str = "revolute", inside: str = LIMIT) -> str:
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="0 0 0.5"/><axis xyz="0 1 0"/>{inside}</joint>'
+    )
+
+
+def urdf(kind: str = "revolute", inside: str = LIMIT, collision: str = CYLINDER) -> str:
+    """Base, arm and hand; the first joint, `elbow`, and the hand's shape as given."""
+    parts = link("base") + link("arm") + link("hand", collision)
+    joints = joint("elbow", "base", "arm", kind, inside) + joint("wrist", "arm", "hand")
+    return f'<robot name="arm">{parts}{joints}</robot>'
+
+
+def built(folder: Path, text: str, **robot: Any) -> Robot:
+    (folder / "arm.urdf").write_text(text, encoding="utf-8")
+    return build_robot(RobotSpec(urdf="arm.urdf", **robot), folder)
+
+
+def problem(folder: Path, text: str, checked: bool = True, **robot: Any) -> Problem:
+    """A problem with self-collision `checked`."""
+    (folder / "arm.urdf").write_text(text, encoding="utf-8")
+    return build_problem(
+        Spec(
+            robot=RobotSpec(urdf="arm.urdf", **robot),
+            sampling=SamplingSpec(
+                cost=GridSpec(samples=20, step=0.1), constraints=GridSpec(samples=20, step=0.1)
+            ),
+            constraints=ConstraintsSpec(self_collision=SelfCollisionSpec() if checked else None),
+        ),
+        folder,
+    )
+
+
+@pytest.mark.parametrize(("wrong", "nearest"), [("talso", "talos"), ("ur1", "ur10")])
+def test_unknown_example_robot(wrong: str, nearest: str) -> None:
+    with pytest.raises(RobotError, match=f"no robot '{wrong}'. Did you mean '{nearest}'") as caught:
+        build_robot(RobotSpec(urdf=f"example-robot-data:{wrong}"))
+    assert "robot.urdf" in str(caught.value)
+    assert "excite robots" in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["none.urdf", "", "."])
+def test_missing_urdf(tmp_path: Path, name: str) -> None:
+    with pytest.raises(RobotError, match=r"robot.urdf: there is no file .*relative to the YAML"):
+        build_robot(RobotSpec(urdf=name), tmp_path)
+
+
+def test_missing_package_folder(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match=r"robot.package_dirs: there is no folder meshes"):
+        built(tmp_path, urdf(), package_dirs=("meshes",))
+
+
+def test_a_path_is_relative_to_the_config(tmp_path: Path) -> None:
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots/arm.urdf").write_text(urdf(), encoding="utf-8")
+    robot = build_robot(RobotSpec(urdf="robots/arm.urdf"), tmp_path)
+    assert robot.joint_names == ("elbow", "wrist")
+
+
+@pytest.mark.parametrize("text", ["", "an arm", urdf()[:-3], "<robot>&arm;</robot>"])
+def test_not_xml(tmp_path: Path, text: str) -> None:
+    with pytest.raises(RobotError, match=r"arm.urdf is not well-formed XML"):
+        built(tmp_path, text)
+
+
+def test_not_text(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_bytes(b"<robot name='\xff'/>")
+    with pytest.raises(RobotError, match="cannot be read as text"):
+        build_robot(RobotSpec(urdf="arm.urdf"), tmp_path)
+
+
+def test_xml_with_another_root(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="its root is <mujoco>, not <robot>"):
+        built(tmp_path, "<mujoco/>")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<robot/>",
+        urdf().replace('child link="arm"', 'child link="none"'),
+        urdf().replace(link("hand"), link("arm")),
+        urdf("hinge"),
+        urdf(inside=LIMIT.replace('"-1"', '"low"')),
+        urdf(inside=""),
+        urdf().replace(joint("wrist", "arm", "hand"), ""),
+    ],
+    ids=["empty", "unknown link", "twin links", "unknown type", "words", "no limit", "two roots"],
+)
+def test_xml_that_is_not_a_urdf(tmp_path: Path, text: str) -> None:
+    with pytest.raises(RobotError, match=r"arm.urdf is not a URDF that can be used"):
+        built(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    "prologue",
+    [
+        '<!DOCTYPE robot [<!ENTITY a "b">]>',
+        '<!DOCTYPE robot SYSTEM "file:///etc/hostname">',
+        '<?xml version="1.0"?>\n<!DOCTYPE robot>',
+    ],
+)
+def test_document_types_and_entities_are_refused(tmp_path: Path, prologue: str) -> None:
+    with pytest.raises(RobotError, match="document type or entities"):
+        built(tmp_path, prologue + urdf())
+
+
+def test_an_axis_without_direction_is_refused(tmp_path: Path) -> None:
+    """Such a joint moves nothing; every number that follows would be about another robot."""
+    with pytest.raises(RobotError, match="axis"):
+        built(tmp_path, urdf().replace('xyz="0 1 0"', 'xyz="0 0 0"', 1))
+
+
+def mesh(path: str) -> str:
+    return f'<collision><geometry><mesh filename="{path}"/></geometry></collision>'
+
+
+@pytest.mark.parametrize("name", ["none.stl", "package://none/none.stl", "../none.stl"])
+def test_missing_mesh_matters_where_collisions_are_checked(tmp_path: Path, name: str) -> None:
+    text = urdf(collision=mesh(name))
+    with pytest.raises(RobotError, match="was not found") as caught:
+        problem(tmp_path, text)
+    assert name in str(caught.value)
+    assert "robot.package_dirs" in str(caught.value)
+    assert not problem(tmp_path, text, checked=False).constraints[0].name.startswith("self")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "../mesh.obj",
+        "../../secret/mesh.obj",
+        "file://{outside}/mesh.obj",
+        "{outside}/mesh.obj",
+        "package://../mesh.obj",
+    ],
+)
+def test_mesh_paths_must_not_leave_the_robots_folders(tmp_path: Path, path: str) -> None:
+    folder = tmp_path / "secret" / "robot"
+    folder.mkdir(parents=True)
+    (folder.parent / "mesh.obj").write_text(OBJ, encoding="utf-8")
+    path = path.format(outside=folder.parent)
+    with pytest.raises(RobotError, match="leaves the robot's own folders"):
+        problem(folder, urdf(collision=mesh(path)))
+
+
+def test_a_link_out_of_the_folder_is_no_way_out(tmp_path: Path) -> None:
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    (tmp_path / "mesh.obj").write_text(OBJ, encoding="utf-8")
+    (folder / "mesh.obj").symlink_to(tmp_path / "mesh.obj")
+    with pytest.raises(RobotError, match="leaves the robot's own folders"):
+        problem(folder, urdf(collision=mesh("mesh.obj")))
+
+
+def test_a_mesh_inside_or_in_a_named_folder_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    folder, shapes = tmp_path / "robot", tmp_path / "shapes"
+    for place in (folder / "meshes", shapes / "arm_shapes"):
+        place.mkdir(parents=True)
+        (place / "hand.obj").write_text(OBJ, encoding="utf-8")
+    assert problem(folder, urdf(collision=mesh("meshes/hand.obj")))
+    packaged = urdf(collision=mesh("package://arm_shapes/hand.obj"))
+    assert problem(folder, packaged, package_dirs=("../shapes",))
+    with pytest.raises(RobotError, match="was not found"):
+        problem(folder, packaged)
+
+
+def test_a_file_that_is_no_mesh(tmp_path: Path) -> None:
+    (tmp_path / "hand.stl").write_text("no mesh", encoding="utf-8")
+    with pytest.raises(RobotError, match="cannot be loaded"):
+        problem(tmp_path, urdf(collision=mesh("hand.stl")))
+
+
+def test_no_collision_geometry(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="no collision geometry") as caught:
+        problem(tmp_path, urdf().replace(CYLINDER, ""))
+    assert "constraints.self_collision.capsules" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("where", "robot"),
+    [
+        ("robot.joints", {"joints": ("wrist", "elbw")}),
+        ("robot.posture", {"posture": {"elbw": 0.0}}),
+        ("robot.limits", {"limits": {"elbw": JointLimits(velocity=1.0)}}),
+    ],
+)
+def test_unknown_joint(tmp_path: Path, where: str, robot: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError) as caught:
+        built(tmp_path, urdf(), **robot)
+    message = str(caught.value)
+    assert message.startswith(f"{where}: the robot has no joint 'elbw'. Did you mean 'elbow'?")
+    assert "Its joints: elbow, wrist" in message
+
+
+def test_posture_outside_limits(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"robot.posture.elbow: 1.5 is outside .*\[-1, 1\]"):
+        built(tmp_path, urdf(), posture={"elbow": 1.5})
+    wider = {"elbow": JointLimits(position=(-2.0, 2.0))}
+    assert built(tmp_path, urdf(), posture={"elbow": 1.5}, limits=wider).posture[0] == 1.5
+    narrower = {"elbow": JointLimits(position=(-0.5, 0.5))}
+    with pytest.raises(ConfigError, match=r"\[-0.5, 0.5\]"):
+        built(tmp_path, urdf(), posture={"elbow": 0.7}, limits=narrower)
+
+
+@pytest.mark.parametrize("posture", [{}, {"elbow": 0.0}])
+def test_crossed_limits(tmp_path: Path, posture: dict[str, float]) -> None:
+    text = urdf(inside='<limit lower="1" upper="-1" velocity="2" effort="10"/>')
+    with pytest.raises(ConfigError, match=r"elbow' has crossed .*robot.limits.elbow.position"):
+        built(tmp_path, text, posture=posture)
+    assert built(tmp_path, text, joints=("wrist",)).joint_names == ("wrist",)
+    mended = {"elbow": JointLimits(position=(-1.0, 1.0))}
+    assert built(tmp_path, text, limits=mended).limits.lower[0] == -1.0
+
+
+@pytest.mark.parametrize("inside", ["", '<limit velocity="3" effort="7"/>', LIMIT])
+def test_a_continuous_joint_is_one_without_position_limits(tmp_path: Path, inside: str) -> None:
+    robot = built(tmp_path, urdf("continuous", inside), posture={"elbow": 12.0})
+    assert robot.model.nq == robot.model.nv == 2
+    assert robot.limits.lower[0] <= -UNBOUNDED
+    assert robot.limits.upper[0] >= UNBOUNDED
+    assert robot.limits.velocity[0] == {"": np.inf, LIMIT: 2.0}.get(inside, 3.0)
+    assert robot.posture[0] == 12.0
+    bounds = next(c for c in problem(tmp_path, urdf("continuous", inside), False).constraints)
+    assert bounds.labels == ("wrist lower", "wrist upper")
+
+
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+def test_joints_of_several_coordinates_are_refused(tmp_path: Path, kind: str) -> None:
+    with pytest.raises(RobotError, match=r"joint 'elbow' is of type .* prismatic and fixed") as e:
+        built(tmp_path, urdf(kind))
+    assert "arm.urdf" in str(e.value)
+
+
+def test_no_movable_joint(tmp_path: Path) -> None:
+    text = urdf("fixed", "").replace('name="wrist" type="revolute"', 'name="wrist" type="fixed"')
+    with pytest.raises(RobotError, match="has no movable joint"):
+        built(tmp_path, text)
+    with pytest.raises(RobotError, match="has no movable joint"):
+        built(tmp_path, text, base="floating")
