@@ -230,11 +230,13 @@ class OptimizerSpec(Section):
     """How the motion is sought."""
 
     method: Literal["interior_point", "sqp", "slsqp"] = "interior_point"
-    qp_solver: Literal["daqp", "piqp"] = "piqp"
+    qp_solver: Literal["daqp", "piqp"] = Field("daqp", description="used by method: sqp")
     max_seconds: Positive = Field(30.0, description="per motion")
     max_iterations: int = Field(400, ge=1, le=100_000)
     restarts: int = Field(1, ge=1, le=100, description="starts tried per motion, the best kept")
-    tolerance: Positive = Field(1e-3, description="relative change of the criterion at the end")
+    tolerance: Positive = Field(
+        1e-3, description="change of the (logarithmic) criterion over 8 iterations that ends a run"
+    )
 
 
 class SequenceSpec(Section):

@@ -95,7 +95,7 @@ def kept_between_instants(
     """
     problem = task.problem
     times = fine_times(problem)
-    short = replace(effort, max_iterations=max(10, effort.max_iterations // 8))
+    began = time.perf_counter()
     for _ in range(_GUARD_ROUNDS):
         margins = fine_margins(problem, task.coefficients(outcome.x), times)
         lacking = [np.maximum(-margin.min(axis=0), 0.0) for margin in margins]
@@ -106,6 +106,12 @@ def kept_between_instants(
         ]
         tighter = task.with_guards(guards)
         inside = _drawn_inside(tighter, outcome.x, start)
+        short = Effort(
+            max_iterations=max(10, effort.max_iterations // 8),
+            max_seconds=max(1.0, effort.max_seconds / 4 - (time.perf_counter() - began)),
+            tolerance=effort.tolerance,
+            polish=True,
+        )
         again = solver.solve(tighter, inside, short, report)
         outcome = Outcome(
             again.x,

@@ -12,7 +12,7 @@ from excite_cli.cli.app import app
 from tests.cli.program import ROOT, SMOKE, Program
 
 COMMANDS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
-HEAVY = ("pinocchio", "coal", "scipy", "h5py", "numpy", "matplotlib", "pydantic")
+HEAVY = ("pinocchio", "coal", "scipy", "h5py", "numpy", "matplotlib")
 
 
 def test_there_are_commands() -> None:
@@ -106,13 +106,12 @@ def test_wrong_options_and_arguments(excite: Program, arguments: list[str], word
     ("arguments", "words"),
     [
         (["optimize", "none.yaml"], "There is no config file none.yaml"),
-        (["optimize", SMOKE, "--set", "seed"], "--set seed"),
-        (["optimize", SMOKE, "--seed", "4294967296"], "seed"),
+        (["optimize", SMOKE, "-o", "."], "is a folder"),
+        (["optimize", SMOKE, "--prior", SMOKE], "is not a readable HDF5 file"),
         (["optimize", SMOKE, "--set", "robot.urdf=example-robot-data:talso"], "'talos'"),
-        (["verify-gradient", SMOKE, "--set", "criterion.kind=condition"], "criterion.kind"),
+        (["verify-gradient", SMOKE, "--set", "sampling.cost.step=0.2"], "sampling.cost: 60"),
         (["compare-random", SMOKE, "--optimized", "none.h5"], "There is no file none.h5"),
         (["check", SMOKE, "none.h5"], "There is no file none.h5"),
-        (["robots", "none.urdf"], "there is no file"),
     ],
 )
 def test_bad_input_is_one_message_and_status_2(
@@ -151,15 +150,13 @@ def test_schema_prints_json(excite: Program) -> None:
 def test_robots_lists_names_that_can_be_used(excite: Program) -> None:
     listed = excite.answer("robots")["robots"]
     assert "example-robot-data:ur10" in listed
-    assert "example-robot-data:ur10" in excite("robots").stdout
-    joints = excite.answer("robots", "example-robot-data:ur10")["joints"]
-    assert len(joints) == 6
-    assert all(limit["lower"] < limit["upper"] for limit in joints.values())
+    assert "example-robot-data:talos" in listed
 
 
 def test_robots_of_a_file_have_null_for_what_has_no_bound(excite: Program) -> None:
     joints = excite.answer("robots", ROOT / "data" / "smoke_arm.urdf")["joints"]
     assert list(joints) == ["shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide"]
     assert joints["slide"]["lower"] == 0
+    assert joints["slide"]["upper"] > 0
     assert joints["wrist_roll"]["lower"] is None
     assert joints["wrist_roll"]["upper"] is None

@@ -1,7 +1,5 @@
 import json
-from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
@@ -46,42 +44,15 @@ def test_people_are_told_on_stderr_what_was_understood(two_motions: Run) -> None
     assert "motion 2: condition number" in told
 
 
-def test_tables_on_stdout_and_the_default_name(excite: Program) -> None:
-    run = excite("optimize", SMOKE, *BRIEF, "--motions", "1", "--no-progress")
-    assert run.returncode == 0
-    assert (excite.folder / "smoke.h5").is_file()
-    condition = read_result(excite.folder / "smoke.h5").motions[0].condition_number
-    assert f"{condition:.2f}" in run.stdout
-    for word in ("joint_torque", "self_collision", "rad/s²", "smoke.h5"):
-        assert word in run.stdout
-
-
 def test_quiet_is_silent_and_seed_and_set_count(excite: Program, two_motions: Run) -> None:
     run = excite("optimize", SMOKE, *BRIEF, "--motions", "1", "--seed", "9", "--quiet")
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
-    result = read_result(excite.folder / "smoke.h5")
+    result = read_result(excite.folder / "smoke.h5")  # named after the config
     assert result.seed == 9
     assert "seed: 9" in result.config
     assert "max_iterations: 6" in result.config
     other = read_result(two_motions.path).motions[0]
     assert not np.allclose(result.motions[0].coefficients, other.coefficients)
-
-
-def test_the_same_seed_gives_the_same_numbers(excite: Program, two_motions: Run) -> None:
-    excite("optimize", SMOKE, *BRIEF, "--motions", "1", "--quiet")
-    again = read_result(excite.folder / "smoke.h5").motions[0]
-    np.testing.assert_array_equal(
-        again.coefficients, read_result(two_motions.path).motions[0].coefficients
-    )
-
-
-def test_verbose_lists_pairs_and_base_parameters(excite: Program) -> None:
-    run = excite("optimize", SMOKE, "--motions", "1", *BRIEF, "--verbose")
-    assert run.returncode == 0
-    dropped = [line for line in run.stderr.splitlines() if line.startswith("  dropped")]
-    checked = [line for line in run.stderr.splitlines() if line.startswith("  checked")]
-    assert f"{len(checked)} pairs checked, {len(dropped)} dropped" in run.stderr
-    assert "base parameter" in run.stderr
 
 
 def test_an_existing_file_is_refused_and_left_alone(excite: Program, two_motions: Run) -> None:
@@ -96,25 +67,28 @@ def test_an_existing_file_is_refused_and_left_alone(excite: Program, two_motions
     assert run.stdout == ""
 
 
-def test_overwrite(excite: Program) -> None:
-    (excite.folder / "arm.h5").write_text("to be replaced", encoding="utf-8")
-    run = excite("optimize", SMOKE, "-o", "arm.h5", *BRIEF, "--motions", "1", "--overwrite")
-    assert run.returncode == 0
-    assert len(read_result(excite.folder / "arm.h5").motions) == 1
-
-
 def test_overwrite_leaves_the_old_file_where_nothing_replaces_it(excite: Program) -> None:
     path = excite.folder / "arm.h5"
     path.write_text("kept", encoding="utf-8")
     run = excite("optimize", SMOKE, "-o", path, "--overwrite", "--set", "optimizer.max_itertions=1")
     assert run.returncode == 2
+    assert "Did you mean 'max_iterations'?" in run.stderr
     assert path.read_text(encoding="utf-8") == "kept"
 
 
-def test_a_folder_is_no_output(excite: Program) -> None:
-    run = excite("optimize", SMOKE, "-o", excite.folder)
-    assert run.returncode == 2
-    assert "is a folder" in run.stderr
+def test_overwrite_with_tables_on_stdout_and_details_on_stderr(excite: Program) -> None:
+    path = excite.folder / "arm.h5"
+    path.write_text("to be replaced", encoding="utf-8")
+    run = excite("optimize", SMOKE, "-o", path, *BRIEF, "--motions", "1", "--overwrite", "-v")
+    assert run.returncode == 0
+    (motion,) = read_result(path).motions
+    assert f"{motion.condition_number:.2f}" in run.stdout
+    for word in ("joint_torque", "self_collision", "rad/s²", str(path)):
+        assert word in run.stdout
+    dropped = [line for line in run.stderr.splitlines() if line.startswith("  dropped")]
+    checked = [line for line in run.stderr.splitlines() if line.startswith("  checked")]
+    assert f"{len(checked)} pairs checked, {len(dropped)} dropped" in run.stderr
+    assert "base parameter" in run.stderr
 
 
 def test_a_prior_makes_the_stack_better_than_the_motion(excite: Program, two_motions: Run) -> None:
@@ -142,7 +116,6 @@ def test_a_prior_makes_the_stack_better_than_the_motion(excite: Program, two_mot
     "change",
     [
         "robot.joints=[shoulder_pitch, elbow, wrist_roll, slide]",
-        "robot.gravity=[0, 0, -1.62]",
         "criterion.row_weights=effort",
     ],
 )
@@ -155,22 +128,14 @@ def test_a_prior_of_another_problem_is_refused(
     assert list(excite.folder.iterdir()) == []
 
 
-def test_a_prior_that_is_no_result(excite: Program) -> None:
-    run = excite("optimize", SMOKE, "--prior", SMOKE)
-    assert run.returncode == 2
-    assert "is not a readable HDF5 file" in run.stderr
-    with h5py.File(excite.folder / "foreign.h5", "w") as file:
-        file["tau"] = np.zeros(3)
-    run = excite("optimize", SMOKE, "--prior", "foreign.h5")
-    assert run.returncode == 2
-    assert "not a result of this program" in run.stderr
-
-
+# What nothing can meet, with all other constraints that could be named instead.
 INFEASIBLE = {
-    "balance": "constraints.balance={kind: disc, radius: 0.001, center: [9, 9]}",
-    "balance polygon": "constraints.balance={kind: polygon, vertices: [[9, 9], [10, 9], [9, 10]]}",
-    "torque": "constraints.torque.scale=0.01",
-    "self_collision": "constraints.self_collision.margin=10",
+    "balance": [
+        "constraints.self_collision=null",
+        "constraints.balance={kind: disc, radius: 0.001, center: [9, 9]}",
+    ],
+    "torque": ["constraints.self_collision=null", "constraints.torque.scale=0.01"],
+    "self_collision": ["constraints.self_collision.margin=10"],
 }
 
 
@@ -178,32 +143,23 @@ INFEASIBLE = {
 def test_an_impossible_constraint_is_named_and_nothing_is_written(
     excite: Program, kind: str
 ) -> None:
-    run = excite("optimize", SMOKE, *BRIEF, "--set", INFEASIBLE[kind])
+    changes = [word for change in INFEASIBLE[kind] for word in ("--set", change)]
+    run = excite("optimize", SMOKE, *BRIEF, *changes)
     assert run.returncode == 1, run.stderr
     reason = run.stderr.splitlines()[-1]
     assert reason.startswith("excite: No admissible motion")
-    assert kind.split()[0] in reason
+    assert kind in reason
     assert run.stdout == ""
     assert list(excite.folder.iterdir()) == []
 
 
-def test_more_samples_than_the_trajectory_lasts(excite: Program) -> None:
-    run = excite("optimize", SMOKE, "--set", "sampling.cost.step=0.2")
-    assert run.returncode == 2
-    assert "sampling.cost" in run.stderr
-    assert "last longer than the trajectory" in run.stderr
-
-
-def test_a_robot_beside_the_config(excite: Program) -> None:
-    """Paths in a config start from the config, wherever the program is started."""
+def test_paths_in_a_config_start_from_the_config(excite: Program) -> None:
     place = excite.folder / "place"
     place.mkdir()
     text = SMOKE.read_text(encoding="utf-8").replace("../data/smoke_arm.urdf", "arm.urdf")
     (place / "arm.yaml").write_text(text, encoding="utf-8")
-    run = excite("optimize", "place/arm.yaml", *BRIEF, "--motions", "1")
-    assert run.returncode == 2
-    assert f"there is no file {Path(place / 'arm.urdf').resolve()}" in run.stderr
     urdf = (SMOKE.parent / "../data/smoke_arm.urdf").read_text(encoding="utf-8")
     (place / "arm.urdf").write_text(urdf, encoding="utf-8")
-    assert excite("optimize", "place/arm.yaml", *BRIEF, "--motions", "1").returncode == 0
+    run = excite("optimize", "place/arm.yaml", *BRIEF, "--motions", "1")
+    assert run.returncode == 0, run.stderr
     assert (excite.folder / "arm.h5").is_file()

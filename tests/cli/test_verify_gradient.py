@@ -24,8 +24,3 @@ def test_tables_say_it_in_words(excite: Program) -> None:
     run = excite("verify-gradient", SMOKE, "--set", "criterion.kind=log_det", "--seed", "4")
     assert run.returncode == 0
     assert "The gradient is right." in run.stdout
-
-
-def test_quiet_leaves_only_the_status(excite: Program) -> None:
-    run = excite("verify-gradient", SMOKE, "--quiet")
-    assert (run.returncode, run.stdout, run.stderr) == (0, "", "")

@@ -22,18 +22,12 @@ from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
+from excite_cli.excitation.solvers.linearised import Linearised, dips, gathered, lowest
 from excite_cli.excitation.solvers.quadratic_program import build_backend
+from excite_cli.excitation.solvers.quasi_newton import damped_update
+from excite_cli.excitation.solvers.restoration import BestAdmissible, least_distance
 from excite_cli.excitation.solvers.slsqp import ScipySlsqp
-from excite_cli.excitation.solvers.sqp import (
-    BestAdmissible,
-    Linearised,
-    SequentialQuadratic,
-    damped_update,
-    dips,
-    gathered,
-    least_distance,
-    lowest,
-)
+from excite_cli.excitation.solvers.sqp import SequentialQuadratic
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture, random_start
 from excite_cli.excitation.task import MotionTask

@@ -32,7 +32,8 @@ def test_mapping_reproduces_torques_with_the_numerical_rank(
     y = _stack(robot, seed + 1)
     phi = np.random.default_rng(seed).normal(size=y.shape[1])
     tau = y @ phi
-    assert np.allclose(y[:, base.selection] @ (base.mapping @ phi), tau, atol=1e-7 * np.abs(tau).max())
+    found = y[:, base.selection] @ (base.mapping @ phi)
+    assert np.allclose(found, tau, atol=1e-7 * np.abs(tau).max())
     sigma = np.linalg.svd(y / np.maximum(np.linalg.norm(y, axis=0), 1e-12), compute_uv=False)
     assert base.rank == int((sigma > 1e-9 * sigma[0]).sum())
 

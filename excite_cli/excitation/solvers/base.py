@@ -10,11 +10,15 @@ from excite_cli.excitation.task import MotionTask
 
 @dataclass(frozen=True)
 class Effort:
-    """When a solver stops: iterations, seconds, relative change of the criterion."""
+    """When a solver stops: iterations, seconds, change of the criterion at which it has converged.
+
+    With `polish` the start is nearly optimal: only the last stage of the continuation is run.
+    """
 
     max_iterations: int
     max_seconds: float
     tolerance: float
+    polish: bool = False
 
 
 class Solver(ABC):

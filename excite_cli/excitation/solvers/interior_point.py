@@ -31,6 +31,7 @@ from excite_cli.excitation.residuals import (
     summed_per_instant,
 )
 from excite_cli.excitation.solvers.base import Effort, Solver
+from excite_cli.excitation.solvers.quasi_newton import damped_update
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.states import States
 
@@ -87,7 +88,8 @@ class _Run:
     def all_stages(self, x: Array) -> Outcome:
         steps = self.task.problem.criterion.continuation()
         status: Status = "converged"
-        for number, (mu, step, change) in enumerate(_STAGES):
+        first = len(_STAGES) - 1 if self.effort.polish else 0
+        for number, (mu, step, change) in enumerate(_STAGES[first:], start=first):
             criterion = steps[min(step, len(steps) - 1)]
             change = max(change, self.effort.tolerance)
             stage = f"{number + 1}/{len(_STAGES)}"
@@ -208,17 +210,7 @@ class _Run:
             size = float(step @ change) / float(step @ self.task.metric @ step)
             if size > 0:
                 self.hessian = self.task.metric * size
-        image = self.hessian @ step
-        curvature, bend = float(step @ change), float(step @ image)
-        if bend <= 1e-14:
-            return
-        if curvature < 0.1 * bend:
-            share = 0.9 * bend / (bend - curvature)
-            change = share * change + (1 - share) * image
-            curvature = float(step @ change)
-        self.hessian = (
-            self.hessian - np.outer(image, image) / bend + np.outer(change, change) / curvature
-        )
+        self.hessian = damped_update(self.hessian, step, change)
 
 
 def _descent(hessian: Array, gradient: Array) -> Array:

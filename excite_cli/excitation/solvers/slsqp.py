@@ -20,14 +20,8 @@ from excite_cli.criteria.base import Criterion
 from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
 from excite_cli.excitation.objective import Spectrum
 from excite_cli.excitation.solvers.base import Effort, Solver
-from excite_cli.excitation.solvers.sqp import (
-    BestAdmissible,
-    Linearised,
-    Mask,
-    dips,
-    gathered,
-    lowest,
-)
+from excite_cli.excitation.solvers.linearised import Linearised, Mask, dips, gathered, lowest
+from excite_cli.excitation.solvers.restoration import BestAdmissible
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.states import States
 
@@ -92,6 +86,7 @@ class _Run:
 
     def all_stages(self, x: Array) -> Outcome:
         steps = self.task.problem.criterion.continuation()
+        steps = steps[-1:] if self.effort.polish else steps
         status: Status = "converged"
         self.reached = x
         try:

@@ -23,26 +23,25 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.optimize import nnls
+from scipy.linalg import cho_factor, cho_solve
 
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.criteria.base import Criterion
 from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
 from excite_cli.excitation.objective import Spectrum
-from excite_cli.excitation.residuals import Rows, summed_per_instant
+from excite_cli.excitation.residuals import summed_per_instant
 from excite_cli.excitation.solvers.base import Effort, Solver
+from excite_cli.excitation.solvers.linearised import Linearised, Mask, dips, gathered, lowest
 from excite_cli.excitation.solvers.quadratic_program import (
     QuadraticBackend,
     QuadraticSolution,
     build_backend,
 )
+from excite_cli.excitation.solvers.quasi_newton import damped_update
+from excite_cli.excitation.solvers.restoration import BestAdmissible
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.states import States
-
-Mask = NDArray[np.bool_]
 
 # What a stage may still gain over `_WINDOW` iterations when it counts as done, first to last.
 _CHANGES = (3e-2, 1e-2, 1e-3)
@@ -53,171 +52,6 @@ _MENDED_SHARES = (1.0, 0.3, 0.0)
 _CUTS = 8
 _SUFFICIENT, _HALVINGS = 1e-4, 10
 _RESTORATIONS = 10
-
-
-class Linearised:
-    """Residuals to first order about a point; derivatives only where `near` is true."""
-
-    def __init__(
-        self,
-        task: MotionTask,
-        states: States,
-        values: list[Array],
-        near: list[Mask] | None = None,
-    ) -> None:
-        self.task, self.values = task, values
-        self.near = near or [
-            np.ones_like(value, dtype=bool) if isinstance(constraint, JointBound)
-            else value < _REACH
-            for constraint, value in zip(task.problem.constraints, values, strict=True)
-        ]  # fmt: skip
-        self.rows: list[Rows | None] = [
-            None if isinstance(c, JointBound) else task.residuals.rows(states, i, self.near[i])
-            for i, c in enumerate(task.problem.constraints)
-        ]
-
-    def change(self, direction: Array) -> list[Array]:
-        """J d as (T, m) per constraint, zero where nothing was linearised."""
-        task = self.task
-        by_order = [
-            order @ direction.reshape(task.n, task.k).T for order in task.residuals.grid.orders
-        ]
-        found = []
-        for index, constraint in enumerate(task.problem.constraints):
-            change, rows = np.zeros_like(self.values[index]), self.rows[index]
-            if isinstance(constraint, JointBound):
-                per_joint = by_order[constraint.order][:, constraint.joints]
-                change = per_joint * (-constraint.signs / constraint.scale)
-            elif rows is not None:
-                total = np.zeros(len(rows.times))
-                for part, order in zip(rows.parts, by_order, strict=True):
-                    if part is not None:
-                        total += np.einsum("kn,kn->k", part, order[rows.times])
-                change[self.near[index]] = total
-            found.append(change)
-        return found
-
-    def dense(self, chosen: list[Mask]) -> Array:
-        """Rows of J where `chosen` (T, m) per constraint is true, in the order of `gathered`."""
-        task, orders = self.task, self.task.residuals.grid.orders
-        blocks = [np.zeros((0, task.size))]
-        for index, constraint in enumerate(task.problem.constraints):
-            times, columns = np.nonzero(chosen[index])
-            block = np.zeros((len(times), task.n, task.k))
-            rows = self.rows[index]
-            if isinstance(constraint, JointBound):
-                weights = -(constraint.signs / constraint.scale)[columns]
-                block[np.arange(len(times)), constraint.joints[columns]] = (
-                    weights[:, None] * orders[constraint.order][times]
-                )
-            elif rows is not None:
-                at = np.flatnonzero(chosen[index][self.near[index]])
-                for part, order in zip(rows.parts, orders, strict=True):
-                    if part is not None:
-                        block += part[at][:, :, None] * order[times][:, None, :]
-            blocks.append(block.reshape(len(times), task.size))
-        return np.vstack(blocks)
-
-
-def gathered(values: list[Array], chosen: list[Mask]) -> Array:
-    """The chosen entries of all constraints in one vector."""
-    picked = [value[mask] for value, mask in zip(values, chosen, strict=True)]
-    return np.concatenate([np.zeros(0), *picked])
-
-
-def dips(value: Array) -> Mask:
-    """Where each column of (T, m) is not above its neighbours in time."""
-    padded = np.pad(value, ((1, 1), (0, 0)), constant_values=np.inf)
-    return np.asarray((value <= padded[:-2]) & (value <= padded[2:]))
-
-
-def lowest(values: list[Array]) -> float:
-    """The smallest residual of all."""
-    return min((float(value.min()) for value in values), default=np.inf)
-
-
-def least_distance(rows: Array, bounds: Array) -> Array | None:
-    """The shortest y with rows·y ≥ bounds; None if there is none.
-
-    Dual of a non-negative least-squares problem (Lawson and Hanson 1974, algorithm LDP), so it
-    needs no library for quadratic programs.
-    """
-    system = np.vstack([rows.T, bounds])
-    target = np.append(np.zeros(rows.shape[1]), 1.0)
-    try:
-        weights, _ = nnls(system, target)
-    except RuntimeError:  # its iteration limit
-        return None
-    residual = system @ weights - target
-    if residual[-1] > -1e-12:
-        return None
-    return np.asarray(-residual[:-1] / residual[-1])
-
-
-class BestAdmissible:
-    """The best strictly admissible point seen, by the criterion asked for."""
-
-    def __init__(self, task: MotionTask) -> None:
-        self.task = task
-        self.x: Array | None = None
-        self.cost = np.inf
-
-    def offer(self, x: Array, values: list[Array], spectrum: Spectrum) -> None:
-        """Keep x if it is strictly admissible and better than what is kept."""
-        cost = self.task.problem.criterion.value(spectrum.sigma)
-        if lowest(values) > 0 and (cost < self.cost or self.x is None):
-            self.x, self.cost = x.copy(), cost
-
-    def kept(self) -> Array:
-        """The point itself; there is one as soon as an admissible start was offered."""
-        assert self.x is not None, "a solver starts from an admissible point"
-        return self.x
-
-    def offer_restored(self, x: Array) -> None:
-        """Offer the admissible point that least-length corrections or a retreat make of x."""
-        candidate = self._corrected(x)
-        if candidate is None:
-            candidate = self._retreated(x)
-        self.task.evaluations += 1
-        objective = self.task.objective
-        block = objective.block(self.task.coefficients(candidate))
-        values = self.task.values(self.task.states(candidate))
-        self.offer(candidate, values, objective.spectrum(block))
-
-    def _corrected(self, x: Array) -> Array | None:
-        """Least corrections, in the metric of the task, to the linearised residuals."""
-        task, aim = self.task, _AIM
-        eye = np.eye(task.size)
-        factor = np.linalg.cholesky(task.metric + 1e-9 * np.trace(task.metric) / task.size * eye)
-        chosen: list[Mask] | None = None
-        for _ in range(_RESTORATIONS):
-            states = task.states(x)
-            values = task.values(states)
-            if lowest(values) > 0:
-                return x
-            near = [(value < _NEAR) & dips(value) for value in values]
-            chosen = [a | b for a, b in zip(chosen or near, near, strict=True)]
-            rows = Linearised(task, states, values, chosen).dense(chosen)
-            scaled = solve_triangular(factor, rows.T, lower=True).T
-            correction = least_distance(scaled, aim - gathered(values, chosen))
-            if correction is None:
-                return None
-            x = x + solve_triangular(factor, correction, lower=True, trans="T")
-            aim *= 1.5
-        return None
-
-    def _retreated(self, x: Array) -> Array:
-        """A point on the way from the kept point to x, as far along as bisection proves."""
-        inside, outside = 0.0, 1.0
-        start = self.kept()
-        for _ in range(12):
-            middle = 0.5 * (inside + outside)
-            values = self.task.values(self.task.states(start + middle * (x - start)))
-            if lowest(values) > 0:
-                inside = middle
-            else:
-                outside = middle
-        return start + inside * (x - start)
 
 
 @dataclass(frozen=True)
@@ -275,6 +109,7 @@ class _Run:
 
     def all_stages(self, x: Array) -> Outcome:
         steps = self.task.problem.criterion.continuation()
+        steps = steps[-1:] if self.effort.polish else steps
         status: Status = "converged"
         for number, criterion in enumerate(steps):
             change = _CHANGES[max(number - len(steps), -len(_CHANGES))]
@@ -459,19 +294,6 @@ class _Run:
                 gradient, summed_per_instant(rows, weights[weights > 0], grid.samples)
             )
         return self.task.flat(gradient)
-
-
-def damped_update(hessian: Array, step: Array, change: Array) -> Array:
-    """BFGS kept positive definite by Powell's damping (Nocedal and Wright 2006, Eq. 18.15)."""
-    image = hessian @ step
-    curvature, bend = float(step @ change), float(step @ image)
-    if bend <= 1e-14:
-        return hessian
-    if curvature < 0.1 * bend:
-        share = 0.9 * bend / (bend - curvature)
-        change = share * change + (1 - share) * image
-        curvature = float(step @ change)
-    return hessian - np.outer(image, image) / bend + np.outer(change, change) / curvature
 
 
 def _active(step: _Step) -> list[Mask]:

@@ -1,0 +1,3 @@
+from tests.cli.conftest import cache, excite
+
+__all__ = ["cache", "excite"]
