@@ -78,6 +78,7 @@ def optimize(
                 write_result(path, current, problem)
                 motion = step.motion
                 note = "" if motion.improved else "; it brings no improvement"
+                note += f"; {motion.note}" if motion.note else ""
                 terminal.say(
                     f"motion {motion.index}: condition number {motion.condition_number:.2f}, "
                     f"stacked {motion.stacked_condition_number:.2f} "

@@ -79,6 +79,7 @@ def motion_data(motion: Motion) -> dict[str, Any]:
         "stacked_condition_number": motion.stacked_condition_number,
         "improved": motion.improved,
         "status": motion.status,
+        "note": motion.note,
         "seconds": motion.seconds,
         "iterations": motion.iterations,
         "evaluations": motion.evaluations,

@@ -32,9 +32,9 @@ class JointLimits(Section):
     """Limits of one joint that replace those of the URDF."""
 
     position: tuple[Finite, Finite] | None = Field(None, description="lower, upper [rad or m]")
-    velocity: Positive | None = Field(None, description="largest |velocity| [rad/s or m/s]")
-    acceleration: Positive | None = Field(None, description="largest |acceleration| [rad/s²]")
-    effort: Positive | None = Field(None, description="largest |torque| [N·m or N]")
+    velocity: Positive | None = Field(None, description="largest speed [rad/s or m/s]")
+    acceleration: Positive | None = Field(None, description="largest acceleration [rad/s²]")
+    effort: Positive | None = Field(None, description="largest torque [N·m or N]")
 
     @field_validator("position")
     @classmethod

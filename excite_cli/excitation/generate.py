@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.constraints.base import Array
-from excite_cli.criteria.base import condition_number, singular_values
+from excite_cli.criteria.base import Criterion, singular_values
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import fine_margins, fine_times, worst_margins
 from excite_cli.excitation.motion import Motion, Outcome, Progress, ProgressCallback
@@ -18,7 +18,8 @@ from excite_cli.excitation.task import MotionTask
 
 _GUARD_ROUNDS = 6
 _GUARD_GROWTH = 1.3
-# A motion counts as an improvement of the stack from this relative change on.
+_MOVED = "robot.posture is not clear of the constraints; a clear one near it was taken"
+# A motion counts as an improvement of the stack from this change of the (logarithmic) criterion.
 _IMPROVEMENT = 1e-3
 
 
@@ -56,28 +57,28 @@ def generate_motion(
         if best is None or value < best[0]:
             best = (value, coefficients, outcome)
     assert best is not None
-    _, coefficients, outcome = best
-    stacked = task.objective.stacked_condition_number(coefficients)
+    value, coefficients, outcome = best
     return Motion(
         index=index,
         coefficients=coefficients,
         condition_number=task.objective.own_condition_number(coefficients),
-        stacked_condition_number=stacked,
-        improved=is_improvement(stack, stacked),
+        stacked_condition_number=task.objective.stacked_condition_number(coefficients),
+        improved=is_improvement(stack, problem.criterion, value),
         status=outcome.status,
         seconds=time.perf_counter() - began,
         iterations=iterations,
         evaluations=evaluations,
         margins=worst_margins(problem, coefficients),
+        note="" if start.as_configured else _MOVED,
     )
 
 
-def is_improvement(stack: Stack, stacked: float) -> bool:
-    """Whether the condition number fell noticeably below that of the earlier data."""
-    if stack.rows == 0:
+def is_improvement(stack: Stack, criterion: Criterion, value: float) -> bool:
+    """Whether the criterion fell noticeably below its value for the earlier data alone."""
+    sigma = singular_values(stack.factor)
+    if stack.rows == 0 or sigma[-1] <= np.finfo(float).eps * sigma[0]:
         return True
-    before = condition_number(singular_values(stack.factor))
-    return stacked < (1.0 - _IMPROVEMENT) * before
+    return value < criterion.value(sigma) - _IMPROVEMENT
 
 
 def kept_between_instants(

@@ -40,7 +40,8 @@ class Motion:
     """One generated motion that keeps all constraints.
 
     `condition_number` is that of the motion alone, `stacked_condition_number` that of the motion
-    with all earlier data; `improved` tells whether the stack became better by it.
+    with all earlier data; `improved` tells whether the stack became better by it; `note` says what
+    else one should know.
     """
 
     index: int
@@ -53,3 +54,4 @@ class Motion:
     iterations: int
     evaluations: int
     margins: dict[str, Worst]
+    note: str = ""

@@ -104,7 +104,7 @@ def _candidate(task: MotionTask, start: Start, rng: np.random.Generator) -> Arra
     standing = task.variables(task.problem.still(centre))
     if not _admissible(task, standing):
         standing = task.variables(task.problem.still(posture))
-    direction = random_direction(task, rng)
+    direction = random_direction(task, rng, slow=rng.uniform())
     amplitude = _LARGEST
     for _ in range(_STEPS):
         if _admissible(task, standing + amplitude * direction):

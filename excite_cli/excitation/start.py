@@ -8,6 +8,7 @@ falling as 1/k is shrunk until every residual is clear.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
 from excite_cli.constraints.base import Array
@@ -57,23 +58,25 @@ def random_start(task: MotionTask, start: Start, seed: tuple[int, ...]) -> Array
     )
 
 
-def random_direction(task: MotionTask, rng: np.random.Generator) -> Array:
-    """A random motion (size,) whose states have about the size of their bounds.
+def random_direction(task: MotionTask, rng: np.random.Generator, slow: float = 1.0) -> Array:
+    """A random motion (size,) of unit length in the task's metric, joint by joint.
 
-    Low harmonics (or any coefficients) are drawn in the metric of the task, so that no derivative
-    dominates.
+    With `slow` = 1 it is white in that metric: slow coefficients, which the bounds on acceleration
+    hardly see, come out large and fast ones small, whatever the family of trajectories. With 0 all
+    coefficients are drawn alike, so that fast ones dominate; values between mix the two.
     """
-    problem = task.problem
-    k = problem.trajectory.n_coefficients
-    raw = rng.normal(size=(k, task.n))
-    x = task.variables(raw)
-    length = np.sqrt(np.einsum("jk,jk->j", *_by_joint(task, x)))
-    return (x.reshape(task.n, task.k) / length[:, None]).ravel()
+    factor = np.linalg.cholesky(task.metric + 1e-12 * np.trace(task.metric) * np.eye(task.size))
+    white = solve_triangular(factor.T, rng.normal(size=task.size))
+    alike = rng.normal(size=task.size)
+    x = slow * _unit_by_joint(task, white) + (1.0 - slow) * _unit_by_joint(task, alike)
+    return _unit_by_joint(task, x)
 
 
-def _by_joint(task: MotionTask, x: Array) -> tuple[Array, Array]:
-    """x and M x as (n, K'), for lengths joint by joint."""
-    return x.reshape(task.n, task.k), (task.metric @ x).reshape(task.n, task.k)
+def _unit_by_joint(task: MotionTask, x: Array) -> Array:
+    """x with every joint's part of unit length in the metric (which does not couple joints)."""
+    by_joint = x.reshape(task.n, task.k)
+    length = np.sqrt(np.einsum("jk,jk->j", by_joint, (task.metric @ x).reshape(task.n, task.k)))
+    return np.asarray((by_joint / length[:, None]).ravel())
 
 
 def clear_posture(task: MotionTask, seed: int) -> Start:

@@ -67,7 +67,8 @@ def test_answers_that_need_no_mathematics_load_none(arguments: list[str]) -> Non
 
 
 @pytest.mark.parametrize(
-    ("wrong", "right"), [("optmize", "optimize"), ("verify", "verify-gradient"), ("chek", "check")]
+    ("wrong", "right"),
+    [("optmize", "optimize"), ("verify-gradiant", "verify-gradient"), ("chek", "check")],
 )
 def test_a_mistyped_command(excite: Program, wrong: str, right: str) -> None:
     run = excite(wrong, SMOKE)
@@ -107,7 +108,6 @@ def test_wrong_options_and_arguments(excite: Program, arguments: list[str], word
     [
         (["optimize", "none.yaml"], "There is no config file none.yaml"),
         (["optimize", SMOKE, "-o", "."], "is a folder"),
-        (["optimize", SMOKE, "--prior", SMOKE], "is not a readable HDF5 file"),
         (["optimize", SMOKE, "--set", "robot.urdf=example-robot-data:talso"], "'talos'"),
         (["verify-gradient", SMOKE, "--set", "sampling.cost.step=0.2"], "sampling.cost: 60"),
         (["compare-random", SMOKE, "--optimized", "none.h5"], "There is no file none.h5"),

@@ -33,12 +33,3 @@ def test_it_optimises_first_where_there_is_no_result(excite: Program, two_motion
     assert motion["condition_number"] == first.condition_number
     assert len(answer["random"]) == 1
     assert list(excite.folder.iterdir()) == []  # no -o, no file
-
-
-def test_a_result_of_another_robot_is_refused(excite: Program, two_motions: Run) -> None:
-    run = excite(
-        "compare-random", SMOKE, "--optimized", two_motions.path,
-        "--set", "robot.joints=[shoulder_pitch, elbow, wrist_roll, slide]",
-    )  # fmt: skip
-    assert run.returncode == 2
-    assert "does not belong to" in run.stderr

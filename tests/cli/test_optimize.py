@@ -112,17 +112,9 @@ def test_a_prior_makes_the_stack_better_than_the_motion(excite: Program, two_mot
     )
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        "robot.joints=[shoulder_pitch, elbow, wrist_roll, slide]",
-        "criterion.row_weights=effort",
-    ],
-)
-def test_a_prior_of_another_problem_is_refused(
-    excite: Program, two_motions: Run, change: str
-) -> None:
-    run = excite("optimize", SMOKE, "--set", change, *BRIEF, "--prior", two_motions.path)
+def test_a_prior_of_another_robot_is_refused(excite: Program, two_motions: Run) -> None:
+    others = "robot.joints=[shoulder_pitch, elbow, wrist_roll, slide]"
+    run = excite("optimize", SMOKE, "--set", others, *BRIEF, "--prior", two_motions.path)
     assert run.returncode == 2
     assert f"--prior {two_motions.path} cannot be stacked" in run.stderr
     assert list(excite.folder.iterdir()) == []

@@ -89,7 +89,6 @@ def test_a_finished_run_has_nothing_to_go_on_with(excite: Program, whole: Path) 
     [
         (("--set", "trajectory.harmonics=3"), "trajectory"),
         (("--seed", "4"), "seed"),
-        (("--set", "constraints.torque=null"), "constraints"),
     ],
 )
 def test_another_config_is_refused_by_the_name_of_what_differs(
@@ -111,12 +110,3 @@ def test_a_prior_that_the_file_was_not_made_with_is_refused(excite: Program, who
     assert run.returncode == 2
     assert "--prior" in run.stderr
     assert path.read_bytes() == whole.read_bytes()
-
-
-def test_a_file_that_is_no_result_is_not_resumed(excite: Program) -> None:
-    path = excite.folder / "cut.h5"
-    path.write_text("notes", encoding="utf-8")
-    run = excite(*ASKED, "-o", path, "--resume")
-    assert run.returncode == 2
-    assert "is not a readable HDF5 file" in run.stderr
-    assert path.read_text(encoding="utf-8") == "notes"

@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 
 from excite_cli import __version__
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load import load_spec, parse_spec
 from excite_cli.criteria.base import condition_number, singular_values
 from excite_cli.errors import FileError
+from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.result import matches
+from excite_cli.robot.model import build_robot
 from excite_cli.store import atomic, result_file
 from excite_cli.store.result_file import read_result, write_result
-from tests.store.conftest import Stored
+from tests.store.conftest import CONFIG, Stored
 
 
 def assert_identical(first: Any, second: Any, where: str = "result") -> None:
@@ -74,6 +76,33 @@ def test_the_stored_config_is_the_problem(stored: Stored) -> None:
     result = read_result(stored.path)
     assert parse_spec(result.config) == stored.problem.spec
     assert matches(stored.problem, result) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("robot.joints=[shoulder_pitch, elbow, wrist_roll, slide]", "another robot"),
+        ("robot.gravity=[0, 0, -1.62]", "another robot"),
+        ("robot.base_orientation=[1.57, 0, 0]", "another robot"),
+        ("criterion.row_weights=effort", "row weights"),
+        ("criterion.column_scaling=unit_norm", "column scaling"),
+    ],
+)
+def test_a_result_belongs_to_its_own_problem_only(stored: Stored, change: str, words: str) -> None:
+    spec = load_spec(CONFIG, [change, "constraints={}"])
+    reason = matches(build_problem(spec, CONFIG.parent), read_result(stored.path))
+    assert reason is not None
+    assert words in reason
+
+
+def test_a_robot_that_stands_differently_is_another_robot() -> None:
+    """Gravity in the frame of the base decides the regressor, whichever way it is given."""
+    prints = set()
+    for tilt in (0.2, 0.4):
+        for base in ("fixed", "floating"):
+            change = [f"robot.base_orientation=[{tilt}, 0, 0]", f"robot.base={base}"]
+            prints.add(build_robot(load_spec(CONFIG, change).robot, CONFIG.parent).fingerprint())
+    assert len(prints) == 4
 
 
 def test_root_attributes(stored: Stored) -> None:

@@ -36,9 +36,9 @@ from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.states import States
 
 # μ and the share of the criterion's continuation for each stage, and when a stage is done: the
-# merit fell by less than this over the last `_WINDOW` iterations.
+# merit fell by less than this over the last `_WINDOW` iterations (never less than the tolerance).
 _STAGES = ((1.0, 0, 5e-2), (0.3, 0, 2e-2), (0.1, 0, 1e-2), (0.03, 1, 5e-3), (0.01, 1, 2e-3),
-           (0.003, 2, 1e-3))  # fmt: skip
+           (0.003, 2, 0.0))  # fmt: skip
 _WINDOW = 8
 _REACH_LINEAR, _REACH_OTHER = 0.5, 1.0
 _SUFFICIENT = 1e-4
