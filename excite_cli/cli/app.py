@@ -9,7 +9,7 @@ import typer
 from excite_cli import __version__
 from excite_cli.cli.check import check
 from excite_cli.cli.compare_random import compare_random
-from excite_cli.cli.console import run_guarded
+from excite_cli.cli.console import INTERRUPTED, run_guarded
 from excite_cli.cli.optimize import optimize
 from excite_cli.cli.report import report
 from excite_cli.cli.robots import robots
@@ -95,6 +95,8 @@ def main() -> None:
             if show is not None:
                 show()
             raise SystemExit(2) from error
+        if status == INTERRUPTED:  # typer turns Ctrl-C into this status
+            raise KeyboardInterrupt
         if isinstance(status, int) and status:
             raise SystemExit(status)
 

@@ -40,6 +40,7 @@ def optimize(
 
     from excite_cli.cli.setup import load_problem, output_path, single_threaded
     from excite_cli.cli.tables import margin_table, motion_data, motion_table
+    from excite_cli.errors import ConfigError
     from excite_cli.excitation.motion import Progress, ProgressCallback
     from excite_cli.excitation.result import Result
     from excite_cli.excitation.run import continue_run, new_result, resumed_result
@@ -48,6 +49,8 @@ def optimize(
     from excite_cli.store.versions import versions
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    if resume and overwrite:
+        raise ConfigError("--resume goes on with the file, --overwrite replaces it: give one.")
     path = output_path(output, config, overwrite, resume)
     extra = [f"sequence.motions={motions}"] if motions is not None else []
     extra += [f"seed={seed}"] if seed is not None else []
@@ -55,7 +58,7 @@ def optimize(
         problem = load_problem(terminal, config, overrides, extra)
         priors = [(str(name), read_result(name)) for name in prior or []]
         if resume and path.exists():
-            result = resumed_result(problem, read_result(path), path)
+            result = resumed_result(problem, read_result(path), path, prior or [])
             terminal.say(f"resuming after motion {len(result.motions)} of {path}")
         else:
             result = new_result(problem, priors, versions(), config.resolve().parent)

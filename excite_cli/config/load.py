@@ -6,17 +6,17 @@ and the nearest known key.
 """
 
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
-from excite_cli.config.spec import Section, Spec
-from excite_cli.errors import ConfigError, nearest
+from excite_cli.config.explain import explain
+from excite_cli.config.spec import Spec
+from excite_cli.errors import ConfigError
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 30
-_TAGS = {"fourier", "bspline", "disc", "polygon"}
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -33,6 +33,9 @@ class _StrictLoader(yaml.SafeLoader):
         """Refuse a key given twice."""
         seen = set()
         for key_node, _ in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                mark = key_node.start_mark
+                raise yaml.MarkedYAMLError(None, None, "a key must be a plain word", mark)
             key = key_node.value
             if key in seen:
                 mark = key_node.start_mark
@@ -70,7 +73,7 @@ def parse_spec(text: str, source: str = "config", overrides: list[str] | None = 
     try:
         return Spec.model_validate(tree)
     except ValidationError as error:
-        raise ConfigError(_explain(error, source)) from error
+        raise ConfigError(explain(error, tree, source)) from error
 
 
 def spec_as_yaml(spec: Spec) -> str:
@@ -114,6 +117,11 @@ def _apply(tree: dict[str, Any], override: str) -> None:
             f"--set {override}: write key.path=value, for example optimizer.max_seconds=20."
         )
     parts = [part.strip() for part in key.split(".")]
+    if not all(parts):
+        raise ConfigError(
+            f"--set {override}: '{key}' has an empty part between its dots; write "
+            "key.path=value, for example optimizer.max_seconds=20."
+        )
     node: Any = tree
     for part in parts[:-1]:
         if node.get(part) is None:
@@ -122,55 +130,3 @@ def _apply(tree: dict[str, Any], override: str) -> None:
         if not isinstance(node, dict):
             raise ConfigError(f"--set {override}: '{part}' holds a value, not further keys.")
     node[parts[-1]] = _load(text, f"--set {key}")
-
-
-def _explain(error: ValidationError, source: str) -> str:
-    lines = []
-    for item in error.errors(include_url=False):
-        path = [part for part in item["loc"] if part not in _TAGS]
-        where = ".".join(str(part) for part in path) or "the file"
-        lines.append(f"{source}: {where}: {_reason(item, path)}")
-    return "\n".join(dict.fromkeys(lines))
-
-
-def _reason(item: Any, path: list[Any]) -> str:
-    kind = item["type"]
-    if kind == "extra_forbidden":
-        allowed = _keys_at(path[:-1])
-        return f"unknown key.{nearest(str(path[-1]), allowed)} Allowed here: {', '.join(allowed)}."
-    if kind == "missing":
-        return "this key is required."
-    if kind == "union_tag_not_found":
-        return f"give {item['ctx']['discriminator']} to say which kind."
-    if kind == "union_tag_invalid":
-        tag, expected = item["ctx"]["tag"], item["ctx"]["expected_tags"].replace("'", "")
-        return f"unknown kind '{tag}'.{nearest(tag, expected.split(', '))} Allowed: {expected}."
-    message = item["msg"].removeprefix("Value error, ")
-    value = item.get("input")
-    if isinstance(value, str | int | float | bool | None):
-        options = item.get("ctx", {}).get("expected")
-        hint = (
-            nearest(str(value), options.replace("'", "").replace(" or ", ", ").split(", "))
-            if (isinstance(options, str))
-            else ""
-        )
-        return f"{message} (given: {value!r}).{hint}"
-    return f"{message}."
-
-
-def _keys_at(path: list[Any]) -> list[str]:
-    """Field names of the section at `path`, following the models."""
-    models: list[type[BaseModel]] = [Spec]
-    for part in path:
-        found: list[type[BaseModel]] = []
-        for model in models:
-            if part in model.model_fields:
-                found += _models_in(model.model_fields[part].annotation)
-        models = found or models
-    return sorted({name for model in models for name in model.model_fields})
-
-
-def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, Section):
-        return [annotation]
-    return [model for inner in get_args(annotation) for model in _models_in(inner)]

@@ -4,21 +4,34 @@ Every model is frozen and refuses unknown keys. Units: rad (m for prismatic join
 kg, m. The JSON Schema that `excite schema` prints is made from these classes.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
+    StrictBool,
     Tag,
     field_validator,
     model_validator,
 )
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+def _not_a_truth_value(value: Any) -> Any:
+    """Pydantic takes true for 1; a person who writes true means something else."""
+    if isinstance(value, bool):
+        raise ValueError("allowed: a number, not true or false")
+    return value
+
+
+_NO_TRUTH_VALUE = BeforeValidator(_not_a_truth_value)
+Integer = Annotated[int, _NO_TRUTH_VALUE]
+Finite = Annotated[float, Field(allow_inf_nan=False), _NO_TRUTH_VALUE]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), _NO_TRUTH_VALUE]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), _NO_TRUTH_VALUE]
+Share = Annotated[float, Field(gt=0, le=1), _NO_TRUTH_VALUE]
 Vector3 = tuple[Finite, Finite, Finite]
 
 
@@ -26,6 +39,29 @@ class Section(BaseModel):
     """Base of all sections: frozen, unknown keys refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", str_strip_whitespace=True)
+
+    @classmethod
+    def child(cls, key: str, value: Any) -> "type[Section] | None":
+        """The section that `value` under `key` is meant to be; None for plain values.
+
+        Of several kinds, the one whose tag (`family`, `kind`) is given, else the first.
+        """
+        if key not in cls.model_fields:
+            return None
+        kinds = _sections_in(cls.model_fields[key].annotation)
+        given = value if isinstance(value, dict) else {}
+        for kind in kinds:
+            for tag in ("family", "kind"):
+                field = kind.model_fields.get(tag)
+                if field is not None and given.get(tag) in get_args(field.annotation):
+                    return kind
+        return kinds[0] if kinds else None
+
+
+def _sections_in(annotation: Any) -> list[type[Section]]:
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return [annotation]
+    return [kind for inner in get_args(annotation) for kind in _sections_in(inner)]
 
 
 class JointLimits(Section):
@@ -90,9 +126,9 @@ class FourierSpec(Section):
     """Fourier series of Eq. 50."""
 
     family: Literal["fourier"] = "fourier"
-    harmonics: int = Field(5, ge=1, le=100, description="N")
+    harmonics: Integer = Field(5, ge=1, le=100, description="N")
     base_frequency: Positive = Field(0.785398, description="ω [rad/s]")
-    at_rest: bool = Field(False, description="velocity and acceleration vanish at start and end")
+    at_rest: StrictBool = Field(False, description="no velocity or acceleration at start and end")
 
 
 class BSplineSpec(Section):
@@ -100,9 +136,9 @@ class BSplineSpec(Section):
 
     family: Literal["bspline"]
     duration: Positive = Field(description="[s]")
-    control_points: int = Field(12, ge=4, le=500)
-    degree: int = Field(5, ge=3, le=9)
-    at_rest: bool = Field(True, description="velocity and acceleration vanish at start and end")
+    control_points: Integer = Field(12, ge=4, le=500)
+    degree: Integer = Field(5, ge=3, le=9)
+    at_rest: StrictBool = Field(True, description="no velocity or acceleration at start and end")
 
     @model_validator(mode="after")
     def _enough_points(self) -> "BSplineSpec":
@@ -114,7 +150,9 @@ class BSplineSpec(Section):
 
 def _family(value: Any) -> Any:
     """The `family` of a section; Fourier where none is given."""
-    return value.get("family", "fourier") if isinstance(value, dict) else value.family
+    if isinstance(value, dict):
+        return value.get("family", "fourier")
+    return getattr(value, "family", "fourier")
 
 
 TrajectorySpec = Annotated[
@@ -126,7 +164,7 @@ TrajectorySpec = Annotated[
 class GridSpec(Section):
     """Equidistant instants."""
 
-    samples: int = Field(ge=2, le=1_000_000)
+    samples: Integer = Field(ge=2, le=1_000_000)
     step: Positive = Field(description="[s]")
 
 
@@ -161,17 +199,19 @@ class CriterionSpec(Section):
 class JointLimitsSpec(Section):
     """Bounds on joint position, velocity and acceleration."""
 
-    position: bool = True
-    velocity: bool | Positive = Field(True, description="URDF limit, or [rad/s] for every joint")
+    position: StrictBool = True
+    velocity: StrictBool | Positive = Field(
+        True, description="URDF limit, or [rad/s] for every joint"
+    )
     acceleration: Positive | None = Field(None, description="[rad/s²] for every joint")
-    scale: Annotated[float, Field(gt=0, le=1)] = Field(1.0, description="share of velocity limits")
+    scale: Share = Field(1.0, description="share of velocity limits")
     position_margin: NonNegative = Field(0.0, description="kept from position limits [rad or m]")
 
 
 class TorqueSpec(Section):
     """Bound on the torque predicted with the URDF's inertias."""
 
-    scale: Annotated[float, Field(gt=0, le=1)] = Field(1.0, description="share of the effort limit")
+    scale: Share = Field(1.0, description="share of the effort limit")
 
 
 class DiscSpec(Section):
@@ -232,8 +272,8 @@ class OptimizerSpec(Section):
     method: Literal["interior_point", "sqp", "slsqp"] = "interior_point"
     qp_solver: Literal["daqp", "piqp"] = Field("daqp", description="used by method: sqp")
     max_seconds: Positive = Field(30.0, description="per motion")
-    max_iterations: int = Field(400, ge=1, le=100_000)
-    restarts: int = Field(1, ge=1, le=100, description="starts tried per motion, the best kept")
+    max_iterations: Integer = Field(400, ge=1, le=100_000)
+    restarts: Integer = Field(1, ge=1, le=100, description="starts tried per motion, the best kept")
     tolerance: Positive = Field(
         1e-3, description="change of the (logarithmic) criterion over 8 iterations that ends a run"
     )
@@ -242,7 +282,7 @@ class OptimizerSpec(Section):
 class SequenceSpec(Section):
     """Motions generated one after the other."""
 
-    motions: int = Field(1, ge=1, le=1000)
+    motions: Integer = Field(1, ge=1, le=1000)
 
 
 class Spec(Section):
@@ -255,4 +295,4 @@ class Spec(Section):
     constraints: ConstraintsSpec = ConstraintsSpec()
     optimizer: OptimizerSpec = OptimizerSpec()
     sequence: SequenceSpec = SequenceSpec()
-    seed: int = Field(1, ge=0, le=2**32 - 1)
+    seed: Integer = Field(1, ge=0, le=2**32 - 1)

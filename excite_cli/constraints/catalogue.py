@@ -12,7 +12,6 @@ from excite_cli.errors import ConfigError
 from excite_cli.robot.capsules import fit_capsules
 from excite_cli.robot.center_of_mass import CenterOfMass
 from excite_cli.robot.collision_pairs import choose_pairs
-from excite_cli.robot.description import UNBOUNDED
 from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Robot
 from excite_cli.robot.states import States
@@ -46,8 +45,8 @@ def _joint_bounds(spec: JointLimitsSpec, robot: Robot) -> list[Constraint]:
     limits, names = robot.limits, robot.joint_names
     found: list[Constraint] = []
     if spec.position:
-        lower = np.where(limits.lower > -UNBOUNDED, limits.lower, -np.inf) + spec.position_margin
-        upper = np.where(limits.upper < UNBOUNDED, limits.upper, np.inf) - spec.position_margin
+        lower = limits.lower + spec.position_margin
+        upper = limits.upper - spec.position_margin
         crossed = [n for n, low, high in zip(names, lower, upper, strict=True) if low >= high]
         if crossed:
             raise ConfigError(

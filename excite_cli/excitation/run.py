@@ -1,6 +1,6 @@
 """A run over a whole problem: fresh, on top of earlier results, or resumed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -59,14 +59,23 @@ def new_result(
     )
 
 
-def resumed_result(problem: Problem, result: Result, path: Path) -> Result:
+def resumed_result(
+    problem: Problem, result: Result, path: Path, priors: Sequence[Path] = ()
+) -> Result:
     """The stored result, once it is sure that it belongs to this problem.
 
     Raises
     ------
     FileError
-        The stored config differs in more than the number of motions.
+        The stored config differs in more than the number of motions, or `priors` are not those
+        that the file was made with.
     """
+    if priors and tuple(str(prior) for prior in priors) != result.priors:
+        made = ", ".join(result.priors) or "none"
+        raise FileError(
+            f"--resume --prior: {path} was made with other priors ({made}). Leave --prior out to "
+            "go on with it, or give another -o."
+        )
     stored = parse_spec(result.config, f"the config stored in {path}")
     if _without_count(stored) != _without_count(problem.spec) or matches(problem, result):
         keys = _differing(stored, problem.spec)

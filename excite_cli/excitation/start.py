@@ -14,7 +14,6 @@ from scipy.optimize import minimize
 from excite_cli.constraints.base import Array
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.task import MotionTask
-from excite_cli.robot.description import UNBOUNDED
 from excite_cli.robot.states import States
 
 # Residuals a start must have: inside, so that a barrier is finite, yet little is given away.
@@ -111,8 +110,8 @@ def clear_posture(task: MotionTask, seed: int) -> Start:
 
 def _blend(task: MotionTask, posture: Array, rng: np.random.Generator, spread: float) -> Array:
     limits = task.problem.robot.limits
-    lower = np.where(limits.lower > -UNBOUNDED, limits.lower, posture - np.pi)
-    upper = np.where(limits.upper < UNBOUNDED, limits.upper, posture + np.pi)
+    lower = np.where(np.isfinite(limits.lower), limits.lower, posture - np.pi)
+    upper = np.where(np.isfinite(limits.upper), limits.upper, posture + np.pi)
     inner = 0.05 * (upper - lower)
     centred = np.clip(posture, lower + inner, upper - inner)
     return centred + spread * (rng.uniform(lower + inner, upper - inner) - centred)
@@ -148,6 +147,7 @@ def _pushed_clear(task: MotionTask, guess: Array) -> Array:
         stacked = np.vstack(rows)
         return np.hstack([stacked, -np.ones((len(stacked), 1))])
 
+    limits = task.problem.robot.limits
     slope = np.zeros(task.n + 1)
     slope[-1] = -1.0
     room = float(_standing(task, guess).min())
@@ -156,7 +156,7 @@ def _pushed_clear(task: MotionTask, guess: Array) -> Array:
         np.append(guess, room),
         jac=lambda z: slope,
         method="SLSQP",
-        bounds=[(None, None)] * task.n + [(None, 0.25)],
+        bounds=[*zip(limits.lower, limits.upper, strict=True), (-np.inf, 0.25)],
         constraints=[{"type": "ineq", "fun": residuals, "jac": jacobian}],
         options={"maxiter": 60},
     )

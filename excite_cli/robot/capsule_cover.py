@@ -2,12 +2,11 @@
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
-from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 from excite_cli.robot.capsule import Capsule
@@ -31,7 +30,6 @@ CUT_BULGE = 0.03  # [m] that a capsule may stand out from the hull before it is 
 CUT_GAIN = 0.7  # waste with one capsule more over that without
 MOST_PIECES = 3
 _CUTS = np.linspace(0.2, 0.8, 7)
-_BOX = qmc.Halton(3, scramble=False).random(4000)
 _SPHERE = sphere_points(100)
 
 
@@ -160,8 +158,9 @@ class _Outside:
         """Places (M, 3) around the capsule, their heights (M,) and the volume of each."""
         start, end, radius = self._fit
         low, high = np.minimum(start, end) - 1.2 * radius, np.maximum(start, end) + 1.2 * radius
-        places = low + (high - low) * _BOX
-        return places, self._heights(places), float(np.prod(high - low)) / len(_BOX)
+        box = _evenly_spread_points()
+        places = low + (high - low) * box
+        return places, self._heights(places), float(np.prod(high - low)) / len(box)
 
     def _heights(self, places: Array) -> Array:
         """Height [m] of places above the hull: that above the face that sees them highest."""
@@ -229,3 +228,12 @@ def _main_axes(points: Array) -> Array:
     principal = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2]
     box, turned = np.ptp(points, axis=0).prod(), np.ptp(points @ principal.T, axis=0).prod()
     return principal if turned < 0.9 * box else np.eye(3)
+
+
+@cache
+def _evenly_spread_points() -> Array:
+    """Points (4000, 3) of the unit cube."""
+    # Imported here: it takes long, and only a first fit needs it.
+    from scipy.stats import qmc
+
+    return np.asarray(qmc.Halton(3, scramble=False).random(4000))

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from excite_cli.config.spec import SelfCollisionSpec
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.description import UNBOUNDED
 from excite_cli.robot.mesh_distances import MeshDistances
 from excite_cli.robot.model import Robot
 from excite_cli.robot.pair_distances import PairDistances, carried_bodies
@@ -24,6 +23,7 @@ from excite_cli.robot.pair_distances import PairDistances, carried_bodies
 Array = NDArray[np.float64]
 
 _ALWAYS = 0.99  # share of the sample in contact
+_CONTACT = 0.01  # [m] a wider margin does not make a contact; it may make the problem infeasible
 _ALLOWANCE = 0.05  # [m] beyond the margin that the nearest posture found must keep
 _STARTS = 3
 _STEPS = 30
@@ -138,7 +138,7 @@ def _by_sampling(
     q, _, _ = robot.draw_states(samples, seed)
     distances = np.vstack([measure.distances(q[k : k + _BLOCK]) for k in range(0, len(q), _BLOCK)])
     touching = (distances < margin).mean(axis=0)
-    always = touching >= _ALWAYS
+    always = (distances < min(margin, _CONTACT)).mean(axis=0) >= _ALWAYS
     nearest = distances.min(axis=0)
     clear = np.flatnonzero(nearest > margin + _ALLOWANCE)
     if len(clear):
@@ -198,8 +198,7 @@ def _descend(
     Steps go along the gradient to where the linearised distance is just below the target, at most
     0.3 rad (or 0.3 m) far, shorter with time, and are kept within the limits.
     """
-    lower = np.where(robot.limits.lower > -UNBOUNDED, robot.limits.lower, -np.pi)
-    upper = np.where(robot.limits.upper < UNBOUNDED, robot.limits.upper, np.pi)
+    lower, upper = robot.limits.ranges()
     least = np.full(len(pairs), np.inf)
     for q in starts:
         going = np.arange(len(pairs))

@@ -38,7 +38,10 @@ _PREFERRED = {
 
 @dataclass(frozen=True)
 class RobotDescription:
-    """A URDF as text, where it came from, and where its packages lie."""
+    """A URDF as text, where it came from, and where its packages lie.
+
+    `mimicking` names the joints that follow another one, with that other one.
+    """
 
     name: str
     source: str
@@ -46,6 +49,7 @@ class RobotDescription:
     xml: str
     package_dirs: tuple[str, ...]
     sha256: str
+    mimicking: dict[str, str]
 
 
 def example_robots_folder() -> Path:
@@ -113,15 +117,22 @@ def load_description(
                 f"robot.urdf: there is no file {path}. Give a path relative to the YAML file, or "
                 f"{EXAMPLE_PREFIX}<name>."
             )
-    xml = _read(path)
+    text = _read(path)
+    tree = _parsed(path, text)
+    _check_axes(path, tree)
     packages = (*extra, str(_share_folder(path)), str(path.parent))
     return RobotDescription(
         name=path.stem,
         source=urdf,
         path=path,
-        xml=_without_continuous_joints(path, xml),
+        xml=_without_continuous_joints(tree),
         package_dirs=tuple(dict.fromkeys(packages)),
-        sha256=hashlib.sha256(xml.encode()).hexdigest(),
+        sha256=hashlib.sha256(text.encode()).hexdigest(),
+        mimicking={
+            joint.get("name", ""): mimic.get("joint", "")
+            for joint in tree.findall("joint")
+            for mimic in joint.findall("mimic")
+        },
     )
 
 
@@ -145,13 +156,33 @@ def _read(path: Path) -> str:
     return text
 
 
-def _without_continuous_joints(path: Path, xml: str) -> str:
+def _parsed(path: Path, text: str) -> ElementTree.Element:
     try:
-        root = ElementTree.fromstring(xml)
+        root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise RobotError(f"{path} is not well-formed XML: {error}") from error
     if root.tag != "robot":
         raise RobotError(f"{path} is not a URDF: its root is <{root.tag}>, not <robot>.")
+    return root
+
+
+def _check_axes(path: Path, root: ElementTree.Element) -> None:
+    for joint in root.findall("joint"):
+        axis = joint.find("axis")
+        if axis is None or joint.get("type") == "fixed":
+            continue
+        try:
+            length = sum(float(word) ** 2 for word in axis.get("xyz", "1 0 0").split()) ** 0.5
+        except ValueError:
+            length = 0.0
+        if length < 1e-6:
+            raise RobotError(
+                f"{path}: joint '{joint.get('name')}' has the axis '{axis.get('xyz')}'; an axis "
+                "is three numbers that are not all zero."
+            )
+
+
+def _without_continuous_joints(root: ElementTree.Element) -> str:
     for joint in root.findall("joint"):
         if joint.get("type") != "continuous":
             continue

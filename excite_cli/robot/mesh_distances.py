@@ -7,7 +7,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from excite_cli.robot.description import UNBOUNDED
 from excite_cli.robot.link_shapes import collision_model
 from excite_cli.robot.model import Robot
 
@@ -29,8 +28,7 @@ class MeshDistances:
             link = str(robot.model.frames[item.parentFrame].name)
             entry = (int(item.parentJoint), item.placement.copy(), item.geometry)
             self._items.setdefault(link, []).append(entry)
-        self._lower = np.where(robot.limits.lower > -UNBOUNDED, robot.limits.lower, -np.pi)
-        self._upper = np.where(robot.limits.upper < UNBOUNDED, robot.limits.upper, np.pi)
+        self._lower, self._upper = robot.limits.ranges()
 
     def knows(self, links: Iterable[str]) -> bool:
         """Whether all these links have collision geometry."""

@@ -33,6 +33,11 @@ class Limits:
     acceleration: Array
     effort: Array
 
+    def ranges(self) -> tuple[Array, Array]:
+        """Finite positions (n,) to draw between: half a turn where there is no bound."""
+        lower = np.where(np.isfinite(self.lower), self.lower, -_FREE_POSITION)
+        return lower, np.where(np.isfinite(self.upper), self.upper, _FREE_POSITION)
+
 
 @dataclass(frozen=True)
 class Robot:
@@ -52,6 +57,7 @@ class Robot:
     moved: NDArray[np.intp]
     floating: bool
     limits: Limits
+    base_orientation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     locked: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -95,8 +101,7 @@ class Robot:
     def draw_states(self, count: int, seed: int) -> tuple[Array, Array, Array]:
         """`count` random positions, velocities and accelerations (count, n) within the limits."""
         rng = np.random.default_rng(seed)
-        lower = np.where(self.limits.lower > -UNBOUNDED, self.limits.lower, -_FREE_POSITION)
-        upper = np.where(self.limits.upper < UNBOUNDED, self.limits.upper, _FREE_POSITION)
+        lower, upper = self.limits.ranges()
         speed = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, _FREE_VELOCITY)
         q = rng.uniform(lower, upper, (count, self.n))
         v = rng.uniform(-speed, speed, (count, self.n))
@@ -112,7 +117,7 @@ class Robot:
                 ",".join(f"{joint}={value!r}" for joint, value in sorted(self.locked.items())),
                 f"floating={self.floating}",
                 ",".join(map(str, self.rows)),
-                np.array2string(self.reference[:7]) if self.floating else "",
+                f"base={self.base_orientation}",
                 np.array2string(np.asarray(self.model.gravity.linear)),
             ]
         )
@@ -133,9 +138,10 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
     full = _parse(description, spec)
     names = [str(name) for name in full.names[1:] if str(name) != "root_joint"]
     _check_types(full, names, description)
-    chosen = _chosen(spec, names)
+    chosen = _chosen(spec, names, description.mimicking)
     limits_full = {name: _limits_of(full, name, spec.limits.get(name)) for name in names}
-    posture = _posture(spec, names, limits_full)
+    _check_limits(chosen, limits_full)
+    posture = _posture(spec, names, chosen, limits_full)
     reference = pin.neutral(full)
     for name in names:
         reference[full.joints[full.getJointId(name)].idx_q] = posture[name]
@@ -158,7 +164,6 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
         reduced[7:] = start
     else:
         reduced = start.copy()
-    _check_limits(moved_names, limits_full)
     columns = np.array([limits_full[name] for name in moved_names]).T
     return Robot(
         name=description.name,
@@ -171,6 +176,7 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
         moved=moved,
         floating=floating,
         limits=Limits(*columns),
+        base_orientation=spec.base_orientation,
         locked={name: posture[name] for name in names if name not in chosen},
     )
 
@@ -213,11 +219,16 @@ def _check_types(model: pin.Model, names: list[str], description: RobotDescripti
             )
 
 
-def _chosen(spec: RobotSpec, names: list[str]) -> list[str]:
+def _chosen(spec: RobotSpec, names: list[str], mimicking: dict[str, str]) -> list[str]:
     if spec.joints == "all":
-        return names
+        return [name for name in names if name not in mimicking]
     for joint in spec.joints:
         _known(joint, names, "robot.joints")
+        if joint in mimicking:
+            raise ConfigError(
+                f"robot.joints: '{joint}' mimics '{mimicking[joint]}' and does not move on its "
+                "own; coupled joints are not modelled. Leave it out of robot.joints."
+            )
     return [name for name in names if name in spec.joints]
 
 
@@ -233,6 +244,8 @@ def _limits_of(model: pin.Model, name: str, given: JointLimits | None) -> list[f
     joint = model.joints[model.getJointId(name)]
     lower = float(model.lowerPositionLimit[joint.idx_q])
     upper = float(model.upperPositionLimit[joint.idx_q])
+    lower = lower if lower > -UNBOUNDED else -np.inf
+    upper = upper if upper < UNBOUNDED else np.inf
     velocity = float(model.velocityLimit[joint.idx_v]) or np.inf
     effort = float(model.effortLimit[joint.idx_v]) or np.inf
     acceleration = np.inf
@@ -244,7 +257,7 @@ def _limits_of(model: pin.Model, name: str, given: JointLimits | None) -> list[f
     return [lower, upper, velocity, acceleration, effort]
 
 
-def _check_limits(names: tuple[str, ...], limits: dict[str, list[float]]) -> None:
+def _check_limits(names: list[str], limits: dict[str, list[float]]) -> None:
     for name in names:
         lower, upper = limits[name][:2]
         if not lower < upper:
@@ -255,7 +268,9 @@ def _check_limits(names: tuple[str, ...], limits: dict[str, list[float]]) -> Non
             )
 
 
-def _posture(spec: RobotSpec, names: list[str], limits: dict[str, list[float]]) -> dict[str, float]:
+def _posture(
+    spec: RobotSpec, names: list[str], chosen: list[str], limits: dict[str, list[float]]
+) -> dict[str, float]:
     for joint in spec.posture:
         _known(joint, names, "robot.posture")
     for joint in spec.limits:
@@ -265,7 +280,7 @@ def _posture(spec: RobotSpec, names: list[str], limits: dict[str, list[float]]) 
         lower, upper = limits[name][:2]
         if name in spec.posture:
             value = float(spec.posture[name])
-            if not lower <= value <= upper:
+            if not lower <= value <= upper and (lower < upper or name in chosen):
                 raise ConfigError(
                     f"robot.posture.{name}: {value:g} is outside its limits "
                     f"[{lower:g}, {upper:g}]. Give a value between them."

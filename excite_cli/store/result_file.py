@@ -11,6 +11,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Worst
 from excite_cli.errors import FileError
@@ -122,7 +123,7 @@ def read_result(path: Path) -> Result:
             return _read(file, path)
     except OSError as error:
         raise FileError(f"{path} is not a readable HDF5 file ({error}).") from error
-    except (KeyError, ValueError, TypeError, json.JSONDecodeError) as error:
+    except (KeyError, ValueError, TypeError, AttributeError, IndexError, RuntimeError) as error:
         raise FileError(
             f"{path} is damaged or not a result of this program: {error}. Result files are "
             "written by `excite optimize` and `excite compare-random`."
@@ -154,14 +155,14 @@ def _read(file: Any, path: Path) -> Result:
         column_scales=np.asarray(base["column_scales"]),
         motions=tuple(
             _read_motion(file[f"motions/{index}"], index)
-            for index in sorted(int(name) for name in file.get("motions", {}))
+            for index in range(1, len(file.get("motions", {})) + 1)
         ),
         stack=_read_stack(file["stack/R"], int(file["stack"].attrs["rows"])),
         prior_stack=_read_stack(file["stack/R_0"], int(file["stack/R_0"].attrs["rows"])),
         random=tuple(
             RandomMotion(
                 index,
-                np.asarray(file[f"random/{index}/coefficients"]),
+                _finite_matrix(file[f"random/{index}/coefficients"]),
                 float(file[f"random/{index}"].attrs["condition_number"]),
                 float(file[f"random/{index}"].attrs["stacked_condition_number"]),
             )
@@ -179,10 +180,17 @@ def _read(file: Any, path: Path) -> Result:
 
 
 def _read_stack(dataset: Any, rows: int) -> Stack:
-    factor = np.asarray(dataset, dtype=float)
-    if factor.ndim != 2 or factor.shape[0] != factor.shape[1] or not np.isfinite(factor).all():
-        raise ValueError(f"{dataset.name} is not a finite square matrix")
+    factor = _finite_matrix(dataset)
+    if factor.shape[0] != factor.shape[1]:
+        raise ValueError(f"{dataset.name} is not square")
     return Stack(factor, rows)
+
+
+def _finite_matrix(dataset: Any) -> NDArray[np.float64]:
+    matrix = np.asarray(dataset, dtype=float)
+    if matrix.ndim != 2 or not np.isfinite(matrix).all():
+        raise ValueError(f"{dataset.name} is not a matrix of finite numbers")
+    return matrix
 
 
 def _read_motion(group: Any, index: int) -> Motion:
@@ -190,7 +198,7 @@ def _read_motion(group: Any, index: int) -> Motion:
     margins = json.loads(attributes["margins"])
     return Motion(
         index=index,
-        coefficients=np.asarray(group["coefficients"], dtype=float),
+        coefficients=_finite_matrix(group["coefficients"]),
         condition_number=float(attributes["condition_number"]),
         stacked_condition_number=float(attributes["stacked_condition_number"]),
         improved=bool(attributes["improved"]),

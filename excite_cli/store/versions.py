@@ -2,12 +2,14 @@
 
 from importlib import metadata
 
-_LIBRARIES = ("excite-cli", "pin", "coal", "numpy", "scipy", "h5py", "example-robot-data")
+from excite_cli import __version__
+
+_LIBRARIES = ("pin", "coal", "numpy", "scipy", "h5py", "example-robot-data")
 
 
 def versions() -> dict[str, str]:
     """Installed version of each library, `missing` where there is none."""
-    found = {}
+    found = {"excite-cli": __version__}
     for name in _LIBRARIES:
         try:
             found[name] = metadata.version(name)

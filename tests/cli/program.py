@@ -11,7 +11,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 SMOKE = ROOT / "configs" / "smoke.yaml"
 # A few iterations only: what is tested here is the program, not how good the motions get.
-BRIEF = ("--set", "optimizer.max_iterations=6")
+BRIEF = ("--set", "optimizer.max_iterations=12")
 
 _found = shutil.which("excite", path=f"{Path(sys.executable).parent}{os.pathsep}{os.defpath}")
 EXCITE = (

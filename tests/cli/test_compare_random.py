@@ -1,3 +1,8 @@
+import numpy as np
+import pytest
+
+from excite_cli.config.load import load_spec
+from excite_cli.excitation.problem import build_problem
 from excite_cli.store.result_file import read_result
 from tests.cli.conftest import Run
 from tests.cli.program import BRIEF, SMOKE, Program
@@ -19,8 +24,16 @@ def test_random_beside_optimised(excite: Program, two_motions: Run) -> None:
     assert [m["index"] for m in random] == [1, 2]
     for motion in random:
         assert set(motion) >= {"index", "condition_number", "stacked_condition_number"}
-    assert random[1]["stacked_condition_number"] < random[0]["stacked_condition_number"]
     both = read_result(excite.folder / "both.h5")
+    objective = build_problem(load_spec(SMOKE, ["constraints={}"]), SMOKE.parent).objective()
+    blocks = [objective.block(motion.coefficients) for motion in both.random]
+    for index, motion in enumerate(random):
+        own, stacked = (
+            np.linalg.cond(np.vstack(rows))
+            for rows in (blocks[index : index + 1], blocks[: index + 1])
+        )
+        assert motion["condition_number"] == pytest.approx(own, rel=1e-6)
+        assert motion["stacked_condition_number"] == pytest.approx(stacked, rel=1e-6)
     assert [m.condition_number for m in both.random] == [m["condition_number"] for m in random]
     assert both.random_candidates == (answer["candidates"], answer["admissible"])
     assert len(both.motions) == 2

@@ -50,7 +50,7 @@ def test_quiet_is_silent_and_seed_and_set_count(excite: Program, two_motions: Ru
     result = read_result(excite.folder / "smoke.h5")  # named after the config
     assert result.seed == 9
     assert "seed: 9" in result.config
-    assert "max_iterations: 6" in result.config
+    assert "max_iterations: 12" in result.config
     other = read_result(two_motions.path).motions[0]
     assert not np.allclose(result.motions[0].coefficients, other.coefficients)
 

@@ -1,9 +1,11 @@
 """`excite report`, driven as a user would."""
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
+import h5py
 import pytest
 import typer
 
@@ -124,7 +126,11 @@ def test_a_missing_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
 def test_a_urdf_that_is_not_found_asks_for_the_config(
     stored: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert _run("report", stored, "-o", tmp_path / "figures") == 2
+    moved = tmp_path / "moved.h5"
+    shutil.copy(stored, moved)
+    with h5py.File(moved, "a") as file:
+        file.attrs["config_folder"] = str(tmp_path / "gone")
+    assert _run("report", moved, "-o", tmp_path / "figures") == 2
     message = capsys.readouterr().err
     assert "../data/smoke_arm.urdf" in message
     assert "--config CONFIG.yaml" in message

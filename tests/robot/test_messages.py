@@ -17,7 +17,6 @@ from excite_cli.config.spec import (
 )
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.robot.description import UNBOUNDED
 from excite_cli.robot.model import Robot, build_robot
 
 LIMIT = '<limit lower="-1" upper="1" velocity="2" effort="10"/>'
@@ -256,8 +255,8 @@ def test_crossed_limits(tmp_path: Path, posture: dict[str, float]) -> None:
 def test_a_continuous_joint_is_one_without_position_limits(tmp_path: Path, inside: str) -> None:
     robot = built(tmp_path, urdf("continuous", inside), posture={"elbow": 12.0})
     assert robot.model.nq == robot.model.nv == 2
-    assert robot.limits.lower[0] <= -UNBOUNDED
-    assert robot.limits.upper[0] >= UNBOUNDED
+    assert robot.limits.lower[0] == -np.inf
+    assert robot.limits.upper[0] == np.inf
     assert robot.limits.velocity[0] == {"": np.inf, LIMIT: 2.0}.get(inside, 3.0)
     assert robot.posture[0] == 12.0
     bounds = next(c for c in problem(tmp_path, urdf("continuous", inside), False).constraints)

@@ -62,9 +62,9 @@ def test_free_directions_are_orthonormal_and_keep_rest(family: Trajectory) -> No
 def test_constant_stands_still_within_the_free_directions(family: Trajectory) -> None:
     q = np.array([0.3, -1.2, 2.0])
     alpha = family.constant(q)
-    position, velocity, acceleration = family.basis(
-        np.linspace(0, family.duration, 23)
-    ).states(alpha)
+    position, velocity, acceleration = family.basis(np.linspace(0, family.duration, 23)).states(
+        alpha
+    )
     assert np.allclose(position, q)
     assert np.abs(velocity).max() < 1e-12
     assert np.abs(acceleration).max() < 1e-11
