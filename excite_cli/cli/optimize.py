@@ -39,7 +39,7 @@ def optimize(
     from rich.table import Table
 
     from excite_cli.cli.setup import load_problem, output_path, single_threaded
-    from excite_cli.cli.tables import margin_table, motion_data, motion_table
+    from excite_cli.cli.tables import criterion_data, margin_table, motion_data, motion_table
     from excite_cli.errors import ConfigError
     from excite_cli.excitation.motion import Progress, ProgressCallback
     from excite_cli.excitation.result import Result
@@ -68,10 +68,9 @@ def optimize(
             def report(index: int) -> ProgressCallback:
                 def tell(progress: Progress) -> None:
                     show(
-                        f"motion {index}/{total}  iteration {progress.iteration}  "
-                        f"cond {progress.condition_number:.2f}  {progress.worst_name} "
-                        f"{progress.worst_margin:.3g} {progress.worst_unit}  "
-                        f"stage {progress.stage}",
+                        f"motion {index}/{total}  stage {progress.stage}  "
+                        f"it {progress.iteration}  cond {progress.condition_number:.2f}  "
+                        f"{progress.worst_name} {progress.worst_margin:.3g} {progress.worst_unit}",
                         progress.iteration,
                     )
 
@@ -93,5 +92,10 @@ def optimize(
     if problem.constraints:
         tables.insert(1, margin_table(result.motions, problem.constraints))
     terminal.answer(
-        tables, {"motions": [motion_data(m) for m in result.motions], "output": str(path)}
+        tables,
+        {
+            "motions": [motion_data(m) for m in result.motions],
+            "criterion": criterion_data(problem),
+            "output": str(path),
+        },
     )

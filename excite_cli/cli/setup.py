@@ -1,5 +1,6 @@
 """From command-line arguments to a problem, with what is worth saying about it."""
 
+from collections import Counter
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from excite_cli.config.load import load_spec
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.robot.collision_pairs import CollisionPairs
 
 
 def single_threaded(threads: int = 1) -> AbstractContextManager[object]:
@@ -29,6 +31,11 @@ def load_problem(
         f"{problem.variables} variables, {len(problem.cost_basis.times)} cost and "
         f"{len(problem.constraint_basis.times)} constraint samples"
     )
+    criterion, weighting = problem.spec.criterion, problem.weighting
+    terminal.say(
+        f"criterion: {criterion.kind}, row weights: {weighting.row_name}, column scaling: "
+        f"{weighting.column_name}"
+    )
     names = ", ".join(constraint.name for constraint in problem.constraints) or "none"
     terminal.say(f"constraints: {names}")
     for constraint in problem.constraints:
@@ -36,7 +43,7 @@ def load_problem(
             pairs = constraint.pairs
             terminal.say(
                 f"self-collision: {len(constraint.capsules)} capsules, {len(pairs.checked)} pairs "
-                f"checked, {len(pairs.dropped)} dropped (--verbose lists them)"
+                f"checked; not checked (--verbose lists all): {_reasons(pairs)}"
             )
             for label in constraint.labels:
                 terminal.detail(f"  checked  {label}")
@@ -45,6 +52,12 @@ def load_problem(
     for name, words in zip(_symbols(problem), problem.base.in_words(), strict=True):
         terminal.detail(f"  base parameter {name}: {words}")
     return problem
+
+
+def _reasons(pairs: CollisionPairs) -> str:
+    """How many pairs were dropped for each reason, figures in the reasons left aside."""
+    counts = Counter(pair.reason.split(" (")[0] for pair in pairs.dropped)
+    return ", ".join(f"{count} {reason}" for reason, count in counts.most_common()) or "none"
 
 
 def _symbols(problem: Problem) -> list[str]:

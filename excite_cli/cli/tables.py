@@ -7,6 +7,7 @@ from rich.table import Table
 
 from excite_cli.constraints.base import Constraint, Worst
 from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
 
 
@@ -84,6 +85,15 @@ def motion_data(motion: Motion) -> dict[str, Any]:
         "iterations": motion.iterations,
         "evaluations": motion.evaluations,
         "margins": {name: worst_data(worst) for name, worst in motion.margins.items()},
+    }
+
+
+def criterion_data(problem: Problem) -> dict[str, str]:
+    """What was minimised and how it was weighted, for `--json`."""
+    return {
+        "kind": problem.spec.criterion.kind,
+        "row_weights": problem.weighting.row_name,
+        "column_scaling": problem.weighting.column_name,
     }
 
 

@@ -232,6 +232,13 @@ def _chosen(spec: RobotSpec, names: list[str], mimicking: dict[str, str]) -> lis
     return [name for name in names if name in spec.joints]
 
 
+def _in_degrees(value: float) -> str:
+    """A hint for those who wrote degrees."""
+    if abs(value) <= 2 * np.pi:
+        return ""
+    return f"; angles are in radians, {value:g}° is {np.radians(value):.4g} rad"
+
+
 def _known(joint: str, names: list[str], where: str) -> None:
     if joint not in names:
         raise ConfigError(
@@ -283,7 +290,7 @@ def _posture(
             if not lower <= value <= upper and (lower < upper or name in chosen):
                 raise ConfigError(
                     f"robot.posture.{name}: {value:g} is outside its limits "
-                    f"[{lower:g}, {upper:g}]. Give a value between them."
+                    f"[{lower:g}, {upper:g}]. Give a value between them{_in_degrees(value)}."
                 )
         else:
             value = 0.0 if lower <= 0.0 <= upper else (lower + upper) / 2
