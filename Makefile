@@ -21,6 +21,7 @@ lint: $(STAMP)
 bench: $(STAMP)          ## cost and gradient, growth, whole motions
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.gradient
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.growth
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.clearance
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.motions
 
 $(STAMP): pyproject.toml

@@ -41,6 +41,13 @@ class Constraint(ABC):
     def margins(self, states: States) -> Array:
         """Margins (T, m) in `unit`."""
 
+    def margins_within(self, states: States, reach: Array) -> Array:
+        """Margins (T, m) that are exact up to `reach` (m,) and at least `reach` beyond it.
+
+        For members that can tell cheaply what is far away; here all are exact.
+        """
+        return self.margins(states)
+
     @abstractmethod
     def gradients(
         self, states: States, times: Indices, columns: Indices

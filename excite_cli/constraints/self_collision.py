@@ -29,10 +29,15 @@ class SelfCollision(Constraint):
 
     def margins(self, states: States) -> Array:
         """Distance less the margin (T, m) [m]."""
-        return self._clearance.distances(states.q) - self.margin
+        return self._clearance.distances(states) - self.margin
+
+    def margins_within(self, states: States, reach: Array) -> Array:
+        """As `margins`; pairs plainly farther apart than `reach` get a bound beyond it instead."""
+        farthest = self.margin + float(reach.max(initial=0.0))
+        return self._clearance.distances(states, exact_below=farthest) - self.margin
 
     def gradients(
         self, states: States, times: Indices, columns: Indices
     ) -> tuple[Array | None, Array | None, Array | None]:
         """Witness normal times the difference of the witness points' Jacobians."""
-        return self._clearance.gradients(states.q, times, columns), None, None
+        return self._clearance.gradients(states, times, columns), None, None

@@ -22,6 +22,9 @@ from excite_cli.trajectory.base import Basis
 
 Mask = NDArray[np.bool_]
 
+# Residuals beyond this concern no solver: they may be lower bounds instead of exact.
+REACH = 1.0
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -86,11 +89,12 @@ class Residuals:
         self.grid = GridProducts(basis, free)
 
     def values(self, states: States) -> list[Array]:
-        """Residuals (T, m) of every constraint."""
-        return [
-            (constraint.margins(states) - guard) / constraint.scale
-            for constraint, guard in zip(self.constraints, self.guards, strict=True)
-        ]
+        """Residuals (T, m) of every constraint; exact below `REACH`, bounds from there on."""
+        values = []
+        for constraint, guard in zip(self.constraints, self.guards, strict=True):
+            margins = constraint.margins_within(states, REACH * constraint.scale + guard)
+            values.append((margins - guard) / constraint.scale)
+        return values
 
     def rows(self, states: States, index: int, near: Mask) -> Rows:
         """Derivatives of the residuals of one constraint where `near` (T, m) is true."""
@@ -118,20 +122,26 @@ def summed_per_instant(rows: Rows, weights: Array, samples: int) -> list[Array |
 
 
 def squared_per_instant(rows: Rows, weights: Array, samples: int) -> dict[tuple[int, int], Array]:
-    """Σ over the rows of each instant of weight·(gᵢ gⱼᵀ), (T, n, n) per pair of orders."""
+    """Σ over the rows of each instant of weight·(gᵢ gⱼᵀ), (T, n, n) per pair of orders.
+
+    Rows are laid out by instant, short instants filled with zeros, for one batched product.
+    """
     found = {}
     present = [i for i, part in enumerate(rows.parts) if part is not None]
-    starts, instants = _groups(rows.times)
+    starts, _ = _groups(rows.times)
+    counts = np.diff(np.append(starts, len(rows.times)))
+    places = np.arange(len(rows.times)) - np.repeat(starts, counts)
+    deepest = int(counts.max(initial=0))
+    root = np.sqrt(weights)[:, None]
+    laid_out = {}
+    for i in present:
+        part = rows.parts[i]
+        assert part is not None
+        laid_out[i] = np.zeros((samples, deepest, part.shape[1]))
+        laid_out[i][rows.times, places] = root * part
     for i in present:
         for j in (j for j in present if j >= i):
-            left, right = rows.parts[i], rows.parts[j]
-            assert left is not None
-            assert right is not None
-            total = np.zeros((samples, left.shape[1], left.shape[1]))
-            if len(rows.times):
-                outer = (weights[:, None] * left)[:, :, None] * right[:, None, :]
-                total[instants] = np.add.reduceat(outer, starts, axis=0)
-            found[i, j] = total
+            found[i, j] = laid_out[i].transpose(0, 2, 1) @ laid_out[j]
     return found
 
 

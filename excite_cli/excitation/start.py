@@ -21,7 +21,7 @@ _CLEAR_POSTURE, _CLEAR_MOTION = 0.03, 0.02
 _SHRINK, _SMALLEST = 0.7, 1e-4
 _TRIES = 40
 # Columns whose residual is beyond this do not bind a posture.
-_FAR = 2.0
+_FAR = 1.0
 
 
 @dataclass(frozen=True)

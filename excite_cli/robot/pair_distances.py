@@ -17,6 +17,7 @@ from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Robot
 from excite_cli.robot.segments import Nearest, nearest_points, normals
+from excite_cli.robot.states import States
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -45,6 +46,8 @@ class PairDistances:
         self._along = np.array([c.end - c.start for c in kept]).reshape(-1, 3)
         radius = np.array([capsule.radius for capsule in kept])
         self._radii = radius[self._first] + radius[self._second]
+        ball = radius + 0.5 * np.linalg.norm(self._along, axis=1)
+        self._balls = ball[self._first] + ball[self._second]
         carried = carried_bodies(robot)[self._joints]  # (C, n)
         self._sign = carried[self._second] - carried[self._first]
         self._last: tuple[Array, _World] | None = None
@@ -54,9 +57,21 @@ class PairDistances:
         """Number of pairs P."""
         return len(self._first)
 
-    def distances(self, q: Array) -> Array:
-        """Signed distances (T, P) [m] at moved-joint positions q (T, n)."""
+    def distances(self, q: Array | States, exact_below: float = np.inf) -> Array:
+        """Signed distances (T, P) [m] at moved-joint positions q (T, n), or at states.
+
+        Where a ball around each segment already shows the distance to be at least `exact_below`,
+        that bound is returned instead, which saves most of the work for robots of many links.
+        """
         world = self._world(q)
+        if np.isfinite(exact_below):
+            bounds = self._bounds(world)
+            cols, rows = np.nonzero(bounds < exact_below)
+            for k in range(0, len(cols), _BLOCK):
+                some = slice(k, k + _BLOCK)
+                gap = self._nearest_at(world, rows[some], cols[some])[0].gap
+                bounds[cols[some], rows[some]] = _length(gap) - self._radii[cols[some]]
+            return bounds.T
         result = np.empty((self.n_pairs, world.start.shape[2]))
         size = max(1, _BLOCK // max(result.shape[1], 1))
         for k in range(0, self.n_pairs, size):  # blocks that stay in the processor's cache
@@ -71,12 +86,18 @@ class PairDistances:
         result -= self._radii[:, None]
         return result.T
 
+    def _bounds(self, world: "_World") -> Array:
+        """Lower bounds (P, T) of the distances, from balls around the segments."""
+        middle = world.start + 0.5 * world.along
+        apart = _length(middle[:, self._first] - middle[:, self._second])
+        return apart - self._balls[:, None]
+
     def distances_at(self, q: Array, rows: Indices, cols: Indices) -> Array:
         """Signed distances (K,) [m] at instant rows[k] of pair cols[k] only."""
         world = self._world(q)
         return _length(self._nearest_at(world, rows, cols)[0].gap) - self._radii[cols]
 
-    def gradients(self, q: Array, rows: Indices, cols: Indices) -> Array:
+    def gradients(self, q: Array | States, rows: Indices, cols: Indices) -> Array:
         """Derivatives (K, n) of the distance at instant rows[k] of pair cols[k] by q."""
         world = self._world(q)
         nearest, start, along, along_second = self._nearest_at(world, rows, cols)
@@ -95,7 +116,13 @@ class PairDistances:
         nearest = nearest_points(start, along, world.start[:, second, rows], along_second)
         return nearest, start, along, along_second
 
-    def _world(self, q: Array) -> "_World":
+    def _world(self, q: Array | States) -> "_World":
+        if isinstance(q, States):
+            if self._last is None or self._last[0] is not q.q:
+                world = _World(*q.placements, self._joints, self._start, self._along)
+                world.share_axes(q)
+                self._last = (q.q, world)
+            return self._last[1]
         q = np.asarray(q, dtype=float).reshape(-1, self._robot.n)
         if self._last is not None and np.array_equal(self._last[0], q):
             return self._last[1]
@@ -113,6 +140,7 @@ class _World:
     ) -> None:
         self._placements = (rotations, translations)
         self._axes: Array | None = None
+        self._states: States | None = None
         count = len(rotations)
         self.start = np.empty((3, len(joints), count))
         self.along = np.empty((3, len(joints), count))
@@ -127,8 +155,14 @@ class _World:
         self.start[:, moving] = np.moveaxis(both[..., 0] + shift, -1, 0)
         self.along[:, moving] = np.moveaxis(both[..., 1], -1, 0)
 
+    def share_axes(self, states: States) -> None:
+        """Take the Jacobian columns from `states`, which computes them once for all."""
+        self._states = states
+
     def axes(self, kinematics: BatchKinematics) -> Array:
         """Jacobian columns (T, nv, 6) in the world."""
+        if self._states is not None:
+            return self._states.columns
         if self._axes is None:
             self._axes = kinematics.axes(*self._placements)
         return self._axes

@@ -26,6 +26,7 @@ from excite_cli.criteria.base import Criterion
 from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
 from excite_cli.excitation.objective import Spectrum
 from excite_cli.excitation.residuals import (
+    REACH,
     Rows,
     squared_per_instant,
     summed_per_instant,
@@ -40,7 +41,7 @@ from excite_cli.robot.states import States
 _STAGES = ((1.0, 0, 5e-2), (0.3, 0, 2e-2), (0.1, 0, 1e-2), (0.03, 1, 5e-3), (0.01, 1, 2e-3),
            (0.003, 2, 0.0))  # fmt: skip
 _WINDOW = 8
-_REACH_LINEAR, _REACH_OTHER = 0.5, 1.0
+_REACH_LINEAR, _REACH_OTHER = 0.5, REACH
 _SUFFICIENT = 1e-4
 _HALVINGS = 14
 _TO_BOUNDARY = 0.98
@@ -140,7 +141,7 @@ class _Run:
             return None
         cost, gradient, spectrum = self.task.cost(x, criterion)
         barrier = sum(
-            float(_barrier(value, reach).sum())
+            float(_barrier(value[value < reach], reach).sum())
             for value, reach in zip(values, self.reach, strict=True)
         )
         merit = cost + mu / self.samples * barrier
@@ -182,10 +183,12 @@ class _Run:
         task, grid = self.task, self.task.residuals.grid
         gradient = np.zeros((task.k, task.n))
         hessian = np.zeros((task.n, task.k, task.n, task.k))
+        bends: dict[tuple[int, int], Array] = {}
         for index, constraint in enumerate(task.problem.constraints):
             value, reach = point.values[index], self.reach[index]
             weight = mu / self.samples
-            first, second = weight * _first(value, reach), weight * _second(value, reach)
+            counted = value if isinstance(constraint, JointBound) else value[value < reach]
+            first, second = weight * _first(counted, reach), weight * _second(counted, reach)
             if isinstance(constraint, JointBound):
                 pull, bend = _per_joint(constraint, first, second, task.n)
                 parts: list[Array | None] = [None, None, None]
@@ -197,10 +200,11 @@ class _Run:
             if not near.any():
                 continue
             rows: Rows = task.residuals.rows(point.states, index, near)
-            grid.add_gradient(gradient, summed_per_instant(rows, first[near], self.samples))
-            squares = squared_per_instant(rows, second[near], self.samples)
-            for (i, j), weights in squares.items():
-                grid.add_curvature(hessian, i, j, weights)
+            grid.add_gradient(gradient, summed_per_instant(rows, first, self.samples))
+            for pair, squares in squared_per_instant(rows, second, self.samples).items():
+                bends[pair] = bends[pair] + squares if pair in bends else squares
+        for (i, j), squares in bends.items():
+            grid.add_curvature(hessian, i, j, squares)
         return task.flat(gradient), hessian.reshape(task.size, task.size)
 
     def update(self, step: Array, change: Array) -> None:

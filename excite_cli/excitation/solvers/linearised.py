@@ -5,14 +5,11 @@ from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_bound import JointBound
-from excite_cli.excitation.residuals import Rows
+from excite_cli.excitation.residuals import REACH, Rows
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.states import States
 
 Mask = NDArray[np.bool_]
-
-# Residuals beyond this are not linearised.
-_REACH = 1.0
 
 
 class Linearised:
@@ -28,7 +25,7 @@ class Linearised:
         self.task, self.values = task, values
         self.near = near or [
             np.ones_like(value, dtype=bool) if isinstance(constraint, JointBound)
-            else value < _REACH
+            else value < REACH
             for constraint, value in zip(task.problem.constraints, values, strict=True)
         ]  # fmt: skip
         self.rows: list[Rows | None] = [

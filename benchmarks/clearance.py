@@ -1,0 +1,48 @@
+"""Own batched capsule distances against one coal call per instant, and their gradients.
+
+Run: python -m benchmarks.clearance
+"""
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from benchmarks.problems import problem
+from benchmarks.timing import interleaved
+from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.robot.clearance import Clearance
+from excite_cli.robot.clearance_coal import CoalClearance
+from excite_cli.robot.collision_pairs import CollisionPairs
+
+
+def main() -> None:
+    print(
+        f"{'400 instants, 40 pairs; 1000 rows':34} {'ours ms':>9} {'coal ms':>9} {'coal/ours':>10}"
+    )
+    for name in ("talos_arms", "ur10"):
+        of = problem(name)
+        constraint = next(c for c in of.constraints if isinstance(c, SelfCollision))
+        pairs = CollisionPairs(constraint.pairs.checked[:40], ())
+        ours = Clearance(of.robot, constraint.capsules, pairs)
+        coal = CoalClearance(of.robot, constraint.capsules, pairs)
+        q, _, _ = of.robot.draw_states(400, 1)
+        rng = np.random.default_rng(0)
+        rows = rng.integers(0, 400, 1000)
+        cols = rng.integers(0, len(pairs.checked), 1000)
+        times = interleaved(
+            {
+                "distances": lambda ours=ours, q=q: ours.distances(q.copy()),
+                "distances coal": lambda coal=coal, q=q: coal.distances(q),
+                "gradients": lambda o=ours, q=q, r=rows, c=cols: o.gradients(q, r, c),
+                "gradients coal": lambda o=coal, q=q, r=rows, c=cols: o.gradients(q, r, c),
+            },
+            7,
+        )
+        for what in ("distances", "gradients"):
+            fast, slow = times[what], times[f"{what} coal"]
+            label = f"{name}, {what}"
+            print(f"{label:34} {1e3 * fast:9.2f} {1e3 * slow:9.2f} {slow / fast:10.1f}")
+
+
+if __name__ == "__main__":
+    with threadpool_limits(1):
+        main()
