@@ -97,7 +97,8 @@ class MotionTask:
     def metric(self) -> Array:
         """M (size, size): xᵀ M x is the mean square of q, v, a in units of their bounds.
 
-        The natural length of a change of a motion; joints without bounds count in rad.
+        The natural length of a change of a motion. A thousandth of rad² (m²) is added for every
+        joint, and of (rad/s²)² where acceleration is free, so that it is positive definite.
         """
         grid = self.residuals.grid
         metric = np.zeros((self.n, self.k, self.n, self.k))
