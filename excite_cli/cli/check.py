@@ -29,6 +29,7 @@ def check(
 
     from excite_cli.cli.setup import load_problem, single_threaded
     from excite_cli.cli.tables import worst_data
+    from excite_cli.config.load import parse_spec
     from excite_cli.errors import FileError
     from excite_cli.excitation.admissible import proved_constraints, worst_margins
     from excite_cli.store.result_file import read_result
@@ -42,7 +43,9 @@ def check(
                 f"{file} moves other joints than {config}: {', '.join(result.joint_names)}."
             )
         shape = (problem.trajectory.n_coefficients, problem.robot.n)
-        if any(motion.coefficients.shape != shape for motion in result.motions):
+        stored = parse_spec(result.config, f"the config stored in {file}").trajectory
+        same = stored == problem.spec.trajectory
+        if not same or any(motion.coefficients.shape != shape for motion in result.motions):
             raise FileError(f"{file} has motions of another trajectory section than {config}.")
         table = Table(title=f"Margins at {rate:g} Hz", title_justify="left")
         for name in (

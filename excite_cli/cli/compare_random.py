@@ -14,7 +14,9 @@ def compare_random(
     candidates: Annotated[
         int, typer.Option("--candidates", min=1, help="Least number of random motions.")
     ] = 300,
-    output: options.Output = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write both to this result file.")
+    ] = None,
     optimized: Annotated[
         Path | None,
         typer.Option("--optimized", help="Result of `excite optimize` to compare with."),

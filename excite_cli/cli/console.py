@@ -130,7 +130,7 @@ def run_guarded(action: Callable[[], None]) -> int:
         print("excite: out of memory; take fewer samples, harmonics or joints.", file=sys.stderr)
         return 2
     except Exception as error:
-        if "--verbose" in sys.argv:
+        if {"--verbose", "-v"} & set(sys.argv):
             traceback.print_exc()
         print(
             f"excite: internal error ({type(error).__name__}: {error}). This is a bug of the "

@@ -80,6 +80,7 @@ def optimize(
                 write_result(path, current, problem)
                 motion = step.motion
                 note = "" if motion.improved else "; it brings no improvement"
+                note += "; raise optimizer.max_seconds" if motion.status == "time limit" else ""
                 note += f"; {motion.note}" if motion.note else ""
                 terminal.say(
                     f"motion {motion.index}: condition number {motion.condition_number:.2f}, "

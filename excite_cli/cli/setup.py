@@ -9,7 +9,7 @@ from excite_cli.config.load import load_spec
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.robot.collision_pairs import CollisionPairs
+from excite_cli.robot.collision_pairs import UNGUARDED, CollisionPairs
 
 
 def single_threaded(threads: int = 1) -> AbstractContextManager[object]:
@@ -45,6 +45,14 @@ def load_problem(
                 f"self-collision: {len(constraint.capsules)} capsules, {len(pairs.checked)} pairs "
                 f"checked; not checked (--verbose lists all): {_reasons(pairs)}"
             )
+            unguarded = [pair for pair in pairs.dropped if pair.reason.startswith(UNGUARDED)]
+            if unguarded:
+                loose = sorted({f"{pair.first} – {pair.second}" for pair in unguarded})
+                terminal.say(
+                    f"warning: {len(loose)} pairs are not guarded, since their capsules overlap "
+                    f"whatever the posture while the meshes do not: {', '.join(loose)}. Look at "
+                    "them, or give slimmer capsules under constraints.self_collision.capsules."
+                )
             for label in constraint.labels:
                 terminal.detail(f"  checked  {label}")
             for pair in pairs.dropped:

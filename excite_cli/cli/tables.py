@@ -101,6 +101,7 @@ def worst_data(worst: Worst) -> dict[str, Any]:
     """A worst margin for `--json`."""
     return {
         "margin": worst.margin,
+        "share": worst.share,
         "unit": worst.unit,
         "where": worst.label,
         "time": worst.time,

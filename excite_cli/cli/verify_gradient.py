@@ -73,7 +73,7 @@ def verify_gradient(
     }
     for key, word in words.items():
         seconds = found.seconds[key]
-        times.add_row(word, f"{1e3 * seconds:.2f}", f"{found.seconds['forward'] / seconds:.0f} ×")
+        times.add_row(word, f"{1e3 * seconds:.2f}", f"{found.seconds['forward'] / seconds:.3g} ×")
     verdict = "The gradient is right." if found.passed else "The gradient is WRONG."
     terminal.answer(
         [

@@ -7,6 +7,7 @@ kg, m. The JSON Schema that `excite schema` prints is made from these classes.
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -28,9 +29,28 @@ def _not_a_truth_value(value: Any) -> Any:
 
 _NO_TRUTH_VALUE = BeforeValidator(_not_a_truth_value)
 Integer = Annotated[int, _NO_TRUTH_VALUE]
-Finite = Annotated[float, Field(allow_inf_nan=False), _NO_TRUTH_VALUE]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), _NO_TRUTH_VALUE]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), _NO_TRUTH_VALUE]
+# Beyond these a figure is a mistake, and arithmetic with it overflows.
+_MOST, _LEAST = 1e9, 1e-15
+
+
+def _not_vanishing(value: float) -> float:
+    if 0 < value < _LEAST:
+        raise ValueError(f"allowed: a number of at least {_LEAST:g}")
+    return value
+
+
+Finite = Annotated[float, Field(ge=-_MOST, le=_MOST, allow_inf_nan=False), _NO_TRUTH_VALUE]
+Positive = Annotated[
+    float,
+    Field(gt=0, le=_MOST, allow_inf_nan=False),
+    AfterValidator(_not_vanishing),
+    _NO_TRUTH_VALUE,
+]
+NonNegative = Annotated[float, Field(ge=0, le=_MOST, allow_inf_nan=False), _NO_TRUTH_VALUE]
+Duration = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False), _NO_TRUTH_VALUE]
+Frequency = Annotated[float, Field(gt=0, le=630, allow_inf_nan=False), _NO_TRUTH_VALUE]
+Power = Annotated[float, Field(ge=1, le=1e4, allow_inf_nan=False), _NO_TRUTH_VALUE]
+Samples = Annotated[int, Field(ge=2, le=1_000_000), _NO_TRUTH_VALUE]
 Share = Annotated[float, Field(gt=0, le=1), _NO_TRUTH_VALUE]
 Vector3 = tuple[Finite, Finite, Finite]
 
@@ -127,15 +147,21 @@ class FourierSpec(Section):
 
     family: Literal["fourier"] = "fourier"
     harmonics: Integer = Field(5, ge=1, le=100, description="N")
-    base_frequency: Positive = Field(0.785398, description="ω [rad/s]")
+    base_frequency: Frequency = Field(0.785398, description="ω [rad/s]")
     at_rest: StrictBool = Field(False, description="no velocity or acceleration at start and end")
+
+    @model_validator(mode="after")
+    def _enough_harmonics(self) -> "FourierSpec":
+        if self.at_rest and self.harmonics < 3:
+            raise ValueError("at_rest needs at least 3 harmonics")
+        return self
 
 
 class BSplineSpec(Section):
     """Clamped B-spline."""
 
     family: Literal["bspline"]
-    duration: Positive = Field(description="[s]")
+    duration: Duration = Field(description="[s]")
     control_points: Integer = Field(12, ge=4, le=500)
     degree: Integer = Field(5, ge=3, le=9)
     at_rest: StrictBool = Field(True, description="no velocity or acceleration at start and end")
@@ -162,17 +188,21 @@ TrajectorySpec = Annotated[
 
 
 class GridSpec(Section):
-    """Equidistant instants."""
+    """Equidistant instants from the start; what is not given follows from the trajectory."""
 
-    samples: Integer = Field(ge=2, le=1_000_000)
-    step: Positive = Field(description="[s]")
+    samples: Samples | None = Field(None, description="default: see sampling")
+    step: Positive | None = Field(None, description="[s]; default: duration / samples")
 
 
 class SamplingSpec(Section):
-    """Instants at which the cost and the constraints are evaluated."""
+    """Instants at which cost and constraints are evaluated.
 
-    cost: GridSpec = GridSpec(samples=40, step=0.2)
-    constraints: GridSpec = GridSpec(samples=400, step=0.02)
+    By default they cover the whole trajectory: the cost with 40 samples (or two per coefficient),
+    the constraints every 0.02 s (at least 100, at most 1000 samples).
+    """
+
+    cost: GridSpec = GridSpec()
+    constraints: GridSpec = GridSpec()
 
 
 CriterionKind = Literal[
@@ -189,7 +219,7 @@ class CriterionSpec(Section):
     """What is minimised, and how rows and columns of the regressor are weighted."""
 
     kind: CriterionKind = "condition_number"
-    smoothing: Positive = Field(64.0, description="p of the smooth condition number")
+    smoothing: Power = Field(64.0, description="p of the smooth condition number")
     row_weights: Literal["none", "effort"] | dict[str, Positive] = Field(
         "none", description="1/effort limit, or one weight per joint (1/torque noise)"
     )
@@ -239,6 +269,19 @@ class PolygonSpec(Section):
         return value
 
 
+def _balance_kind(value: Any) -> Any:
+    """The `kind` of a balance section; a disc where none is given."""
+    if isinstance(value, dict):
+        return value.get("kind", "disc")
+    return getattr(value, "kind", "disc")
+
+
+BalanceSpec = Annotated[
+    Annotated[DiscSpec, Tag("disc")] | Annotated[PolygonSpec, Tag("polygon")],
+    Discriminator(_balance_kind),
+]
+
+
 class CapsuleSpec(Section):
     """A capsule given by hand, in the frame of its joint (see `excite robots`)."""
 
@@ -262,7 +305,7 @@ class ConstraintsSpec(Section):
 
     joint_limits: JointLimitsSpec | None = JointLimitsSpec()
     torque: TorqueSpec | None = None
-    balance: Annotated[DiscSpec | PolygonSpec, Field(discriminator="kind")] | None = None
+    balance: BalanceSpec | None = None
     self_collision: SelfCollisionSpec | None = None
 
 
@@ -271,7 +314,7 @@ class OptimizerSpec(Section):
 
     method: Literal["interior_point", "sqp", "slsqp"] = "interior_point"
     qp_solver: Literal["daqp", "piqp"] = Field("daqp", description="used by method: sqp")
-    max_seconds: Positive = Field(30.0, description="per motion")
+    max_seconds: Positive = Field(30.0, description="per start of a motion")
     max_iterations: Integer = Field(400, ge=1, le=100_000)
     restarts: Integer = Field(1, ge=1, le=100, description="starts tried per motion, the best kept")
     tolerance: Positive = Field(

@@ -26,7 +26,9 @@ class Balance(Constraint):
     def __init__(self, robot: Robot, normals: Array, offsets: Array, center: Array) -> None:
         self._mass = CenterOfMass(robot)
         self.normals, self.offsets, self.center = normals, offsets, center
-        self.labels = tuple(f"edge {i + 1}" for i in range(len(offsets)))
+        self.labels = tuple(
+            f"towards {np.degrees(np.arctan2(y, x)) % 360:.0f}°" for x, y in normals
+        )
         self.scale = offsets - normals @ center
 
     @classmethod

@@ -6,7 +6,7 @@ Members neither know the optimiser nor the trajectory.
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,22 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Worst:
-    """The smallest margin of a constraint over a motion, with where and when it occurs."""
+    """The smallest margin of a constraint over a motion, with where and when it occurs.
+
+    Smallest as a `share` of the scale of its column, so that joints of different size compare.
+    """
 
     margin: float
     unit: str
     label: str
     time: float
     violations: int
+    share: float = 0.0
+
+    def with_later(self, later: "Worst") -> "Worst":
+        """The worse of two, by the share of the scale, with the violations of both."""
+        worse = later if later.share < self.share else self
+        return replace(worse, violations=self.violations + later.violations)
 
 
 class Constraint(ABC):
@@ -59,8 +68,10 @@ class Constraint(ABC):
         return self.unit
 
     def worst(self, margins: Array, times: Array) -> Worst:
-        """Smallest margin of all, ties and all instants included."""
-        t, column = divmod(int(np.argmin(margins)), margins.shape[1])
+        """The margin that is smallest as a share of its column's scale, and how many are broken."""
+        t, column = divmod(int(np.argmin(margins / self.scale)), margins.shape[1])
         margin = float(margins[t, column])
         broken = int(np.count_nonzero(margins < 0))
-        return Worst(margin, self.unit_of(column), self.labels[column], float(times[t]), broken)
+        share = margin / float(self.scale[column])
+        unit, label = self.unit_of(column), self.labels[column]
+        return Worst(margin, unit, label, float(times[t]), broken, share)

@@ -62,9 +62,8 @@ def _joint_bounds(spec: JointLimitsSpec, robot: Robot) -> list[Constraint]:
     acceleration = limits.acceleration
     if spec.acceleration is not None:
         acceleration = np.minimum(acceleration, spec.acceleration)
-    if np.isfinite(acceleration).any():
-        found.append(JointBound.between(2, -acceleration, acceleration, robot))
-    return found
+    found.append(JointBound.between(2, -acceleration, acceleration, robot))
+    return [bound for bound in found if bound.labels]
 
 
 def _torque(scale: float, robot: Robot) -> Constraint:

@@ -37,6 +37,11 @@ class JointBound(Constraint):
         return f"joint_{_ORDERS[self.order]}"
 
     @property
+    def two_sided(self) -> Mask:
+        """Whether the joint of each column (m,) is bounded on both sides."""
+        return np.bincount(self.joints)[self.joints] == 2
+
+    @property
     def unit(self) -> str:  # type: ignore[override]
         """Unit of revolute joints; see `unit_of`."""
         return _UNITS[self.order]

@@ -1,5 +1,7 @@
 """Whether a motion keeps every constraint, judged on a grid of its own."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from excite_cli.constraints.base import Array, Worst
@@ -16,35 +18,49 @@ def fine_times(problem: Problem, rate: float = CONTROLLER_RATE) -> Array:
     return np.linspace(0.0, problem.trajectory.duration, count)
 
 
+def _chunks(
+    problem: Problem, coefficients: Array, times: Array
+) -> Iterator[tuple[Array, list[Array]]]:
+    """Times and margins (T, m) of every constraint, a few thousand instants at a time."""
+    for begin in range(0, len(times), _CHUNK):
+        some = times[begin : begin + _CHUNK]
+        states = problem.states(coefficients, problem.trajectory.basis(some))
+        yield some, [constraint.margins(states) for constraint in problem.constraints]
+
+
 def fine_margins(problem: Problem, coefficients: Array, times: Array) -> list[Array]:
     """Margins (T, m) of every constraint at `times`, in their own units."""
-    parts: list[list[Array]] = [[] for _ in problem.constraints]
-    for begin in range(0, len(times), _CHUNK):
-        basis = problem.trajectory.basis(times[begin : begin + _CHUNK])
-        states = problem.states(coefficients, basis)
-        for part, constraint in zip(parts, problem.constraints, strict=True):
-            part.append(constraint.margins(states))
-    return [np.vstack(part) for part in parts]
+    parts = [margins for _, margins in _chunks(problem, coefficients, times)]
+    return [np.vstack(column) for column in zip(*parts, strict=True)]
+
+
+def smallest_margins(problem: Problem, coefficients: Array, times: Array) -> list[Array]:
+    """Smallest margin (m,) of every column of every constraint over `times`."""
+    parts = [
+        [m.min(axis=0) for m in margins] for _, margins in _chunks(problem, coefficients, times)
+    ]
+    return [np.min(column, axis=0) for column in zip(*parts, strict=True)]
 
 
 def worst_margins(
     problem: Problem, coefficients: Array, rate: float = CONTROLLER_RATE
 ) -> dict[str, Worst]:
     """The worst margin of every constraint at `rate` [Hz], by the constraint's name."""
-    times = fine_times(problem, rate)
-    return {
-        constraint.name: constraint.worst(margins, times)
-        for constraint, margins in zip(
-            problem.constraints, fine_margins(problem, coefficients, times), strict=True
-        )
-    }
+    found: dict[str, Worst] = {}
+    for times, margins in _chunks(problem, coefficients, fine_times(problem, rate)):
+        for constraint, margin in zip(problem.constraints, margins, strict=True):
+            worst = constraint.worst(margin, times)
+            before = found.get(constraint.name)
+            found[constraint.name] = worst if before is None else before.with_later(worst)
+    return found
 
 
 def proved_constraints(problem: Problem, coefficients: Array) -> dict[str, bool]:
     """Whether each constraint holds at every instant, not only at those sampled.
 
     Joint bounds of a Fourier series: with M samples of one period, max |p| is at most
-    max_i |p(t_i)| / cos(πN/M), p being the deviation from the middle of the bounds.
+    max_i |p(t_i)| / cos(πN/M), p being the deviation from the middle of the bounds; so a joint
+    that is bounded on one side only is never proved.
     """
     samples = 64 * max(problem.trajectory.n_coefficients, 1)
     step = problem.trajectory.duration / samples
@@ -57,5 +73,6 @@ def proved_constraints(problem: Problem, coefficients: Array) -> dict[str, bool]
     for constraint in problem.constraints:
         if isinstance(constraint, JointBound):
             lacking = constraint.margins(states) - (1.0 - factor) * constraint.scale
-            proved[constraint.name] = bool(np.all(lacking >= 0))
+            both_sides = bool(np.all(constraint.two_sided))
+            proved[constraint.name] = both_sides and bool(np.all(lacking >= 0))
     return proved

@@ -8,17 +8,18 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import Criterion, singular_values
 from excite_cli.errors import NoAdmissibleMotionError
-from excite_cli.excitation.admissible import fine_margins, fine_times, worst_margins
+from excite_cli.excitation.admissible import fine_times, smallest_margins, worst_margins
 from excite_cli.excitation.motion import Motion, Outcome, Progress, ProgressCallback
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.start import Start, clear_posture, random_start
+from excite_cli.excitation.start import Start, clear_posture, moved_note, random_start
 from excite_cli.excitation.task import MotionTask
 
 _GUARD_ROUNDS = 6
 _GUARD_GROWTH = 1.3
-_MOVED = "robot.posture is not clear of the constraints; a clear one near it was taken"
+# Beyond this condition number some parameters do not show at all.
+_BLIND = 1e9
 # A motion counts as an improvement of the stack from this change of the (logarithmic) criterion.
 _IMPROVEMENT = 1e-3
 
@@ -45,31 +46,45 @@ def generate_motion(
     start = clear_posture(task, seed)
     best: tuple[float, Array, Outcome] | None = None
     iterations = evaluations = 0
+    failure: NoAdmissibleMotionError | None = None
     for restart in range(spec.restarts):
         run = MotionTask(problem, stack)
-        x0 = random_start(run, start, (seed, index, restart))
-        outcome = solver.solve(run, x0, effort, _labelled(report, restart, spec.restarts))
-        outcome = kept_between_instants(run, solver, start, outcome, effort, report)
+        told = _labelled(report, restart, spec.restarts)
+        try:
+            x0 = random_start(run, start, (seed, index, restart))
+            outcome = solver.solve(run, x0, effort, told)
+            outcome = kept_between_instants(run, solver, start, outcome, effort, told)
+        except NoAdmissibleMotionError as error:
+            failure = error
+            continue
         iterations += outcome.iterations
         evaluations += outcome.evaluations
         coefficients = run.coefficients(outcome.x)
         value = run.objective.value(coefficients, problem.criterion)
         if best is None or value < best[0]:
             best = (value, coefficients, outcome)
-    assert best is not None
+    if best is None:
+        assert failure is not None
+        raise failure
     value, coefficients, outcome = best
+    stacked = task.objective.stacked_condition_number(coefficients)
+    if not stacked < _BLIND:
+        raise NoAdmissibleMotionError(
+            f"No motion found that shows all {problem.base.rank} base parameters (condition number "
+            f"{stacked:.1e}). Give the trajectory more coefficients, or wider limits and sampling."
+        )
     return Motion(
         index=index,
         coefficients=coefficients,
         condition_number=task.objective.own_condition_number(coefficients),
-        stacked_condition_number=task.objective.stacked_condition_number(coefficients),
+        stacked_condition_number=stacked,
         improved=is_improvement(stack, problem.criterion, value),
         status=outcome.status,
         seconds=time.perf_counter() - began,
         iterations=iterations,
         evaluations=evaluations,
         margins=worst_margins(problem, coefficients),
-        note="" if start.as_configured else _MOVED,
+        note=moved_note(task, start),
     )
 
 
@@ -97,11 +112,13 @@ def kept_between_instants(
     problem = task.problem
     times = fine_times(problem)
     began = time.perf_counter()
-    for _ in range(_GUARD_ROUNDS):
-        margins = fine_margins(problem, task.coefficients(outcome.x), times)
-        lacking = [np.maximum(-margin.min(axis=0), 0.0) for margin in margins]
+    for round_ in range(_GUARD_ROUNDS + 1):
+        margins = smallest_margins(problem, task.coefficients(outcome.x), times)
+        lacking = [np.maximum(-margin, 0.0) for margin in margins]
         if not any(lack.any() for lack in lacking):
             return outcome
+        if round_ == _GUARD_ROUNDS:
+            break
         guards = [
             guard + _GUARD_GROWTH * lack for guard, lack in zip(task.guards, lacking, strict=True)
         ]
@@ -116,7 +133,7 @@ def kept_between_instants(
         again = solver.solve(tighter, inside, short, report)
         outcome = Outcome(
             again.x,
-            outcome.status,
+            "time limit" if again.status == "time limit" else outcome.status,
             outcome.iterations + again.iterations,
             outcome.evaluations + again.evaluations,
         )

@@ -112,9 +112,10 @@ class Objective:
         """
         weight = criterion.derivative(spectrum.sigma)
         kept = np.flatnonzero(np.abs(weight) > _NEGLIGIBLE * np.abs(weight).max())
+        shape = (len(self.basis.times), len(self.robot.rows))
         vectors = spectrum.right[:, kept]
         left = (block @ (vectors * (weight[kept] / spectrum.sigma[kept]))).T
-        left = left.reshape(len(kept), -1, len(self.robot.rows)) * self.weighting.rows
+        left = left.reshape(len(kept), *shape) * self.weighting.rows
         right = np.zeros((len(kept), len(self.base.names)))
         right[:, self.base.selection] = (vectors * self.weighting.columns[:, None]).T
         return left, right

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from excite_cli.config.spec import Spec
 from excite_cli.constraints.base import Array, Constraint
 from excite_cli.constraints.catalogue import build_constraints
@@ -12,6 +10,7 @@ from excite_cli.criteria.base import Criterion
 from excite_cli.criteria.catalogue import build_criterion
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.objective import Objective
+from excite_cli.excitation.sampling import instants, with_sampling
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting, build_weighting
 from excite_cli.robot.base_parameters import BaseParameters, find_base_parameters
@@ -65,20 +64,19 @@ def build_problem(spec: Spec, relative_to: Path | None = None) -> Problem:
     """
     robot = build_robot(spec.robot, relative_to)
     trajectory = build_trajectory(spec.trajectory)
-    cost, grid = spec.sampling.cost, spec.sampling.constraints
-    for name, section in (("cost", cost), ("constraints", grid)):
-        if (section.samples - 1) * section.step > trajectory.duration * (1 + 1e-5):
-            raise ConfigError(
-                f"sampling.{name}: {section.samples} samples every {section.step:g} s last longer "
-                f"than the trajectory ({trajectory.duration:g} s). Take fewer samples or a "
-                "smaller step."
-            )
+    spec = with_sampling(spec, trajectory)
+    cost, grid = instants(spec.sampling.cost), instants(spec.sampling.constraints)
     base = find_base_parameters(robot)
-    if cost.samples * len(robot.rows) < base.rank:
+    if len(cost) * len(robot.rows) < base.rank:
         raise ConfigError(
-            f"sampling.cost: {cost.samples} samples of {len(robot.rows)} rows cannot show "
+            f"sampling.cost: {len(cost)} samples of {len(robot.rows)} rows cannot show "
             f"{base.rank} base parameters. Take at least "
             f"{-(-base.rank // len(robot.rows))} samples."
+        )
+    if base.rank == 1 and "condition" in spec.criterion.kind:
+        raise ConfigError(
+            "criterion.kind: this robot has one base parameter, so its condition number is always "
+            "1. Take log_det or sigma_min."
         )
     return Problem(
         spec=spec,
@@ -88,7 +86,7 @@ def build_problem(spec: Spec, relative_to: Path | None = None) -> Problem:
         criterion=build_criterion(spec.criterion),
         weighting=build_weighting(spec.criterion, robot, base),
         constraints=build_constraints(spec.constraints, robot),
-        cost_basis=trajectory.basis(np.arange(cost.samples, dtype=float) * cost.step),
-        constraint_basis=trajectory.basis(np.arange(grid.samples, dtype=float) * grid.step),
+        cost_basis=trajectory.basis(cost),
+        constraint_basis=trajectory.basis(grid),
         kinematics=BatchKinematics(robot),
     )

@@ -51,8 +51,12 @@ def matches(problem: Problem, result: Result) -> str | None:
         return "it was made for another robot, other moved joints, posture or rows"
     if not np.array_equal(result.base_selection, problem.base.selection):
         return "its base parameters differ"
-    same_rows = np.allclose(result.row_weights, problem.weighting.rows, rtol=1e-12)
-    same_columns = np.allclose(result.column_scales, problem.weighting.columns, rtol=1e-12)
+    same_rows = _same(result.row_weights, problem.weighting.rows)
+    same_columns = _same(result.column_scales, problem.weighting.columns)
     if not (same_rows and same_columns):
         return "its row weights or column scaling differ"
     return None
+
+
+def _same(first: Array, second: Array) -> bool:
+    return first.shape == second.shape and np.allclose(first, second, rtol=1e-12, atol=0.0)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.config.load import parse_spec, spec_as_yaml
-from excite_cli.config.spec import Spec
+from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import ProgressCallback
@@ -29,6 +29,10 @@ def new_result(
     FileError
         A prior does not fit the problem.
     """
+    names = [name for name, _ in priors]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise FileError(f"--prior {twice[0]} is given twice; its data would count twice.")
     stack = Stack.empty(problem.base.rank)
     for name, prior in priors:
         reason = matches(problem, prior)
@@ -67,8 +71,8 @@ def resumed_result(
     Raises
     ------
     FileError
-        The stored config differs in more than the number of motions, or `priors` are not those
-        that the file was made with.
+        The stored config differs in more than the number of motions and the optimizer, or
+        `priors` are not those that the file was made with.
     """
     if priors and tuple(str(prior) for prior in priors) != result.priors:
         made = ", ".join(result.priors) or "none"
@@ -77,7 +81,7 @@ def resumed_result(
             "go on with it, or give another -o."
         )
     stored = parse_spec(result.config, f"the config stored in {path}")
-    if _without_count(stored) != _without_count(problem.spec) or matches(problem, result):
+    if _asked(stored) != _asked(problem.spec) or matches(problem, result):
         keys = _differing(stored, problem.spec)
         raise FileError(
             f"--resume: {path} was made with another config (different: {', '.join(keys)}). "
@@ -103,15 +107,16 @@ def continue_run(
     return result
 
 
-def _without_count(spec: Spec) -> Spec:
-    return spec.model_copy(update={"sequence": spec.sequence.model_copy(update={"motions": 1})})
+def _asked(spec: Spec) -> Spec:
+    """What a stored motion answers: all but the number of motions and the effort spent."""
+    return spec.model_copy(update={"sequence": SequenceSpec(), "optimizer": OptimizerSpec()})
 
 
 def _differing(first: Spec, second: Spec) -> list[str]:
     return [
         name
         for name in type(first).model_fields
-        if getattr(first, name) != getattr(second, name) and name != "sequence"
+        if getattr(first, name) != getattr(second, name) and name not in ("sequence", "optimizer")
     ] or ["the URDF or the library versions"]
 
 

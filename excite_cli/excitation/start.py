@@ -22,6 +22,7 @@ _SHRINK, _SMALLEST = 0.7, 1e-4
 _TRIES = 40
 # Columns whose residual is beyond this do not bind a posture.
 _FAR = 1.0
+_TOLD = 8
 
 
 @dataclass(frozen=True)
@@ -100,12 +101,29 @@ def clear_posture(task: MotionTask, seed: int) -> Start:
             return Start(found, False)
         if clearance > best_clearance:
             best, best_clearance = found, clearance
-    label = _blocking(task, [row[None] for row in _standing_parts(task, best)])
+    values = task.values(_still(task, best))
     raise NoAdmissibleMotionError(
-        f"No admissible motion: no posture found that is clear of all constraints; {label} stands "
-        f"in the way ({_TRIES} postures tried from robot.posture). Give a clear robot.posture or "
-        "loosen that constraint."
+        f"No admissible motion: no posture found that is clear of all constraints "
+        f"({_TRIES} tried from robot.posture). In the way: {_blocking(task, values)}. At the best "
+        f"of them: {_all_broken(task, best)}. Give a clear robot.posture or loosen the constraint "
+        "(pairs of links that always touch: constraints.self_collision.ignore)."
     )
+
+
+def moved_note(task: MotionTask, start: Start) -> str:
+    """What was changed of the configured posture and why; empty if nothing was."""
+    if start.as_configured:
+        return ""
+    configured = task.problem.robot.posture
+    changed = ", ".join(
+        f"{name}: {value:.3f}"
+        for name, value, before in zip(
+            task.problem.robot.joint_names, start.posture, configured, strict=True
+        )
+        if abs(value - before) > 1e-3
+    )
+    broken = _blocking(task, task.values(_still(task, configured)))
+    return f"robot.posture is too near a bound of {broken}; moved about {{{changed}}} instead"
 
 
 def _blend(task: MotionTask, posture: Array, rng: np.random.Generator, spread: float) -> Array:
@@ -172,3 +190,17 @@ def _blocking(task: MotionTask, values: list[Array]) -> str:
             smallest = float(value[:, column].min())
             words = f"{constraint.name} ({constraint.labels[column]})"
     return words
+
+
+def _all_broken(task: MotionTask, posture: Array) -> str:
+    """Every constraint column without room at `posture`, worst first, with its margin."""
+    states, found = _still(task, posture), []
+    for constraint in task.problem.constraints:
+        margins = constraint.margins(states)[0]
+        for column in np.flatnonzero(margins < _CLEAR_POSTURE * constraint.scale).tolist():
+            share = float(margins[column] / constraint.scale[column])
+            unit = constraint.unit_of(column)
+            found.append((share, f"{constraint.labels[column]} {margins[column]:.3g} {unit}"))
+    found.sort()
+    more = f" and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
+    return "; ".join(words for _, words in found[:_TOLD]) + more

@@ -122,7 +122,7 @@ def first_guards(problem: Problem) -> list[Array]:
     Joint bounds on a Fourier series get the exact amount (Ehlich and Zeller); others an estimate.
     """
     factor = problem.trajectory.sampling_factor(
-        len(problem.constraint_basis.times), problem.spec.sampling.constraints.step
+        len(problem.constraint_basis.times), float(np.diff(problem.constraint_basis.times[:2])[0])
     )
     guards = []
     for constraint in problem.constraints:

@@ -23,6 +23,9 @@ from excite_cli.robot.pair_distances import PairDistances, carried_bodies
 Array = NDArray[np.float64]
 
 _ALWAYS = 0.99  # share of the sample in contact
+_CONTACT_SAMPLES = 200
+ALWAYS = "always in contact"
+UNGUARDED = "unguarded: capsules always overlap"
 _CONTACT = 0.01  # [m] a wider margin does not make a contact; it may make the problem infeasible
 _ALLOWANCE = 0.05  # [m] beyond the margin that the nearest posture found must keep
 _STARTS = 3
@@ -154,8 +157,10 @@ def _by_sampling(
     wanted = {k: pairs[k] for k in np.flatnonzero(doubtful).tolist()}
     for k, reason in _by_meshes(robot, capsules, wanted, (q, distances), margin):
         reasons[k] = reason
-    for k in np.flatnonzero(always).tolist():
-        reasons[k] = "always in contact"
+    for k, reason in _contacts(
+        robot, capsules, {k: pairs[k] for k in np.flatnonzero(always).tolist()}, q
+    ):
+        reasons[k] = reason
     return reasons
 
 
@@ -188,6 +193,33 @@ def _by_meshes(
             known[links] = meshes.least_distance(*links, starts, moved, stop=margin)
         if known[links] > margin:
             yield k, f"meshes never near (at least {known[links]:.3f} m found)"
+
+
+def _contacts(
+    robot: Robot,
+    capsules: tuple[Capsule, ...],
+    always: dict[int, tuple[int, int]],
+    q: Array,
+) -> Iterator[tuple[int, str]]:
+    """Why each pair of capsules that overlap at all times is not checked.
+
+    No motion can part the capsules, so nothing can be asked of them. Where the meshes do part at
+    times, the pair is said to be unguarded, so that somebody looks at it.
+    """
+    meshes: MeshDistances | None = None
+    known: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = {}
+    for k, pair in always.items():
+        first, second = (capsules[index] for index in pair)
+        links = (first.links, second.links)
+        meshes = meshes or MeshDistances(robot)
+        if first.by_hand or second.by_hand or not meshes.knows(first.links + second.links):
+            yield k, ALWAYS
+            continue
+        if links not in known:
+            some = q[:: max(1, len(q) // _CONTACT_SAMPLES)]
+            known[links] = float(np.mean([meshes.distance(*links, at) > 0.0 for at in some]))
+        apart = known[links]
+        yield k, ALWAYS if apart < 1 - _ALWAYS else f"{UNGUARDED} (meshes apart in {apart:.0%})"
 
 
 def _descend(

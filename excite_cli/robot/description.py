@@ -7,6 +7,7 @@ Continuous joints become revolute ones without bounds, so that one coordinate is
 """
 
 import hashlib
+import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from importlib import metadata
@@ -17,6 +18,7 @@ from excite_cli.errors import RobotError, nearest
 EXAMPLE_PREFIX = "example-robot-data:"
 MAX_URDF_BYTES = 20_000_000
 UNBOUNDED = 1e9
+_HEAVIEST = 1e9
 
 # The file meant by a short name where the package holds several of the same robot.
 _PREFERRED = {
@@ -113,13 +115,15 @@ def load_description(
     else:
         path = (root / urdf).resolve()
         if not path.is_file():
+            meant = f" Did you mean {EXAMPLE_PREFIX}{urdf}?" if urdf in example_robots() else ""
             raise RobotError(
-                f"robot.urdf: there is no file {path}. Give a path relative to the YAML file, or "
-                f"{EXAMPLE_PREFIX}<name>."
+                f"robot.urdf: there is no file {path}.{meant} Give a path relative to the YAML "
+                f"file, or {EXAMPLE_PREFIX}<name>."
             )
     text = _read(path)
     tree = _parsed(path, text)
     _check_axes(path, tree)
+    _check_inertias(path, tree)
     packages = (*extra, str(_share_folder(path)), str(path.parent))
     return RobotDescription(
         name=path.stem,
@@ -180,6 +184,23 @@ def _check_axes(path: Path, root: ElementTree.Element) -> None:
                 f"{path}: joint '{joint.get('name')}' has the axis '{axis.get('xyz')}'; an axis "
                 "is three numbers that are not all zero."
             )
+
+
+def _check_inertias(path: Path, root: ElementTree.Element) -> None:
+    for link in root.findall("link"):
+        for tag in ("mass", "inertia"):
+            element = link.find(f"inertial/{tag}")
+            values = [] if element is None else list(element.attrib.values())
+            try:
+                numbers = [float(value) for value in values]
+            except ValueError:
+                numbers = [math.nan]
+            wrong = any(not math.isfinite(x) or abs(x) > _HEAVIEST for x in numbers)
+            if wrong or (tag == "mass" and any(x < 0 for x in numbers)):
+                raise RobotError(
+                    f"{path}: link '{link.get('name')}' has <{tag}> {' '.join(values)}; it must be "
+                    "finite numbers of a real robot, and a mass not negative."
+                )
 
 
 def _without_continuous_joints(root: ElementTree.Element) -> str:

@@ -20,7 +20,7 @@ from excite_cli.robot.description import UNBOUNDED, RobotDescription, load_descr
 Array = NDArray[np.float64]
 
 # Where a robot has no bound of its own, samples are drawn from these.
-_FREE_POSITION, _FREE_VELOCITY = np.pi, 2.0
+_TURN, _FASTEST = np.pi, 10.0
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,10 @@ class Limits:
     effort: Array
 
     def ranges(self) -> tuple[Array, Array]:
-        """Finite positions (n,) to draw between: half a turn where there is no bound."""
-        lower = np.where(np.isfinite(self.lower), self.lower, -_FREE_POSITION)
-        return lower, np.where(np.isfinite(self.upper), self.upper, _FREE_POSITION)
+        """Finite positions (n,) to draw between: a turn where there is no bound, or only one."""
+        low, high = np.isfinite(self.lower), np.isfinite(self.upper)
+        lower = np.where(low, self.lower, np.where(high, self.upper - 2 * _TURN, -_TURN))
+        return lower, np.where(high, self.upper, np.where(low, self.lower + 2 * _TURN, _TURN))
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ class Robot:
         """`count` random positions, velocities and accelerations (count, n) within the limits."""
         rng = np.random.default_rng(seed)
         lower, upper = self.limits.ranges()
-        speed = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, _FREE_VELOCITY)
+        speed = np.minimum(self.limits.velocity, _FASTEST)  # placeholders like 1e6 drown gravity
         q = rng.uniform(lower, upper, (count, self.n))
         v = rng.uniform(-speed, speed, (count, self.n))
         a = rng.uniform(-3 * speed, 3 * speed, (count, self.n))
@@ -232,6 +233,13 @@ def _chosen(spec: RobotSpec, names: list[str], mimicking: dict[str, str]) -> lis
     return [name for name in names if name in spec.joints]
 
 
+def _inside(lower: float, upper: float) -> float:
+    """The middle of the range, or a little off its only bound."""
+    if np.isfinite(lower) and np.isfinite(upper):
+        return (lower + upper) / 2
+    return lower + 0.5 if np.isfinite(lower) else upper - 0.5
+
+
 def _in_degrees(value: float) -> str:
     """A hint for those who wrote degrees."""
     if abs(value) <= 2 * np.pi:
@@ -293,6 +301,6 @@ def _posture(
                     f"[{lower:g}, {upper:g}]. Give a value between them{_in_degrees(value)}."
                 )
         else:
-            value = 0.0 if lower <= 0.0 <= upper else (lower + upper) / 2
+            value = 0.0 if lower <= 0.0 <= upper else _inside(lower, upper)
         posture[name] = value
     return posture

@@ -81,8 +81,11 @@ def _table(motions: tuple[Motion, ...] | tuple[RandomMotion, ...]) -> Any:
 
 
 def _write_states(group: Any, coefficients: Any, problem: Problem) -> None:
-    q, v, a = problem.constraint_basis.states(coefficients)
-    arrays = {"t": problem.constraint_basis.times, "q": q, "v": v, "a": a}
+    times = problem.constraint_basis.times
+    if times[-1] < problem.trajectory.duration:
+        times = np.append(times, problem.trajectory.duration)
+    q, v, a = problem.trajectory.basis(times).states(coefficients)
+    arrays = {"t": times, "q": q, "v": v, "a": a}
     for name, array in {**arrays, "coefficients": coefficients}.items():
         group[name] = array
 

@@ -69,6 +69,7 @@ words = st.one_of(
     st.integers(0, 2**32 - 1),
 )
 def test_any_problem_round_trips(names: list[str], x: float, y: float, seed: int) -> None:
+    x, y = min(x, 1e9), min(y, 1e9)
     spec = Spec(
         robot=RobotSpec(
             urdf=names[0],
@@ -76,7 +77,7 @@ def test_any_problem_round_trips(names: list[str], x: float, y: float, seed: int
             posture=dict.fromkeys(names, -x),
             limits={names[-1]: JointLimits(position=(-x, y), velocity=y)},
         ),
-        trajectory=FourierSpec(base_frequency=x),
+        trajectory=FourierSpec(base_frequency=min(x, 600.0)),
         seed=seed,
     )
     assert_same(parse_spec(spec_as_yaml(spec)), spec)

@@ -57,9 +57,7 @@ def problem(folder: Path, text: str, checked: bool = True, **robot: Any) -> Prob
     return build_problem(
         Spec(
             robot=RobotSpec(urdf="arm.urdf", **robot),
-            sampling=SamplingSpec(
-                cost=GridSpec(samples=20, step=0.1), constraints=GridSpec(samples=20, step=0.1)
-            ),
+            sampling=SamplingSpec(cost=GridSpec(samples=20), constraints=GridSpec(samples=20)),
             constraints=ConstraintsSpec(self_collision=SelfCollisionSpec() if checked else None),
         ),
         folder,

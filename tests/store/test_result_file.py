@@ -123,13 +123,14 @@ def test_root_attributes(stored: Stored) -> None:
 
 def test_motion_datasets_and_attributes(stored: Stored) -> None:
     problem = stored.problem
-    times = len(problem.constraint_basis.times)
+    times = len(problem.constraint_basis.times) + 1  # and the very end
     with h5py.File(stored.path, "r") as file:
         assert sorted(file["motions"]) == ["1", "2"]
         for motion in stored.result.motions:
             group = file[f"motions/{motion.index}"]
             assert set(group) == {"t", "q", "v", "a", "coefficients"}
             assert group["t"].shape == (times,)
+            assert group["t"][-1] == problem.trajectory.duration
             for name in ("q", "v", "a"):
                 assert group[name].shape == (times, problem.robot.n)
             assert group["coefficients"].shape == motion.coefficients.shape
@@ -154,8 +155,10 @@ def test_states_in_the_file_follow_from_the_coefficients(stored: Stored) -> None
                 expected += np.outer(np.sin(k * rate * t), c[k - 1])
                 expected += np.outer(np.cos(k * rate * t), c[harmonics + k - 1])
             np.testing.assert_allclose(q, expected, atol=1e-12)
-            np.testing.assert_allclose(v, periodic_derivative(q, t), atol=1e-9)
-            np.testing.assert_allclose(a, periodic_derivative(v, t), atol=1e-9)
+            np.testing.assert_allclose(v[:-1], periodic_derivative(q[:-1], t[:-1]), atol=1e-9)
+            np.testing.assert_allclose(a[:-1], periodic_derivative(v[:-1], t[:-1]), atol=1e-9)
+            for x in (q, v, a):
+                np.testing.assert_allclose(x[-1], x[0], atol=1e-9)
             assert np.abs(v).max() > 0.1  # it moves
 
 

@@ -23,6 +23,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.criteria.base import Criterion
+from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
 from excite_cli.excitation.objective import Spectrum
 from excite_cli.excitation.residuals import (
@@ -43,7 +44,7 @@ _STAGES = ((1.0, 0, 5e-2), (0.3, 0, 2e-2), (0.1, 0, 1e-2), (0.03, 1, 5e-3), (0.0
 _WINDOW = 8
 _REACH_LINEAR, _REACH_OTHER = 0.5, REACH
 _SUFFICIENT = 1e-4
-_HALVINGS = 14
+_HALVINGS, _SHIFTS = 14, 20
 _TO_BOUNDARY = 0.98
 
 
@@ -104,7 +105,11 @@ class _Run:
         self, x: Array, criterion: Criterion, mu: float, change: float, stage: str
     ) -> tuple[Array, Status]:
         point = self.point(x, criterion, mu)
-        assert point is not None, "the start of a stage is admissible"
+        if point is None:
+            raise NoAdmissibleMotionError(
+                "The criterion is not finite at the start: the trajectory shows nothing of some "
+                "parameters. Give it more coefficients or wider limits."
+            )
         self.remember(point)
         merits = [point.merit]
         while True:
@@ -140,6 +145,8 @@ class _Run:
         if any(value.min() <= 0 for value in values):
             return None
         cost, gradient, spectrum = self.task.cost(x, criterion)
+        if not np.isfinite(cost):
+            return None
         barrier = sum(
             float(_barrier(value[value < reach], reach).sum())
             for value, reach in zip(values, self.reach, strict=True)
@@ -155,6 +162,8 @@ class _Run:
             size = np.linalg.norm(point.gradient) + 1e-12
             self.hessian = self.task.metric * size
         direction = _descent(self.hessian + curvature, gradient)
+        if direction is None:
+            return None
         slope = float(gradient @ direction)
         step = self.longest_step(point, direction)
         for _ in range(_HALVINGS):
@@ -217,16 +226,19 @@ class _Run:
         self.hessian = damped_update(self.hessian, step, change)
 
 
-def _descent(hessian: Array, gradient: Array) -> Array:
-    """−H⁻¹ g, with the diagonal raised until H is positive definite."""
+def _descent(hessian: Array, gradient: Array) -> Array | None:
+    """−H⁻¹ g, with the diagonal raised until H is positive definite; None if nothing helps."""
+    if not (np.isfinite(hessian).all() and np.isfinite(gradient).all()):
+        return None
     diagonal = np.diag_indices_from(hessian)
-    shift = 1e-9 * float(np.trace(hessian)) / len(hessian)
-    while True:
+    shift = max(1e-9 * float(np.abs(np.diag(hessian)).mean()), 1e-300)
+    for _ in range(_SHIFTS):
         hessian[diagonal] += shift
         try:
-            return -cho_solve(cho_factor(hessian, check_finite=False), gradient)
+            return np.asarray(-cho_solve(cho_factor(hessian, check_finite=False), gradient))
         except LinAlgError:
             shift *= 100.0
+    return None
 
 
 def _per_joint(bound: JointBound, first: Array, second: Array, joints: int) -> tuple[Array, Array]:

@@ -1,0 +1,98 @@
+"""Small and odd robots end with a motion or with one clear sentence, never with a bug."""
+
+from pathlib import Path
+
+import pytest
+
+from excite_cli.config.load import parse_spec
+from excite_cli.errors import ConfigError, NoAdmissibleMotionError, RobotError
+from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.run import continue_run, new_result
+
+LINK = (
+    '<link name="{name}"><inertial><origin xyz="0.1 0 0.2"/><mass value="{mass}"/>'
+    '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+)
+SETTINGS = "trajectory: {harmonics: 3}\noptimizer: {max_iterations: 8}\n"
+
+
+def _problem(folder: Path, joints: list[str], extra: str = "", mass: str = "2") -> Problem:
+    parts = [LINK.format(name="l0", mass="1")]
+    for number, joint in enumerate(joints, start=1):
+        parts.append(LINK.format(name=f"l{number}", mass=mass))
+        parts.append(
+            f'<joint name="j{number}" {joint}<parent link="l{number - 1}"/>'
+            f'<child link="l{number}"/><origin xyz="0 0.1 0.3"/></joint>'
+        )
+    (folder / "r.urdf").write_text(f'<robot name="r">{"".join(parts)}</robot>')
+    text = f"robot: {{urdf: r.urdf{extra}}}\n{SETTINGS}"
+    return build_problem(parse_spec(text), folder)
+
+
+def _turns(axis: str, limit: str = 'lower="-2" upper="2" velocity="2" effort="9"') -> str:
+    return f'type="revolute"><axis xyz="{axis}"/><limit {limit}/>'
+
+
+def _solve(problem: Problem) -> float:
+    result = continue_run(
+        problem, new_result(problem, [], {}), lambda i: lambda p: None, lambda step, now: None
+    )
+    motion = result.motions[0]
+    assert all(worst.violations == 0 for worst in motion.margins.values())
+    return motion.stacked_condition_number
+
+
+def test_joints_without_any_bound(tmp_path: Path) -> None:
+    free = 'type="continuous"><axis xyz="{}"/>'
+    assert _solve(_problem(tmp_path, [free.format("0 1 0"), free.format("1 0 0")])) < 1e6
+
+
+def test_one_revolute_joint(tmp_path: Path) -> None:
+    assert _solve(_problem(tmp_path, [_turns("0 1 0")])) < 1e6
+
+
+def test_one_base_parameter_has_no_condition_number(tmp_path: Path) -> None:
+    slides = (
+        'type="prismatic"><axis xyz="1 0 0"/><limit lower="0" upper="1" velocity="1" effort="9"/>'
+    )
+    with pytest.raises(ConfigError, match=r"one base parameter.*log_det"):
+        _problem(tmp_path, [slides])
+
+
+def test_bounds_on_one_side_only(tmp_path: Path) -> None:
+    limit = 'lower="0.1" upper="1e10" velocity="2" effort="9"'
+    problem = _problem(tmp_path, [_turns("0 1 0", limit), _turns("1 0 0")])
+    assert problem.robot.posture[0] == pytest.approx(0.6)
+    assert _solve(problem) < 1e6
+
+
+def test_placeholder_velocities_lose_no_parameters(tmp_path: Path) -> None:
+    joints = [_turns("0 1 0"), _turns("1 0 0")]
+    sane = _problem(tmp_path, joints)
+    wild = _problem(tmp_path, [joint.replace('velocity="2"', 'velocity="1e6"') for joint in joints])
+    assert wild.base.rank == sane.base.rank
+
+
+@pytest.mark.parametrize("mass", ["nan", "-3", "1e300", "heavy"])
+def test_masses_that_are_none_are_refused(tmp_path: Path, mass: str) -> None:
+    with pytest.raises(RobotError, match="link 'l1' has <mass>"):
+        _problem(tmp_path, [_turns("0 1 0")], mass=mass)
+
+
+def test_a_trajectory_too_poor_to_show_everything(tmp_path: Path) -> None:
+    problem = _problem(tmp_path, [_turns("0 1 0"), _turns("1 0 0"), _turns("0 0 1")])
+    poor = build_problem(
+        problem.spec.model_copy(
+            update={
+                "trajectory": problem.spec.trajectory.model_copy(update={"harmonics": 1}),
+                "sampling": problem.spec.sampling.model_copy(
+                    update={"cost": problem.spec.sampling.cost.model_copy(
+                        update={"samples": 40, "step": 1e-12}
+                    )}
+                ),
+            }
+        ),
+        tmp_path,
+    )  # fmt: skip
+    with pytest.raises(NoAdmissibleMotionError, match=r"all .* base parameters|not finite"):
+        _solve(poor)
