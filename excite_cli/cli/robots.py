@@ -25,7 +25,7 @@ def robots(
 
     from excite_cli.config.spec import RobotSpec
     from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots
-    from excite_cli.robot.model import build_robot
+    from excite_cli.robot.model import build_robot, links_by_joint
 
     terminal = Terminal(as_json, quiet)
     if urdf is None:
@@ -39,12 +39,20 @@ def robots(
     robot = build_robot(RobotSpec(urdf=urdf), Path.cwd())
     limits = robot.limits
     table = Table(title=robot.name, title_justify="left")
-    for name in ("joint", "lower", "upper", "velocity", "effort"):
-        table.add_column(name, justify="left" if name == "joint" else "right")
-    data = []
+    for name in ("joint", "kind", "lower", "upper", "velocity", "effort", "links"):
+        left = name in ("joint", "kind", "links")
+        table.add_column(name, justify="left" if left else "right")
+    links = links_by_joint(robot)
+    data = {}
     for index, joint in enumerate(robot.joint_names):
         row = [limits.lower, limits.upper, limits.velocity, limits.effort]
         values = [float(column[index]) for column in row]
-        table.add_row(joint, *(f"{value:.4g}" for value in values))
-        data.append(dict(zip(("lower", "upper", "velocity", "effort"), values, strict=True)))
-    terminal.answer(table, {"joints": dict(zip(robot.joint_names, data, strict=True))})
+        kind = "prismatic [m]" if robot.sliding[index] else "revolute [rad]"
+        carried = links.get(joint, [])
+        table.add_row(joint, kind, *(f"{value:.4g}" for value in values), ", ".join(carried))
+        numbers = dict(zip(("lower", "upper", "velocity", "effort"), values, strict=True))
+        data[joint] = {"kind": kind.split()[0], **numbers, "links": carried}
+    base = links.get("", [])
+    terminal.answer(
+        [table, f"fixed to the base: {', '.join(base)}"], {"joints": data, "base_links": base}
+    )

@@ -47,11 +47,12 @@ def load_problem(
             )
             unguarded = [pair for pair in pairs.dropped if pair.reason.startswith(UNGUARDED)]
             if unguarded:
-                loose = sorted({f"{pair.first} – {pair.second}" for pair in unguarded})
+                loose = sorted({pair.reason.partition("apart: ")[2][:-1] for pair in unguarded})
                 terminal.say(
-                    f"warning: {len(loose)} pairs are not guarded, since their capsules overlap "
-                    f"whatever the posture while the meshes do not: {', '.join(loose)}. Look at "
-                    "them, or give slimmer capsules under constraints.self_collision.capsules."
+                    "warning: not guarded, since their capsules overlap whatever the posture "
+                    "(links and the share of postures in which their meshes are apart): "
+                    f"{'; '.join(loose)}. Look at these, or give slimmer capsules under "
+                    "constraints.self_collision.capsules."
                 )
             for label in constraint.labels:
                 terminal.detail(f"  checked  {label}")

@@ -14,7 +14,6 @@ from excite_cli.report.style import (
     BLUE,
     VERMILION,
     logarithmic,
-    matplotlib_part,
     new_figure,
     styled,
 )
@@ -54,7 +53,8 @@ def draw_condition_numbers(result: Result) -> "Figure":
         _draw_sequence(axes, word, colour, motions, below=side == 0)
     count = max(len(motions) for _, _, motions in parts)
     axes.set_xlim(0.5, count + 0.5)
-    axes.xaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(integer=True))
+    every = -(-count // 20)
+    axes.set_xticks(range(1, count + 1, every))
     axes.grid(axis="x", visible=False)
     axes.set_xlabel("motion [–]")
     axes.set_ylabel("condition number of the base regressor [–]")
@@ -139,7 +139,8 @@ def draw_spectrum(result: Result, problem: Problem) -> "Figure":
             markersize=3.5,
             label=f"{word}: largest / smallest = {condition:.1f}",
         )
-    axes.xaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(integer=True))
+    every = -(-count // 20)
+    axes.set_xticks(range(1, count + 1, every))
     axes.set_xlabel("singular value, from the largest [–]")
     axes.set_ylabel(f"size of the singular value [{_unit(problem)}]")
     axes.set_title(_spectrum_title(result))

@@ -78,7 +78,7 @@ def draw_motion(motion: Motion, problem: Problem) -> "Figure":
         inner = outer[divmod(joint, columns)].subgridspec(2, 1, height_ratios=(5, 3), hspace=0.1)
         upper = figure.add_subplot(inner[0])
         lower = figure.add_subplot(inner[1], sharex=upper)
-        upper.set_title(name, fontsize=8.5)
+        upper.set_title(_shortened(name, 40 if columns <= 3 else 22), fontsize=8.5)
         _draw_position(upper, times, states[0][:, joint], bounds, joint)
         upper.set_ylabel(f"q [{units[joint]}]", labelpad=2)
         for order, colour in ((2, GREEN), (1, VERMILION)):
@@ -87,6 +87,14 @@ def draw_motion(motion: Motion, problem: Problem) -> "Figure":
         _finish_band(lower, times, bounded, last=joint + columns >= robot.n)
     _head(figure, motion, problem, height, bool(np.isinf(bounds.upper[1:]).any()))
     return figure
+
+
+def _shortened(name: str, longest: int) -> str:
+    """The name with its middle left out where it would run into the next panel."""
+    if len(name) <= longest:
+        return name
+    head = longest // 2
+    return f"{name[:head]}…{name[head + 1 - longest :]}"
 
 
 def _columns(joints: int) -> int:

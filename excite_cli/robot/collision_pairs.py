@@ -10,6 +10,7 @@ capsules can tell: where their capsules touch, the meshes themselves decide whet
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,19 +208,24 @@ def _contacts(
     times, the pair is said to be unguarded, so that somebody looks at it.
     """
     meshes: MeshDistances | None = None
-    known: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = {}
+    known: dict[tuple[str, str], float] = {}
+    some = q[:: max(1, len(q) // _CONTACT_SAMPLES)]
     for k, pair in always.items():
         first, second = (capsules[index] for index in pair)
-        links = (first.links, second.links)
         meshes = meshes or MeshDistances(robot)
         if first.by_hand or second.by_hand or not meshes.knows(first.links + second.links):
             yield k, ALWAYS
             continue
-        if links not in known:
-            some = q[:: max(1, len(q) // _CONTACT_SAMPLES)]
-            known[links] = float(np.mean([meshes.distance(*links, at) > 0.0 for at in some]))
-        apart = known[links]
-        yield k, ALWAYS if apart < 1 - _ALWAYS else f"{UNGUARDED} (meshes apart in {apart:.0%})"
+        apart = {}
+        # Link by link: one that always touches must not excuse another in the same capsule.
+        for links in product(first.links, second.links):
+            if links not in known:
+                one, other = links
+                gaps = [meshes.distance([one], [other], at) for at in some]
+                known[links] = float(np.mean(np.array(gaps) > 0.0))
+            apart[links] = known[links]
+        loose = [f"{a} – {b} {share:.0%}" for (a, b), share in apart.items() if share > 1 - _ALWAYS]
+        yield k, f"{UNGUARDED} (meshes apart: {', '.join(loose)})" if loose else ALWAYS
 
 
 def _descend(

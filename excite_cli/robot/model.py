@@ -182,6 +182,18 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
     )
 
 
+def links_by_joint(robot: Robot) -> dict[str, list[str]]:
+    """Links that each moved joint carries directly; those fixed to the base under ''."""
+    found: dict[str, list[str]] = {}
+    for frame in robot.model.frames:
+        if frame.type == pin.FrameType.BODY:
+            joint = str(robot.model.names[frame.parentJoint])
+            found.setdefault(joint if joint in robot.joint_names else "", []).append(
+                str(frame.name)
+            )
+    return found
+
+
 def _parse(description: RobotDescription, spec: RobotSpec) -> pin.Model:
     try:
         if spec.base == "floating":
