@@ -47,11 +47,11 @@ def robots(
     for index, joint in enumerate(robot.joint_names):
         row = [limits.lower, limits.upper, limits.velocity, limits.effort]
         values = [float(column[index]) for column in row]
-        kind = "prismatic [m]" if robot.sliding[index] else "revolute [rad]"
+        kind = "prismatic, m" if robot.sliding[index] else "revolute, rad"
         carried = links.get(joint, [])
         table.add_row(joint, kind, *(f"{value:.4g}" for value in values), ", ".join(carried))
         numbers = dict(zip(("lower", "upper", "velocity", "effort"), values, strict=True))
-        data[joint] = {"kind": kind.split()[0], **numbers, "links": carried}
+        data[joint] = {"kind": kind.split(",")[0], **numbers, "links": carried}
     base = links.get("", [])
     terminal.answer(
         [table, f"fixed to the base: {', '.join(base)}"], {"joints": data, "base_links": base}

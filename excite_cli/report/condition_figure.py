@@ -14,6 +14,7 @@ from excite_cli.report.style import (
     BLUE,
     VERMILION,
     logarithmic,
+    matplotlib_part,
     new_figure,
     styled,
 )
@@ -139,8 +140,7 @@ def draw_spectrum(result: Result, problem: Problem) -> "Figure":
             markersize=3.5,
             label=f"{word}: largest / smallest = {condition:.1f}",
         )
-    every = -(-count // 20)
-    axes.set_xticks(range(1, count + 1, every))
+    axes.xaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(integer=True))
     axes.set_xlabel("singular value, from the largest [–]")
     axes.set_ylabel(f"size of the singular value [{_unit(problem)}]")
     axes.set_title(_spectrum_title(result))
