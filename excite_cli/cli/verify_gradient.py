@@ -47,12 +47,12 @@ def verify_gradient(
         "adjoint – block form", f"{errors['adjoint_vs_block']:.1e}", f"{ADJOINT_BLOCK_LIMIT:.0e}"
     )
     table.add_row(
-        "adjoint – central differences",
+        "adjoint – central differences, 5 points",
         f"{errors['adjoint_vs_central']:.1e}",
         f"{CENTRAL_LIMIT:.0e}",
     )
     table.add_row(
-        "block form – central differences",
+        "block form – central differences, 5 points",
         f"{errors['block_vs_central']:.1e}",
         f"{CENTRAL_LIMIT:.0e}",
     )
@@ -69,7 +69,7 @@ def verify_gradient(
         "adjoint": "cost and gradient, adjoint",
         "block": "cost and gradient, block form",
         "forward": "forward differences",
-        "central": "central differences",
+        "central": "central differences, 5 points",
     }
     for key, word in words.items():
         seconds = found.seconds[key]

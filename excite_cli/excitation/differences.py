@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 FORWARD_STEP = 1e-6
 CENTRAL_STEP = 1e-5
-FOURTH_ORDER_STEP = 3e-4
+FOURTH_ORDER_STEP = 3e-5
 
 
 def forward_differences(

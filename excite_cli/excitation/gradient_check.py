@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.excitation.differences import (
-    central_differences,
     forward_differences,
+    fourth_order_differences,
     relative_error,
 )
 from excite_cli.excitation.problem import Problem
@@ -58,7 +58,7 @@ def check_gradient(
     def block() -> Array:
         return block_gradient(problem, task, alpha)
 
-    central, seconds_central = _timed(lambda: central_differences(cost, alpha), 1)
+    central, seconds_central = _timed(lambda: fourth_order_differences(cost, alpha), 1)
     forward, seconds_forward = _timed(lambda: forward_differences(cost, alpha), 1)
     by_adjoint, seconds_adjoint = _timed(adjoint, repeats)
     by_block, seconds_block = _timed(block, max(2, repeats // 5))
