@@ -40,33 +40,11 @@ def generate_motion(
         No start is admissible, or the result cannot be kept admissible between the instants.
     """
     began = time.perf_counter()
-    spec = problem.spec.optimizer
-    effort = Effort(spec.max_iterations, spec.max_seconds, spec.tolerance)
     task = MotionTask(problem, stack)
     start = clear_posture(task, seed)
-    best: tuple[float, Array, Outcome] | None = None
-    iterations = evaluations = 0
-    failure: NoAdmissibleMotionError | None = None
-    for restart in range(spec.restarts):
-        run = MotionTask(problem, stack)
-        told = _labelled(report, restart, spec.restarts)
-        try:
-            x0 = random_start(run, start, (seed, index, restart))
-            outcome = solver.solve(run, x0, effort, told)
-            outcome = kept_between_instants(run, solver, start, outcome, effort, told)
-        except NoAdmissibleMotionError as error:
-            failure = error
-            continue
-        iterations += outcome.iterations
-        evaluations += outcome.evaluations
-        coefficients = run.coefficients(outcome.x)
-        value = run.objective.value(coefficients, problem.criterion)
-        if best is None or value < best[0]:
-            best = (value, coefficients, outcome)
-    if best is None:
-        assert failure is not None
-        raise failure
-    value, coefficients, outcome = best
+    outcome = _best_of_starts(task, solver, start, (seed, index), report)
+    coefficients = task.coefficients(outcome.x)
+    value = task.objective.value(coefficients, problem.criterion)
     stacked = task.objective.stacked_condition_number(coefficients)
     if not stacked < _BLIND:
         raise NoAdmissibleMotionError(
@@ -81,10 +59,47 @@ def generate_motion(
         improved=is_improvement(stack, problem.criterion, value),
         status=outcome.status,
         seconds=time.perf_counter() - began,
-        iterations=iterations,
-        evaluations=evaluations,
+        iterations=outcome.iterations,
+        evaluations=outcome.evaluations,
         margins=worst_margins(problem, coefficients),
         note=moved_note(task, start),
+    )
+
+
+def _best_of_starts(
+    task: MotionTask,
+    solver: Solver,
+    start: Start,
+    seed: tuple[int, int],
+    report: ProgressCallback,
+) -> Outcome:
+    """The outcome with the lowest criterion, with iterations and evaluations of all starts.
+
+    A start that fails is passed over; its error is raised only if all fail.
+    """
+    problem, spec = task.problem, task.problem.spec.optimizer
+    effort = Effort(spec.max_iterations, spec.max_seconds, spec.tolerance)
+    found: list[tuple[float, Outcome]] = []
+    failure: NoAdmissibleMotionError | None = None
+    for restart in range(spec.restarts):
+        run = MotionTask(problem, task.stack)
+        told = _labelled(report, restart, spec.restarts)
+        try:
+            outcome = solver.solve(run, random_start(run, start, (*seed, restart)), effort, told)
+            outcome = kept_between_instants(run, solver, start, outcome, effort, told)
+        except NoAdmissibleMotionError as error:
+            failure = error
+            continue
+        value = run.objective.value(run.coefficients(outcome.x), problem.criterion)
+        found.append((value, outcome))
+    if not found:
+        assert failure is not None
+        raise failure
+    _, best = min(found, key=lambda pair: pair[0])
+    return replace(
+        best,
+        iterations=sum(outcome.iterations for _, outcome in found),
+        evaluations=sum(outcome.evaluations for _, outcome in found),
     )
 
 
