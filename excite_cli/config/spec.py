@@ -4,6 +4,7 @@ Every model is frozen and refuses unknown keys. Units: rad (m for prismatic join
 kg, m. The JSON Schema that `excite schema` prints is made from these classes.
 """
 
+from collections.abc import Callable
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
@@ -174,16 +175,20 @@ class BSplineSpec(Section):
         return self
 
 
-def _family(value: Any) -> Any:
-    """The `family` of a section; Fourier where none is given."""
-    if isinstance(value, dict):
-        return value.get("family", "fourier")
-    return getattr(value, "family", "fourier")
+def _kind_by(key: str, default: str) -> Callable[[Any], Any]:
+    """Tells which kind of section is meant: what stands under `key`, else `default`."""
+
+    def kind(value: Any) -> Any:
+        if isinstance(value, dict):
+            return value.get(key, default)
+        return getattr(value, key, default)
+
+    return kind
 
 
 TrajectorySpec = Annotated[
     Annotated[FourierSpec, Tag("fourier")] | Annotated[BSplineSpec, Tag("bspline")],
-    Discriminator(_family),
+    Discriminator(_kind_by("family", "fourier")),
 ]
 
 
@@ -269,16 +274,9 @@ class PolygonSpec(Section):
         return value
 
 
-def _balance_kind(value: Any) -> Any:
-    """The `kind` of a balance section; a disc where none is given."""
-    if isinstance(value, dict):
-        return value.get("kind", "disc")
-    return getattr(value, "kind", "disc")
-
-
 BalanceSpec = Annotated[
     Annotated[DiscSpec, Tag("disc")] | Annotated[PolygonSpec, Tag("polygon")],
-    Discriminator(_balance_kind),
+    Discriminator(_kind_by("kind", "disc")),
 ]
 
 

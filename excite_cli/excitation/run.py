@@ -29,10 +29,11 @@ def new_result(
     FileError
         A prior does not fit the problem.
     """
-    names = [name for name, _ in priors]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise FileError(f"--prior {twice[0]} is given twice; its data would count twice.")
+    seen: set[Path] = set()
+    for name, _ in priors:
+        if Path(name).resolve() in seen:
+            raise FileError(f"--prior {name} is given twice; its data would count twice.")
+        seen.add(Path(name).resolve())
     stack = Stack.empty(problem.base.rank)
     for name, prior in priors:
         reason = matches(problem, prior)

@@ -140,12 +140,9 @@ def _still(task: MotionTask, posture: Array) -> States:
     return States(task.problem.kinematics, posture[None], zero, zero)
 
 
-def _standing_parts(task: MotionTask, posture: Array) -> list[Array]:
-    return [value[0] for value in task.values(_still(task, posture))]
-
-
 def _standing(task: MotionTask, posture: Array) -> Array:
-    parts = _standing_parts(task, posture)
+    """Residuals of all constraints, in one row, of standing still at `posture`."""
+    parts = [value[0] for value in task.values(_still(task, posture))]
     return np.concatenate(parts) if parts else np.array([np.inf])
 
 

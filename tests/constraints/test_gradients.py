@@ -119,3 +119,15 @@ def test_limits_that_cannot_be_asked_for_are_refused() -> None:
     wide = ConstraintsSpec(joint_limits=JointLimitsSpec(position_margin=3.0))
     with pytest.raises(ConfigError, match="position_margin: 3 leaves no range for joint_"):
         build_constraints(wide, robot)
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_quick_margins_are_exact_within_reach_and_bounds_beyond(share: float) -> None:
+    robot = build_robot(RobotSpec(urdf="example-robot-data:panda"))
+    for constraint in build_constraints(_all(DiscSpec(radius=0.3), collision=True), robot):
+        states = States(BatchKinematics(robot), *robot.draw_states(60, 2))
+        exact, reach = constraint.margins(states), share * constraint.scale
+        quick = constraint.margins_within(states, reach)
+        near = exact < reach
+        assert np.allclose(quick[near], exact[near], atol=1e-12)
+        assert np.all((quick >= reach)[~near])

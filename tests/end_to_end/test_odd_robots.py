@@ -6,6 +6,7 @@ import pytest
 
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError, RobotError
+from excite_cli.excitation.admissible import proved_constraints
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.run import continue_run, new_result
 
@@ -96,3 +97,12 @@ def test_a_trajectory_too_poor_to_show_everything(tmp_path: Path) -> None:
     )  # fmt: skip
     with pytest.raises(NoAdmissibleMotionError, match=r"all .* base parameters|not finite"):
         _solve(poor)
+
+
+def test_a_bound_on_one_side_is_never_called_proved(tmp_path: Path) -> None:
+    """Samples bound a series between two limits; from one side they prove nothing."""
+    limit = 'lower="0.1" upper="1e10" velocity="2" effort="9"'
+    problem = _problem(tmp_path, [_turns("0 1 0", limit), _turns("1 0 0")])
+    proved = proved_constraints(problem, problem.still(problem.robot.posture))
+    assert not proved["joint_position"]
+    assert proved["joint_velocity"]
