@@ -5,84 +5,29 @@ kg, m. The JSON Schema that `excite schema` prints is made from these classes.
 """
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    StrictBool,
-    Tag,
-    field_validator,
-    model_validator,
+from pydantic import Discriminator, Field, StrictBool, Tag, field_validator, model_validator
+
+from excite_cli.config.data_spec import (
+    DiagnosisSpec,
+    EffectSpec,
+    IdentificationSpec,
+    MeasurementSpec,
 )
-
-
-def _not_a_truth_value(value: Any) -> Any:
-    """Pydantic takes true for 1; a person who writes true means something else."""
-    if isinstance(value, bool):
-        raise ValueError("allowed: a number, not true or false")
-    return value
-
-
-_NO_TRUTH_VALUE = BeforeValidator(_not_a_truth_value)
-Integer = Annotated[int, _NO_TRUTH_VALUE]
-# Beyond these a figure is a mistake, and arithmetic with it overflows.
-_MOST, _LEAST = 1e9, 1e-15
-
-
-def _not_vanishing(value: float) -> float:
-    if 0 < value < _LEAST:
-        raise ValueError(f"allowed: a number of at least {_LEAST:g}")
-    return value
-
-
-Finite = Annotated[float, Field(ge=-_MOST, le=_MOST, allow_inf_nan=False), _NO_TRUTH_VALUE]
-Positive = Annotated[
-    float,
-    Field(gt=0, le=_MOST, allow_inf_nan=False),
-    AfterValidator(_not_vanishing),
-    _NO_TRUTH_VALUE,
-]
-NonNegative = Annotated[float, Field(ge=0, le=_MOST, allow_inf_nan=False), _NO_TRUTH_VALUE]
-Duration = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False), _NO_TRUTH_VALUE]
-Frequency = Annotated[float, Field(gt=0, le=630, allow_inf_nan=False), _NO_TRUTH_VALUE]
-Power = Annotated[float, Field(ge=1, le=1e4, allow_inf_nan=False), _NO_TRUTH_VALUE]
-Samples = Annotated[int, Field(ge=2, le=1_000_000), _NO_TRUTH_VALUE]
-Share = Annotated[float, Field(gt=0, le=1), _NO_TRUTH_VALUE]
-Vector3 = tuple[Finite, Finite, Finite]
-
-
-class Section(BaseModel):
-    """Base of all sections: frozen, unknown keys refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", str_strip_whitespace=True)
-
-    @classmethod
-    def child(cls, key: str, value: Any) -> "type[Section] | None":
-        """The section that `value` under `key` is meant to be; None for plain values.
-
-        Of several kinds, the one whose tag (`family`, `kind`) is given, else the first.
-        """
-        if key not in cls.model_fields:
-            return None
-        kinds = _sections_in(cls.model_fields[key].annotation)
-        given = value if isinstance(value, dict) else {}
-        for kind in kinds:
-            for tag in ("family", "kind"):
-                field = kind.model_fields.get(tag)
-                if field is not None and given.get(tag) in get_args(field.annotation):
-                    return kind
-        return kinds[0] if kinds else None
-
-
-def _sections_in(annotation: Any) -> list[type[Section]]:
-    if isinstance(annotation, type) and issubclass(annotation, Section):
-        return [annotation]
-    return [kind for inner in get_args(annotation) for kind in _sections_in(inner)]
+from excite_cli.config.section import (
+    Duration,
+    Finite,
+    Frequency,
+    Integer,
+    NonNegative,
+    Positive,
+    Power,
+    Samples,
+    Section,
+    Share,
+    Vector3,
+)
 
 
 class JointLimits(Section):
@@ -335,5 +280,11 @@ class Spec(Section):
     criterion: CriterionSpec = CriterionSpec()
     constraints: ConstraintsSpec = ConstraintsSpec()
     optimizer: OptimizerSpec = OptimizerSpec()
+    effects: tuple[EffectSpec, ...] | None = Field(
+        None, description="the declared model; default: the friction of the URDF's <dynamics>"
+    )
+    measurement: MeasurementSpec = MeasurementSpec()
+    identification: IdentificationSpec = IdentificationSpec()
+    diagnosis: DiagnosisSpec = DiagnosisSpec()
     sequence: SequenceSpec = SequenceSpec()
     seed: Integer = Field(1, ge=0, le=2**32 - 1)

@@ -1,0 +1,118 @@
+"""What a YAML file may say about measured data: torque, filters, declared effects, diagnosis."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator
+
+from excite_cli.config.section import (
+    Finite,
+    Integer,
+    NonNegative,
+    Positive,
+    Section,
+    Share,
+)
+
+EffectKind = str
+
+
+class EffectSpec(Section):
+    """An effect of the declared model; its parameters are identified with the inertias."""
+
+    kind: EffectKind = Field(description="name in the catalogue of effects")
+    joints: Literal["all"] | tuple[str, ...] = Field(
+        "all", description="joints it acts on, each on its own; of a pair, exactly two"
+    )
+    shape: dict[str, Finite] = Field(
+        default_factory=dict, description="values of the effect's non-linear parameters"
+    )
+    runs: Literal["all"] | tuple[str, ...] = Field("all", description="runs it is present in")
+
+
+PerJoint = Finite | dict[str, Finite]
+
+
+class FilterSpec(Section):
+    """Zero-phase low-pass filters; what is `auto` is chosen from the data and reported."""
+
+    position: Literal["auto", "none"] | Positive = Field(
+        "auto", description="cut-off of the positions [Hz]"
+    )
+    parallel: Literal["auto", "none"] | Positive = Field(
+        "auto", description="cut-off of torque and of every regressor column [Hz]"
+    )
+    rate: Literal["auto"] | Positive = Field(
+        "auto", description="rate to which torque and columns are decimated [Hz]"
+    )
+    border: NonNegative | None = Field(
+        None, description="cut at both ends of a run [s]; default: from the cut-offs"
+    )
+    velocity: Literal["auto", "measured", "differentiated"] = Field(
+        "auto", description="auto: differentiated from the filtered positions"
+    )
+
+
+class MeasurementSpec(Section):
+    """What the recorded columns are."""
+
+    torque: Literal["link", "motor", "current"] = Field(
+        "link",
+        description="link: at the joint; motor: before the gear; current: before motor and gear",
+    )
+    gear_ratio: PerJoint = Field(1.0, description="motor turns per turn of the joint, with sign")
+    torque_constant: PerJoint = Field(1.0, description="[N·m/A] at the motor, for torque: current")
+    coupling: dict[str, dict[str, Finite]] = Field(
+        default_factory=dict,
+        description="further shares of other motors in a joint's torque, "
+        "{joint: {motor's joint: share}}",
+    )
+    sign: dict[str, Literal[-1, 1]] = Field(
+        default_factory=dict, description="-1 where the recorded torque counts the other way"
+    )
+    offset: dict[str, Finite] = Field(
+        default_factory=dict, description="added to recorded positions [rad or m]"
+    )
+    time: Literal["s", "ms", "us", "ns"] = "s"
+    angle: Literal["rad", "deg"] = "rad"
+    names: dict[str, str] = Field(
+        default_factory=dict, description="name in the file -> joint of the robot"
+    )
+    topic: str | None = Field(None, description="topic of a bag; default: the only JointState")
+    filter: FilterSpec = FilterSpec()
+    encoder_step: NonNegative | None = Field(None, description="[rad] resolution of the encoders")
+
+
+class IdentificationSpec(Section):
+    """How parameters are found."""
+
+    method: Literal["ols", "wls", "irls"] = "wls"
+    inertias: Literal["free", "cad"] = Field(
+        "free", description="cad: kept at the URDF's values within `uncertainty`"
+    )
+    uncertainty: Positive = Field(
+        0.1, description="one standard deviation of the URDF's inertial parameters, as a share"
+    )
+    consistent: bool = Field(True, description="also a physically consistent full set (SDP)")
+
+
+class DiagnosisSpec(Section):
+    """When a candidate becomes a named effect."""
+
+    significance: Share = Field(0.01, description="family-wise error rate")
+    gain: NonNegative = Field(
+        0.01, description="least share by which it lowers the error on runs left out"
+    )
+    kinds: Literal["all"] | tuple[EffectKind, ...] = "all"
+    exclude: tuple[EffectKind, ...] = ()
+    moving_speed: Positive | None = Field(
+        None, description="a joint moves above this speed [rad/s or m/s]; default 0.02"
+    )
+    rounds: Annotated[Integer, Field(ge=0, le=200)] = 60
+    block: Positive | None = Field(None, description="[s] blocks a single run is cut into")
+
+    @field_validator("kinds")
+    @classmethod
+    def _some(cls, value: str | tuple[str, ...]) -> str | tuple[str, ...]:
+        if value != "all" and not value:
+            raise ValueError("name at least one kind, or write 'all'")
+        return value

@@ -1,0 +1,134 @@
+"""What a diagnosis found, as frozen records."""
+
+from dataclasses import dataclass, field
+
+from excite_cli.effects.base import Value
+from excite_cli.measurement.dataset import Finding
+from excite_cli.robot.model import Array
+
+
+@dataclass(frozen=True)
+class EffectRecord:
+    """An effect by name: kind, names of its joints, shape, linear parameters, runs (all: empty)."""
+
+    kind: str
+    joints: tuple[str, ...]
+    shape: dict[str, float] = field(default_factory=dict)
+    values: tuple[float, ...] = ()
+    runs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that the declared model lacks, with its evidence.
+
+    `parameters` as people know them; `p_value` corrected for the family of tests;
+    `share_of_residual` of the energy of the residual before, on the rows it touches;
+    `gain` by which the error on runs left out fell; `aliases` what the data cannot tell it from.
+    """
+
+    effect: EffectRecord
+    parameters: dict[str, Value]
+    p_value: float
+    share_of_residual: float
+    gain: float
+    aliases: tuple[EffectRecord, ...] = ()
+
+
+@dataclass(frozen=True)
+class Absorbed:
+    """A candidate that shows as a change of parameters of the declared model only."""
+
+    kind: str
+    joints: tuple[str, ...]
+    by: tuple[str, ...]
+    left: float
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """Structure in a joint's residual that fits no name, and what it depends on."""
+
+    joint: str
+    depends_on: tuple[str, ...]
+    share_of_residual: float
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of the torque on the sealed data: per joint, relative (RMS/RMS) and in N·m.
+
+    `interval` is the 95 % block-bootstrap interval of the mean relative error.
+    """
+
+    mean_relative: float
+    mean_relative_moving: float
+    relative: dict[str, float]
+    relative_moving: dict[str, float]
+    rms: dict[str, float]
+    rms_raw: dict[str, float]
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """One candidate in one round, with its evidence and what became of it."""
+
+    effect: EffectRecord
+    p_value: float
+    share_of_residual: float
+    gain: float
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round of tracing: residual per joint [N·m], the suspects, the verdict."""
+
+    index: int
+    residual: dict[str, float]
+    suspects: tuple[Suspect, ...]
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Information:
+    """What the training data say, for planning the next motion.
+
+    `factor` R (k, k) with RᵀR = Σ cᵀc of the columns [base parameters, `model` effects, `rivals`],
+    each effect with all its linear parameters in order, rows weighted by 1/noise and whitened.
+    `noise` (n,) per moved joint [N·m] belongs to independent samples.
+    """
+
+    factor: Array
+    rank: int
+    model: tuple[EffectRecord, ...]
+    rivals: tuple[EffectRecord, ...]
+    noise: Array
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """All that `excite diagnose` learned. `phi`: full standard parameters that fit the data."""
+
+    config: str
+    config_folder: str
+    fingerprint: str
+    joint_names: tuple[str, ...]
+    base_names: tuple[str, ...]
+    declared: tuple[EffectRecord, ...]
+    effects: tuple[NamedEffect, ...]
+    absorbed: tuple[Absorbed, ...]
+    unexplained: tuple[Unexplained, ...]
+    sealed_run: str
+    before: Errors
+    after: Errors
+    rounds: tuple[Round, ...]
+    findings: tuple[Finding, ...]
+    processing: dict[str, object]
+    phi: Array
+    base_values: Array
+    base_std: Array
+    information: Information
+    versions: dict[str, str]
+    seconds: float = 0.0

@@ -1,0 +1,108 @@
+"""The catalogue: every kind of effect by its name; users' own come through an entry point.
+
+A package that declares, in the group `excite.effects`, a name for a subclass of `Effect` adds it.
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import entry_points
+
+from excite_cli.config.data_spec import EffectSpec
+from excite_cli.effects.base import Effect
+from excite_cli.effects.coulomb_friction import CoulombFriction
+from excite_cli.effects.viscous_friction import ViscousFriction
+from excite_cli.errors import ConfigError, nearest
+from excite_cli.robot.model import Robot
+
+GROUP = "excite.effects"
+_OURS: tuple[type[Effect], ...] = (ViscousFriction, CoulombFriction)
+
+
+@cache
+def catalogue() -> Mapping[str, type[Effect]]:
+    """All kinds by name.
+
+    Raises
+    ------
+    ConfigError
+        An effect of a package cannot be loaded, is none, or takes a name that exists.
+    """
+    kinds = {effect.kind: effect for effect in _OURS}
+    for point in entry_points(group=GROUP):
+        try:
+            found = point.load()
+        except Exception as error:
+            raise ConfigError(
+                f"effect '{point.name}' ({point.value}) cannot be loaded: {error}."
+            ) from error
+        if not (isinstance(found, type) and issubclass(found, Effect)):
+            raise ConfigError(f"effect '{point.name}' ({point.value}) is not a subclass of Effect.")
+        if found.kind in kinds:
+            raise ConfigError(f"effect '{found.kind}' ({point.value}): there is one of this name.")
+        kinds[found.kind] = found
+    return kinds
+
+
+def kind_named(name: str, where: str = "effects") -> type[Effect]:
+    """The class of a kind.
+
+    Raises
+    ------
+    ConfigError
+        There is none of this name.
+    """
+    kinds = catalogue()
+    if name not in kinds:
+        raise ConfigError(
+            f"{where}: there is no effect '{name}'.{nearest(name, kinds)} "
+            f"Effects: {', '.join(kinds)}."
+        )
+    return kinds[name]
+
+
+def declared_effects(specs: tuple[EffectSpec, ...] | None, robot: Robot) -> tuple[Effect, ...]:
+    """Effects of the declared model; without `specs`, the friction of the URDF's <dynamics>.
+
+    Raises
+    ------
+    ConfigError
+        A kind, joint or shape is unknown, or the joints do not fit the kind.
+    """
+    if specs is None:
+        model, moved = robot.model, robot.moved
+        damped = [j for j in range(robot.n) if model.damping[moved[j]] > 0]
+        dry = [j for j in range(robot.n) if model.friction[moved[j]] > 0]
+        return (
+            *(ViscousFriction((j,)) for j in damped),
+            *(CoulombFriction((j,)) for j in dry),
+        )
+    return tuple(effect for i, spec in enumerate(specs) for effect in _built(spec, i, robot))
+
+
+def _built(spec: EffectSpec, index: int, robot: Robot) -> list[Effect]:
+    where = f"effects[{index}]"
+    kind = kind_named(spec.kind, f"{where}.kind")
+    names = list(robot.joint_names)
+    if spec.joints == "all":
+        places = kind.places(robot)
+    else:
+        for joint in spec.joints:
+            if joint not in names:
+                raise ConfigError(
+                    f"{where}.joints: no moved joint '{joint}'.{nearest(joint, names)} "
+                    f"Moved joints: {', '.join(names)}."
+                )
+        chosen = tuple(names.index(joint) for joint in spec.joints)
+        if kind.scope == "pair" and len(chosen) != 2:
+            raise ConfigError(f"{where}.joints: {spec.kind} acts on two joints; name exactly two.")
+        places = [(j,) for j in chosen] if kind.scope == "joint" else [chosen]
+    known = {parameter.name: parameter for parameter in kind.shapes}
+    for name in spec.shape:
+        if name not in known:
+            raise ConfigError(
+                f"{where}.shape: {spec.kind} has no parameter '{name}'.{nearest(name, known)} "
+                f"Allowed: {', '.join(known) or 'none'}."
+            )
+    shape, _ = kind.planted(0.0, spec.shape)
+    runs = () if spec.runs == "all" else spec.runs
+    return [kind(place, shape, runs) for place in places]

@@ -1,0 +1,39 @@
+"""Dry friction: τ_j = f_c sgn v_j."""
+
+from typing import ClassVar
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
+from excite_cli.robot.model import Array
+
+
+class CoulombFriction(Effect):
+    """τ_j = f_c sgn v_j, f_c ≥ 0."""
+
+    kind: ClassVar = "coulomb_friction"
+    title: ClassVar = "Coulomb friction"
+    signature: ClassVar = "the residual jumps when the joint reverses and is flat in between"
+    parameters: ClassVar = (Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True),)
+    simpler_than: ClassVar = (
+        "asymmetric_friction", "stribeck_friction", "load_dependent_friction",
+        "friction_drift", "coupled_friction",
+    )  # fmt: skip
+
+    def columns(self, signals: Signals) -> Array:
+        """sgn v_j, (T, 1, 1)."""
+        return smooth_sign(signals.v[:, list(self.joints), None])
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂v_j = weight · slope of the smoothed sign."""
+        j = self.joints[0]
+        cotangents = Cotangents(v=signals.v * 0.0)
+        cotangents.v[:, j] = weights[:, 0, 0] * smooth_sign_slope(signals.v[:, j])
+        return cotangents
+
+    def urdf(self, values: Array) -> dict[str, float]:
+        """`friction`."""
+        return {"friction": float(values[0])}
+
+    def mjcf(self, values: Array) -> dict[str, float]:
+        """`frictionloss`."""
+        return {"frictionloss": float(values[0])}

@@ -1,0 +1,34 @@
+"""Friction proportional to speed: τ_j = f_v v_j."""
+
+from typing import ClassVar
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.robot.model import Array
+
+
+class ViscousFriction(Effect):
+    """τ_j = f_v v_j, f_v ≥ 0."""
+
+    kind: ClassVar = "viscous_friction"
+    title: ClassVar = "viscous friction"
+    signature: ClassVar = "the residual is a straight line through zero over the joint's speed"
+    parameters: ClassVar = (Parameter("viscous", "N·m·s/rad", 0.1, 100.0, nonnegative=True),)
+    simpler_than: ClassVar = ("nonlinear_viscous_friction", "friction_drift", "coupled_friction")
+
+    def columns(self, signals: Signals) -> Array:
+        """v_j, (T, 1, 1)."""
+        return signals.v[:, list(self.joints), None]
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂v_j = weight."""
+        cotangents = Cotangents(v=signals.v * 0.0)
+        cotangents.v[:, self.joints[0]] = weights[:, 0, 0]
+        return cotangents
+
+    def urdf(self, values: Array) -> dict[str, float]:
+        """`damping`."""
+        return {"damping": float(values[0])}
+
+    def mjcf(self, values: Array) -> dict[str, float]:
+        """`damping`."""
+        return {"damping": float(values[0])}
