@@ -10,16 +10,20 @@ from excite_cli import __version__
 from excite_cli.cli.check import check
 from excite_cli.cli.compare_random import compare_random
 from excite_cli.cli.console import INTERRUPTED, run_guarded
+from excite_cli.cli.diagnose import diagnose
+from excite_cli.cli.identify import identify
 from excite_cli.cli.optimize import optimize
 from excite_cli.cli.report import report
 from excite_cli.cli.robots import robots
 from excite_cli.cli.schema import schema
+from excite_cli.cli.simulate import simulate
 from excite_cli.cli.verify_gradient import verify_gradient
 from excite_cli.errors import ConfigError, nearest
 
 app = typer.Typer(
     name="excite",
-    help="Plan robot motions that make inertial parameters visible.",
+    help="Plan robot motions that make inertial parameters visible, and trace what a robot's model "
+    "lacks from what was measured.",
     epilog="Example:  excite optimize configs/ur10.yaml -o ur10.h5",
     no_args_is_help=True,
     add_completion=True,
@@ -39,6 +43,9 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "verify-gradient": verify_gradient,
     "compare-random": compare_random,
     "check": check,
+    "identify": identify,
+    "simulate": simulate,
+    "diagnose": diagnose,
     "report": report,
     "robots": robots,
     "schema": schema,
@@ -59,7 +66,7 @@ def _options(
         False, "--version", callback=_version, is_eager=True, help="Print the version."
     ),
 ) -> None:
-    """Plan robot motions that make inertial parameters visible."""
+    """Plan exciting robot motions; trace what the model lacks from measured data."""
 
 
 # Typer brings its own copy of click in some versions: take the base from one of its errors.

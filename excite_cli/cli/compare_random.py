@@ -81,8 +81,7 @@ def compare_random(
                 def report(index: int) -> ProgressCallback:
                     def tell(progress: Progress) -> None:
                         show(
-                            f"motion {index}  iteration {progress.iteration}  "
-                            f"cond {progress.condition_number:.2f}",
+                            f"motion {index}  iteration {progress.iteration}  {progress.figure}",
                             progress.iteration,
                         )
 

@@ -17,7 +17,14 @@ def optimize(
     ] = None,
     prior: Annotated[
         list[Path] | None,
-        typer.Option("--prior", help="Result file stacked as earlier data (may be repeated)."),
+        typer.Option(
+            "--prior",
+            help="Result file or measured data stacked as earlier data (may be repeated).",
+        ),
+    ] = None,
+    after: Annotated[
+        Path | None,
+        typer.Option("--after", help="Plan the next motion after this diagnosis."),
     ] = None,
     seed: options.Seed = None,
     overrides: options.Set = None,
@@ -29,17 +36,31 @@ def optimize(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Find motions that make the inertial parameters visible.
+    """Find motions that make the inertial parameters, and effects that are listed, visible.
 
-    Every stored motion keeps all constraints. Exit status 1: no admissible motion exists or was
-    found, and the message names what stands in the way.
+    Every stored motion keeps all constraints. With --after, the motion tells apart the effects that
+    the diagnosis could not; if there are none, it excites the model with all effects found, on top
+    of the measured data. Exit status 1: no admissible motion exists or was found, and the message
+    names what stands in the way.
 
     Example:  excite optimize configs/talos_arms.yaml -o arms.h5 --motions 3
     """
     from rich.table import Table
 
-    from excite_cli.cli.setup import load_problem, output_path, single_threaded
-    from excite_cli.cli.tables import criterion_data, margin_table, motion_data, motion_table
+    from excite_cli.cli.setup import (
+        load_next_motion,
+        load_priors,
+        load_problem,
+        output_path,
+        single_threaded,
+    )
+    from excite_cli.cli.tables import (
+        criterion_data,
+        margin_table,
+        motion_data,
+        motion_table,
+        outlook_table,
+    )
     from excite_cli.errors import ConfigError
     from excite_cli.excitation.motion import Progress, ProgressCallback
     from excite_cli.excitation.result import Result
@@ -51,17 +72,30 @@ def optimize(
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     if resume and overwrite:
         raise ConfigError("--resume goes on with the file, --overwrite replaces it: give one.")
+    if after is not None and prior:
+        raise ConfigError("--after brings the measured data with it: leave --prior out.")
     path = output_path(output, config, overwrite, resume)
     extra = [f"sequence.motions={motions}"] if motions is not None else []
     extra += [f"seed={seed}"] if seed is not None else []
     with single_threaded(threads):
-        problem = load_problem(terminal, config, overrides, extra)
-        priors = [(str(name), read_result(name)) for name in prior or []]
+        following = None
+        if after is not None:
+            following = load_next_motion(terminal, config, after, [*(overrides or []), *extra])
+            problem = following.model
+            earlier: list[Path] = [after]
+        else:
+            problem = load_problem(terminal, config, overrides, extra)
+            earlier = prior or []
         if resume and path.exists():
-            result = resumed_result(problem, read_result(path), path, prior or [])
+            result = resumed_result(problem, read_result(path), path, earlier)
             terminal.say(f"resuming after motion {len(result.motions)} of {path}")
         else:
-            result = new_result(problem, priors, versions(), config.resolve().parent)
+            stacks = (
+                load_priors(terminal, problem, earlier)
+                if following is None
+                else [(str(after), following.prior)]
+            )
+            result = new_result(problem, stacks, versions(), config.resolve().parent)
         total = problem.spec.sequence.motions
         with terminal.live("", problem.spec.optimizer.max_iterations) as show:
 
@@ -69,7 +103,7 @@ def optimize(
                 def tell(progress: Progress) -> None:
                     show(
                         f"motion {index}/{total}  stage {progress.stage}  "
-                        f"it {progress.iteration}  cond {progress.condition_number:.2f}  "
+                        f"it {progress.iteration}  {progress.figure}  "
                         f"{progress.worst_name} {progress.worst_margin:.3g} {progress.worst_unit}",
                         progress.iteration,
                     )
@@ -88,15 +122,22 @@ def optimize(
                     f"({motion.seconds:.1f} s, {motion.status}{note})"
                 )
 
-            result = continue_run(problem, result, report, store)
+            if following is None:
+                result = continue_run(problem, result, report, store)
+            else:
+                result = continue_run(following.problem, result, report, store, following.model)
+    outlook = following.outlook([m.coefficients for m in result.motions]) if following else None
     tables: list[Table | str] = [motion_table(result.motions), f"{path}"]
+    if outlook is not None and outlook["pairs"]:
+        tables.insert(0, outlook_table(outlook))
     if problem.constraints:
-        tables.insert(1, margin_table(result.motions, problem.constraints))
+        tables.insert(-1, margin_table(result.motions, problem.constraints))
     terminal.answer(
         tables,
         {
             "motions": [motion_data(m) for m in result.motions],
             "criterion": criterion_data(problem),
             "output": str(path),
+            **({"next_experiment": outlook} if outlook is not None else {}),
         },
     )

@@ -54,9 +54,9 @@ def report(
 
     Example:  excite report talos_arms.h5 -o figures --format svg
     """
+    from excite_cli.atomic import write_atomically
     from excite_cli.cli.setup import single_threaded
     from excite_cli.report.style import matplotlib_part, save_figure, save_pages
-    from excite_cli.store.atomic import write_atomically
     from excite_cli.store.result_file import read_result
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)

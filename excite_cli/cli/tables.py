@@ -72,6 +72,26 @@ def _pair(motion: Motion | RandomMotion | None) -> tuple[str, str]:
     return f"{motion.condition_number:.1f}", f"{motion.stacked_condition_number:.1f}"
 
 
+def outlook_table(outlook: dict[str, Any]) -> Table:
+    """What the motions are expected to tell apart."""
+    table = Table(
+        title=f"Expected divergence ½Δ; from {outlook['told_apart_from']:g} on, told apart",
+        title_justify="left",
+    )
+    for name in ("effect", "alias", "so far", "with the motions", "motions like the first needed"):
+        table.add_column(name, justify="left" if name in ("effect", "alias") else "right")
+    for pair in outlook["pairs"]:
+        needed = pair["motions_needed"]
+        table.add_row(
+            pair["effect"],
+            pair["alias"],
+            f"{pair['kl_so_far']:.2g}",
+            f"{pair['expected_kl']:.3g}",
+            "more than 1000" if needed is None else str(needed),
+        )
+    return table
+
+
 def motion_data(motion: Motion) -> dict[str, Any]:
     """A motion for `--json`."""
     return {

@@ -16,8 +16,9 @@ def verify_gradient(
 ) -> None:
     """Check the gradient of this problem in three ways and time them.
 
-    Exit status 1: the adjoint and the block form differ by more than 1e-9, or one of them from
-    central differences by more than 1e-7 (relative).
+    The block form is that of the base regressor; effects listed in the config are checked against
+    differences. Exit status 1: the adjoint and the block form differ by more than 1e-9, or one of
+    them from central differences by more than 1e-7 (relative).
 
     Example:  excite verify-gradient configs/talos_arms.yaml
     """

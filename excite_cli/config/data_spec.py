@@ -63,8 +63,8 @@ class MeasurementSpec(Section):
     torque_constant: PerJoint = Field(1.0, description="[N·m/A] at the motor, for torque: current")
     coupling: dict[str, dict[str, Finite]] = Field(
         default_factory=dict,
-        description="further shares of other motors in a joint's torque, "
-        "{joint: {motor's joint: share}}",
+        description="further shares of other motors' torques (after their gears) in a joint's "
+        "torque, {joint: {motor's joint: share}}",
     )
     sign: dict[str, Literal[-1, 1]] = Field(
         default_factory=dict, description="-1 where the recorded torque counts the other way"
@@ -72,8 +72,26 @@ class MeasurementSpec(Section):
     offset: dict[str, Finite] = Field(
         default_factory=dict, description="added to recorded positions [rad or m]"
     )
+    position: Literal["link", "motor"] = Field(
+        "link", description="motor: divided by gear_ratio, undoing the coupling"
+    )
+    position_sign: dict[str, Literal[-1, 1]] = Field(
+        default_factory=dict, description="-1 where recorded positions count the other way"
+    )
+    velocity_sign: dict[str, Literal[-1, 1]] = Field(
+        default_factory=dict, description="-1 where recorded speeds count the other way"
+    )
     time: Literal["s", "ms", "us", "ns"] = "s"
-    angle: Literal["rad", "deg"] = "rad"
+    angle: Literal["rad", "deg"] = Field(
+        "rad", description="of positions and speeds; prismatic joints are in m either way"
+    )
+    rate: Positive | None = Field(
+        None, description="[Hz] sampling rate of files that have no column t"
+    )
+    channels: dict[Literal["t", "q", "dq", "tau"], str | None] = Field(
+        default_factory=dict,
+        description="what the file calls a channel, as {tau: current}; {dq: null} leaves it out",
+    )
     names: dict[str, str] = Field(
         default_factory=dict, description="name in the file -> joint of the robot"
     )

@@ -1,8 +1,10 @@
 """What a diagnosis found, as frozen records."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from excite_cli.effects.base import Value
+from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
 
@@ -52,22 +54,6 @@ class Unexplained:
     joint: str
     depends_on: tuple[str, ...]
     share_of_residual: float
-
-
-@dataclass(frozen=True)
-class Errors:
-    """Of the torque on the sealed data: per joint, relative (RMS/RMS) and in N·m.
-
-    `interval` is the 95 % block-bootstrap interval of the mean relative error.
-    """
-
-    mean_relative: float
-    mean_relative_moving: float
-    relative: dict[str, float]
-    relative_moving: dict[str, float]
-    rms: dict[str, float]
-    rms_raw: dict[str, float]
-    interval: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -125,7 +111,7 @@ class Diagnosis:
     after: Errors
     rounds: tuple[Round, ...]
     findings: tuple[Finding, ...]
-    processing: dict[str, object]
+    processing: dict[str, Any]
     phi: Array
     base_values: Array
     base_std: Array

@@ -60,6 +60,12 @@ class Signals:
         back[-2] -= w[-1] / h
         return back
 
+    def only(self, joint: int, x: Array) -> Array:
+        """Zeros (T, n) with x (T,) in the column of `joint`."""
+        full = np.zeros_like(self.q)
+        full[:, joint] = x
+        return full
+
 
 @dataclass
 class Cotangents:
@@ -114,6 +120,8 @@ class Effect(ABC):
     parameters: ClassVar[tuple[Parameter, ...]]
     shapes: ClassVar[tuple[Parameter, ...]] = ()
     simpler_than: ClassVar[tuple[str, ...]] = ()  # kinds that contain this one
+    defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
+    per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
     excitable: ClassVar[bool] = True  # has columns for a planned motion, with a pull-back
     why_not_excitable: ClassVar[str] = ""
@@ -124,13 +132,35 @@ class Effect(ABC):
         if cls.scope == "joint":
             return [(j,) for j in range(robot.n)]
         if cls.scope == "pair":
-            return [(j, j + 1) for j in range(robot.n - 1)]
+            return neighbours(robot)
         return [tuple(range(robot.n))]
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
         """Values of the non-linear parameters that are tried; each counts as a test."""
         return [{}]
+
+    @classmethod
+    def tuned(
+        cls,
+        robot: Robot,
+        joints: tuple[int, ...],
+        signals: Sequence[Signals],
+        residuals: Sequence[Array],
+    ) -> list[dict]:
+        """Values of the non-linear parameters worth trying on residuals, (T, n) for every run.
+
+        Like `grid`, but a kind that can search (a periodogram, windows of time) returns its best
+        few. The search counts for `tests_of_grid` tests.
+        """
+        return cls.grid(robot, joints, signals)
+
+    @classmethod
+    def tests_of_grid(
+        cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]
+    ) -> int:
+        """How many independent tests the choice of the non-linear parameters stands for."""
+        return len(cls.grid(robot, joints, signals))
 
     def active(self, run: str) -> bool:
         """Whether the effect is present in `run`."""
@@ -158,7 +188,7 @@ class Effect(ABC):
     def report(self, values: Array, covariance: Array) -> dict[str, Value]:
         """Named parameters as people know them, with standard deviations."""
         found = {
-            p.name: Value(float(values[i]), float(np.sqrt(max(covariance[i, i], 0.0))), p.unit)
+            p.name: Value(float(values[i]), deviation(np.eye(len(values))[i], covariance), p.unit)
             for i, p in enumerate(self.parameters)
         }
         for shape in self.shapes:
@@ -170,11 +200,15 @@ class Effect(ABC):
     def planted(cls, value: float, others: Mapping[str, float]) -> tuple[dict[str, float], Array]:
         """Shape and linear parameters for `value` of the first parameter and named `others`.
 
-        What is not named takes the middle (geometric mean) of its usual range if it is a shape,
-        zero if it is a linear parameter.
+        What is not named takes its place in `defaults`; without one, the middle (geometric mean)
+        of its usual range if it is a shape, zero if it is a linear parameter.
         """
-        values = np.array([value, *(others.get(p.name, 0.0) for p in cls.parameters[1:])])
-        shape = {p.name: others.get(p.name, float(np.sqrt(p.low * p.high))) for p in cls.shapes}
+        given = {**cls.defaults, **others}
+        values = np.array([value, *(given.get(p.name, 0.0) for p in cls.parameters[1:])])
+        shape = {
+            p.name: float(given[p.name]) if p.name in given else float(np.sqrt(p.low * p.high))
+            for p in cls.shapes
+        }
         return shape, values
 
     def urdf(self, values: Array) -> dict[str, float]:
@@ -184,3 +218,15 @@ class Effect(ABC):
     def mjcf(self, values: Array) -> dict[str, float]:
         """Attributes of MuJoCo's <joint> that hold this effect; empty if none can."""
         return {}
+
+
+def neighbours(robot: Robot) -> list[tuple[int, ...]]:
+    """Pairs (j, k), j < k, of moved joints of which k is carried by j directly."""
+    first = int(robot.model.njoints) - robot.n
+    parents = [int(robot.model.parents[first + k]) - first for k in range(robot.n)]
+    return [(parent, k) for k, parent in enumerate(parents) if parent >= 0]
+
+
+def deviation(slope: Array, covariance: Array) -> float:
+    """Standard deviation of a function of the parameters with this derivative, to first order."""
+    return float(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))

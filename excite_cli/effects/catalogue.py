@@ -8,14 +8,57 @@ from functools import cache
 from importlib.metadata import entry_points
 
 from excite_cli.config.data_spec import EffectSpec
+from excite_cli.effects.armature import Armature
+from excite_cli.effects.asymmetric_friction import AsymmetricFriction
+from excite_cli.effects.backlash import Backlash
 from excite_cli.effects.base import Effect
+from excite_cli.effects.base_tilt import BaseTilt
+from excite_cli.effects.cable_force import CableForce
+from excite_cli.effects.contact import Contact
 from excite_cli.effects.coulomb_friction import CoulombFriction
+from excite_cli.effects.coupled_friction import CoupledFriction
+from excite_cli.effects.elasticity import Elasticity
+from excite_cli.effects.encoder_offset import EncoderOffset
+from excite_cli.effects.friction_drift import FrictionDrift
+from excite_cli.effects.load_dependent_friction import LoadDependentFriction
+from excite_cli.effects.nonlinear_viscous_friction import NonlinearViscousFriction
+from excite_cli.effects.payload import Payload
+from excite_cli.effects.ripple import Ripple
+from excite_cli.effects.spring import Spring
+from excite_cli.effects.stribeck_friction import StribeckFriction
+from excite_cli.effects.torque_delay import TorqueDelay
+from excite_cli.effects.torque_gain import TorqueGain
+from excite_cli.effects.torque_offset import TorqueOffset
+from excite_cli.effects.torque_saturation import TorqueSaturation
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.robot.model import Robot
 
 GROUP = "excite.effects"
-_OURS: tuple[type[Effect], ...] = (ViscousFriction, CoulombFriction)
+_OURS: tuple[type[Effect], ...] = (
+    ViscousFriction,
+    NonlinearViscousFriction,
+    CoulombFriction,
+    AsymmetricFriction,
+    StribeckFriction,
+    LoadDependentFriction,
+    FrictionDrift,
+    CoupledFriction,
+    Armature,
+    Spring,
+    TorqueOffset,
+    TorqueGain,
+    TorqueDelay,
+    TorqueSaturation,
+    Ripple,
+    CableForce,
+    Elasticity,
+    Backlash,
+    BaseTilt,
+    Payload,
+    EncoderOffset,
+    Contact,
+)
 
 
 @cache
@@ -84,7 +127,7 @@ def _built(spec: EffectSpec, index: int, robot: Robot) -> list[Effect]:
     kind = kind_named(spec.kind, f"{where}.kind")
     names = list(robot.joint_names)
     if spec.joints == "all":
-        places = kind.places(robot)
+        places = [tuple(range(robot.n))] if kind.scope == "robot" else kind.places(robot)
     else:
         for joint in spec.joints:
             if joint not in names:

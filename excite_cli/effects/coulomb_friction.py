@@ -26,9 +26,8 @@ class CoulombFriction(Effect):
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂v_j = weight · slope of the smoothed sign."""
         j = self.joints[0]
-        cotangents = Cotangents(v=signals.v * 0.0)
-        cotangents.v[:, j] = weights[:, 0, 0] * smooth_sign_slope(signals.v[:, j])
-        return cotangents
+        slope = smooth_sign_slope(signals.v[:, j])
+        return Cotangents(v=signals.only(j, weights[:, 0, 0] * slope))
 
     def urdf(self, values: Array) -> dict[str, float]:
         """`friction`."""

@@ -21,9 +21,7 @@ class ViscousFriction(Effect):
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂v_j = weight."""
-        cotangents = Cotangents(v=signals.v * 0.0)
-        cotangents.v[:, self.joints[0]] = weights[:, 0, 0]
-        return cotangents
+        return Cotangents(v=signals.only(self.joints[0], weights[:, 0, 0]))
 
     def urdf(self, values: Array) -> dict[str, float]:
         """`damping`."""

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.constraints.base import Array
-from excite_cli.criteria.base import Criterion, singular_values
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import fine_times, smallest_margins, worst_margins
 from excite_cli.excitation.motion import Motion, Outcome, Progress, ProgressCallback
@@ -46,17 +45,20 @@ def generate_motion(
     coefficients = task.coefficients(outcome.x)
     value = task.objective.value(coefficients, problem.criterion)
     stacked = task.objective.stacked_condition_number(coefficients)
-    if not stacked < _BLIND:
+    if task.objective.must_show_all and not stacked < _BLIND:
+        effects = len(problem.extension.names)
+        beside = f" and {effects} of effects" if effects else ""
         raise NoAdmissibleMotionError(
-            f"No motion found that shows all {problem.base.rank} base parameters (condition number "
-            f"{stacked:.1e}). Give the trajectory more coefficients, or wider limits and sampling."
+            f"No motion found that shows all {problem.base.rank} base parameters{beside} "
+            f"(condition number {stacked:.1e}). Give the trajectory more coefficients, or wider "
+            "limits and sampling."
         )
     return Motion(
         index=index,
         coefficients=coefficients,
         condition_number=task.objective.own_condition_number(coefficients),
         stacked_condition_number=stacked,
-        improved=is_improvement(stack, problem.criterion, value),
+        improved=is_improvement(task, value),
         status=outcome.status,
         seconds=time.perf_counter() - began,
         iterations=outcome.iterations,
@@ -103,12 +105,12 @@ def _best_of_starts(
     )
 
 
-def is_improvement(stack: Stack, criterion: Criterion, value: float) -> bool:
+def is_improvement(task: MotionTask, value: float) -> bool:
     """Whether the criterion fell noticeably below its value for the earlier data alone."""
-    sigma = singular_values(stack.factor)
-    if stack.rows == 0 or sigma[-1] <= np.finfo(float).eps * sigma[0]:
+    sigma = task.objective.earlier()
+    if task.stack.rows == 0 or sigma[-1] <= np.finfo(float).eps * sigma[0]:
         return True
-    return value < criterion.value(sigma) - _IMPROVEMENT
+    return value < task.problem.criterion.value(sigma) - _IMPROVEMENT
 
 
 def kept_between_instants(

@@ -11,10 +11,13 @@ Status = Literal["converged", "iteration limit", "time limit", "stalled"]
 
 @dataclass(frozen=True)
 class Progress:
-    """What a solver tells while it runs; `worst` is the smallest margin, in its own unit."""
+    """What a solver tells while it runs; `worst` is the smallest margin, in its own unit.
+
+    `figure` is what is improved, in words: `cond 5.48`.
+    """
 
     iteration: int
-    condition_number: float
+    figure: str
     worst_name: str
     worst_margin: float
     worst_unit: str

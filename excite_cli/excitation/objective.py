@@ -1,7 +1,8 @@
-"""Cost and gradient of a motion: criterion of [C_0; Y_B] and its derivative (Eqs. 41–49).
+"""Cost and gradient of a motion: criterion of [C_0; C] and its derivative (Eqs. 41–49).
 
-With CᵀC = V diag(σ²) Vᵀ, u_k = C v_k / σ_k. So with w = ∂f/∂σ the derivative with respect to the
-block of this motion is Y_B V diag(w/σ) Vᵀ: only V is needed, and earlier data enter through their
+C is the base regressor Y_B, with columns of effects beside it if there are any. With
+CᵀC = V diag(σ²) Vᵀ, u_k = C v_k / σ_k. So with w = ∂f/∂σ the derivative with respect to the block
+of this motion is C V diag(w/σ) Vᵀ: only V is needed, and earlier data enter through their
 triangular factor alone. The spectrum comes from the Gram matrix where that is exact enough (its
 rounding is ε cond²) and from QR and SVD elsewhere.
 """
@@ -12,6 +13,8 @@ import numpy as np
 from scipy.linalg import lapack, qr
 
 from excite_cli.criteria.base import Criterion, condition_number, singular_values
+from excite_cli.excitation.effect_columns import SeenColumns
+from excite_cli.excitation.extension import Extension
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting
 from excite_cli.robot.adjoint import FictitiousInertiaAdjoint
@@ -40,9 +43,17 @@ class Spectrum:
         """σ_max / σ_min."""
         return condition_number(self.sigma)
 
+    @property
+    def words(self) -> str:
+        """The figure that is shown while a solver runs."""
+        return f"cond {self.condition_number:.2f}"
+
 
 class Objective:
     """Criterion of one motion on top of a stack; not to be shared between threads."""
+
+    # Whether a motion is refused when some parameter does not show in the stack at all.
+    must_show_all = True
 
     def __init__(
         self,
@@ -51,9 +62,13 @@ class Objective:
         weighting: Weighting,
         basis: Basis,
         stack: Stack | None = None,
+        extension: Extension | None = None,
     ) -> None:
         self.robot, self.base, self.weighting, self.basis = robot, base, weighting, basis
-        self.stack = stack or Stack.empty(base.rank)
+        self.extension = extension if extension is not None and extension.effects else None
+        self._effects = self.extension.columns() if self.extension else None
+        self.size = base.rank + (self._effects.count if self._effects else 0)
+        self.stack = stack or Stack.empty(self.size)
         self._gram_0 = self.stack.factor.T @ self.stack.factor
         self._regressor = Regressor(robot)
         self._few = FictitiousInertiaAdjoint(robot, base.silent_direction())
@@ -61,14 +76,28 @@ class Objective:
         self._plain = weighting.plain
 
     def block(self, coefficients: Array) -> Array:
-        """Weighted base regressor of this motion alone, (T·R, r)."""
-        return self._block(*self.basis.states(coefficients))
+        """Weighted and scaled columns of this motion alone, (T·R, r)."""
+        return self.block_of(self.basis.times, *self.basis.states(coefficients))
 
-    def _block(self, q: Array, v: Array, a: Array) -> Array:
+    def block_of(self, times: Array, q: Array, v: Array, a: Array) -> Array:
+        """Weighted and scaled columns (T·R, r) of states (T, n) at equidistant `times`."""
+        return self._block(q, v, a, self._seen(times, q, v, a))
+
+    def _seen(self, times: Array, q: Array, v: Array, a: Array) -> SeenColumns | None:
+        return None if self._effects is None else self._effects.evaluate(times, q, v, a)
+
+    def _block(self, q: Array, v: Array, a: Array, seen: SeenColumns | None) -> Array:
         y = self._regressor.evaluate(q, v, a)[:, :, self.base.selection]
         if not self._plain:
             y = y * self.weighting.rows[:, None] * self.weighting.columns
-        return y.reshape(-1, self.base.rank)
+        if seen is not None:
+            y = np.concatenate([y, seen.columns * self._effect_weights()], axis=2)
+        return y.reshape(-1, self.size)
+
+    def _effect_weights(self) -> Array:
+        """Row weight times column scale, (R, k), of the columns of effects."""
+        assert self.extension is not None
+        return np.outer(self.weighting.rows, self.extension.scales)
 
     def spectrum(self, block: Array) -> Spectrum:
         """Singular values and right vectors of [C_0; block]."""
@@ -80,6 +109,10 @@ class Objective:
         triangle = qr(np.vstack([self.stack.factor, block]), mode="r")[0][: block.shape[1]]
         _, sigma, turned = np.linalg.svd(triangle)
         return Spectrum(sigma, turned.T)
+
+    def earlier(self) -> Array:
+        """What the criterion is a function of, for the earlier data alone."""
+        return singular_values(self.stack.factor)
 
     def own_condition_number(self, coefficients: Array) -> float:
         """Condition number of this motion alone, cond(C^(i)) of Table I."""
@@ -98,24 +131,50 @@ class Objective:
     ) -> tuple[float, Array, Spectrum]:
         """Criterion, its derivative (K, n) with respect to the coefficients, and the spectrum."""
         q, v, a = self.basis.states(coefficients)
-        block = self._block(q, v, a)
+        seen = self._seen(self.basis.times, q, v, a)
+        block = self._block(q, v, a, seen)
         spectrum = self.spectrum(block)
         left, right = self.pairs(block, spectrum, criterion)
         adjoint = self._few if len(right) <= FEW_PAIRS else self._many
         gradient = self.basis.pull_back(*adjoint.pull_back(q, v, a, left, right))
+        if seen is not None:
+            gradient += self._through_effects(seen, block, spectrum, criterion)
         return criterion.value(spectrum.sigma), gradient, spectrum
+
+    def effect_gradient(self, coefficients: Array, criterion: Criterion) -> Array:
+        """The part (K, n) of the gradient that goes through columns of effects."""
+        seen = self._seen(self.basis.times, *self.basis.states(coefficients))
+        if seen is None:
+            return np.zeros_like(coefficients)
+        block = self._block(seen.signals.q, seen.signals.v, seen.signals.a, seen)
+        return self._through_effects(seen, block, self.spectrum(block), criterion)
 
     def pairs(self, block: Array, spectrum: Spectrum, criterion: Criterion) -> tuple[Array, Array]:
         """Factors of ∂f/∂Y: left (K, T, R) and fictitious parameters (K, 10·n_bodies).
 
         ∂f/∂Y_t = Σ_k left_kt right_kᵀ (Eq. 45), without the pairs whose weight is negligible.
         """
+        left, vectors = self._factors(block, spectrum, criterion)
+        right = np.zeros((len(left), len(self.base.names)))
+        inertial = vectors[: self.base.rank]
+        right[:, self.base.selection] = (inertial * self.weighting.columns[:, None]).T
+        return left * self.weighting.rows, right
+
+    def _factors(
+        self, block: Array, spectrum: Spectrum, criterion: Criterion
+    ) -> tuple[Array, Array]:
+        """Left (K, T, R) and right (r, K) factors of ∂f/∂C."""
         weight = criterion.derivative(spectrum.sigma)
         kept = np.flatnonzero(np.abs(weight) > _NEGLIGIBLE * np.abs(weight).max())
-        shape = (len(self.basis.times), len(self.robot.rows))
         vectors = spectrum.right[:, kept]
         left = (block @ (vectors * (weight[kept] / spectrum.sigma[kept]))).T
-        left = left.reshape(len(kept), *shape) * self.weighting.rows
-        right = np.zeros((len(kept), len(self.base.names)))
-        right[:, self.base.selection] = (vectors * self.weighting.columns[:, None]).T
-        return left, right
+        return left.reshape(len(kept), -1, len(self.robot.rows)), vectors
+
+    def _through_effects(
+        self, seen: SeenColumns, block: Array, spectrum: Spectrum, criterion: Criterion
+    ) -> Array:
+        assert self._effects is not None
+        left, vectors = self._factors(block, spectrum, criterion)
+        weights = left.transpose(1, 2, 0) @ vectors[self.base.rank :].T
+        parts = self._effects.pull_back(seen, weights * self._effect_weights())
+        return self.basis.pull_back(*parts)

@@ -1,14 +1,19 @@
 """A `Spec` made concrete: robot, base parameters, trajectory, criterion, constraints, grids."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from excite_cli.config.spec import Spec
 from excite_cli.constraints.base import Array, Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.criteria.base import Criterion
 from excite_cli.criteria.catalogue import build_criterion
+from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ConfigError
+from excite_cli.excitation.discrimination import Discrimination, Separation
+from excite_cli.excitation.extension import Extension, extend
 from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.sampling import instants, with_sampling
 from excite_cli.excitation.stack import Stack
@@ -23,7 +28,11 @@ from excite_cli.trajectory.catalogue import build_trajectory
 
 @dataclass(frozen=True)
 class Problem:
-    """Everything that is fixed while motions are sought."""
+    """Everything that is fixed while motions are sought.
+
+    `extension` holds the effects whose columns stand beside the base regressor. With a
+    `separation` a motion is sought that tells effects apart, and `extension` has the rivals too.
+    """
 
     spec: Spec
     robot: Robot
@@ -35,15 +44,35 @@ class Problem:
     cost_basis: Basis
     constraint_basis: Basis
     kinematics: BatchKinematics
+    extension: Extension
+    separation: Separation | None = None
 
     @property
     def variables(self) -> int:
         """Number of coefficients of one motion."""
         return self.trajectory.n_coefficients * self.robot.n
 
+    @property
+    def columns(self) -> int:
+        """Number of columns of the regressor: base parameters, then those of effects."""
+        return self.base.rank + len(self.extension.names)
+
+    @property
+    def column_words(self) -> tuple[str, ...]:
+        """Every column in words, base parameters first."""
+        return (*self.base.in_words(), *self.extension.names)
+
+    @property
+    def column_scales(self) -> Array:
+        """Scale of every column, base parameters first."""
+        return np.concatenate([self.weighting.columns, self.extension.scales])
+
     def objective(self, stack: Stack | None = None) -> Objective:
         """The cost of one motion on top of `stack`."""
-        return Objective(self.robot, self.base, self.weighting, self.cost_basis, stack)
+        parts = (self.robot, self.base, self.weighting, self.cost_basis, stack, self.extension)
+        if self.separation is None:
+            return Objective(*parts)
+        return Discrimination(*parts, separation=self.separation)
 
     def states(self, coefficients: Array, basis: Basis | None = None) -> States:
         """Joint states on the constraint grid, or on `basis`."""
@@ -57,6 +86,12 @@ class Problem:
 def build_problem(spec: Spec, relative_to: Path | None = None) -> Problem:
     """Resolve `spec`; paths in it start from `relative_to`.
 
+    The regressor is extended by the effects that `spec.effects` lists. The friction of the URDF's
+    <dynamics> belongs to the declared model of identification, but not to the regressor of a
+    motion unless it is listed: the paper's problem is about inertial parameters. Where an effect
+    needs time derivatives, the cost is taken on the constraint grid, its rows weighted so that the
+    motion counts as much as before.
+
     Raises
     ------
     ConfigError, RobotError
@@ -67,26 +102,46 @@ def build_problem(spec: Spec, relative_to: Path | None = None) -> Problem:
     spec = with_sampling(spec, trajectory)
     cost, grid = instants(spec.sampling.cost), instants(spec.sampling.constraints)
     base = find_base_parameters(robot)
-    if len(cost) * len(robot.rows) < base.rank:
+    weighting = build_weighting(spec.criterion, robot, base)
+    effects = declared_effects(spec.effects, robot) if spec.effects else ()
+    extension = extend(robot, base, weighting, effects, trajectory.duration)
+    columns = base.rank + len(extension.names)
+    if len(cost) * len(robot.rows) < columns:
+        beside = f" and {len(extension.names)} of effects" if extension.names else ""
         raise ConfigError(
             f"sampling.cost: {len(cost)} samples of {len(robot.rows)} rows cannot show "
-            f"{base.rank} base parameters. Take at least "
-            f"{-(-base.rank // len(robot.rows))} samples."
+            f"{base.rank} base parameters{beside}. Take at least "
+            f"{-(-columns // len(robot.rows))} samples."
         )
-    if base.rank == 1 and "condition" in spec.criterion.kind:
+    if columns == 1 and "condition" in spec.criterion.kind:
         raise ConfigError(
             "criterion.kind: this robot has one base parameter, so its condition number is always "
             "1. Take log_det or sigma_min."
         )
-    return Problem(
+    problem = Problem(
         spec=spec,
         robot=robot,
         base=base,
         trajectory=trajectory,
         criterion=build_criterion(spec.criterion),
-        weighting=build_weighting(spec.criterion, robot, base),
+        weighting=weighting,
         constraints=build_constraints(spec.constraints, robot),
         cost_basis=trajectory.basis(cost),
         constraint_basis=trajectory.basis(grid),
         kinematics=BatchKinematics(robot),
+        extension=extension,
     )
+    return on_fine_grid(problem) if extension.fine else problem
+
+
+def on_fine_grid(problem: Problem) -> Problem:
+    """The problem with its cost on the constraint grid, every motion counting as much as before."""
+    fine = problem.constraint_basis
+    share = np.sqrt(len(problem.cost_basis.times) / len(fine.times))
+    weighting = problem.weighting
+    weighted = replace(
+        weighting,
+        rows=weighting.rows * share,
+        row_name=weighting.row_name if weighting.row_name != "none" else "even",
+    )
+    return replace(problem, cost_basis=fine, weighting=weighted)

@@ -19,6 +19,7 @@ class Result:
 
     `config` is the full resolved problem as YAML text, `config_folder` where its relative paths
     start, `fingerprint` the robot's. `prior_stack` holds what was there before motion 1.
+    `base_words` and `column_scales` go on with the columns of effects, where there are any.
     """
 
     config: str
@@ -40,6 +41,11 @@ class Result:
     checked_pairs: tuple[str, ...] = ()
     dropped_pairs: tuple[str, ...] = ()
 
+    @property
+    def effect_names(self) -> tuple[str, ...]:
+        """Names of the columns beside those of base parameters."""
+        return self.base_words[len(self.base_selection) :]
+
     def with_step(self, step: Step) -> "Result":
         """The result with one more motion."""
         return replace(self, motions=(*self.motions, step.motion), stack=step.stack)
@@ -51,8 +57,14 @@ def matches(problem: Problem, result: Result) -> str | None:
         return "it was made for another robot, other moved joints, posture or rows"
     if not np.array_equal(result.base_selection, problem.base.selection):
         return "its base parameters differ"
+    here = problem.extension.names
+    if result.effect_names != here:
+        return (
+            f"its regressor has other effects ({_listed(result.effect_names)}; here "
+            f"{_listed(here)}), see `effects` in the config"
+        )
     same_rows = _same(result.row_weights, problem.weighting.rows)
-    same_columns = _same(result.column_scales, problem.weighting.columns)
+    same_columns = _same(result.column_scales, problem.column_scales)
     if not (same_rows and same_columns):
         return "its row weights or column scaling differ"
     return None
@@ -60,3 +72,7 @@ def matches(problem: Problem, result: Result) -> str | None:
 
 def _same(first: Array, second: Array) -> bool:
     return first.shape == second.shape and np.allclose(first, second, rtol=1e-12, atol=0.0)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(names) or "none"

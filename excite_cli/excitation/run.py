@@ -18,11 +18,13 @@ from excite_cli.excitation.stack import Stack
 
 def new_result(
     problem: Problem,
-    priors: list[tuple[str, Result]],
+    priors: Sequence[tuple[str, Result | Stack]],
     versions: dict[str, str],
     folder: Path | None = None,
 ) -> Result:
     """A result without motions, its stack made of the priors; `folder` is that of the config.
+
+    A prior is an earlier result, or the stack of measured data (`measured_stack`).
 
     Raises
     ------
@@ -34,15 +36,17 @@ def new_result(
         if Path(name).resolve() in seen:
             raise FileError(f"--prior {name} is given twice; its data would count twice.")
         seen.add(Path(name).resolve())
-    stack = Stack.empty(problem.base.rank)
+    stack = Stack.empty(problem.columns)
     for name, prior in priors:
-        reason = matches(problem, prior)
-        if reason:
-            raise FileError(
-                f"--prior {name} cannot be stacked: {reason}. A prior must come from the same "
-                "robot section and weighting."
-            )
-        stack = Stack(stack.with_rows(prior.stack.factor).factor, stack.rows + prior.stack.rows)
+        if isinstance(prior, Result):
+            reason = matches(problem, prior)
+            if reason:
+                raise FileError(
+                    f"--prior {name} cannot be stacked: {reason}. A prior must come from the same "
+                    "robot section, effects and weighting."
+                )
+            prior = prior.stack
+        stack = stack.with_stack(prior)
     checked, dropped = _pairs(problem)
     return Result(
         config=spec_as_yaml(problem.spec),
@@ -51,9 +55,9 @@ def new_result(
         seed=problem.spec.seed,
         joint_names=problem.robot.joint_names,
         base_selection=problem.base.selection,
-        base_words=problem.base.in_words(),
+        base_words=problem.column_words,
         row_weights=problem.weighting.rows,
-        column_scales=problem.weighting.columns,
+        column_scales=problem.column_scales,
         motions=(),
         stack=stack,
         prior_stack=stack,
@@ -96,16 +100,43 @@ def continue_run(
     result: Result,
     report: Callable[[int], ProgressCallback],
     on_motion: Callable[[Step, Result], None],
+    model: Problem | None = None,
 ) -> Result:
-    """Generate the motions that are still missing, calling `on_motion` after each."""
+    """Generate the motions that are still missing, calling `on_motion` after each.
+
+    Where `problem` separates effects, `model` is the problem that the result is kept for: the same
+    without the rivals. Stack and condition numbers are then its own.
+    """
     solver = build_solver(problem.spec.optimizer)
     remaining = range(len(result.motions) + 1, problem.spec.sequence.motions + 1)
     for step in generate_sequence(
-        problem, solver, result.stack, remaining, problem.spec.seed, report
+        problem, solver, _running(problem, result), remaining, problem.spec.seed, report
     ):
-        result = result.with_step(step)
-        on_motion(step, result)
+        stored = step if model is None else _judged(step, model, result.stack)
+        result = result.with_step(stored)
+        on_motion(stored, result)
     return result
+
+
+def _running(problem: Problem, result: Result) -> Stack:
+    """The stack to go on from: the stored one, or all anew where it lacks the rivals' columns."""
+    if problem.separation is None:
+        return result.stack
+    stack, objective = problem.separation.prior, problem.objective()
+    for motion in result.motions:
+        stack = stack.with_rows(objective.block(motion.coefficients))
+    return stack
+
+
+def _judged(step: Step, model: Problem, stack: Stack) -> Step:
+    """The step as `model` sees it: its stack and its condition numbers."""
+    objective, alpha = model.objective(stack), step.motion.coefficients
+    motion = replace(
+        step.motion,
+        condition_number=objective.own_condition_number(alpha),
+        stacked_condition_number=objective.stacked_condition_number(alpha),
+    )
+    return Step(motion, stack.with_rows(objective.block(alpha)))
 
 
 def _asked(spec: Spec) -> Spec:

@@ -28,3 +28,7 @@ class Stack:
         """The stack with the rows of `block` (m, r) below."""
         factor = qr(np.vstack([self.factor, block]), mode="r")[0][: self.factor.shape[1]]
         return Stack(np.ascontiguousarray(factor), self.rows + len(block))
+
+    def with_stack(self, other: "Stack") -> "Stack":
+        """The stack with all that `other` holds."""
+        return Stack(self.with_rows(other.factor).factor, self.rows + other.rows)

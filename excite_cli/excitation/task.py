@@ -29,7 +29,7 @@ class MotionTask:
         self, problem: Problem, stack: Stack | None = None, guards: list[Array] | None = None
     ) -> None:
         self.problem = problem
-        self.stack = stack or Stack.empty(problem.base.rank)
+        self.stack = stack or Stack.empty(problem.columns)
         self.objective = problem.objective(self.stack)
         self.free = problem.trajectory.free_directions
         self.guards = guards or first_guards(problem)
@@ -91,7 +91,7 @@ class MotionTask:
                 smallest = float(value[:, at].min())
                 margin = smallest * float(constraint.scale[at]) + float(guard[at])
                 name, unit = constraint.name, constraint.unit_of(at)
-        return Progress(iteration, spectrum.condition_number, name, margin, unit, seconds, stage)
+        return Progress(iteration, spectrum.words, name, margin, unit, seconds, stage)
 
     @cached_property
     def metric(self) -> Array:

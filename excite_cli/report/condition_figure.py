@@ -149,7 +149,7 @@ def draw_spectrum(result: Result, problem: Problem) -> "Figure":
 
 
 def _random_stack(result: Result, problem: Problem) -> Array:
-    stack = Stack.empty(problem.base.rank)
+    stack = Stack.empty(problem.columns)
     objective = problem.objective()
     for motion in result.random:
         stack = stack.with_rows(objective.block(motion.coefficients))

@@ -25,26 +25,35 @@ def robot_with(robot: Robot, phi: Array) -> pin.Model:
 
 
 def _inertia(ten: Array) -> pin.Inertia:
-    mass, first = float(ten[0]), np.asarray(ten[1:4])
-    ixx, ixy, iyy, ixz, iyz, izz = ten[4:]
-    about_origin = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    if abs(mass) < 1e-9:  # a lever needs a mass; the first moment decides
-        mass = 1e-9
-    lever = first / mass
-    cross = pin.skew(lever)
-    return pin.Inertia(mass, lever, about_origin + mass * cross @ cross)
+    """An inertia from any ten numbers: a fit may leave the consistent ones."""
+    ten = np.array(ten, dtype=float)
+    if abs(ten[0]) < 1e-9:  # the lever is first moment over mass
+        ten[0] = 1e-9
+    return pin.Inertia.FromDynamicParameters(ten)
 
 
 class RigidBody:
-    """The rigid-body part of a motion q, v, a (T, n) at φ (10·n_bodies,); rows are moved joints."""
+    """The rigid-body part of a motion q, v, a (T, n) at φ (10·n_bodies,); rows are moved joints.
 
-    def __init__(self, robot: Robot, phi: Array, q: Array, v: Array, a: Array) -> None:
+    `model`: that of `robot_with(robot, phi)`, for those who evaluate many motions at one φ.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        phi: Array,
+        q: Array,
+        v: Array,
+        a: Array,
+        model: pin.Model | None = None,
+    ) -> None:
         self.robot, self.phi = robot, np.asarray(phi, dtype=float)
         self.q, self.v, self.a = q, v, a
+        self._given = model
 
     @cached_property
     def _model(self) -> pin.Model:
-        return robot_with(self.robot, self.phi)
+        return robot_with(self.robot, self.phi) if self._given is None else self._given
 
     @cached_property
     def regressor(self) -> Array:
@@ -59,7 +68,9 @@ class RigidBody:
             strict=True,
         )
         for t, state in enumerate(states):
-            full[t] = pin.computeJointTorqueRegressor(model, data, *state)[robot.moved]
+            full[t] = pin.computeJointTorqueRegressor(model, data, *state).reshape(model.nv, -1)[
+                robot.moved
+            ]
         return full
 
     @cached_property
@@ -85,6 +96,12 @@ class RigidBody:
     def mass(self) -> Array:
         """∂τ/∂a, the joint-space inertia matrix (T, n, n)."""
         return self._derivatives[2]
+
+    def pull_back(self, weights: Array) -> tuple[Array, Array, Array]:
+        """Derivatives by q, v, a, each (T, n), of Σ weights ∘ τ for weights (T, n)."""
+        row = weights[:, None, :]
+        by_q, by_v, mass = ((row @ part)[:, 0] for part in self._derivatives)
+        return by_q, by_v, mass
 
     @cached_property
     def gravity_axes(self) -> Array:

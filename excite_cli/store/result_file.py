@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.atomic import write_atomically
 from excite_cli.constraints.base import Worst
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Motion
@@ -20,7 +21,6 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
-from excite_cli.store.atomic import write_atomically
 
 SCHEMA = 1
 PROGRAM = "excite"
@@ -133,12 +133,29 @@ def read_result(path: Path) -> Result:
         ) from error
 
 
+def is_result(path: Path) -> bool:
+    """Whether `path` is an HDF5 file of motions that this program planned (or a damaged one)."""
+    if not (path.is_file() and h5py.is_hdf5(path)):
+        return False
+    try:
+        with h5py.File(path, "r") as file:
+            return "base_parameters" in file or "stack" in file
+    except OSError:
+        return True
+
+
 def _read(file: Any, path: Path) -> Result:
     attributes = file.attrs
     if attributes.get("program") != PROGRAM:
         raise FileError(
             f"{path} is HDF5, but not a result of this program. Result files are written by "
             "`excite optimize` and `excite compare-random`."
+        )
+    content = str(attributes.get("content", "motions"))
+    if content != "motions":
+        raise FileError(
+            f"{path} holds a {content}, not motions. Motions are written by `excite optimize` and "
+            "`excite compare-random`."
         )
     if int(attributes["schema"]) > SCHEMA:
         raise FileError(

@@ -4,7 +4,7 @@ from importlib import metadata
 
 from excite_cli import __version__
 
-_LIBRARIES = ("pin", "coal", "numpy", "scipy", "h5py", "example-robot-data")
+_LIBRARIES = ("pin", "coal", "numpy", "scipy", "h5py", "clarabel", "mujoco", "example-robot-data")
 
 
 def versions() -> dict[str, str]:

@@ -9,14 +9,14 @@ import h5py
 import numpy as np
 import pytest
 
-from excite_cli import __version__
+from excite_cli import __version__, atomic
 from excite_cli.config.load import load_spec, parse_spec
 from excite_cli.criteria.base import condition_number, singular_values
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.result import matches
 from excite_cli.robot.model import build_robot
-from excite_cli.store import atomic, result_file
+from excite_cli.store import result_file
 from excite_cli.store.result_file import read_result, write_result
 from tests.store.conftest import CONFIG, Stored
 

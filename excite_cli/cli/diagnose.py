@@ -1,0 +1,130 @@
+"""`excite diagnose`: what the declared model lacks, and the error before and after."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from excite_cli.cli import options
+from excite_cli.cli.console import Terminal
+from excite_cli.errors import FileError
+
+if TYPE_CHECKING:
+    from excite_cli.config.spec import Spec
+    from excite_cli.diagnosis.result import Diagnosis
+
+
+def diagnose(
+    config: options.Config,
+    data: Annotated[
+        list[Path], typer.Argument(help="Measured data: HDF5, CSV or bags.", show_default=False)
+    ],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File for the diagnosis (HDF5).")
+    ] = None,
+    sealed: Annotated[
+        str | None,
+        typer.Option("--sealed", metavar="RUN", help="Run kept out. Default: the last one."),
+    ] = None,
+    apply: Annotated[
+        Path | None,
+        typer.Option("--apply", metavar="NEW.yaml", help="Write the config with what was found."),
+    ] = None,
+    overwrite: options.Overwrite = False,
+    overrides: options.Set = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
+) -> None:
+    """Find what the declared model lacks: friction, springs, payloads, delays and more.
+
+    The declared model is fitted to all runs but the sealed one; its residual is traced to named
+    effects, with their size, certainty, and what these data cannot tell them from. The sealed run
+    is used once, for the error before and after. A single run is cut into blocks, every third
+    sealed.
+
+    Example:  excite diagnose configs/ur10.yaml measured.h5 -o diagnosis.h5 --apply better.yaml
+    """
+    from dataclasses import replace
+
+    from excite_cli.cli.diagnose_tables import answer_of, tables_of
+    from excite_cli.cli.setup import load_dataset, single_threaded
+    from excite_cli.config.load import load_spec, spec_as_yaml
+    from excite_cli.diagnosis.diagnose import diagnose as run_diagnosis
+    from excite_cli.diagnosis.next_motion import next_experiment
+    from excite_cli.robot.base_parameters import find_base_parameters
+    from excite_cli.robot.model import build_robot
+    from excite_cli.store.diagnosis_file import write_diagnosis
+    from excite_cli.store.versions import versions
+
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    for path in (output, apply):
+        _refuse(path, overwrite)
+    with single_threaded():
+        spec = load_spec(config, overrides)
+        folder = config.resolve().parent
+        robot = build_robot(spec.robot, folder)
+        base = find_base_parameters(robot)
+        dataset = load_dataset(terminal, robot, spec, data)
+        with terminal.live("diagnose", 10) as show:
+            found = run_diagnosis(robot, base, dataset, spec, sealed, show)
+        found = replace(
+            found, config=spec_as_yaml(spec), config_folder=str(folder), versions=versions()
+        )
+        if output is not None:
+            write_diagnosis(output, found)
+        if apply is not None:
+            _apply(spec, folder, found, apply)
+    experiment = next_experiment(found, str(config), str(output or "DIAGNOSIS.h5"))
+    written = {key: str(path) for key, path in (("diagnosis", output), ("config", apply)) if path}
+    terminal.answer(
+        tables_of(found, robot, experiment, verbose),
+        {**answer_of(found, experiment), "output": written},
+    )
+
+
+def _refuse(path: Path | None, overwrite: bool) -> None:
+    """Refuse before the work begins."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise FileError(f"{path} is a folder. Give a file name.")
+    if path.exists() and not overwrite:
+        raise FileError(
+            f"{path} exists already. Give another name, or replace it with --overwrite."
+        )
+
+
+def _apply(spec: "Spec", folder: Path, found: "Diagnosis", path: Path) -> None:
+    """Write the config with declared and found effects, atomically."""
+    import os
+
+    from excite_cli.atomic import write_atomically
+    from excite_cli.config.write import yaml_text
+    from excite_cli.diagnosis.candidates import effect_of
+    from excite_cli.export.parameters import effect_specs
+
+    tree = spec.model_dump(mode="json", exclude_unset=True)
+    urdf = spec.robot.urdf
+    if ":" not in urdf and not Path(urdf).is_absolute():
+        tree["robot"]["urdf"] = os.path.relpath(folder / urdf, path.resolve().parent)
+    if spec.robot.package_dirs:
+        tree["robot"]["package_dirs"] = [
+            os.path.relpath(folder / each, path.resolve().parent)
+            for each in spec.robot.package_dirs
+        ]
+    records = [*found.declared, *(named.effect for named in found.effects)]
+    effects = [effect_of(record, found.joint_names) for record in records]
+    tree["effects"] = effect_specs(effects, found.joint_names)
+    comment = (
+        f"{len(found.effects)} effects found by `excite diagnose`, added to the declared model.\n"
+        f"Mean relative error on {found.sealed_run}: {found.before.mean_relative_moving:.2%} "
+        f"before, {found.after.mean_relative_moving:.2%} after (moving samples)."
+    )
+    text = yaml_text(tree, comment)
+
+    def write(temporary: Path) -> None:
+        temporary.write_text(text, encoding="utf-8")
+
+    write_atomically(path, write)

@@ -1,0 +1,137 @@
+"""`excite identify`: parameters of the declared model from measured data."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from excite_cli.cli import options
+from excite_cli.cli.console import Terminal
+from excite_cli.errors import FileError
+
+if TYPE_CHECKING:
+    from excite_cli.export.exported import Exported
+    from excite_cli.identification.fit import Fit
+    from excite_cli.robot.model import Robot
+
+
+def identify(
+    config: options.Config,
+    data: Annotated[
+        list[Path], typer.Argument(help="Measured data: HDF5, CSV or bags.", show_default=False)
+    ],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File for the fit (HDF5).")
+    ] = None,
+    urdf: Annotated[
+        Path | None, typer.Option("--urdf", help="Write the URDF with what was identified.")
+    ] = None,
+    mjcf: Annotated[
+        Path | None, typer.Option("--mjcf", help="Write a MuJoCo model of it (MJCF).")
+    ] = None,
+    parameters: Annotated[
+        Path | None, typer.Option("--parameters", help="Write all parameters (YAML).")
+    ] = None,
+    sealed: Annotated[
+        str | None,
+        typer.Option("--sealed", metavar="RUN", help="Run for the errors. Default: the last one."),
+    ] = None,
+    overwrite: options.Overwrite = False,
+    overrides: options.Set = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
+) -> None:
+    """Find the parameters of the declared model, with what they are worth.
+
+    Base parameters and those of the declared effects are fitted to all runs but the sealed one, on
+    which the errors are measured. A single run is cut into blocks, of which every third is sealed.
+
+    Example:  excite identify configs/ur10.yaml measured.h5 -o fit.h5 --urdf identified.urdf
+    """
+    from excite_cli.cli.identify_tables import answer_of, tables_of
+    from excite_cli.cli.setup import load_dataset, single_threaded
+    from excite_cli.config.load import load_spec, spec_as_yaml
+    from excite_cli.identification.identify import identify as run_identification
+    from excite_cli.robot.base_parameters import find_base_parameters
+    from excite_cli.robot.model import build_robot
+    from excite_cli.store.fit_file import write_fit
+
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    outputs = {"fit": output, "urdf": urdf, "mjcf": mjcf, "parameters": parameters}
+    _check_outputs(outputs, overwrite)
+    with single_threaded():
+        spec = load_spec(config, overrides)
+        folder = config.resolve().parent
+        robot = build_robot(spec.robot, folder)
+        base = find_base_parameters(robot)
+        dataset = load_dataset(terminal, robot, spec, data)
+        with terminal.live("identify") as show:
+            found = run_identification(
+                robot, base, dataset, spec, sealed, lambda text: show(text, 0)
+            )
+        for reason in found.processing.reasons:
+            terminal.say(reason)
+        notes: list[str] = []
+        if output is not None:
+            sources = tuple(map(str, data))
+            fingerprint = robot.fingerprint()
+            write_fit(output, found, spec_as_yaml(spec), str(folder), fingerprint, sources)
+        notes += _export(robot, found.fit, urdf, mjcf, parameters)
+    for finding in found.findings[len(dataset.findings) :]:
+        where = f" ({finding.run})" if finding.run else ""
+        terminal.say(f"{finding.severity}{where}: {finding.text}")
+    for note in notes:
+        terminal.say(f"note: {note}")
+    written = {key: str(path) for key, path in outputs.items() if path is not None}
+    terminal.answer(tables_of(found, robot), {**answer_of(found), "output": written})
+
+
+def _check_outputs(outputs: dict[str, Path | None], overwrite: bool) -> None:
+    """Refuse before the work begins."""
+    for path in outputs.values():
+        if path is None:
+            continue
+        if path.is_dir():
+            raise FileError(f"{path} is a folder. Give a file name.")
+        if path.exists() and not overwrite:
+            raise FileError(
+                f"{path} exists already. Give another name, or replace it with --overwrite."
+            )
+    given = [path.resolve() for path in outputs.values() if path is not None]
+    if len(set(given)) < len(given):
+        raise FileError("two outputs have the same file name. Give each its own.")
+
+
+def _export(
+    robot: "Robot", fit: "Fit", urdf: Path | None, mjcf: Path | None, parameters: Path | None
+) -> list[str]:
+    """Write what was asked for; return what must be said about it."""
+    from excite_cli.atomic import write_atomically
+    from excite_cli.export.exported import IdentifiedModel
+    from excite_cli.export.mjcf import mjcf as as_mjcf
+    from excite_cli.export.parameters import parameters_yaml
+    from excite_cli.export.urdf import updated_urdf
+
+    count = range(len(fit.effects))
+    values = tuple(fit.consistent_effect_values(i) for i in count)
+    model = IdentifiedModel(fit.best_phi(), fit.effects, values)
+    writers: list[tuple[Path | None, Callable[..., Exported]]] = [
+        (urdf, updated_urdf),
+        (mjcf, as_mjcf),
+    ]
+    notes = []
+    for path, writer in writers:
+        if path is not None:
+            exported = writer(robot, model)
+            write_atomically(path, _text_writer(exported.text))
+            notes += [f"{path}: {note}" for note in exported.notes]
+    if parameters is not None:
+        write_atomically(parameters, _text_writer(parameters_yaml(robot, fit)))
+    return notes
+
+
+def _text_writer(text: str) -> Any:
+    return lambda path: path.write_text(text, encoding="utf-8")

@@ -1,0 +1,136 @@
+"""What `excite identify` found, as tables and as data."""
+
+from typing import Any
+
+from rich.table import Table
+
+from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.fit import Fit
+from excite_cli.identification.identify import Identification
+from excite_cli.robot.model import Robot
+
+
+def tables_of(found: Identification, robot: Robot) -> list[Table | str]:
+    """Parameters, errors per joint, and sentences."""
+    low, high = found.error.interval
+    fit = found.fit
+    sentences = [
+        f"Mean relative error on {found.sealed_run}: {found.error.mean_relative:.2%} "
+        f"(95 % interval {low:.2%} to {high:.2%}), moving {found.error.mean_relative_moving:.2%}.",
+        f"{fit.count} samples carry the information of {fit.samples:.0f} independent ones.",
+        f"{found.hausman.sentence()[0].upper()}{found.hausman.sentence()[1:]}.",
+    ]
+    if fit.consistent is not None:
+        sentences.append(_consistency(fit))
+    return [
+        _parameter_table(fit),
+        error_table(found.error, found.training_error, robot),
+        *sentences,
+    ]
+
+
+def _consistency(fit: Fit) -> str:
+    consistent = fit.consistent
+    assert consistent is not None
+    if not consistent.solved:
+        return f"No physically consistent set of parameters was found: {consistent.status}."
+    return (
+        "A physically consistent set of all standard parameters fits as well but for "
+        f"{max(consistent.cost, 0.0) ** 0.5:.1f} standard deviations."
+    )
+
+
+def _parameter_table(fit: Fit) -> Table:
+    table = Table(title="Parameters", title_justify="left")
+    for name in ("parameter", "value", "std", "relative", "unit", "fixed by the data"):
+        table.add_column(name, justify="right" if name in ("value", "std", "relative") else "left")
+    for i, name in enumerate(fit.names):
+        relative = f"{fit.relative_std[i]:.1%}" if fit.relative_std[i] < 10 else "> 1000%"
+        verdict = "yes" if fit.identifiable[i] else "NO"
+        if fit.identifiable[i] and not fit.essential[i]:
+            verdict = "yes, small"
+        row = (_short(fit.values[i], 5), _short(fit.std[i], 3), relative, fit.units[i], verdict)
+        table.add_row(name.replace("[", r"\["), *row)
+    return table
+
+
+def _short(value: float, digits: int) -> str:
+    """So many digits, and no exponent for hundreds and thousands."""
+    return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
+
+
+def error_table(error: Errors, training: Errors, robot: Robot) -> Table:
+    """Errors per joint on the sealed part, and on the training part beside them."""
+    table = Table(title="Error of the torque", title_justify="left")
+    for name in ("joint", "relative", "moving", "RMS", "RMS as recorded", "unit", "training"):
+        table.add_column(name, justify="left" if name in ("joint", "unit") else "right")
+    for joint, sliding in zip(robot.joint_names, robot.sliding, strict=True):
+        table.add_row(
+            joint,
+            f"{error.relative[joint]:.2%}",
+            f"{error.relative_moving[joint]:.2%}",
+            f"{error.rms[joint]:.4g}",
+            f"{error.rms_raw[joint]:.4g}",
+            "N" if sliding else "N·m",
+            f"{training.relative[joint]:.2%}",
+        )
+    return table
+
+
+def answer_of(found: Identification) -> dict[str, Any]:
+    """The answer for `--json`."""
+    fit = found.fit
+    return {
+        "parameters": [
+            {
+                "name": name,
+                "value": float(fit.values[i]),
+                "std": float(fit.std[i]),
+                "relative_std": float(fit.relative_std[i]),
+                "identifiable": bool(fit.identifiable[i]),
+                "essential": bool(fit.essential[i]),
+                "unit": fit.units[i],
+            }
+            for i, name in enumerate(fit.names)
+        ],
+        "effects": [
+            {
+                "kind": effect.kind,
+                "joints": [fit.joint_names[j] for j in effect.joints],
+                "parameters": {
+                    name: {"value": value.value, "std": value.std, "unit": value.unit}
+                    for name, value in fit.effect_report(i).items()
+                },
+            }
+            for i, effect in enumerate(fit.effects)
+        ],
+        "sealed_run": found.sealed_run,
+        "error": found.error.as_data(),
+        "training_error": found.training_error.as_data(),
+        "samples": {"count": fit.count, "independent": fit.samples},
+        "noise": dict(zip(fit.joint_names, map(float, fit.noise), strict=True)),
+        "consistent": None
+        if fit.consistent is None
+        else {
+            "solved": fit.consistent.solved,
+            "status": fit.consistent.status,
+            "cost": fit.consistent.cost,
+            "smallest_eigenvalue": float(fit.consistent.eigenvalues.min()),
+        },
+        "closed_loop_bias": {
+            "testable": found.hausman.testable,
+            "p_value": found.hausman.p_value,
+            "source": found.hausman.source,
+            "text": found.hausman.sentence(),
+        },
+        "findings": [
+            {
+                "kind": finding.kind,
+                "severity": finding.severity,
+                "run": finding.run,
+                "text": finding.text,
+            }
+            for finding in found.findings
+        ],
+        "processing": found.processing.as_data(),
+    }

@@ -1,0 +1,264 @@
+"""`excite simulate`: motions of a result file, played on a robot that differs from its model."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from excite_cli.cli import options
+from excite_cli.cli.console import Terminal
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from excite_cli.config.spec import Spec
+    from excite_cli.robot.model import Robot
+    from excite_cli.simulation.motion import PlannedMotion
+    from excite_cli.simulation.settings import SimulationSettings
+    from excite_cli.simulation.simulate import Simulation
+
+
+def simulate(
+    config: options.Config,
+    file: options.ResultFile,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The data file, HDF5.")],
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--effect",
+            metavar="KIND@JOINT=VALUE",
+            help="Put an effect into the robot: kind@joint[,joint…]=value[,name:value…]"
+            "[;runs:name|name]. May be given several times.",
+        ),
+    ] = None,
+    motion: Annotated[
+        list[int] | None,
+        typer.Option("--motion", min=1, help="Play this motion only; may be given several times."),
+    ] = None,
+    repeat: Annotated[
+        int, typer.Option("--repeat", min=1, help="Takes of each motion, with fresh noise.")
+    ] = 1,
+    periods: Annotated[
+        int, typer.Option("--periods", min=1, help="Periods of a motion in each take.")
+    ] = 1,
+    rate: Annotated[float, typer.Option("--rate", help="Samples per second [Hz].")] = 500.0,
+    torque_noise: Annotated[
+        float, typer.Option("--torque-noise", help="As a share of the joint's torque RMS.")
+    ] = 0.01,
+    noise_correlation: Annotated[
+        float, typer.Option("--noise-correlation", help="Of the noise, from sample to sample.")
+    ] = 0.0,
+    encoder: Annotated[
+        float, typer.Option("--encoder", help="Resolution of the encoders, in rad (m).")
+    ] = 2e-5,
+    inertia_error: Annotated[
+        float,
+        typer.Option("--inertia-error", help="Of the robot's inertias against the URDF; 0: none."),
+    ] = 0.2,
+    no_declared: Annotated[
+        bool, typer.Option("--no-declared", help="The robot lacks the config's own effects.")
+    ] = False,
+    torque_limits: Annotated[
+        bool, typer.Option("--torque-limits", help="Motors stop at the robot's effort limits.")
+    ] = False,
+    seed: options.Seed = None,
+    overrides: options.Set = None,
+    overwrite: options.Overwrite = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
+) -> None:
+    """Play motions on a MuJoCo robot and record them as measured data.
+
+    The robot has a tracking controller, encoders, torque noise, inertias that differ from the URDF,
+    the effects that the config declares, in plausible sizes, and those given with --effect. What
+    was put in is stored in the file's attribute `truth`.
+
+    Example:  excite simulate configs/ur10.yaml ur10.h5 -o data.h5 --effect
+    'load_dependent_friction@elbow_joint=0.06' --effect 'payload@all=1.5;runs:motion_2'
+    """
+    from excite_cli.cli.setup import single_threaded
+    from excite_cli.config.load import load_spec
+    from excite_cli.effects.catalogue import declared_effects
+    from excite_cli.measurement.hdf5_writer import write_dataset
+    from excite_cli.robot.model import build_robot
+    from excite_cli.simulation.engine import load_mujoco
+    from excite_cli.simulation.planted import parse_planted
+    from excite_cli.simulation.settings import SimulationSettings
+    from excite_cli.simulation.simulate import run_names
+    from excite_cli.simulation.simulate import simulate as simulate_motions
+
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    path = _output(output, overwrite)
+    with single_threaded():
+        spec = load_spec(config, overrides)
+        settings = SimulationSettings(
+            seed=spec.seed if seed is None else seed,
+            rate=rate,
+            torque_noise=torque_noise,
+            noise_correlation=noise_correlation,
+            encoder=encoder,
+            inertia_error=inertia_error,
+            repeat=repeat,
+            periods=periods,
+            torque_limits=torque_limits,
+        )
+        load_mujoco()
+        robot = build_robot(spec.robot, config.resolve().parent)
+        motions = _motions(file, config, robot.joint_names, motion)
+        names = [name for takes in run_names(motions, repeat) for name in takes]
+        planted = [p for text in effect or [] for p in parse_planted(text, robot, names)]
+        declared = () if no_declared else declared_effects(spec.effects, robot)
+        if _converts(spec):
+            terminal.say(
+                "warning: the config converts recorded positions or torques (measurement: …), but "
+                "this file holds rad and N·m at the joints. Read it with a config without that."
+            )
+        with terminal.live("simulating", len(names)) as show:
+            simulation = simulate_motions(robot, motions, settings, planted, declared, show)
+        write_dataset(path, simulation.dataset, _attributes(simulation, settings, spec, robot))
+    records = [p.record(robot) for p in simulation.truth.effects]
+    runs = [
+        {
+            "name": run.name,
+            "samples": len(run.t),
+            "duration": run.duration,
+            "tracking_error": dict(
+                zip(robot.joint_names, map(float, simulation.tracking[run.name]), strict=True)
+            ),
+        }
+        for run in simulation.dataset.runs
+    ]
+    terminal.answer(
+        [_run_table(simulation), _effect_table(records), str(path)],
+        {"runs": runs, "effects": records, "output": str(path), "seed": settings.seed},
+    )
+
+
+def _output(path: Path, overwrite: bool) -> Path:
+    from excite_cli.errors import FileError
+
+    if path.is_dir():
+        raise FileError(f"{path} is a folder. Give a file name with -o.")
+    if path.exists() and not overwrite:
+        raise FileError(
+            f"{path} exists already. Give another name with -o, or replace it with --overwrite."
+        )
+    return path
+
+
+def _motions(
+    file: Path, config: Path, joints: tuple[str, ...], chosen: list[int] | None
+) -> "list[PlannedMotion]":
+    """The motions to play, with the trajectory that the file itself says they have."""
+    from excite_cli.config.load import parse_spec
+    from excite_cli.errors import FileError
+    from excite_cli.simulation.motion import PlannedMotion
+    from excite_cli.store.result_file import read_result
+    from excite_cli.trajectory.catalogue import build_trajectory
+
+    result = read_result(file)
+    if result.joint_names != joints:
+        raise FileError(
+            f"{file} moves other joints than {config}: {', '.join(result.joint_names)}. Take the "
+            "config that the motions were made with."
+        )
+    stored = parse_spec(result.config, f"the config stored in {file}")
+    trajectory = build_trajectory(stored.trajectory)
+    there = {motion.index: motion for motion in result.motions}
+    if not there:
+        raise FileError(f"{file} holds no motion. Make some with `excite optimize`.")
+    for index in chosen or ():
+        if index not in there:
+            raise FileError(
+                f"{file} has no motion {index}; it has {', '.join(map(str, there))} (--motion)."
+            )
+    shape = (trajectory.n_coefficients, len(joints))
+    if any(motion.coefficients.shape != shape for motion in there.values()):
+        raise FileError(f"{file}: coefficients do not have the shape {shape} of its trajectory.")
+    return [
+        PlannedMotion(f"motion_{index}", trajectory, there[index].coefficients)
+        for index in dict.fromkeys(chosen or there)
+    ]
+
+
+def _converts(spec: "Spec") -> bool:
+    """Whether reading with this config changes positions or torques."""
+    from excite_cli.config.data_spec import MeasurementSpec
+
+    kept = {"filter", "encoder_step", "topic", "rate"}
+    plain, given = MeasurementSpec(), spec.measurement
+    return any(
+        getattr(given, name) != getattr(plain, name)
+        for name in MeasurementSpec.model_fields
+        if name not in kept
+    )
+
+
+def _attributes(
+    simulation: "Simulation", settings: "SimulationSettings", spec: "Spec", robot: "Robot"
+) -> dict[str, object]:
+    """What the data file says about its making."""
+    import json
+    from dataclasses import asdict
+
+    from excite_cli.config.load import spec_as_yaml
+    from excite_cli.store.versions import versions
+
+    return {
+        "simulated": True,
+        "seed": settings.seed,
+        "settings": json.dumps(asdict(settings)),
+        "truth": json.dumps(simulation.truth.record(robot), ensure_ascii=False),
+        "config": spec_as_yaml(spec),
+        "versions": json.dumps(versions()),
+    }
+
+
+def _run_table(simulation: "Simulation") -> "Table":
+    import numpy as np
+    from rich.table import Table
+
+    table = Table(title="Runs", title_justify="left")
+    table.add_column("run")
+    for name in ("samples", "duration [s]", "tracking RMS [mrad]", "worst joint [mrad]"):
+        table.add_column(name, justify="right")
+    table.add_column("joint")
+    for run in simulation.dataset.runs:
+        error = 1e3 * simulation.tracking[run.name]
+        worst = int(np.argmax(error))
+        table.add_row(
+            run.name,
+            str(len(run.t)),
+            f"{run.duration:.2f}",
+            f"{np.sqrt(np.mean(error**2)):.3f}",
+            f"{error[worst]:.3f}",
+            simulation.dataset.joint_names[worst],
+        )
+    return table
+
+
+def _effect_table(records: list[dict[str, object]]) -> "Table":
+    from rich.table import Table
+
+    table = Table(title="Effects in the robot", title_justify="left")
+    for name in ("effect", "joints", "parameters", "runs", "declared"):
+        table.add_column(name)
+    for record in records:
+        parameters, joints = record["parameters"], record["joints"]
+        assert isinstance(parameters, dict)
+        assert isinstance(joints, list)
+        runs = record["runs"]
+        values = (
+            f"{key} {each['value']:.4g} {'' if each['unit'] == '1' else each['unit']}".strip()
+            for key, each in parameters.items()
+        )
+        table.add_row(
+            str(record["kind"]),
+            ", ".join(joints),
+            ", ".join(values),
+            ", ".join(runs) if isinstance(runs, list) and runs else "all",
+            "yes" if record["declared"] else "no",
+        )
+    return table

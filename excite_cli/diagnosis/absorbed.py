@@ -1,0 +1,57 @@
+"""Effects that would show as other values of inertial parameters only, and of which."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import cho_solve
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.evidence import ABSORBED, Evidence
+from excite_cli.diagnosis.result import Absorbed
+from excite_cli.diagnosis.search import FIRST
+
+_NAMED = 4
+_WORTH_NAMING = 0.15
+
+
+def absorbed_effects(
+    evidence: Evidence,
+    candidates: Sequence[Candidate],
+    names: Sequence[str],
+    joint_names: Sequence[str],
+    chosen: Sequence[int],
+) -> list[Absorbed]:
+    """Candidates of which the model leaves less than 0.1 % of their energy.
+
+    The model is the declared one with the chosen effects. `names` are those of its columns. Only
+    the first parameter counts (a spring whose stiffness is absorbed is absorbed, though its preload
+    may show as an offset).
+    """
+    at = evidence.columns(chosen)
+    factor = evidence.factor(chosen)
+    found: dict[tuple, Absorbed] = {}
+    taken = {candidates[i].place for i in chosen}
+    for i, c in enumerate(candidates):
+        if c.place in taken or c.place in found or c.effect.runs or c.effect.kind in FIRST:
+            continue
+        block = evidence.blocks[i]
+        main, others = block[0], block[1:]
+        shared = evidence.total[at, main]
+        own = float(evidence.total[main, main])
+        x = cho_solve(factor, shared)
+        left = own - shared @ x
+        if len(others):
+            cross = evidence.total[np.ix_(others, [main])][:, 0]
+            mixed = evidence.total[np.ix_(at, others)]
+            solved = cho_solve(factor, mixed)
+            rest = evidence.total[np.ix_(others, others)] - mixed.T @ solved
+            bridge = cross - solved.T @ shared
+            left -= bridge @ np.linalg.lstsq(rest, bridge, rcond=1e-9)[0]
+        if left > ABSORBED * own:
+            continue
+        weight = np.abs(x[: len(names)])
+        order = np.argsort(-weight)
+        by = [names[k] for k in order[:_NAMED] if weight[k] > _WORTH_NAMING * weight.max()]
+        joints = tuple(joint_names[j] for j in c.effect.joints)
+        found[c.place] = Absorbed(c.effect.kind, joints, tuple(by), float(max(left, 0.0) / own))
+    return list(found.values())

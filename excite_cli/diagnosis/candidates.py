@@ -1,0 +1,153 @@
+"""What a diagnosis looks for: every kind of the catalogue, at every place, with every shape."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.config.data_spec import DiagnosisSpec
+from excite_cli.diagnosis.result import EffectRecord
+from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.catalogue import catalogue, kind_named
+from excite_cli.errors import ConfigError
+from excite_cli.identification.prepare import PreparedRun
+from excite_cli.robot.model import Array, Robot
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that may be missing, with its columns in every training part.
+
+    `columns[i]` (M_i, len(rows), p) filtered and decimated; zeros where it is not present.
+    `tests`: how many tests its kind stands for, times the number of kinds (Bonferroni with equal
+    shares of α for all kinds).
+    """
+
+    effect: Effect
+    rows: tuple[int, ...]
+    columns: tuple[Array, ...]
+    tests: int = 1
+
+    @property
+    def place(self) -> tuple[str, tuple[int, ...], tuple[str, ...]]:
+        """Kind, joints and runs: candidates that differ in shape only share it."""
+        return self.effect.kind, self.effect.joints, self.effect.runs
+
+    @property
+    def width(self) -> int:
+        """Number of linear parameters."""
+        return len(self.effect.parameters)
+
+
+def possible_effects(
+    spec: DiagnosisSpec,
+    robot: Robot,
+    declared: Sequence[Effect],
+    signals: Sequence[Signals],
+    residuals: Sequence[Array],
+    runs: Sequence[str],
+) -> list[tuple[Effect, int]]:
+    """All effects to be tested but those declared, and how many tests each stands for.
+
+    `signals` and `residuals` (T, n) are of the training parts; `runs` the names of all runs, for
+    effects that are present in some of them only.
+
+    Raises
+    ------
+    ConfigError
+        `diagnosis.kinds` or `exclude` names an unknown kind.
+    """
+    for name in (*([] if spec.kinds == "all" else spec.kinds), *spec.exclude):
+        kind_named(name, "diagnosis")
+    names = list(catalogue()) if spec.kinds == "all" else list(spec.kinds)
+    known = {(e.kind, e.joints) for e in declared}
+    found: list[tuple[Effect, int]] = []
+    for name in names:
+        if name in spec.exclude:
+            continue
+        kind = catalogue()[name]
+        effects: list[Effect] = []
+        tests = 0
+        for place in kind.places(robot):
+            if (name, place) in known:
+                continue
+            if kind.per_run:
+                effects += _in_runs(kind, robot, place, signals, residuals, runs)
+                tests += len(set(runs)) * kind.tests_of_grid(robot, place, signals[:1])
+            else:
+                shapes = kind.tuned(robot, place, signals, residuals)
+                effects += [kind(place, shape) for shape in shapes]
+                tests += kind.tests_of_grid(robot, place, signals)
+        found += [(effect, max(tests, len(effects)) * len(names)) for effect in effects]
+    if not found:
+        raise ConfigError("diagnosis: every effect to be looked for is declared or excluded.")
+    return found
+
+
+def _in_runs(
+    kind: type[Effect],
+    robot: Robot,
+    place: tuple[int, ...],
+    signals: Sequence[Signals],
+    residuals: Sequence[Array],
+    runs: Sequence[str],
+) -> list[Effect]:
+    """A kind that is present in some runs only, looked for in each on its own.
+
+    One without a shape of its own (a payload) also in all runs from some run on; in all of them it
+    would be part of the robot.
+    """
+    found: list[Effect] = []
+    trained = [run for run in runs if any(s.run == run for s in signals)]
+    for run in trained:
+        own = [i for i, s in enumerate(signals) if s.run == run]
+        shapes = kind.tuned(robot, place, [signals[i] for i in own], [residuals[i] for i in own])
+        if kind.shapes or len(runs) > 1:
+            found += [kind(place, shape, (run,)) for shape in shapes]
+    if not kind.shapes:
+        later = [tuple(runs[i:]) for i in range(1, len(runs) - 1)]
+        found += [kind(place, {}, chosen) for chosen in later if set(chosen) & set(trained)]
+    return found
+
+
+def with_columns(
+    effects: Sequence[tuple[Effect, int]],
+    signals: Sequence[Signals],
+    runs: Sequence[PreparedRun],
+) -> list[Candidate]:
+    """Candidates with their filtered columns; those that are zero everywhere are left out."""
+    found = []
+    for effect, tests in effects:
+        n = signals[0].q.shape[1]
+        rows = effect.rows(n)
+        blocks = tuple(
+            run.averaged(effect.columns(signal))
+            if effect.active(signal.run)
+            else np.zeros((run.averages.shape[0], len(rows), len(effect.parameters)))
+            for signal, run in zip(signals, runs, strict=True)
+        )
+        if any(np.abs(block).max(initial=0.0) > 0 for block in blocks) and all(
+            np.isfinite(block).all() for block in blocks
+        ):
+            found.append(Candidate(effect, rows, blocks, tests))
+    return found
+
+
+def record_of(
+    effect: Effect, joint_names: Sequence[str], values: Iterable[float] = ()
+) -> EffectRecord:
+    """The effect by name."""
+    return EffectRecord(
+        effect.kind,
+        tuple(joint_names[j] for j in effect.joints),
+        dict(effect.shape),
+        tuple(float(value) for value in values),
+        effect.runs,
+    )
+
+
+def effect_of(record: EffectRecord, joint_names: Sequence[str]) -> Effect:
+    """The effect that a record names."""
+    joints = tuple(list(joint_names).index(joint) for joint in record.joints)
+    shape: Mapping[str, float] = dict(record.shape)
+    return catalogue()[record.kind](joints, shape, record.runs)

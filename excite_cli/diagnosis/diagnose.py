@@ -1,0 +1,281 @@
+"""From measured data to a diagnosis: split, filter, trace, name, and measure once at the end."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cholesky
+
+from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.absorbed import absorbed_effects
+from excite_cli.diagnosis.aliases import Alias, aliases_of
+from excite_cli.diagnosis.candidates import record_of
+from excite_cli.diagnosis.friction_line import friction_lines
+from excite_cli.diagnosis.plausibility import check_plausibility
+from excite_cli.diagnosis.prediction import errors_on
+from excite_cli.diagnosis.result import (
+    Diagnosis,
+    EffectRecord,
+    Information,
+    NamedEffect,
+)
+from excite_cli.diagnosis.rounds import rounds_of
+from excite_cli.diagnosis.tracing import Model, Traced, full_inertias, run_name, trace
+from excite_cli.diagnosis.training import KeptInertias
+from excite_cli.diagnosis.uncertainty import covariance_of
+from excite_cli.diagnosis.unexplained import unexplained_structure
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import declared_effects
+from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.prior import prior_rows
+from excite_cli.identification.processing import Processing, choose_processing
+from excite_cli.identification.split import Split, split
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.robot.base_parameters import BaseParameters
+from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.regressor import standard_parameters
+
+Progress = Callable[[str, int], None]
+
+
+def diagnose(
+    robot: Robot,
+    base: BaseParameters,
+    dataset: Dataset,
+    spec: Spec,
+    sealed: str | None = None,
+    progress: Progress = lambda text, done: None,
+) -> Diagnosis:
+    """Find what the declared model of `spec` lacks, and measure the error before and after.
+
+    Nothing of the sealed part is used but for `before` and `after`. Texts of the configuration and
+    versions are left to the caller (`dataclasses.replace`).
+
+    Raises
+    ------
+    ConfigError
+        The configuration does not fit the robot or the data.
+    FileError
+        The data cannot be what the configuration says (joint order, signs), or are too short.
+    """
+    started = time.monotonic()
+    model = _model(robot, base, spec)
+    parts = split(dataset, sealed, spec.diagnosis.block)
+    processing = choose_processing(
+        parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
+    )
+    progress("filtering", 0)
+    training = [prepare(run, processing) for run in parts.training]
+    check_plausibility(robot, training)
+    names = [run.name for run in dataset.runs]
+    traced = trace(model, spec.diagnosis, training, parts.folds, names, progress)
+    progress("naming", 8)
+    parameters = traced.search.plain.solve(traced.chosen)
+    named, rivals = _named(model, traced, parameters, processing)
+    before, after = _errors(model, traced, parameters, parts, processing)
+    rules = traced.search.rules
+    unexplained = unexplained_structure(
+        traced.data, traced.candidates, traced.chosen, traced.signals, traced.noise,
+        (rules.significance, rules.gain, rules.inflation), robot.joint_names,
+    )  # fmt: skip
+    base_values, base_std = _base_parameters(model, traced, parameters)
+    return Diagnosis(
+        config="",
+        config_folder="",
+        fingerprint=robot.fingerprint(),
+        joint_names=robot.joint_names,
+        base_names=base.in_words(),
+        declared=tuple(record_of(e, robot.joint_names) for e in model.declared),
+        effects=named,
+        absorbed=tuple(
+            absorbed_effects(
+                traced.search.white, traced.candidates, _column_names(model),
+                robot.joint_names, traced.chosen,
+            )
+        ),
+        unexplained=tuple(unexplained),
+        sealed_run=parts.sealed_name,
+        before=before,
+        after=after,
+        rounds=rounds_of(traced, robot.joint_names),
+        findings=dataset.findings,
+        processing=_choices(processing, traced, training),
+        phi=full_inertias(model, parameters),
+        base_values=base_values,
+        base_std=base_std,
+        information=_information(model, traced, rivals),
+        versions={},
+        seconds=time.monotonic() - started,
+    )  # fmt: skip
+
+
+def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:
+    prior = None
+    if spec.identification.inertias == "cad":
+        cad = standard_parameters(robot)
+        prior = KeptInertias(cad, prior_rows(robot, cad, spec.identification.uncertainty))
+    return Model(robot, base, declared_effects(spec.effects, robot), prior)
+
+
+def _column_names(model: Model) -> list[str]:
+    """Names of the inertial columns that the search saw, then of the declared effects'."""
+    base = model.base
+    names = list(base.names) if model.prior else [base.names[k] for k in base.selection]
+    for effect in model.declared:
+        where = "+".join(model.robot.joint_names[j] for j in effect.joints)
+        names += [f"{parameter.name}[{where}]" for parameter in effect.parameters]
+    return names
+
+
+def _named(
+    model: Model, traced: Traced, parameters: Array, processing: Processing
+) -> tuple[tuple[NamedEffect, ...], list[tuple[Alias, Array]]]:
+    """Named effects with values, evidence and aliases; and the aliases with their own values."""
+    search, names = traced.search, model.robot.joint_names
+    covariance = covariance_of(
+        traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
+    )
+    start = len(parameters) - sum(traced.candidates[i].width for i in traced.chosen)
+    transform = friction_lines(traced, start)
+    shown, spread = transform @ parameters, transform @ covariance @ transform.T
+    found: list[NamedEffect] = []
+    strength: list[float] = []
+    taken = {traced.candidates[i].place for i in traced.chosen}
+    rivals: list[tuple[Alias, Array]] = []
+    at = start
+    for i in traced.chosen:
+        c = traced.candidates[i]
+        own = slice(at, at + c.width)
+        at += c.width
+        rest = search.without(i, traced.chosen)
+        gain = search.white.schur(rest).gain(i)
+        joints = list(c.rows)
+        whole = search.plain.energy_on((), joints)
+        share = (
+            search.plain.energy_on(rest, joints) - search.plain.energy_on([*rest, i], joints)
+        ) / max(whole, 1e-300)
+
+        def possible(others: Sequence[int], d: int) -> bool:
+            together = [*others, d]
+            return search.allowed(search.plain.solve(together), together, [d])
+
+        aliases = aliases_of(
+            i, rest, taken, traced.candidates, search.white, traced.inflation, possible
+        )
+        records = []
+        for alias in aliases:
+            values = search.plain.solve([*rest, alias.candidate])
+            width = traced.candidates[alias.candidate].width
+            rivals.append((alias, values[-width:]))
+            records.append(
+                record_of(traced.candidates[alias.candidate].effect, names, values[-width:])
+            )
+        strength.append(gain.chi2)
+        found.append(
+            NamedEffect(
+                effect=record_of(c.effect, names, parameters[own]),
+                parameters=c.effect.report(shown[own], spread[own, own]),
+                p_value=search.p_value(i, gain),
+                share_of_residual=float(max(share, 0.0)),
+                gain=float(search.left_out_gain(rest, [i])),
+                aliases=tuple(records),
+            )
+        )
+    order = np.argsort([-each for each in strength], kind="stable")
+    return tuple(found[k] for k in order), rivals
+
+
+def _errors(
+    model: Model, traced: Traced, parameters: Array, parts: Split, processing: Processing
+) -> tuple[Errors, Errors]:
+    """Before (the declared model refitted) and after, on the sealed part, once."""
+    sealed: list[PreparedRun] = [prepare(run, processing) for run in parts.sealed]
+    names = [run_name(run.name) for run in parts.sealed]
+    declared = traced.search.plain.solve(())
+    width = sum(len(e.parameters) for e in model.declared)
+
+    def judge(x: Array, effects: tuple[Effect, ...], count: int) -> Errors:
+        values = x[len(x) - count :] if count else np.zeros(0)
+        return errors_on(model.robot, full_inertias(model, x), effects, values, sealed, names)
+
+    found = sum(len(e.parameters) for e in traced.effects)
+    return (
+        judge(declared, model.declared, width),
+        judge(parameters, (*model.declared, *traced.effects), width + found),
+    )
+
+
+def _base_parameters(model: Model, traced: Traced, parameters: Array) -> tuple[Array, Array]:
+    covariance = covariance_of(
+        traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
+    )
+    rank = model.base.rank
+    if model.prior is None:
+        return parameters[:rank], np.sqrt(np.maximum(np.diag(covariance)[:rank], 0.0))
+    mapping = model.base.mapping
+    count = mapping.shape[1]
+    spread = mapping @ covariance[:count, :count] @ mapping.T
+    phi = full_inertias(model, parameters)
+    return mapping @ phi, np.sqrt(np.maximum(np.diag(spread), 0.0))
+
+
+def _information(model: Model, traced: Traced, rivals: list[tuple[Alias, Array]]) -> Information:
+    """Triangular factor of the training data's columns, whitened, for the next motion."""
+    data = traced.data
+    if model.prior is not None:
+        selection = model.base.selection
+        count = model.base.mapping.shape[1]
+        keep = np.concatenate([selection, np.arange(count, data.declared[0].shape[2])])
+        data = replace(
+            data, declared=tuple(d[:, :, keep] for d in data.declared), prior_precision=None
+        )
+    unique: dict[tuple, tuple[Alias, Array]] = {}
+    for alias, values in rivals:
+        unique.setdefault(traced.candidates[alias.candidate].place, (alias, values))
+    pool = [traced.candidates[i] for i in traced.chosen]
+    pool += [traced.candidates[alias.candidate] for alias, _ in unique.values()]
+    evidence = data.evidence(pool, traced.noise)
+    gram = evidence.raw.sum(axis=(0, 1))[:-1, :-1]
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    unit = gram / np.outer(scale, scale)
+    unit[np.diag_indices(len(unit))] += 1e-12
+    parameters = traced.search.plain.solve(traced.chosen)
+    declared_width = sum(len(e.parameters) for e in model.declared)
+    at = len(parameters) - sum(c.width for c in pool[: len(traced.chosen)]) - declared_width
+    records: list[EffectRecord] = []
+    for effect in (*model.declared, *traced.effects):
+        width = len(effect.parameters)
+        records.append(record_of(effect, model.robot.joint_names, parameters[at : at + width]))
+        at += width
+    return Information(
+        factor=cholesky(unit) * scale,
+        rank=model.base.rank,
+        model=tuple(records),
+        rivals=tuple(
+            record_of(traced.candidates[alias.candidate].effect, model.robot.joint_names, values)
+            for alias, values in unique.values()
+        ),
+        noise=traced.levels,
+    )
+
+
+def _choices(
+    processing: Processing, traced: Traced, training: Sequence[PreparedRun]
+) -> dict[str, Any]:
+    """Every choice that was made, for the result."""
+    valid = np.concatenate([run.valid for run in training])
+    usable = np.concatenate([run.usable for run in training])
+    return {
+        **processing.as_data(),
+        "standstill_share": [float(x) for x in (valid & ~usable).mean(axis=0)],
+        "invalid_share": [float(x) for x in (~valid).mean(axis=0)],
+        "noise_orders": [len(c) for c in traced.noise.coefficients],
+        "noise_rms": [float(x) for x in traced.levels],
+        "runs": sorted({run_name(run.name) for run in training}),
+        "inflation": traced.inflation,
+        "candidates": len(traced.candidates),
+        "samples": int(usable.sum()),
+    }

@@ -1,0 +1,225 @@
+"""All that the search needs, as Gram matrices: any model is judged without touching samples again.
+
+Columns are [inertial | declared effects | candidates | torque], rows whitened. A Gram matrix is
+kept per fold and joint; their sums give the residual energy, the gain of any candidate, and the
+error on any fold left out, each by solves of the size of the model.
+
+With N = G_SS + Λ (Λ the precision of a prior on the inertial columns, if there is one) and a
+candidate c, the Schur complement Z = G_cc − G_cS N⁻¹ G_Sc is what is left of the candidate once the
+model has taken its part, z = G_cy − G_cS N⁻¹ G_Sy its product with the residual, and zᵀ Z⁻¹ z the
+energy that it explains: χ² distributed for unit noise if the candidate is not there.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from excite_cli.robot.model import Array
+
+# A direction of a candidate of which less than this share is left is absorbed by the model.
+ABSORBED = 1e-3
+_COLLINEAR = 1e-9
+_RIDGE = 1e-11
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What one candidate adds to a model: χ², degrees of freedom, share of it that is left."""
+
+    chi2: float
+    dof: int
+    left: float
+
+
+class Evidence:
+    """Gram matrices per fold and joint, (F, n, K, K), of normalised columns; torque is the last.
+
+    `blocks[i]` are the columns of candidate i; the first `fixed` columns are the declared model,
+    with prior precision `prior` (fixed,) in the units of the raw columns.
+    """
+
+    def __init__(
+        self,
+        grams: Array,
+        fixed: int,
+        blocks: Sequence[NDArray[np.intp]],
+        rows_of: Sequence[tuple[int, ...]],
+        prior: Array | None = None,
+    ) -> None:
+        self.raw, self.fixed, self.blocks = grams, fixed, list(blocks)
+        self.rows_of = list(rows_of)
+        total = grams.sum(axis=(0, 1))
+        norms = np.sqrt(np.diag(total))
+        norms[norms < 1e-100] = 1.0
+        norms[-1] = 1.0
+        self.norms = norms
+        self.total = total / np.outer(norms, norms)
+        self.prior = np.zeros(fixed) if prior is None else np.asarray(prior)
+
+    @property
+    def torque(self) -> int:
+        """Index of the torque's column."""
+        return self.total.shape[0] - 1
+
+    def columns(self, chosen: Sequence[int]) -> NDArray[np.intp]:
+        """Columns of the declared model and the chosen candidates."""
+        return np.concatenate([np.arange(self.fixed), *(self.blocks[i] for i in chosen)]).astype(
+            np.intp
+        )
+
+    def _normal(self, gram: Array, at: NDArray[np.intp]) -> Array:
+        normal = gram[np.ix_(at, at)].copy()
+        normal[np.diag_indices(len(at))] += self._ridge(at)
+        return normal
+
+    def _ridge(self, at: NDArray[np.intp]) -> Array:
+        """Precision of the prior, and a trace for columns that say nothing."""
+        ridge = np.full(len(at), _RIDGE)
+        ridge[: self.fixed] += self.prior / self.norms[: self.fixed] ** 2
+        return ridge
+
+    def factor(self, chosen: Sequence[int]) -> tuple[Array, bool]:
+        """Cholesky factor of the normal matrix (normalised columns) of a model."""
+        return cho_factor(self._normal(self.total, self.columns(chosen)))
+
+    def solve(self, chosen: Sequence[int]) -> Array:
+        """Parameters (raw units) of the model with the chosen candidates."""
+        at = self.columns(chosen)
+        x = cho_solve(cho_factor(self._normal(self.total, at)), self.total[at, self.torque])
+        return np.asarray(x / self.norms[at])
+
+    def covariance(self, chosen: Sequence[int]) -> Array:
+        """Covariance of `solve`'s parameters for unit noise."""
+        at = self.columns(chosen)
+        inverse = cho_solve(cho_factor(self._normal(self.total, at)), np.eye(len(at)))
+        return np.asarray(inverse / np.outer(self.norms[at], self.norms[at]))
+
+    def energy(self, chosen: Sequence[int]) -> float:
+        """Residual energy (with the prior's, if any) of the model with the chosen candidates."""
+        at = self.columns(chosen)
+        rhs = self.total[at, self.torque]
+        x = cho_solve(cho_factor(self._normal(self.total, at)), rhs)
+        return float(self.total[self.torque, self.torque] - x @ rhs)
+
+    def schur(self, chosen: Sequence[int]) -> "Schur":
+        """What is left of every candidate once the chosen model has taken its part."""
+        at = self.columns(chosen)
+        rest = np.arange(self.fixed, self.torque)
+        factor = cho_factor(self._normal(self.total, at))
+        shared = self.total[np.ix_(at, rest)]
+        solved = cho_solve(factor, shared)
+        left = self.total[np.ix_(rest, rest)] - shared.T @ solved
+        cross = self.total[rest, self.torque] - solved.T @ self.total[at, self.torque]
+        return Schur(self, left, cross)
+
+    @cached_property
+    def _folds(self) -> Array:
+        """Normalised Gram matrices of the folds (F, K, K)."""
+        return self.raw.sum(axis=1) / np.outer(self.norms, self.norms)
+
+    def _part(
+        self, fold: int | None, joints: Sequence[int] | None, at: NDArray[np.intp]
+    ) -> tuple[Array, Array, float]:
+        """Normal matrix, product with the torque, and energy of a fold's rows of some joints."""
+        grams = self.raw if fold is None else self.raw[fold : fold + 1]
+        rows = range(grams.shape[1]) if joints is None else joints
+        both = np.append(at, self.torque)
+        index = np.ix_(both, both)
+        own = sum(grams[f, j][index] for f in range(len(grams)) for j in rows)
+        own = own / np.outer(self.norms[both], self.norms[both])
+        return own[:-1, :-1], own[:-1, -1], float(own[-1, -1])
+
+    def left_out(self, chosen: Sequence[int], joints: Sequence[int] | None) -> Array:
+        """Energy (F,) on the rows of `joints` of each fold, fitted to all other folds."""
+        at = self.columns(chosen)
+        found = np.empty(len(self.raw))
+        index = np.ix_(at, at)
+        ridge = self._ridge(at)
+        for fold in range(len(self.raw)):
+            normal = self.total[index] - self._folds[fold][index]
+            normal[np.diag_indices(len(at))] += ridge
+            rhs = self.total[at, self.torque] - self._folds[fold][at, self.torque]
+            x = cho_solve(cho_factor(normal, check_finite=False), rhs, check_finite=False)
+            own, cross, energy = self._part(fold, joints, at)
+            found[fold] = energy - 2 * x @ cross + x @ own @ x
+        return np.maximum(found, 0.0)
+
+    def energy_on(self, chosen: Sequence[int], joints: Sequence[int] | None) -> float:
+        """Residual energy on the rows of `joints` of the model fitted to everything."""
+        at = self.columns(chosen)
+        x = self.solve(chosen) * self.norms[at]
+        own, cross, energy = self._part(None, joints, at)
+        return max(float(energy - 2 * x @ cross + x @ own @ x), 0.0)
+
+
+class Schur:
+    """Candidates after projection off a model."""
+
+    def __init__(self, evidence: Evidence, left: Array, cross: Array) -> None:
+        self.evidence, self.matrix, self.cross = evidence, left, cross
+
+    def gain(self, *candidates: int) -> Gain:
+        """χ², degrees of freedom and the largest share left of candidates taken together."""
+        e = self.evidence
+        at = np.concatenate([e.blocks[i] for i in candidates]) - e.fixed
+        own = e.total[np.ix_(at + e.fixed, at + e.fixed)]
+        left, cross = self.matrix[np.ix_(at, at)], self.cross[at]
+        if len(at) == 1:
+            share = float(left[0, 0] / max(own[0, 0], 1e-300))
+            if share < ABSORBED:
+                return Gain(0.0, 0, share)
+            return Gain(float(cross[0] ** 2 / left[0, 0]), 1, share)
+        values, vectors = np.linalg.eigh(own)
+        kept = values > _COLLINEAR * values[-1]
+        basis = vectors[:, kept] / np.sqrt(values[kept])
+        shares, turned = np.linalg.eigh(basis.T @ left @ basis)
+        alive = shares > ABSORBED
+        if not alive.any():
+            return Gain(0.0, 0, float(shares.max(initial=0.0)))
+        z = turned[:, alive].T @ (basis.T @ cross)
+        return Gain(float(np.sum(z**2 / shares[alive])), int(alive.sum()), float(shares[-1]))
+
+    @cached_property
+    def singles(self) -> "Singles":
+        """Gain of every candidate alone."""
+        return Singles(self)
+
+    def pair_chi2(self, first: Array, second: Array) -> Array:
+        """χ² of pairs of candidates of one column each, without those that are collinear."""
+        e = self.evidence
+        i = np.array([e.blocks[k][0] for k in first]) - e.fixed
+        j = np.array([e.blocks[k][0] for k in second]) - e.fixed
+        ii, jj, ij = self.matrix[i, i], self.matrix[j, j], self.matrix[i, j]
+        zi, zj = self.cross[i], self.cross[j]
+        determinant = ii * jj - ij**2
+        found = (zi**2 * jj - 2 * zi * zj * ij + zj**2 * ii) / np.maximum(determinant, 1e-300)
+        return np.where(determinant > 1e-3 * ii * jj, found, 0.0)
+
+
+class Singles:
+    """Gains of single candidates: those with one column all at once, the others when asked for."""
+
+    def __init__(self, schur: Schur) -> None:
+        e = schur.evidence
+        self._schur = schur
+        self._first = np.array([b[0] for b in e.blocks], dtype=int) - e.fixed
+        self._single = np.array([len(b) == 1 for b in e.blocks])
+        own = np.diag(e.total)[e.fixed : e.torque][self._first]
+        left = np.diag(schur.matrix)[self._first]
+        self._share = left / np.maximum(own, 1e-300)
+        alive = self._share > ABSORBED
+        cross = schur.cross[self._first]
+        self._chi2 = np.where(alive, cross**2 / np.where(alive, left, 1.0), 0.0)
+        self._others: dict[int, Gain] = {}
+
+    def __getitem__(self, i: int) -> Gain:
+        if self._single[i]:
+            share = float(self._share[i])
+            return Gain(float(self._chi2[i]), int(share > ABSORBED), share)
+        if i not in self._others:
+            self._others[i] = self._schur.gain(i)
+        return self._others[i]

@@ -1,0 +1,74 @@
+"""Measured data as earlier data C_0 of a planned motion."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from excite_cli.errors import ConfigError, FileError
+from excite_cli.excitation.objective import Objective
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.stack import Stack
+from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.processing import choose_processing
+from excite_cli.measurement.dataset import Array, Dataset
+
+
+def measured_stack(problem: Problem, data: Dataset) -> tuple[Stack, str]:
+    """The data as a stack that fits `problem`, and what was made of them in words.
+
+    Filtered motion is sampled as sparsely as the cost grid of a planned one, so that a second of
+    recorded motion weighs as much as a second of planned motion.
+
+    Raises
+    ------
+    ConfigError
+        The measured rows of the problem hold no joint torque, which is all that data have.
+    FileError
+        A run is too short, or nothing in the data can be used.
+    """
+    measured = set(problem.robot.rows.tolist()) & set(problem.robot.moved.tolist())
+    if not measured:
+        raise ConfigError("--prior: measured data are torques of joints; robot.rows has none.")
+    processing = choose_processing(
+        data.runs, problem.spec.measurement.filter, problem.spec.diagnosis.moving_speed
+    )
+    runs = [prepare(run, processing) for run in data.runs]
+    return stack_of_runs(problem, runs)
+
+
+def stack_of_runs(problem: Problem, runs: Sequence[PreparedRun]) -> tuple[Stack, str]:
+    """The same for runs that are prepared already."""
+    wanted = float(np.diff(problem.cost_basis.times[:2])[0])
+    stack, objective = Stack.empty(problem.columns), problem.objective()
+    samples = 0
+    for run in runs:
+        every = max(1, round(wanted / run.step))
+        block = _rows(problem, objective, run, every)
+        samples += len(run.tau[::every])
+        stack = stack.with_rows(block)
+    if stack.rows == 0:
+        raise FileError("--prior: no sample of the data can be used.")
+    plural = "run" if len(runs) == 1 else "runs"
+    words = (
+        f"{len(runs)} {plural} of measured data, {samples} samples about every {wanted:.3g} s (as "
+        f"the cost grid), {stack.rows} usable rows"
+    )
+    return stack, words
+
+
+def _rows(problem: Problem, objective: Objective, run: PreparedRun, every: int) -> Array:
+    """Usable rows of every `every`-th averaged sample of a run."""
+    robot = problem.robot
+    if problem.extension.fine:  # time derivatives first, then the average
+        block = objective.block_of(run.t, run.q, run.v, run.a)
+        block = run.averaged(block.reshape(len(run.t), len(robot.rows), -1))[::every]
+    else:
+        q, v, a = (run.averaged(x)[::every] for x in (run.q, run.v, run.a))
+        times: Array = np.arange(len(q), dtype=float) * (run.step * every)
+        block = objective.block_of(times, q, v, a).reshape(len(q), len(robot.rows), -1)
+    place = {int(row): joint for joint, row in enumerate(robot.moved)}
+    usable = np.zeros(block.shape[:2], dtype=bool)
+    for index, row in enumerate(robot.rows):
+        if int(row) in place:
+            usable[:, index] = run.usable[::every, place[int(row)]]
+    return np.asarray(block[usable])

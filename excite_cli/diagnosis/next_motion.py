@@ -1,0 +1,171 @@
+"""The next motion after a diagnosis: separate what the data could not, else excite what is known.
+
+Both problems take what the diagnosis measured: the data's factor as C_0, rows weighted by 1/noise
+(each sample of the cost grid counts as an independent one), and the effects that were found.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from excite_cli.config.data_spec import EffectSpec
+from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.candidates import effect_of
+from excite_cli.diagnosis.result import Diagnosis, EffectRecord
+from excite_cli.diagnosis.separation import DataColumns, separated
+from excite_cli.effects.base import Effect
+from excite_cli.errors import FileError
+from excite_cli.excitation.discrimination import (
+    SEPARATED,
+    divergences,
+    motions_needed,
+)
+from excite_cli.excitation.extension import in_words, why_not_planned
+from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.stack import Stack
+from excite_cli.robot.model import Array, Robot, build_robot
+
+
+@dataclass(frozen=True)
+class NextMotion:
+    """The problem of the next motion, and the `model` that its result is kept for.
+
+    `prior` are the measured data on the columns of `model`, which is `problem` unless that
+    separates effects; then `problem` has the rivals' columns too. `purpose` is `separate` or
+    `excite`; `messages` say what is done and why.
+    """
+
+    problem: Problem
+    model: Problem
+    prior: Stack
+    purpose: str
+    messages: tuple[str, ...]
+
+    def outlook(self, coefficients: Sequence[Array]) -> dict[str, Any]:
+        """What the motions (coefficients (K, n) each) are expected to show, for `--json`.
+
+        For every pair the divergence (½ Δ, the smaller of both ways) before and after, and how
+        many motions like the first reach `SEPARATED`, all told; None: more than a thousand.
+        """
+        found: dict[str, Any] = {"purpose": self.purpose, "pairs": []}
+        separation = self.problem.separation
+        if separation is None or not coefficients:
+            return found
+        objective = self.problem.objective(separation.prior)
+        blocks = [objective.block(alpha) for alpha in coefficients]
+        grams = [block.T @ block for block in blocks]
+        before = separation.prior.factor.T @ separation.prior.factor
+        after = before + np.sum(grams, axis=0)
+        for first, second in zip(
+            separation.directions[::2], separation.directions[1::2], strict=True
+        ):
+            both = (first, second)
+            found["pairs"].append(
+                {
+                    "effect": first.pair[0],
+                    "alias": first.pair[1],
+                    "kl_so_far": float(divergences(before, both).min()),
+                    "expected_kl": float(divergences(after, both).min()),
+                    "motions_needed": motions_needed(before, grams[0], both),
+                }
+            )
+        found["expected_kl"] = min(pair["expected_kl"] for pair in found["pairs"])
+        found["told_apart_from"] = SEPARATED
+        return found
+
+
+def next_experiment(
+    diagnosis: Diagnosis, config: str = "CONFIG", file: str = "DIAGNOSIS.h5"
+) -> dict[str, Any]:
+    """What to do next, without planning it: purpose, the pairs to tell apart, the command."""
+    pairs = [
+        {"effect": _as_data(named), "alias": _as_data(alias)}
+        for named, alias in _alias_pairs(diagnosis)
+    ]
+    purpose = "separate" if pairs else "excite"
+    return {
+        "purpose": purpose,
+        "pairs": pairs,
+        "command": f"excite optimize {config} --after {file}",
+    }
+
+
+def plan_after(diagnosis: Diagnosis, spec: Spec, folder: Path) -> NextMotion:
+    """The problem of `spec` after what `diagnosis` learned.
+
+    Raises
+    ------
+    FileError
+        The diagnosis belongs to another robot, or its numbers do not fit together.
+    """
+    noise = np.asarray(diagnosis.information.noise, dtype=float)
+    if not (np.all(np.isfinite(noise)) and np.all(noise > 0)):
+        raise FileError("--after: the diagnosis has no noise level for every joint; make it anew.")
+    weights = {j: float(1.0 / x) for j, x in zip(diagnosis.joint_names, noise, strict=True)}
+    robot = build_robot(spec.robot, folder)
+    _check_robot(diagnosis, robot)
+    model = [effect_of(record, robot.joint_names) for record in diagnosis.information.model]
+    planned = [effect for effect in model if not why_not_planned(effect, robot)]
+    problem = build_problem(
+        spec.model_copy(
+            update={
+                "effects": tuple(_spec_of(effect, robot) for effect in planned),
+                "criterion": spec.criterion.model_copy(update={"row_weights": weights}),
+            }
+        ),
+        folder,
+    )
+    columns = DataColumns(diagnosis, problem)
+    said = [
+        f"left out of the next motion: {in_words(effect, robot)}: {why_not_planned(effect, robot)}"
+        for effect in model
+        if effect not in planned
+    ]
+    prior = columns.factor(problem)
+    pairs = _alias_pairs(diagnosis)
+    wide, reasons = separated(problem, columns, pairs)
+    said += reasons
+    if wide is not None:
+        assert wide.separation is not None
+        names = [" / ".join(d.pair) for d in wide.separation.directions[::2]]
+        said.insert(0, f"the next motion separates what the data cannot: {'; '.join(names)}")
+        return NextMotion(wide, problem, prior, "separate", tuple(said))
+    why = "no effect has an alias" if not pairs else "no alias can be separated by a motion"
+    said.insert(
+        0,
+        f"{why}: the next motion excites the model with its {len(problem.extension.effects)} "
+        "effects, on top of the measured data",
+    )
+    return NextMotion(problem, problem, prior, "excite", tuple(said))
+
+
+def _check_robot(diagnosis: Diagnosis, robot: Robot) -> None:
+    if diagnosis.fingerprint != robot.fingerprint():
+        raise FileError(
+            "--after: the diagnosis was made for another robot, other moved joints, posture or "
+            "rows. Give the config that it was made with."
+        )
+    if robot.rows.tolist() != robot.moved.tolist():
+        raise FileError(
+            "--after: the data are torques of the joints; robot.rows has others. Plan with "
+            "rows: [joints]."
+        )
+
+
+def _alias_pairs(diagnosis: Diagnosis) -> list[tuple[EffectRecord, EffectRecord]]:
+    return [(named.effect, alias) for named in diagnosis.effects for alias in named.aliases]
+
+
+def _spec_of(effect: Effect, robot: Robot) -> EffectSpec:
+    return EffectSpec(
+        kind=effect.kind,
+        joints=tuple(robot.joint_names[j] for j in effect.joints),
+        shape=dict(effect.shape),
+    )
+
+
+def _as_data(record: EffectRecord) -> dict[str, Any]:
+    return {"kind": record.kind, "joints": list(record.joints), "shape": dict(record.shape)}

@@ -1,0 +1,93 @@
+"""Placebos: the same columns, shifted in time, where they can explain nothing.
+
+If the noise model were right, the energy that a shifted column explains would be χ² distributed
+with one degree of freedom. Where it is more, tests promise too much, and every χ² is divided by the
+excess.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import cho_solve
+from scipy.stats import chi2
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.evidence import Evidence
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.robot.model import Array
+
+_SHIFTS = 6
+_SEED = 20261121
+_QUANTILE = 0.9
+
+
+def inflation_of(
+    data: TrainingData,
+    candidates: Sequence[Candidate],
+    chosen: Sequence[int],
+    noise: NoiseModel,
+    white: Evidence,
+) -> float:
+    """By how much shifted columns of local candidates exceed χ², at least 1.
+
+    The residual is that of the model with the `chosen` candidates.
+    """
+    found = placebo_gains(data, candidates, chosen, noise, white)
+    if len(found) < 20:
+        return 1.0
+    excess = np.quantile(found, _QUANTILE) / chi2.ppf(_QUANTILE, 1)
+    return float(max(1.0, excess))
+
+
+def placebo_gains(
+    data: TrainingData,
+    candidates: Sequence[Candidate],
+    chosen: Sequence[int],
+    noise: NoiseModel,
+    white: Evidence,
+) -> Array:
+    """χ² of every shifted column of a local candidate, given the model with those `chosen`."""
+    rng = np.random.default_rng(_SEED)
+    at = white.columns(chosen)
+    factor = white.factor(chosen)
+    gains = []
+    residuals = data.residuals(candidates, chosen, white.solve(chosen))
+    for joint in range(data.n):
+        local = [c for c in candidates if c.rows == (joint,) and c.width == 1]
+        if not local:
+            continue
+        own = [
+            np.concatenate(
+                [
+                    data.declared[part][:, joint],
+                    *(_row(candidates[i], part, joint, len(tau)) for i in chosen),
+                ],
+                axis=1,
+            )
+            for part, tau in enumerate(data.tau)
+        ]
+        for _ in range(_SHIFTS):
+            cross = np.zeros((len(at), len(local)))
+            square, product = np.zeros(len(local)), np.zeros(len(local))
+            for part, run in enumerate(data.runs):
+                columns = np.stack([c.columns[part][:, 0, 0] for c in local], axis=1)
+                shift = int(rng.integers(len(columns) // 4, max(3 * len(columns) // 4, 2)))
+                clean = noise.clean(run.usable[:, joint])
+                moved = noise.whitened(np.roll(columns, shift, axis=0), joint)[clean]
+                rest = noise.whitened(residuals[part][:, joint, None], joint)[clean, 0]
+                cross += noise.whitened(own[part], joint)[clean].T @ moved
+                square += np.sum(moved**2, axis=0)
+                product += rest @ moved
+            cross /= white.norms[at][:, None]
+            left = square - np.einsum("ik,ik->k", cross, cho_solve(factor, cross))
+            good = left > 1e-2 * square
+            gains += list(product[good] ** 2 / left[good])
+    return np.array(gains)
+
+
+def _row(candidate: Candidate, part: int, joint: int, samples: int) -> Array:
+    """Columns (M, p) of a candidate in one joint's row."""
+    if joint not in candidate.rows:
+        return np.zeros((samples, candidate.width))
+    return candidate.columns[part][:, candidate.rows.index(joint)]

@@ -1,0 +1,100 @@
+"""The way from the declared model to the diagnosis, told one effect at a time."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from excite_cli.diagnosis.candidates import record_of
+from excite_cli.diagnosis.result import Round, Suspect
+from excite_cli.diagnosis.tracing import Traced
+from excite_cli.robot.model import Array
+
+_SUSPECTS = 5
+
+
+def rounds_of(traced: Traced, joint_names: Sequence[str]) -> tuple[Round, ...]:
+    """Rounds in the order of what each effect saves; the last one finds nothing more."""
+    search = traced.search
+    chosen: list[int] = []
+    found: list[Round] = []
+    left = set(traced.chosen)
+    while True:
+        residual = _residual(traced, chosen)
+        schur = search.white.schur(chosen)
+        best: int | None = None
+        if left:
+            best = max(left, key=lambda i: schur.singles[i].chi2 - search.price(i, 1))
+        suspects = _suspects(traced, chosen, best, joint_names)
+        verdict = "nothing more" if best is None else _words(traced, best, joint_names)
+        found.append(
+            Round(
+                len(found) + 1,
+                dict(zip(joint_names, map(float, residual), strict=True)),
+                suspects,
+                verdict,
+            )
+        )
+        if best is None:
+            return tuple(found)
+        chosen.append(best)
+        left.discard(best)
+
+
+def _words(traced: Traced, i: int, joint_names: Sequence[str]) -> str:
+    effect = traced.candidates[i].effect
+    where = ", ".join(joint_names[j] for j in effect.joints)
+    if len(effect.joints) == len(joint_names) > 2:
+        where = "all joints"
+    return f"{effect.kind} on {where}"
+
+
+def _residual(traced: Traced, chosen: Sequence[int]) -> Array:
+    """RMS (n,) [N·m] of what the model with the chosen effects leaves of the training torque."""
+    x = traced.search.plain.solve(chosen)
+    left = traced.data.residuals(traced.candidates, chosen, x)
+    usable = np.concatenate([run.usable for run in traced.data.runs])
+    squares = np.where(usable, np.concatenate(left) ** 2, 0.0).sum(axis=0)
+    return np.asarray(np.sqrt(squares / np.maximum(usable.sum(axis=0), 1)))
+
+
+def _suspects(
+    traced: Traced, chosen: list[int], accepted: int | None, joint_names: Sequence[str]
+) -> tuple[Suspect, ...]:
+    """The strongest candidates of a round, one per kind and place, the accepted one first."""
+    search = traced.search
+    schur = search.white.schur(chosen)
+    taken = {traced.candidates[i].place for i in chosen}
+    ranked = sorted(
+        (i for i, c in enumerate(traced.candidates) if c.place not in taken),
+        key=lambda i: search.price(i, schur.singles[i].dof) - schur.singles[i].chi2,
+    )
+    order = ([accepted] if accepted is not None else []) + [i for i in ranked if i != accepted]
+    found: list[Suspect] = []
+    places: set = set()
+    for i in order:
+        candidate = traced.candidates[i]
+        if candidate.place in places:
+            continue
+        places.add(candidate.place)
+        gain = schur.singles[i]
+        p = search.p_value(i, gain)
+        left_out = search.left_out_gain(chosen, [i])
+        joints = list(candidate.rows)
+        before = search.plain.energy_on(chosen, joints)
+        share = 1.0 - search.plain.energy_on([*chosen, i], joints) / max(before, 1e-300)
+        if i == accepted:
+            verdict = "accepted"
+        elif p > search.rules.significance:
+            verdict = "not significant"
+        elif left_out < search.rules.gain:
+            verdict = "no gain on runs left out"
+        elif not search.allowed(search.plain.solve([*chosen, i]), [*chosen, i], [i]):
+            verdict = "impossible sign"
+        elif i in traced.chosen:
+            verdict = "later"
+        else:
+            verdict = "another explains it"
+        found.append(Suspect(record_of(candidate.effect, joint_names), p, share, left_out, verdict))
+        if len(found) == _SUSPECTS:
+            break
+    return tuple(found)

@@ -1,0 +1,375 @@
+"""Which effects are missing: a local search over sets of candidates.
+
+J(S) = residual energy (whitened) + Σ price(c). The price of a candidate is the χ² value that one of
+all the tests made would exceed by chance in a share α of diagnoses (Bonferroni), plus a little for
+unusual kinds: so a step downhill is a test with family-wise control. Steps: add a candidate, add
+two of one joint at once (two effects may hide each other), replace one, drop one. An addition must
+also lower the error on runs left out. Coherent effects compete with local ones on all rows at once:
+one parameter that explains many joints wins over many that explain one each.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import chi2
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.evidence import Evidence, Gain, Schur
+from excite_cli.robot.model import Array
+
+# Surprise at an effect of this kind (χ² units), where two explain the data about as well.
+UNUSUAL = {
+    "viscous_friction": 0.0,
+    "coulomb_friction": 0.0,
+    "torque_offset": 1.0,
+    "load_dependent_friction": 1.0,
+    "armature": 1.0,
+    "spring": 1.0,
+    "coupled_friction": 3.0,
+    "nonlinear_viscous_friction": 2.0,
+    "asymmetric_friction": 4.0,
+    "stribeck_friction": 2.0,
+}
+_UNUSUAL_DEFAULT = 4.0
+# The order in which kinds are asked for: what every robot has, what many have, the rest. A later
+# kind may still replace an earlier one.
+_FIRST_TIER = ("viscous_friction", "coulomb_friction")
+_LAST_TIER = (
+    "ripple", "contact", "friction_drift", "cable_force", "elasticity", "backlash",
+    "torque_saturation", "asymmetric_friction",
+)  # fmt: skip
+# First-order friction comes first: what refines it is only asked for once it is in.
+FIRST = {
+    "nonlinear_viscous_friction": ("viscous_friction", "coulomb_friction"),
+    "stribeck_friction": ("viscous_friction", "coulomb_friction"),
+    "friction_drift": ("viscous_friction", "coulomb_friction"),
+    "coupled_friction": ("viscous_friction", "coulomb_friction"),
+    "asymmetric_friction": ("coulomb_friction", "torque_offset"),
+    "load_dependent_friction": ("coulomb_friction",),
+}
+# It stays in beside its refinement unless it is useless there (χ² units).
+_PARENT_PRICE = 4.5
+_MOST_STEPS = 80
+_TRIED = 12  # best candidates whose gain on runs left out is looked at in a step
+_PAIRED = 14  # candidates of one joint that are tried in pairs
+
+
+@dataclass(frozen=True)
+class Rules:
+    """α of the family, least gain (RMS) on runs left out, inflation of χ²."""
+
+    significance: float
+    gain: float
+    inflation: float = 1.0
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A candidate's evidence in a step: χ², p-value corrected for the family, gain left out."""
+
+    candidate: int
+    chi2: float
+    dof: int
+    p_value: float
+    gain: float
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step: what was added (and dropped), and the suspects that were looked at."""
+
+    added: tuple[int, ...]
+    dropped: tuple[int, ...]
+    suspects: tuple[Judged, ...]
+    before: tuple[int, ...]
+    after: tuple[int, ...]
+
+
+@dataclass
+class Search:
+    """A search on whitened evidence; `plain` is the same data with independent samples.
+
+    `allowed(chosen, added)` may veto a set, for instance for friction that would be negative.
+    """
+
+    white: Evidence
+    plain: Evidence
+    candidates: Sequence[Candidate]
+    rules: Rules
+    allowed: Callable[[Array, Sequence[int], Sequence[int]], bool]
+    steps: list[Step] = field(default_factory=list)
+    _thresholds: dict[tuple[int, int], float] = field(default_factory=dict)
+    _most: int = _MOST_STEPS
+
+    def __post_init__(self) -> None:
+        """Look up who refines whom."""
+        at = {(c.effect.kind, c.effect.joints): i for i, c in enumerate(self.candidates)}
+        self.parents = [
+            tuple(
+                at[kind, (joint,)]
+                for kind in FIRST.get(c.effect.kind, ())
+                for joint in c.effect.joints
+                if (kind, (joint,)) in at
+            )
+            for c in self.candidates
+        ]
+
+    def price(self, candidate: int, dof: int) -> float:
+        """χ² that `candidate` must save."""
+        c = self.candidates[candidate]
+        unusual = UNUSUAL.get(c.effect.kind, _UNUSUAL_DEFAULT)
+        key = (max(dof, 1), c.tests)
+        if key not in self._thresholds:
+            self._thresholds[key] = float(chi2.isf(self.rules.significance / c.tests, key[0]))
+        return self.rules.inflation * (self._thresholds[key] + unusual)
+
+    def _prices(self, chosen: Sequence[int]) -> float:
+        """Price of a set: parents of members are cheap."""
+        cheap = {p for i in chosen for p in self.parents[i]}
+        return sum(
+            self.rules.inflation * _PARENT_PRICE
+            if i in cheap
+            else self.price(i, self.candidates[i].width)
+            for i in chosen
+        )
+
+    def _bound(self, candidate: int, chosen: Sequence[int]) -> bool:
+        """Whether it must stay: √|v| beside no Coulomb and viscous friction is no physics."""
+        return any(
+            candidate in self.parents[k] and self.candidates[k].effect.shape.get("power") == 0.5
+            for k in chosen
+        )
+
+    def cost(self, chosen: Sequence[int]) -> float:
+        """J(S)."""
+        return self.white.energy(chosen) + self._prices(chosen)
+
+    def _in_order(self, schur: Schur, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """Whether the first-order friction that `added` refines is in, or has nothing to add."""
+        for i in added:
+            for parent in self.parents[i]:
+                if parent in chosen or parent in added:
+                    continue
+                gain = schur.singles[parent]
+                if gain.chi2 > self.price(parent, gain.dof) and self.allowed(
+                    self.plain.solve([*chosen, parent]), [*chosen, parent], [parent]
+                ):
+                    return False
+        return True
+
+    def without(self, member: int, chosen: Sequence[int]) -> list[int]:
+        """The set without `member` and what refines it: first-order friction is judged alone."""
+        return [k for k in chosen if k != member and member not in self.parents[k]]
+
+    def p_value(self, candidate: int, gain: Gain) -> float:
+        """Corrected for the number of tests and the inflation."""
+        if gain.dof == 0:
+            return 1.0
+        single = chi2.sf(gain.chi2 / self.rules.inflation, gain.dof)
+        return float(min(1.0, self.candidates[candidate].tests * single))
+
+    def left_out_gain(self, chosen: Sequence[int], added: Sequence[int]) -> float:
+        """Share by which the RMS error on runs left out falls, on the rows that `added` touches.
+
+        The better of filtered torque and whitened torque: an effect near the noise shows in the
+        second only.
+        """
+        joints = sorted({j for i in added for j in self.white.rows_of[i]})
+        best = -np.inf
+        for evidence in (self.plain, self.white):
+            before = evidence.left_out(chosen, joints).sum()
+            after = evidence.left_out([*chosen, *added], joints).sum()
+            best = max(best, 1.0 - float(np.sqrt(after / max(before, 1e-300))))
+        return best
+
+    def run(self, most: int = _MOST_STEPS) -> list[int]:
+        """Search from the declared model until no step lowers J, or `most` effects are in."""
+        chosen: list[int] = []
+        self._most = most
+        for _ in range(_MOST_STEPS):
+            before = set(chosen)
+            for tier in (1, 2, 3):
+                chosen = self._forward(chosen, tier)
+            chosen = self._polish(chosen)
+            if set(chosen) == before:
+                break
+        return self._pruned(chosen)
+
+    def tier(self, candidate: int) -> int:
+        """When its kind is asked for."""
+        kind = self.candidates[candidate].effect.kind
+        return 1 if kind in _FIRST_TIER else 3 if kind in _LAST_TIER else 2
+
+    def _forward(self, chosen: list[int], tier: int) -> list[int]:
+        """Add candidates up to `tier` while one (or two of a joint) passes."""
+        refused: set[tuple[int, ...]] = set()
+        while len(chosen) < self._most:
+            step = self._add(chosen, tier, refused) or self._add_pair(chosen, tier, refused)
+            if step is None:
+                break
+            chosen = list(step.after)
+        return chosen
+
+    def _free(self, chosen: Sequence[int], tier: int = 3) -> list[int]:
+        """Candidates up to `tier` whose place is not taken."""
+        taken = {self.candidates[i].place for i in chosen}
+        return [
+            i
+            for i, c in enumerate(self.candidates)
+            if c.place not in taken and self.tier(i) <= tier
+        ]
+
+    def _add(self, chosen: list[int], tier: int, refused: set[tuple[int, ...]]) -> Step | None:
+        schur = self.white.schur(chosen)
+        free = self._free(chosen, tier)
+        gains = {i: schur.singles[i] for i in free}
+        ranked = sorted(
+            (i for i in free if gains[i].dof),
+            key=lambda i: self.price(i, gains[i].dof) - gains[i].chi2,
+        )
+        suspects: list[Judged] = []
+        for i in ranked[:_TRIED]:
+            gain = gains[i]
+            saved = gain.chi2 - self.price(i, gain.dof)
+            if saved <= 0:
+                if len(suspects) < 5:
+                    suspects.append(self._judged(chosen, i, gain, "not significant"))
+                continue
+            if (i,) in refused or not self._in_order(schur, chosen, [i]):
+                continue
+            verdict = self._verdict(chosen, [i])
+            suspects.append(self._judged(chosen, i, gain, verdict))
+            if verdict == "accepted":
+                after = (*chosen, i)
+                step = Step((i,), (), tuple(suspects), tuple(chosen), after)
+                self.steps.append(step)
+                return step
+        return None
+
+    def _verdict(self, chosen: Sequence[int], added: Sequence[int]) -> str:
+        together = [*chosen, *added]
+        parameters = self.plain.solve(together)
+        if not self.allowed(parameters, together, added):
+            return "impossible sign"
+        if self.left_out_gain(chosen, added) < self.rules.gain:
+            return "no gain on runs left out"
+        return "accepted"
+
+    def _judged(self, chosen: Sequence[int], i: int, gain: Gain, verdict: str) -> Judged:
+        left_out = self.left_out_gain(chosen, [i])
+        return Judged(i, gain.chi2, gain.dof, self.p_value(i, gain), left_out, verdict)
+
+    def _add_pair(self, chosen: list[int], tier: int, refused: set[tuple[int, ...]]) -> Step | None:
+        """Two of one joint at once, where none passes alone."""
+        schur = self.white.schur(chosen)
+        ranked = sorted(self._pairs(schur, self._free(chosen, tier)), key=lambda found: -found[0])
+        for saved, pair in ranked[:_TRIED]:
+            if saved <= 0:
+                return None
+            if pair in refused or not self._in_order(schur, chosen, pair):
+                continue
+            if self._verdict(chosen, pair) != "accepted":
+                refused.add(pair)
+                continue
+            judged = tuple(
+                self._judged(chosen, i, schur.singles[i], "accepted together") for i in pair
+            )
+            step = Step(pair, (), judged, tuple(chosen), (*chosen, *pair))
+            self.steps.append(step)
+            return step
+        return None
+
+    def _pairs(self, schur: Schur, free: Sequence[int]) -> list[tuple[float, tuple[int, int]]]:
+        """What promising pairs of local candidates of one joint, of different kinds, save."""
+        found = []
+        local = [
+            i for i in free if len(self.candidates[i].rows) == 1 and self.candidates[i].width == 1
+        ]
+        for rows in {self.candidates[i].rows for i in local}:
+            own = [i for i in local if self.candidates[i].rows == rows and schur.singles[i].dof]
+            own.sort(key=lambda i: -schur.singles[i].chi2)
+            own = own[:_PAIRED]
+            pairs = [
+                (a, b)
+                for k, a in enumerate(own)
+                for b in own[k + 1 :]
+                if self.candidates[a].effect.kind != self.candidates[b].effect.kind
+            ]
+            if not pairs:
+                continue
+            chi2s = schur.pair_chi2(*np.array(pairs).T)
+            found += [
+                (float(value) - self.price(a, 1) - self.price(b, 1), (a, b))
+                for value, (a, b) in zip(chi2s, pairs, strict=True)
+            ]
+        return found
+
+    def _polish(self, chosen: list[int]) -> list[int]:
+        """Drop or replace (by one, or by two of the same joint) while J falls."""
+        for _ in range(2 * len(chosen) + 4):
+            better = self._best_replacement(chosen)
+            if better is None:
+                return chosen
+            self.steps.append(
+                Step(
+                    tuple(i for i in better if i not in chosen),
+                    tuple(i for i in chosen if i not in better),
+                    (), tuple(chosen), tuple(better),
+                )
+            )  # fmt: skip
+            chosen = better
+        return chosen
+
+    def _best_replacement(self, chosen: list[int]) -> list[int] | None:
+        """The set with the lowest J that differs in one member."""
+        best, found = self.cost(chosen) - 1e-6, None
+        for i in chosen:
+            if self._bound(i, chosen):
+                continue
+            rest = [k for k in chosen if k != i]
+            schur = self.white.schur(rest)
+            base = self.cost(rest)
+            if base < best:
+                best, found = base, rest
+            rows = set(self.candidates[i].rows)
+            near = [k for k in self._free(rest) if rows & set(self.candidates[k].rows)]
+            moves: list[tuple[float, tuple[int, ...]]] = []
+            for k in near:
+                gain = schur.singles[k]
+                if k != i and gain.dof:
+                    moves.append((gain.chi2 - self.price(k, gain.dof), (k,)))
+            moves += self._pairs(schur, near)
+            for saved, move in sorted(moves, key=lambda each: -each[0])[:_TRIED]:
+                if base - saved >= best:
+                    break
+                trial = [*rest, *move]
+                cost = self.cost(trial)  # parents are cheaper than `saved` says
+                if (
+                    cost < best
+                    and self._in_order(schur, rest, move)
+                    and self.allowed(self.plain.solve(trial), trial, move)
+                ):
+                    best, found = cost, trial
+        return found
+
+    def _pruned(self, chosen: list[int]) -> list[int]:
+        """Without those that, with all others in, are not significant or bring nothing."""
+        while True:
+            weakest = None
+            for i in chosen:
+                rest = [k for k in chosen if k != i]
+                gain = self.white.schur(rest).gain(i)
+                if any(i in self.parents[k] for k in rest):
+                    continue
+                bad = (
+                    self.p_value(i, gain) > self.rules.significance
+                    or self.left_out_gain(rest, [i]) < self.rules.gain
+                    or not self.allowed(self.plain.solve(chosen), chosen, [i])
+                )
+                if bad and (weakest is None or gain.chi2 < weakest[0]):
+                    weakest = (gain.chi2, rest)
+            if weakest is None:
+                return chosen
+            chosen = weakest[1]

@@ -1,0 +1,87 @@
+"""The training data of a diagnosis: motion, inertial columns and torque of every part."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.evidence import Evidence
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.identification.prepare import PreparedRun
+from excite_cli.robot.model import Array
+
+
+@dataclass(frozen=True)
+class KeptInertias:
+    """Inertias kept at the URDF's: mean φ₀ (P,) and precision (P,) of the standard parameters."""
+
+    mean: Array
+    precision: Array
+
+
+@dataclass(frozen=True)
+class TrainingData:
+    """Parts of runs with the columns of the declared model.
+
+    `declared[i]` (M_i, n, k): inertial columns, then those of the declared effects. `folds` says
+    which parts are left out together. With a `prior`, `tau` is what the URDF's inertias leave.
+    """
+
+    runs: tuple[PreparedRun, ...]
+    folds: tuple[int, ...]
+    declared: tuple[Array, ...]
+    tau: tuple[Array, ...]
+    prior_precision: Array | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.tau[0].shape[1])
+
+    def evidence(self, candidates: Sequence[Candidate], noise: NoiseModel) -> Evidence:
+        """Gram matrices of all columns, whitened by `noise`; linear in the number of samples."""
+        fixed = self.declared[0].shape[2]
+        starts = fixed + np.cumsum([0, *(c.width for c in candidates)])
+        blocks = [np.arange(starts[i], starts[i + 1]) for i in range(len(candidates))]
+        size = int(starts[-1]) + 1
+        grams = np.zeros((max(self.folds) + 1, self.n, size, size))
+        for joint in range(self.n):
+            touching = [i for i, c in enumerate(candidates) if joint in c.rows]
+            active = np.concatenate(
+                [np.arange(fixed), *(blocks[i] for i in touching), [size - 1]]
+            ).astype(np.intp)
+            for part, fold in enumerate(self.folds):
+                x = np.concatenate(
+                    [
+                        self.declared[part][:, joint],
+                        *(
+                            candidates[i].columns[part][:, candidates[i].rows.index(joint)]
+                            for i in touching
+                        ),
+                        self.tau[part][:, joint, None],
+                    ],
+                    axis=1,
+                )
+                clean = noise.clean(self.runs[part].usable[:, joint])
+                white = noise.whitened(x, joint)[clean]
+                grams[fold, joint][np.ix_(active, active)] += white.T @ white
+        rows_of = [c.rows for c in candidates]
+        return Evidence(grams, fixed, blocks, rows_of, self.prior_precision)
+
+    def residuals(
+        self, candidates: Sequence[Candidate], chosen: Sequence[int], parameters: Array
+    ) -> list[Array]:
+        """τ − model (M, n) of every part."""
+        found = []
+        fixed = self.declared[0].shape[2]
+        for part, tau in enumerate(self.tau):
+            residual = tau - self.declared[part] @ parameters[:fixed]
+            at = fixed
+            for i in chosen:
+                candidate = candidates[i]
+                values = parameters[at : at + candidate.width]
+                residual[:, list(candidate.rows)] -= candidate.columns[part] @ values
+                at += candidate.width
+            found.append(residual)
+        return found

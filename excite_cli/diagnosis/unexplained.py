@@ -1,0 +1,179 @@
+"""What is still structured and fits no name: on what does it depend?
+
+Smooth functions of one quantity at a time are tested like any candidate: position, speed,
+direction, acceleration and load of every joint, and time.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+from scipy.stats import chi2
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.evidence import Evidence
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.result import Unexplained
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.effects.base import Effect, Parameter, Signals
+from excite_cli.robot.model import Array
+
+_MOST_NAMED = 3
+_LEAST_SHARE = 0.02
+
+
+@dataclass(frozen=True)
+class Dependence(Effect):
+    """A smooth function of one quantity, with free coefficients; not an effect with a name."""
+
+    kind: ClassVar = "dependence"
+    title: ClassVar = "dependence"
+    signature: ClassVar = ""
+    parameters: ClassVar = (Parameter("c", "N·m", 0.0, 1.0),)
+    quantity: str = ""
+
+    def columns(self, signals: Signals) -> Array:
+        """Not used: the columns are made for all quantities at once."""
+        raise NotImplementedError
+
+
+def unexplained_structure(
+    data: TrainingData,
+    candidates: Sequence[Candidate],
+    chosen: Sequence[int],
+    signals: Sequence[Signals],
+    noise: NoiseModel,
+    rules: tuple[float, float, float],
+    joint_names: Sequence[str],
+) -> list[Unexplained]:
+    """Joints whose residual depends on something, and on what.
+
+    `rules` are α of the family, least gain on runs left out, and inflation of χ².
+    """
+    significance, least_gain, inflation = rules
+    kept = [candidates[i] for i in chosen]
+    found = []
+    for joint in range(data.n):
+        names, columns = _quantities(data, signals, joint, joint_names)
+        features = [
+            Feature(Dependence((joint,), quantity=name), (joint,), blocks)
+            for name, blocks in zip(names, columns, strict=True)
+        ]
+        pool: list[Candidate] = [*kept, *features]
+        white = data.evidence(pool, noise)
+        plain = data.evidence(pool, NoiseModel.white(np.ones(data.n)))
+        base = list(range(len(kept)))
+        named: list[int] = []
+        tests = len(features) * data.n
+        while len(named) < _MOST_NAMED:
+            best = _best(white, plain, [*base, *named], len(kept), joint, tests,
+                         significance, least_gain, inflation)  # fmt: skip
+            if best is None:
+                break
+            named.append(best)
+        if not named:
+            continue
+        before = plain.energy_on(base, [joint])
+        share = 1.0 - plain.energy_on([*base, *named], [joint]) / max(before, 1e-300)
+        if share >= _LEAST_SHARE:
+            found.append(
+                Unexplained(
+                    joint_names[joint], tuple(names[i - len(kept)] for i in named), float(share)
+                )
+            )
+    return found
+
+
+@dataclass(frozen=True)
+class Feature(Candidate):
+    """Columns of a dependence; their number is that of the columns themselves."""
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return int(self.columns[0].shape[2])
+
+
+def _best(
+    white: Evidence,
+    plain: Evidence,
+    chosen: list[int],
+    first: int,
+    joint: int,
+    tests: int,
+    significance: float,
+    least_gain: float,
+    inflation: float,
+) -> int | None:
+    schur = white.schur(chosen)
+    best: tuple[float, int] | None = None
+    for i in range(first, len(white.blocks)):
+        if i in chosen:
+            continue
+        gain = schur.gain(i)
+        if gain.dof == 0:
+            continue
+        p = float(tests * chi2.sf(gain.chi2 / inflation, gain.dof))
+        if p > significance:
+            continue
+        after = plain.left_out([*chosen, i], [joint]).sum()
+        before = plain.left_out(chosen, [joint]).sum()
+        if 1.0 - np.sqrt(after / max(before, 1e-300)) < least_gain:
+            continue
+        score = gain.chi2 / inflation - float(chi2.isf(significance / tests, gain.dof))
+        if best is None or score > best[0]:
+            best = (score, i)
+    return None if best is None else best[1]
+
+
+def _quantities(
+    data: TrainingData, signals: Sequence[Signals], joint: int, joint_names: Sequence[str]
+) -> tuple[list[str], list[tuple[Array, ...]]]:
+    """Names of quantities and their columns (M, 1, p) per part."""
+    names = ["time"]
+    longest = float(max(x.t[-1] for x in signals))
+    made: list[Callable[[Signals], Array]] = [lambda s: _powers(s.t, longest)]
+    for k, name in enumerate(joint_names):
+        fastest = max(float(np.abs(s.v[:, k]).max()) for s in signals) + 1e-12
+        strongest = max(float(np.abs(s.a[:, k]).max()) for s in signals) + 1e-12
+        made.append(partial(_of_position, k))
+        names.append(f"q[{name}]")
+        made.append(partial(_of_speed, k, fastest))
+        names.append(f"v[{name}]")
+        made.append(partial(_of_acceleration, k, strongest))
+        names.append(f"a[{name}]")
+    heaviest = max(float(np.abs(s.load[:, joint]).max()) for s in signals) + 1e-12
+    made.append(lambda s: _odd_even(s.load[:, joint] / heaviest)[:, :3])
+    names.append(f"load[{joint_names[joint]}]")
+    columns = [
+        tuple(run.averaged(make(s))[:, None] for s, run in zip(signals, data.runs, strict=True))
+        for make in made
+    ]
+    return names, columns
+
+
+def _of_position(k: int, s: Signals) -> Array:
+    return _waves(s.q[:, k])
+
+
+def _of_speed(k: int, scale: float, s: Signals) -> Array:
+    return _odd_even(s.v[:, k] / scale)
+
+
+def _of_acceleration(k: int, scale: float, s: Signals) -> Array:
+    return _odd_even(s.a[:, k] / scale)[:, :3]
+
+
+def _powers(t: Array, longest: float) -> Array:
+    x = t / max(longest, 1e-12)
+    return np.stack([x, x**2, x**3], axis=1)
+
+
+def _waves(q: Array) -> Array:
+    return np.stack([f(k * q) for k in (1, 2, 3) for f in (np.sin, np.cos)], axis=1)
+
+
+def _odd_even(x: Array) -> Array:
+    return np.stack([x, np.abs(x), x * np.abs(x), np.tanh(20 * x), x**3], axis=1)

@@ -1,0 +1,30 @@
+"""Inertia of motor and gear, turning with the joint: τ_j = I_a a_j.
+
+On joints that turn about one fixed direction it cannot be told from the link's own inertia.
+"""
+
+from typing import ClassVar
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.robot.model import Array
+
+
+class Armature(Effect):
+    """τ_j = I_a a_j, I_a ≥ 0."""
+
+    kind: ClassVar = "armature"
+    title: ClassVar = "inertia of the motor (armature)"
+    signature: ClassVar = "the residual is a straight line through zero over the acceleration"
+    parameters: ClassVar = (Parameter("inertia", "kg·m²", 0.01, 30.0, nonnegative=True),)
+
+    def columns(self, signals: Signals) -> Array:
+        """a_j, (T, 1, 1)."""
+        return signals.a[:, list(self.joints), None]
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂a_j = weight."""
+        return Cotangents(a=signals.only(self.joints[0], weights[:, 0, 0]))
+
+    def mjcf(self, values: Array) -> dict[str, float]:
+        """`armature`."""
+        return {"armature": float(values[0])}

@@ -1,0 +1,54 @@
+"""A base that does not stand as the model says: gravity comes from another direction.
+
+With the base turned by small angles δ about the axes of the world, gravity in the model's frame
+becomes R(δ)ᵀ g ≈ g − δ × g, and the torque, linear in gravity, changes by G (−δ × g) with G the
+torque per unit of gravity along each axis. Turning about gravity itself changes nothing, so there
+are two angles: roll about x and pitch about y where gravity is along z. On a robot whose gravity
+lies along another axis, roll and pitch are about the other two, in the order x, y, z.
+"""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.rigid_body import RigidBody
+
+
+class BaseTilt(Effect):
+    """The base is turned by roll about world x and pitch about world y; shows in all rows."""
+
+    kind: ClassVar = "base_tilt"
+    title: ClassVar = "tilted base"
+    signature: ClassVar = "residuals on many joints that depend on the posture like gravity does"
+    scope: ClassVar[Scope] = "robot"
+    parameters: ClassVar = (
+        Parameter("roll", "rad", 1e-3, 0.2),
+        Parameter("pitch", "rad", 1e-3, 0.2),
+    )
+
+    def columns(self, signals: Signals) -> Array:
+        """G (−axis × g) for both axes, (T, n, 2)."""
+        return signals.body.gravity_axes @ _changes(signals.body.robot).T
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """The derivative of gravity's torque by position, gravity being −axis × g."""
+        back = np.zeros_like(signals.q)
+        still, robot = np.zeros_like(signals.q), signals.body.robot
+        for p, change in enumerate(_changes(robot)):
+            model = robot.model.copy()
+            model.gravity.linear = change
+            turned = RigidBody(
+                replace(robot, model=model), signals.body.phi, signals.q, still, still
+            )
+            back += np.einsum("tr,trk->tk", weights[:, :, p], turned.by_position)
+        return Cotangents(q=back)
+
+
+def _changes(robot: Robot) -> Array:
+    """Change of gravity (2, 3) per radian of roll and of pitch."""
+    gravity = np.array(robot.model.gravity.linear, dtype=float)
+    axes = np.delete(np.eye(3), int(np.argmax(np.abs(gravity))), axis=0)
+    return -np.cross(axes, gravity)

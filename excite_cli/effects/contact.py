@@ -1,0 +1,116 @@
+"""A touch: an external force f at the tip during a window of time in one run.
+
+The motors must add −Jᵀ f, with J the linear Jacobian of the last moved joint's frame in axes of the
+world. The parameters are the force on the robot.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.effects.base import Effect, Parameter, Scope, Signals
+from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.rigid_body import RigidBody
+
+_CELLS = 96  # per run, for the search of the window
+_LONGEST = 0.5  # of the run; what lasts longer is no touch
+
+
+class Contact(Effect):
+    """A force (fx, fy, fz) on the tip from `start` to `end`, in axes of the world; all rows."""
+
+    kind: ClassVar = "contact"
+    title: ClassVar = "contact with the surroundings"
+    signature: ClassVar = "residuals on many joints that appear at one instant and go at another"
+    scope: ClassVar[Scope] = "robot"
+    parameters: ClassVar = (
+        Parameter("fx", "N", 1.0, 300.0),
+        Parameter("fy", "N", 1.0, 300.0),
+        Parameter("fz", "N", 1.0, 300.0),
+    )
+    shapes: ClassVar = (Parameter("start", "s", 0.0, 1e4), Parameter("end", "s", 0.0, 1e4))
+    defaults: ClassVar[Mapping[str, float]] = {"start": 1.0, "end": 2.0}
+    per_run: ClassVar = True
+    excitable: ClassVar = False
+    why_not_excitable: ClassVar = "a touch happens in one run; the next motion does not repeat it"
+
+    @classmethod
+    def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
+        """Windows of 1/2, 1/4, 1/8 and 1/16 of each run, each half over the one before."""
+        return [
+            {"start": float(s.t[0] + i / parts / 2 * span), "end": float(s.t[0] + last * span)}
+            for s in signals
+            for span in [float(s.t[-1] - s.t[0])]
+            for parts in (2, 4, 8, 16)
+            for i in range(2 * parts - 1)
+            for last in [(i + 2) / parts / 2]
+        ]
+
+    @classmethod
+    def tuned(
+        cls,
+        robot: Robot,
+        joints: tuple[int, ...],
+        signals: Sequence[Signals],
+        residuals: Sequence[Array],
+    ) -> list[dict]:
+        """The window of each run in which a constant force explains most of the residual."""
+        found = [_window(s, np.asarray(r)) for s, r in zip(signals, residuals, strict=True)]
+        best = sorted((each for each in found if each is not None), key=lambda each: -each[0])
+        return [{"start": start, "end": end} for _, start, end in best]
+
+    def columns(self, signals: Signals) -> Array:
+        """−Jᵀ within the window, else zero, (T, n, 3)."""
+        inside = (signals.t >= self.shape["start"]) & (signals.t <= self.shape["end"])
+        columns = np.zeros((*signals.q.shape, 3))
+        if inside.any():
+            columns[inside] = _columns(signals, inside)
+        return columns
+
+
+def _columns(signals: Signals, at: NDArray[np.bool_] | slice) -> Array:
+    body = signals.body
+    part = RigidBody(body.robot, body.phi, signals.q[at], signals.v[at], signals.a[at])
+    return -np.swapaxes(part.tip_jacobian()[:, :3], 1, 2)
+
+
+def _window(signals: Signals, residual: Array) -> tuple[float, float, float] | None:
+    """Energy explained, start and end of the best window, all pairs of two grids."""
+    count = len(signals.t)
+    if count < 16:
+        return None
+    # Rows count by their own noise, so that a large joint does not drown a wrist.
+    scale = np.median(np.abs(residual - np.median(residual, axis=0)), axis=0)
+    scale = np.maximum(scale, 1e-6 * np.abs(residual).max() + 1e-12)
+    columns, r = _columns(signals, slice(None)) / scale[:, None], residual / scale
+    gram = _sums(np.einsum("tri,trj->tij", columns, columns))
+    moment = _sums(np.einsum("tri,tr->ti", columns, r))
+    edges = np.unique(np.linspace(0, count, min(_CELLS, count) + 1).astype(int))
+    _, start, end = _best(gram, moment, edges, edges)
+    near = int(np.ceil(count / _CELLS))
+    around = [
+        np.unique(np.clip(np.linspace(at - near, at + near, 33).astype(int), 0, count))
+        for at in (start, end)
+    ]
+    energy, start, end = _best(gram, moment, *around)
+    return energy, float(signals.t[start]), float(signals.t[end - 1])
+
+
+def _sums(x: Array) -> Array:
+    return np.concatenate([np.zeros_like(x[:1]), np.cumsum(x, axis=0)])
+
+
+def _best(gram: Array, moment: Array, starts: Array, ends: Array) -> tuple[float, int, int]:
+    """The window [start, end) with the largest bᵀ A⁻¹ b, at most half of the run."""
+    first, last = (x.ravel() for x in np.meshgrid(starts, ends, indexing="ij"))
+    length = last - first
+    fits = (length >= 2) & (length <= _LONGEST * (len(gram) - 1))
+    first, last = first[fits], last[fits]
+    a, b = gram[last] - gram[first], moment[last] - moment[first]
+    ridge = 1e-9 * np.einsum("kii->k", gram[-1:])[0] / len(gram)
+    a = a + (ridge + 1e-300) * np.eye(3)
+    energy = np.einsum("ki,ki->k", b, np.linalg.solve(a, b[:, :, None])[:, :, 0])
+    k = int(np.argmax(energy))
+    return float(energy[k]), int(first[k]), int(last[k])

@@ -1,0 +1,57 @@
+"""Friction between two joints whose gears are coupled, as in the wrists of many arms.
+
+The coupled shaft turns with w = v_j + s v_k, s = ±1. Its friction f_v w + f_c sgn w loads joint j
+as it is and joint k times s:
+
+    τ_j = f_v s v_k + f_c sgn(v_j + s v_k)
+    τ_k = f_v s v_j + f_c s sgn(v_j + s v_k)
+
+The shares f_v v_j of row j and f_v v_k of row k are left to the joints' own viscous friction. With
+s = 1 this is how the Stäubli TX40 is written.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
+from excite_cli.robot.model import Array, Robot
+
+
+class CoupledFriction(Effect):
+    """Friction on v_j + s v_k in the rows of both joints, without their own viscous shares."""
+
+    kind: ClassVar = "coupled_friction"
+    title: ClassVar = "friction of coupled gears"
+    signature: ClassVar = "a joint's residual follows the speed of its neighbour, and the reverse"
+    scope: ClassVar[Scope] = "pair"
+    parameters: ClassVar = (
+        Parameter("viscous", "N·m·s/rad", 0.1, 100.0, nonnegative=True),
+        Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True),
+    )
+    shapes: ClassVar = (Parameter("direction", "1", -1.0, 1.0),)
+    defaults: ClassVar[Mapping[str, float]] = {"direction": 1.0}
+
+    @classmethod
+    def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
+        """The joints turn the shaft the same way, or against each other."""
+        return [{"direction": 1.0}, {"direction": -1.0}]
+
+    def columns(self, signals: Signals) -> Array:
+        """(T, 2, 2): rows j and k, parameters viscous and coulomb."""
+        v, s = signals.v[:, list(self.joints)], self.shape["direction"]
+        sign = smooth_sign(v[:, 0] + s * v[:, 1])
+        viscous = s * v[:, ::-1]
+        coulomb = np.stack([sign, s * sign], axis=-1)
+        return np.stack([viscous, coulomb], axis=-1)
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """Viscous: the other row's weight times s; Coulomb: both through the slope of the sign."""
+        pair, s = list(self.joints), self.shape["direction"]
+        v = signals.v[:, pair]
+        through = (weights[:, 0, 1] + s * weights[:, 1, 1]) * smooth_sign_slope(v @ [1.0, s])
+        back = np.zeros_like(signals.v)
+        back[:, pair] = s * weights[:, ::-1, 0] + through[:, None] * [1.0, s]
+        return Cotangents(v=back)

@@ -1,0 +1,63 @@
+"""A gear that gives way: two inertias with a spring in between, seen from the motor's encoder.
+
+The spring turns by c τ_j, c = 1/K, so the link is at q_j − c τ_j. To first order in c the torque
+of all joints changes by
+
+    −c (∂τ/∂q_j τ_j + ∂τ/∂v_j dτ_j/dt + ∂τ/∂a_j d²τ_j/dt²),     τ the rigid-body torque.
+
+With an encoder at the link nothing of this shows.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Value
+from excite_cli.effects.directional import slope_of_gradient
+from excite_cli.robot.model import Array
+
+
+class Elasticity(Effect):
+    """The gear of one joint turns by compliance · load_j; shows in all rows."""
+
+    kind: ClassVar = "elasticity"
+    title: ClassVar = "elastic gear"
+    signature: ClassVar = "the residual follows the fourth derivative of the motion, on many joints"
+    parameters: ClassVar = (Parameter("compliance", "rad/(N·m)", 1e-6, 1e-3, nonnegative=True),)
+
+    def rows(self, n: int) -> tuple[int, ...]:
+        """All joints."""
+        return tuple(range(n))
+
+    def columns(self, signals: Signals) -> Array:
+        """−(∂τ/∂q_j τ_j + ∂τ/∂v_j dτ_j/dt + ∂τ/∂a_j d²τ_j/dt²), (T, n, 1)."""
+        j, body = self.joints[0], signals.body
+        parts = (body.by_position, body.by_velocity, body.mass)
+        twists = self._twist(signals)[:, :, None, None]
+        return -sum(part[:, :, [j]] * twist for part, twist in zip(parts, twists, strict=True))
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """Through τ_j and its rates, and through the derivatives (`slope_of_gradient`)."""
+        j, body, w = self.joints[0], signals.body, -weights[:, :, 0]
+        d_q, d_v, d_a = (signals.only(j, x) for x in self._twist(signals))
+        gq, gv, ga = slope_of_gradient(body, w, d_q, d_v, d_a)
+        by_q, by_v, by_a = (
+            np.einsum("tr,tr->t", w, part[:, :, j])
+            for part in (body.by_position, body.by_velocity, body.mass)
+        )
+        load = by_q + signals.rate_back(by_v + signals.rate_back(by_a))
+        return Cotangents(q=gq, v=gv, a=ga, load=signals.only(j, load))
+
+    def _twist(self, signals: Signals) -> Array:
+        """τ_j and its first and second rates, (3, T)."""
+        load = signals.load[:, self.joints[0]]
+        rate = signals.rate(load)
+        return np.stack([load, rate, signals.rate(rate)])
+
+    def report(self, values: Array, covariance: Array) -> dict[str, Value]:
+        """Also `stiffness` = 1/compliance, its deviation to first order."""
+        found = super().report(values, covariance)
+        c = found["compliance"]
+        if c.value > 0:
+            found["stiffness"] = Value(1.0 / c.value, c.std / c.value**2, "N·m/rad")
+        return found

@@ -1,0 +1,35 @@
+"""A wrong zero of an encoder: q_true = q_measured + offset.
+
+To first order the torque of all joints changes by offset · ∂τ/∂q_j at the measured position.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.directional import slope_of_gradient
+from excite_cli.robot.model import Array
+
+
+class EncoderOffset(Effect):
+    """q_true = q_measured + offset on one joint; shows in all rows."""
+
+    kind: ClassVar = "encoder_offset"
+    title: ClassVar = "wrong zero of an encoder"
+    signature: ClassVar = "residuals on many joints as if one of them stood elsewhere"
+    parameters: ClassVar = (Parameter("offset", "rad", 1e-3, 0.2),)
+
+    def rows(self, n: int) -> tuple[int, ...]:
+        """All joints."""
+        return tuple(range(n))
+
+    def columns(self, signals: Signals) -> Array:
+        """∂τ/∂q_j, (T, n, 1)."""
+        return signals.body.by_position[:, :, list(self.joints)]
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """Second derivatives of the torque along q_j (`slope_of_gradient`)."""
+        along = signals.only(self.joints[0], np.ones(len(signals.t)))
+        gq, gv, ga = slope_of_gradient(signals.body, weights[:, :, 0], along)
+        return Cotangents(q=gq, v=gv, a=ga)

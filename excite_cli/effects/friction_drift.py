@@ -1,0 +1,35 @@
+"""Friction that changes during a run, as oil and grease warm up: τ_j = t (ċ sgn v_j + ḃ v_j).
+
+t counts from the start of the run, so every run drifts anew. Warming up makes both rates negative.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
+from excite_cli.robot.model import Array
+
+
+class FrictionDrift(Effect):
+    """τ_j = t (coulomb_rate · sgn v_j + viscous_rate · v_j), of either sign."""
+
+    kind: ClassVar = "friction_drift"
+    title: ClassVar = "friction that drifts during a run"
+    signature: ClassVar = "friction is not the same at the end of a run as at its start"
+    parameters: ClassVar = (
+        Parameter("coulomb_rate", "N·m/s", 1e-3, 1.0),
+        Parameter("viscous_rate", "N·m/rad", 1e-3, 1.0),
+    )
+
+    def columns(self, signals: Signals) -> Array:
+        """t sgn v_j and t v_j, (T, 1, 2)."""
+        v = signals.v[:, self.joints[0]]
+        return (signals.t[:, None] * np.stack([smooth_sign(v), v], axis=-1))[:, None]
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂v_j = t (weight₁ · slope of the sign + weight₂)."""
+        j = self.joints[0]
+        slope = weights[:, 0, 0] * smooth_sign_slope(signals.v[:, j]) + weights[:, 0, 1]
+        return Cotangents(v=signals.only(j, signals.t * slope))

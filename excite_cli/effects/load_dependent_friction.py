@@ -1,0 +1,35 @@
+"""Dry friction that grows with what the gear carries: τ_j = μ |load_j| sgn v_j.
+
+`load` is the rigid-body torque of the joint, not the friction itself.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
+from excite_cli.robot.model import Array
+
+
+class LoadDependentFriction(Effect):
+    """τ_j = μ |load_j| sgn v_j, μ ≥ 0."""
+
+    kind: ClassVar = "load_dependent_friction"
+    title: ClassVar = "friction that grows with load"
+    signature: ClassVar = "the jump at a reversal is the larger the more torque the joint carries"
+    parameters: ClassVar = (Parameter("ratio", "N·m/N·m", 0.005, 0.3, nonnegative=True),)
+
+    def columns(self, signals: Signals) -> Array:
+        """|load_j| sgn v_j, (T, 1, 1)."""
+        j = list(self.joints)
+        return (np.abs(signals.load[:, j]) * smooth_sign(signals.v[:, j]))[:, :, None]
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂v_j = weight · |load| · slope of the sign; ∂/∂load_j = weight · sgn load · sgn v."""
+        j = self.joints[0]
+        w, v, load = weights[:, 0, 0], signals.v[:, j], signals.load[:, j]
+        return Cotangents(
+            v=signals.only(j, w * np.abs(load) * smooth_sign_slope(v)),
+            load=signals.only(j, w * np.sign(load) * smooth_sign(v)),
+        )

@@ -1,0 +1,50 @@
+"""A spring at the joint, or a compensator of gravity: τ_j = k q_j + c = k (q_j − q_0)."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Value, deviation
+from excite_cli.robot.model import Array
+
+
+class Spring(Effect):
+    """τ_j = stiffness · q_j + preload; the spring rests at q_0 = −preload/stiffness."""
+
+    kind: ClassVar = "spring"
+    title: ClassVar = "spring at the joint"
+    signature: ClassVar = "the residual is a straight line over the joint's angle"
+    parameters: ClassVar = (
+        Parameter("stiffness", "N·m/rad", 0.5, 2000.0, nonnegative=True),
+        Parameter("preload", "N·m", 0.1, 2000.0),
+    )
+
+    def columns(self, signals: Signals) -> Array:
+        """q_j and 1, (T, 1, 2)."""
+        q = signals.q[:, self.joints[0]]
+        return np.stack([q, np.ones_like(q)], axis=-1)[:, None]
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂q_j = weight of the stiffness."""
+        return Cotangents(q=signals.only(self.joints[0], weights[:, 0, 0]))
+
+    def report(self, values: Array, covariance: Array) -> dict[str, Value]:
+        """Also `rest_position` = −c/k, its deviation to first order."""
+        found = super().report(values, covariance)
+        k, c = (float(value) for value in values)
+        if k != 0.0:
+            slope = np.array([c / k**2, -1.0 / k])
+            found["rest_position"] = Value(-c / k, deviation(slope, covariance), "rad")
+        return found
+
+    @classmethod
+    def planted(cls, value: float, others: Mapping[str, float]) -> tuple[dict[str, float], Array]:
+        """Stiffness `value`; others: `rest_position` [rad] (0) or `preload` [N·m]."""
+        rest = -value * others.get("rest_position", 0.0)
+        return {}, np.array([value, others.get("preload", rest)])
+
+    def mjcf(self, values: Array) -> dict[str, float]:
+        """`stiffness` and `springref`; MuJoCo has no springs that push away."""
+        k, c = (float(value) for value in values)
+        return {"stiffness": k, "springref": -c / k} if k > 0 else {}

@@ -1,0 +1,39 @@
+"""Torque that is recorded late: τ_measured(t) = τ(t − δ) ≈ τ − δ dτ/dt.
+
+One delay for all joints of the effect, of all terms of the torque: a lag of friction alone is not
+a delay. It is looked for on all joints together first, then on single ones.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.robot.model import Array, Robot
+
+
+class TorqueDelay(Effect):
+    """Row j of every joint named: −δ d(torque_j)/dt with one δ."""
+
+    kind: ClassVar = "torque_delay"
+    title: ClassVar = "delay of the measured torque"
+    signature: ClassVar = "the residual is the torque's rate of change, on all joints alike"
+    scope: ClassVar[Scope] = "robot"
+    parameters: ClassVar = (Parameter("delay", "s", 5e-4, 0.1),)
+    data_defect: ClassVar = True
+
+    @classmethod
+    def places(cls, robot: Robot) -> list[tuple[int, ...]]:
+        """All joints together, then each on its own."""
+        every = tuple(range(robot.n))
+        return [every, *((j,) for j in every if robot.n > 1)]
+
+    def columns(self, signals: Signals) -> Array:
+        """−d(torque)/dt, (T, len(joints), 1)."""
+        return -signals.rate(signals.torque[:, list(self.joints)])[:, :, None]
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂torque = −(transpose of the rate) weight."""
+        back = np.zeros_like(signals.torque)
+        back[:, list(self.joints)] = -signals.rate_back(weights[:, :, 0])
+        return Cotangents(torque=back)

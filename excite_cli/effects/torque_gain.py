@@ -1,0 +1,29 @@
+"""A wrong scale of the measured torque: τ_measured = (1 + g) τ.
+
+A wrong torque constant or gear ratio of one joint. The same gain on all joints is absorbed by the
+inertial parameters, which then are all wrong by it. The gain of the joint's friction is absorbed by
+its friction parameters in the same way; what shows is the gain of the rigid-body torque alone.
+"""
+
+from typing import ClassVar
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.robot.model import Array
+
+
+class TorqueGain(Effect):
+    """τ_j grows by g · (rigid-body torque)."""
+
+    kind: ClassVar = "torque_gain"
+    title: ClassVar = "wrong scale of the measured torque"
+    signature: ClassVar = "the residual has the shape of the torque itself"
+    parameters: ClassVar = (Parameter("gain", "1", 0.005, 0.5),)
+    data_defect: ClassVar = True
+
+    def columns(self, signals: Signals) -> Array:
+        """load_j, (T, 1, 1)."""
+        return signals.load[:, list(self.joints), None]
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂load_j = weight."""
+        return Cotangents(load=signals.only(self.joints[0], weights[:, 0, 0]))

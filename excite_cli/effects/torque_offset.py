@@ -1,0 +1,27 @@
+"""A constant in the measured torque: τ_j = b."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.robot.model import Array
+
+
+class TorqueOffset(Effect):
+    """τ_j = b."""
+
+    kind: ClassVar = "torque_offset"
+    title: ClassVar = "offset of the measured torque"
+    signature: ClassVar = "the residual is the same wherever the joint is and however it moves"
+    parameters: ClassVar = (Parameter("offset", "N·m", 0.05, 50.0),)
+    simpler_than: ClassVar = ("asymmetric_friction", "spring")
+    data_defect: ClassVar = True
+
+    def columns(self, signals: Signals) -> Array:
+        """Ones, (T, 1, 1)."""
+        return np.ones((len(signals.t), 1, 1))
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """Nothing: a constant does not depend on the motion."""
+        return Cotangents()

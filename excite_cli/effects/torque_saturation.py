@@ -1,0 +1,45 @@
+"""Torque cut off at a level L by sensor or amplifier: −s (|torque_j| − L)₊ sgn(torque_j).
+
+s = 1 is a clean cut. The model's torque passes L where the measured one stays there.
+"""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.robot.model import Array, Robot
+
+_QUANTILES = (0.7, 0.8, 0.9, 0.95, 0.98)
+
+
+class TorqueSaturation(Effect):
+    """τ_j loses what |torque_j| has above `level`, times `sharpness` (1: all of it)."""
+
+    kind: ClassVar = "torque_saturation"
+    title: ClassVar = "saturation of the measured torque"
+    signature: ClassVar = "the residual is zero up to a level of torque and grows from there"
+    parameters: ClassVar = (Parameter("sharpness", "1", 0.3, 1.5, nonnegative=True),)
+    shapes: ClassVar = (Parameter("level", "N·m", 0.1, 1000.0),)
+    data_defect: ClassVar = True
+
+    @classmethod
+    def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
+        """Levels at five quantiles of |torque_j|."""
+        seen = [np.abs(s.torque[:, joints[0]]) for s in signals if len(s.t)]
+        if not seen:
+            return []
+        levels = np.unique(np.quantile(np.concatenate(seen), _QUANTILES))
+        return [{"level": float(level)} for level in levels if level > 0]
+
+    def columns(self, signals: Signals) -> Array:
+        """−(|torque_j| − L)₊ sgn(torque_j), (T, 1, 1)."""
+        torque, level = signals.torque[:, list(self.joints), None], self.shape["level"]
+        return np.clip(torque, -level, level) - torque
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂torque_j = −weight above the level, else zero."""
+        j = self.joints[0]
+        above = np.abs(signals.torque[:, j]) > self.shape["level"]
+        return Cotangents(torque=signals.only(j, -weights[:, 0, 0] * above))

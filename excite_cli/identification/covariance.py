@@ -1,0 +1,103 @@
+"""Covariance of a weighted least-squares estimate when the noise is serially correlated.
+
+With x̂ − x = B Σ_t c_tᵀ e_t/σ², B = (CᵀC/σ²)⁻¹, the covariance is B S B with S = Cᵀ Ω C. Ω follows
+from an autoregressive model per joint and run, and from the correlation of its innovations between
+joints. Residuals are smaller than the noise, for the fit has eaten some of it; per joint
+E‖e‖² = tr Ω − tr(H Ω), and Ω is enlarged accordingly. What is naive, σ²B, takes 1,200 samples for
+1,200 pieces of information; with such noise they carry the information of some 150.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
+
+from excite_cli.identification.factors import Mask
+from excite_cli.identification.noise import Noise, noise_of
+from excite_cli.robot.model import Array
+
+MOST_ENLARGED = 4.0
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of one run: `columns` (M, n, p), `tau`, `usable` (M, n), `weights` (M, n) or None."""
+
+    columns: Array
+    tau: Array
+    usable: Mask
+    weights: Array | None = None
+
+    def residual(self, x: Array) -> Array:
+        """τ − C x (M, n), zero where unusable."""
+        return np.where(self.usable, self.tau - self.columns @ x, 0.0)
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """`matrix` (p, p); `noises` per run; `samples` the effective number of independent samples."""
+
+    matrix: Array
+    noises: tuple[Noise, ...]
+    samples: float
+
+
+def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: Array) -> Covariance:
+    """Covariance of x from the runs it was fitted to.
+
+    Parameters
+    ----------
+    x: (p,) estimate
+    inverse: (p, p) B, of rows divided by sigma; for a robust fit, of its bread
+    sigma: (n,) standard deviation of each joint's residual
+
+    With `weights` in a run (robust fits) the weighted residual is what is modelled.
+    """
+    p, n = len(x), len(sigma)
+    noises, meat, trace = [], np.zeros((p, p)), np.zeros(n)
+    eaten, white, plain = np.zeros(n), np.zeros(p), 0
+    parts = []
+    for run in runs:
+        residual = run.residual(x)
+        if run.weights is not None:
+            residual = residual * run.weights
+        noise = noise_of(residual, run.usable)
+        noises.append(noise)
+        columns = np.where(run.usable[..., None], run.columns, 0.0)
+        spread = noise.spread_back(columns) / np.square(sigma)[:, None]
+        parts.append((spread, noise))
+        own = np.diag(noise.innovation)
+        projected = spread @ inverse
+        eaten += own * np.einsum("tjp,tjp->j", projected, spread) * np.square(sigma)
+        variance = own * np.array([_gain(a) for a in noise.polynomials])
+        trace += variance * run.usable.sum(axis=0)
+        scores = (columns @ inverse) * (np.sqrt(variance) / np.square(sigma))[:, None]
+        white += np.square(scores).sum(axis=(0, 1))
+        plain += int(run.usable.sum())
+    ratio = np.clip(eaten / np.maximum(trace, 1e-300), 0.0, 1.0 - 1.0 / MOST_ENLARGED)
+    enlarged = np.sqrt(1.0 / (1.0 - ratio))
+    for spread, noise in parts:
+        covariance = noise.innovation * np.outer(enlarged, enlarged)
+        values, vectors = np.linalg.eigh(covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        mixed = np.einsum("tjp,jk->tkp", spread, root).reshape(-1, p)
+        meat += mixed.T @ mixed
+    matrix = inverse @ meat @ inverse
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = white / np.diag(matrix)
+    shares = shares[np.isfinite(shares)]
+    samples = float(plain * np.median(shares)) if len(shares) else float("nan")
+    return Covariance((matrix + matrix.T) / 2, tuple(noises), samples)
+
+
+def _gain(polynomial: Array) -> float:
+    """Variance of an autoregressive series per variance of its innovations."""
+    if len(polynomial) == 1:
+        return 1.0
+    order = len(polynomial) - 1
+    companion = np.eye(order, k=-1)
+    companion[0] = -polynomial[1:]
+    state = np.zeros((order, order))
+    state[0, 0] = 1.0
+    return float(solve_discrete_lyapunov(companion, state)[0, 0])

@@ -1,0 +1,119 @@
+"""Errors of a predicted torque: per joint, relative and in N·m, with an interval of their mean."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from excite_cli.identification.factors import Mask
+from excite_cli.robot.model import Array
+
+_DRAWS, _SEED = 1000, 20170529
+_BLOCK = 1.0  # s, longer than what noise of the filtered torque remembers
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of the torque on the sealed data: per joint, relative (RMS/RMS) and in N·m.
+
+    `interval` is the 95 % block-bootstrap interval of the mean relative error.
+    """
+
+    mean_relative: float
+    mean_relative_moving: float
+    relative: dict[str, float]
+    relative_moving: dict[str, float]
+    rms: dict[str, float]
+    rms_raw: dict[str, float]
+    interval: tuple[float, float]
+
+    def as_data(self) -> dict[str, object]:
+        """Plain values for files and JSON."""
+        return asdict(self)
+
+
+def torque_errors(
+    joint_names: Sequence[str],
+    tau: Sequence[Array],
+    predicted: Sequence[Array],
+    usable: Sequence[Mask],
+    moving: Sequence[Mask],
+    raw: Sequence[Array],
+    raw_predicted: Sequence[Array],
+    step: float,
+) -> Errors:
+    """Compare torque and prediction over all runs.
+
+    Parameters
+    ----------
+    tau, predicted, usable, moving: per run (M, n), filtered; `moving`: the joint itself moves
+    raw, raw_predicted: per run (T, n), torque as recorded; entries that are not finite are left out
+    step: between filtered samples [s]
+
+    A joint without a (moving) sample has NaN and does not enter the mean.
+    """
+    blocks = [_block_sums(*run, step) for run in zip(tau, predicted, usable, moving, strict=True)]
+    sums = np.concatenate(blocks, axis=1)  # (5, blocks, n)
+    wrong, size, wrong_moving, size_moving, count = sums.sum(axis=1)
+    relative, relative_moving = _ratio(wrong, size), _ratio(wrong_moving, size_moving)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rms = np.sqrt(wrong / count)
+    return Errors(
+        mean_relative=_mean(relative),
+        mean_relative_moving=_mean(relative_moving),
+        relative=_named(joint_names, relative),
+        relative_moving=_named(joint_names, relative_moving),
+        rms=_named(joint_names, rms),
+        rms_raw=_named(joint_names, _raw_rms(raw, raw_predicted, len(joint_names))),
+        interval=_interval(sums[0], sums[1]),
+    )
+
+
+def _block_sums(tau: Array, predicted: Array, usable: Mask, moving: Mask, step: float) -> Array:
+    """Per block of about 1 s: ‖e‖², ‖τ‖², the same where moving, and the count; (5, blocks, n)."""
+    good, slow = usable.astype(float), (usable & moving).astype(float)
+    error = np.square(np.where(usable, tau - predicted, 0.0))
+    size = np.square(np.where(usable, tau, 0.0))
+    rows = np.stack([error, size, error * slow, size * slow, good])
+    length = max(1, round(_BLOCK / step))
+    edges = np.arange(0, max(len(tau) - length // 2, 1), length)
+    return np.add.reduceat(rows, edges, axis=1)
+
+
+def _ratio(wrong: Array, size: Array) -> Array:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(size > 0, np.sqrt(wrong / np.where(size > 0, size, 1.0)), np.nan)
+
+
+def _mean(values: Array) -> float:
+    good = values[np.isfinite(values)]
+    return float(good.mean()) if len(good) else float("nan")
+
+
+def _named(names: Sequence[str], values: Array) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(names, values, strict=True)}
+
+
+def _raw_rms(raw: Sequence[Array], predicted: Sequence[Array], n: int) -> Array:
+    if not raw:
+        return np.full(n, np.nan)
+    squares = np.square(np.concatenate(raw) - np.concatenate(predicted))
+    good = np.isfinite(squares)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.sqrt(np.where(good, squares, 0.0).sum(axis=0) / good.sum(axis=0))
+
+
+def _interval(wrong: Array, size: Array) -> tuple[float, float]:
+    """2.5 and 97.5 % of the mean relative error over blocks (B, n) drawn with replacement."""
+    blocks = len(wrong)
+    if blocks < 2:
+        return float("nan"), float("nan")
+    draws = np.random.default_rng(_SEED).multinomial(blocks, np.full(blocks, 1 / blocks), _DRAWS)
+    ratios = _ratio(draws @ wrong, draws @ size)
+    good = np.isfinite(ratios)
+    count = good.sum(axis=1)
+    means = np.where(good, ratios, 0.0).sum(axis=1)[count > 0] / count[count > 0]
+    if not len(means):
+        return float("nan"), float("nan")
+    low, high = np.percentile(means, [2.5, 97.5])
+    return float(low), float(high)

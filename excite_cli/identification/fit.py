@@ -1,0 +1,276 @@
+"""Parameters of the declared model from measured runs: τ = Y_B φ_B + Σ effects' columns · θ + e.
+
+Base parameters and all linear parameters of the effects are fitted together. With the URDF's
+inertias kept (`inertias: cad`), a prior on φ_B is added. Columns of effects that look at the
+model's own torque (friction that grows with load) are rebuilt with what was found, until it
+settles. If asked, a physically consistent full set of standard parameters is found as well.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from excite_cli.config.data_spec import IdentificationSpec
+from excite_cli.effects.base import Effect, Parameter, Signals, Value
+from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
+from excite_cli.identification.covariance import Rows
+from excite_cli.identification.essential import essential_parameters
+from excite_cli.identification.factors import Mask, solve
+from excite_cli.identification.least_squares import LinearFit, fit_rows
+from excite_cli.identification.prior import InertialPrior, inertial_prior
+from excite_cli.identification.pseudo_inertia import body_lengths
+from excite_cli.identification.regression import (
+    Regression,
+    RunColumns,
+    effect_columns,
+    signals_of,
+)
+from excite_cli.robot.base_parameters import BaseParameters
+from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.regressor import standard_parameters
+
+# A parameter is identifiable if the data fix it to this share of its value or usual size.
+_FIXED = 0.5
+_KNOWN_BEYOND_PRIOR = 0.7
+_REBUILDS, _SETTLED = 12, 1e-4
+_PROBE = 60
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What was identified.
+
+    All of (p,): `names`, `units`, `values`, `std`, `relative_std`, `identifiable`, `essential`;
+    the first `rank` are base parameters, the rest the effects' linear parameters in order.
+    `covariance` (p, p) holds infinity on the diagonal for what the data do not show. `noise` (n,)
+    [N·m] of the filtered torque. `phi` (P,) full standard parameters with these base parameters,
+    nearest to the URDF's; `consistent` those of real bodies. `samples`: independent ones that the
+    data are worth, of `count`. With the URDF's inertias kept, nothing is dropped: `essential` is
+    `identifiable`.
+    """
+
+    method: str
+    inertias: str
+    joint_names: tuple[str, ...]
+    effects: tuple[Effect, ...]
+    rank: int
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    words: tuple[str, ...]
+    values: Array
+    std: Array
+    relative_std: Array
+    identifiable: Mask
+    essential: Mask
+    covariance: Array
+    noise: Array
+    phi: Array
+    count: int
+    samples: float
+    consistent: ConsistentParameters | None = None
+
+    @property
+    def base_values(self) -> Array:
+        """φ_B (r,)."""
+        return self.values[: self.rank]
+
+    def effect_values(self, index: int) -> Array:
+        """Linear parameters of effect `index`."""
+        return self.values[self._part(index)]
+
+    def consistent_effect_values(self, index: int) -> Array:
+        """As `effect_values`, of the physically consistent set if there is one."""
+        if self.consistent is None:
+            return self.effect_values(index)
+        part = self._part(index)
+        return self.consistent.effects[part.start - self.rank : part.stop - self.rank]
+
+    def effect_report(self, index: int) -> dict[str, Value]:
+        """Parameters of effect `index` as people know them."""
+        part = self._part(index)
+        return self.effects[index].report(self.values[part], self.covariance[part, part])
+
+    def best_phi(self) -> Array:
+        """φ (P,): the consistent set if there is one, else `phi`."""
+        return self.phi if self.consistent is None else self.consistent.phi
+
+    def predict(self, run: RunColumns, base: BaseParameters) -> Array:
+        """τ̂ (M, n) of a run."""
+        return columns_of(run, base) @ self.values
+
+    def predict_raw(self, run: RunColumns, robot: Robot) -> Array:
+        """τ̂ (T, n) at the working rate, not averaged: for the torque as recorded."""
+        signals = signals_of(run.prepared, robot, self.phi)
+        values = self.values[self.rank :]
+        return signals.load + effect_columns(self.effects, signals) @ values
+
+    def _part(self, index: int) -> slice:
+        first = self.rank + sum(len(e.parameters) for e in self.effects[:index])
+        return slice(first, first + len(self.effects[index].parameters))
+
+
+def columns_of(run: RunColumns, base: BaseParameters) -> Array:
+    """All columns (M, n, r + k): base parameters, then effects."""
+    return np.concatenate([run.inertial[:, :, base.selection], run.effects], axis=2)
+
+
+def rows_of(run: RunColumns, base: BaseParameters) -> Rows:
+    """Rows of a run for the least-squares fit."""
+    return Rows(columns_of(run, base), run.tau, run.usable)
+
+
+def fit(regression: Regression, spec: IdentificationSpec | None = None) -> Fit:
+    """Fit the declared model to all runs of `regression`."""
+    spec = spec or IdentificationSpec()
+    robot, base = regression.robot, regression.base
+    cad = standard_parameters(robot)
+    keep = spec.inertias == "cad"
+    prior = inertial_prior(robot, cad, spec.uncertainty if keep else 1.0)
+    regression, linear = _settled(regression, spec, prior if keep else None, prior)
+    consistent = None
+    if spec.consistent:
+        share = np.sqrt(np.clip(linear.samples / max(int(linear.count.sum()), 1), 0.0, 1.0))
+        consistent = consistent_parameters(
+            linear.factor * (share if share > 0 else 1.0),
+            base,
+            prior,
+            body_lengths(robot, cad),
+            np.array([p.nonnegative for p in effect_parameters(regression.effects)], bool),
+        )
+    return _record(regression, spec, linear, prior, consistent)
+
+
+def _settled(
+    regression: Regression,
+    spec: IdentificationSpec,
+    prior: InertialPrior | None,
+    completion: InertialPrior,
+) -> tuple[Regression, LinearFit]:
+    """Fit, with columns that follow the model rebuilt until their torque settles."""
+    base = regression.base
+    k = sum(len(effect.parameters) for effect in regression.effects)
+    extra = None
+    if prior is not None:
+        rows, target = prior.on_base(base)
+        extra = np.hstack([rows, np.zeros((len(rows), k))]), target
+    usual = np.sqrt(np.square(base.mapping) @ np.square(completion.std))
+    sizes = np.append(usual, [p.high for p in effect_parameters(regression.effects)])
+    follow = follows_model(regression)
+    for _ in range(_REBUILDS if follow else 1):
+        rows_of_runs = [rows_of(run, base) for run in regression.runs]
+        linear = fit_rows(rows_of_runs, spec.method, extra, sizes)
+        if not follow:
+            break
+        before = [run.effects @ linear.x[base.rank :] for run in regression.runs]
+        phi = completion.completed(base, linear.x[: base.rank])
+        regression = rebuilt(regression, phi)
+        after = [run.effects @ linear.x[base.rank :] for run in regression.runs]
+        change = float(np.linalg.norm(np.concatenate(after) - np.concatenate(before)))
+        if change <= _SETTLED * max(float(np.linalg.norm(np.concatenate(before))), 1e-12):
+            break
+    return regression, linear
+
+
+def follows_model(regression: Regression) -> bool:
+    """Whether columns of the effects change with φ, tried on a few samples."""
+    if not regression.effects or not regression.runs:
+        return False
+    prepared = regression.runs[0].prepared
+    cut = slice(0, _PROBE)
+    brief = replace(
+        prepared, t=prepared.t[cut], q=prepared.q[cut], v=prepared.v[cut], a=prepared.a[cut]
+    )
+    cad = standard_parameters(regression.robot)
+    one, other = (
+        effect_columns(regression.effects, signals_of(brief, regression.robot, phi))
+        for phi in (cad, 1.3 * cad)
+    )
+    return not np.allclose(one, other, rtol=1e-9, atol=1e-12)
+
+
+def rebuilt(regression: Regression, phi: Array) -> Regression:
+    """The effects' columns again, with the rigid body at `phi`."""
+    runs = []
+    for run in regression.runs:
+        signals: Signals = signals_of(run.prepared, regression.robot, phi)
+        columns = effect_columns(regression.effects, signals)
+        runs.append(replace(run, effects=run.prepared.averaged(columns)))
+    return replace(regression, runs=tuple(runs))
+
+
+def _record(
+    regression: Regression,
+    spec: IdentificationSpec,
+    linear: LinearFit,
+    prior: InertialPrior,
+    consistent: ConsistentParameters | None,
+) -> Fit:
+    robot, base, effects = regression.robot, regression.base, regression.effects
+    parameters = effect_parameters(effects)
+    std = np.sqrt(np.diag(linear.covariance))
+    size = np.abs(linear.x)
+    relative = np.where(size > 0, std / np.where(size > 0, size, 1.0), np.inf)
+    usual = np.sqrt(np.square(base.mapping) @ np.square(prior.std))
+    smallest = np.array([parameter.low for parameter in parameters])
+    if spec.inertias == "cad":  # known by the data, if they say more than the prior does
+        known = std[: base.rank] <= _KNOWN_BEYOND_PRIOR * usual
+    else:
+        known = (relative[: base.rank] <= _FIXED) | (std[: base.rank] <= _FIXED * usual)
+    fixed = (relative[base.rank :] <= _FIXED) | (std[base.rank :] <= smallest)
+    identifiable = linear.seen & np.concatenate([known, fixed])
+    return Fit(
+        method=spec.method,
+        inertias=spec.inertias,
+        joint_names=robot.joint_names,
+        effects=effects,
+        rank=base.rank,
+        names=(
+            *(base.names[index] for index in base.selection),
+            *effect_parameter_names(effects, robot.joint_names),
+        ),
+        units=(
+            *(_unit(base.names[index]) for index in base.selection),
+            *(parameter.unit for parameter in parameters),
+        ),
+        words=(*base.in_words(), *("" for _ in parameters)),
+        values=linear.x,
+        std=std,
+        relative_std=relative,
+        identifiable=identifiable,
+        essential=identifiable if spec.inertias == "cad" else _essential(linear, std),
+        covariance=linear.covariance,
+        noise=linear.noise,
+        phi=prior.completed(base, linear.x[: base.rank]),
+        count=int(linear.count.sum()),
+        samples=linear.samples,
+        consistent=consistent,
+    )
+
+
+def _essential(linear: LinearFit, std: Array) -> Mask:
+    plain = np.diag(solve(linear.factor).inverse)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inflation = np.where(np.isfinite(std) & (plain > 0), std**2 / plain, 1.0)
+    return essential_parameters(linear.factor, inflation, np.ones(len(std), bool))[0]
+
+
+def _unit(name: str) -> str:
+    symbol = name.partition("[")[0]
+    return {"m": "kg"}.get(symbol, "kg·m" if symbol.startswith("m") else "kg·m²")
+
+
+def effect_parameters(effects: Sequence[Effect]) -> tuple[Parameter, ...]:
+    """Linear parameters of all effects, in the order of their columns."""
+    return tuple(parameter for effect in effects for parameter in effect.parameters)
+
+
+def effect_parameter_names(
+    effects: Sequence[Effect], joint_names: Sequence[str]
+) -> tuple[str, ...]:
+    """Names such as `viscous_friction.viscous[joint_1]`."""
+    return tuple(
+        f"{effect.kind}.{parameter.name}[{','.join(joint_names[j] for j in effect.joints)}]"
+        for effect in effects
+        for parameter in effect.parameters
+    )

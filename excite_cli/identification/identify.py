@@ -1,0 +1,180 @@
+"""From a dataset to the parameters of the declared model, judged on data that took no part."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from excite_cli.config.spec import Spec
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import declared_effects
+from excite_cli.errors import ExciteError
+from excite_cli.identification.errors_of_torque import Errors, torque_errors
+from excite_cli.identification.fit import (
+    Fit,
+    columns_of,
+    effect_parameters,
+    fit,
+    follows_model,
+    rebuilt,
+    rows_of,
+)
+from excite_cli.identification.hausman import (
+    SIGNIFICANT,
+    Hausman,
+    hausman_test,
+    instrument_dataset,
+    not_testable,
+)
+from excite_cli.identification.prepare import prepare
+from excite_cli.identification.processing import Processing, choose_processing
+from excite_cli.identification.regression import Regression, build_regression
+from excite_cli.identification.split import Split, split
+from excite_cli.measurement.dataset import Dataset, Finding, Run
+from excite_cli.robot.base_parameters import BaseParameters
+from excite_cli.robot.model import Robot
+
+Tell = Callable[[str], None]
+# Parameters this many standard deviations below zero that cannot be negative are told.
+_SURELY = 3.0
+
+
+@dataclass(frozen=True)
+class Identification:
+    """The fit, its errors on the sealed part and on the training part, and what was noticed."""
+
+    fit: Fit
+    sealed_run: str
+    error: Errors
+    training_error: Errors
+    hausman: Hausman
+    processing: Processing
+    findings: tuple[Finding, ...]
+
+
+def identify(
+    robot: Robot,
+    base: BaseParameters,
+    dataset: Dataset,
+    spec: Spec,
+    sealed: str | None = None,
+    tell: Tell = lambda text: None,
+) -> Identification:
+    """Fit the declared model of `spec` to all of `dataset` but the sealed part.
+
+    Raises
+    ------
+    ConfigError
+        An effect, a filter or the sealed run does not fit.
+    FileError
+        A run is too short.
+    """
+    effects = declared_effects(spec.effects, robot)
+    parts = split(dataset, sealed, spec.diagnosis.block)
+    processing = choose_processing(
+        parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
+    )
+    tell("columns of the regression")
+    training = _regression(robot, base, effects, parts.training, processing)
+    tell("fit")
+    found = fit(training, spec.identification)
+    tell("errors on the sealed part")
+    held_out = _regression(robot, base, effects, parts.sealed, processing)
+    if follows_model(training):
+        training, held_out = rebuilt(training, found.phi), rebuilt(held_out, found.phi)
+    tell("closed-loop bias")
+    hausman = _hausman(training, dataset, parts, processing, found, (sealed, spec.diagnosis.block))
+    return Identification(
+        fit=found,
+        sealed_run=parts.sealed_name,
+        error=errors_of(found, held_out),
+        training_error=errors_of(found, training),
+        hausman=hausman,
+        processing=processing,
+        findings=(*dataset.findings, *_noticed(found, hausman)),
+    )
+
+
+def _regression(
+    robot: Robot,
+    base: BaseParameters,
+    effects: Sequence[Effect],
+    runs: Sequence[Run],
+    processing: Processing,
+) -> Regression:
+    return build_regression(robot, base, effects, [prepare(run, processing) for run in runs])
+
+
+def errors_of(found: Fit, regression: Regression) -> Errors:
+    """Errors of the fit's torque on the runs of `regression`."""
+    runs = regression.runs
+    return torque_errors(
+        regression.robot.joint_names,
+        [run.tau for run in runs],
+        [found.predict(run, regression.base) for run in runs],
+        [run.usable for run in runs],
+        [run.moving for run in runs],
+        [run.prepared.tau_raw for run in runs],
+        [found.predict_raw(run, regression.robot) for run in runs],
+        runs[0].step,
+    )
+
+
+def _hausman(
+    training: Regression,
+    dataset: Dataset,
+    parts: Split,
+    processing: Processing,
+    found: Fit,
+    cut: tuple[str | None, float | None],
+) -> Hausman:
+    """The test with instruments cut and filtered as the data were."""
+    instruments, source, reason = instrument_dataset(dataset)
+    if instruments is None:
+        return not_testable(reason)
+    runs = split(instruments, *cut).training
+    processing = replace(processing, velocity="differentiated")
+    try:
+        prepared = [prepare(run, processing) for run in runs]
+        other = build_regression(
+            training.robot, training.base, training.effects, prepared, found.phi
+        )
+    except ExciteError as error:
+        return not_testable(str(error))
+    return hausman_test(
+        [rows_of(run, training.base) for run in training.runs],
+        [columns_of(run, training.base) for run in other.runs],
+        source,
+        found.noise,
+    )
+
+
+def _noticed(found: Fit, hausman: Hausman) -> list[Finding]:
+    """What a person must know about the fit."""
+    findings = []
+    parameters = effect_parameters(found.effects)
+    signed = np.array([parameter.nonnegative for parameter in parameters], bool)
+    values, std = found.values[found.rank :], found.std[found.rank :]
+    negative = np.flatnonzero(signed & (values < -_SURELY * std))
+    if len(negative):
+        names = ", ".join(found.names[found.rank + i] for i in negative)
+        text = f"{names}: negative beyond doubt, which they cannot be."
+        if len(negative) == signed.sum() > 1:
+            text += " The sign of the torque may be flipped (measurement.sign)."
+        else:
+            text += " The declared model lacks something: try `excite diagnose`."
+        findings.append(Finding("negative", "warning", text))
+    loose = [name for name, ok in zip(found.names, found.identifiable, strict=True) if not ok]
+    if loose:
+        text = f"{len(loose)} of {len(found.names)} parameters are not fixed by these data."
+        findings.append(Finding("not_identifiable", "note", text))
+    unseen = [name for name, std in zip(found.names, found.std, strict=True) if np.isinf(std)]
+    if unseen:
+        text = f"{', '.join(unseen)}: do not show in these data, or only in sums with each other."
+        findings.append(Finding("not_seen", "note", text))
+    if found.consistent is not None and not found.consistent.solved:
+        text = f"no physically consistent set was found: {found.consistent.status}."
+        findings.append(Finding("inconsistent", "warning", text))
+    if hausman.testable and hausman.p_value < SIGNIFICANT:
+        findings.append(Finding("closed_loop_bias", "warning", hausman.sentence() + "."))
+    return findings

@@ -1,0 +1,149 @@
+"""Filters, chosen from the data: cut-offs of positions and torque, rates, borders.
+
+Positions lose their noise in a zero-phase Butterworth filter whose cut-off lies where the spectrum
+of the positions meets its floor. Torque and every regressor column then pass through the same
+Gaussian averages at the same instants (parallel filtering): whatever that filter does, the linear
+model still holds exactly.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from scipy.signal import welch
+
+from excite_cli.config.data_spec import FilterSpec
+from excite_cli.errors import ConfigError
+from excite_cli.measurement.dataset import Array, Run
+
+# The signal has met its floor where the spectrum is below this multiple of it.
+_ABOVE_FLOOR = 20.0
+_HIGHEST_POSITION, _LOWEST_POSITION = 40.0, 8.0  # Hz
+_SHARE_OF_SPEED = 0.99
+_PARALLEL_BY_BANDWIDTH, _HIGHEST_PARALLEL, _LOWEST_PARALLEL = 6.0, 12.0, 4.0
+# Standard deviation of a Gaussian average in time, times its -3 dB frequency.
+GAUSSIAN = float(np.sqrt(np.log(2.0)) / (2.0 * np.pi))
+GAUSSIAN_REACH = 3.5  # half width of the average in standard deviations
+DEFAULT_MOVING = 0.02  # rad/s
+
+
+@dataclass(frozen=True)
+class Processing:
+    """Every choice made between the file and the regression; frequencies in Hz, times in s."""
+
+    recorded_rate: float
+    position_cutoff: float | None
+    parallel_cutoff: float | None
+    rate: float
+    working_stride: int
+    border: float
+    velocity: str
+    moving_speed: float
+    bandwidth: float
+    reasons: tuple[str, ...] = ()
+
+    def as_data(self) -> dict[str, object]:
+        """Plain values for files and JSON."""
+        return asdict(self)
+
+
+def choose_processing(
+    runs: Sequence[Run], spec: FilterSpec, moving_speed: float | None = None
+) -> Processing:
+    """Choose what `spec` leaves to the data, from `runs` (the training part alone).
+
+    Raises
+    ------
+    ConfigError
+        A cut-off lies beyond half the recorded rate, or measured speeds are asked for and absent.
+    """
+    fs = float(np.median([1.0 / run.step for run in runs]))
+    frequency, power = _spectra(runs, fs)
+    bandwidth = _bandwidth(frequency, power)
+    reasons: list[str] = []
+    position = _position_cutoff(spec, frequency, power, fs, bandwidth, reasons)
+    parallel = _parallel_cutoff(spec, bandwidth, fs, reasons)
+    rate = float(spec.rate) if spec.rate != "auto" else (4.0 * parallel if parallel else fs)
+    rate = min(rate, fs)
+    stride = 1
+    if parallel:
+        wanted = max(10.0 * parallel, 2.5 * (position or fs / 2.5))
+        stride = max(1, int(fs // wanted))
+    border = spec.border
+    if border is None:
+        border = (1.2 / position if position else 0.0) + 2.0 / fs
+    if spec.velocity == "measured" and any(run.dq is None for run in runs):
+        raise ConfigError(
+            "measurement.filter.velocity: 'measured' needs recorded speeds (dq) in every run. "
+            "Record them, or write 'differentiated'."
+        )
+    velocity = "measured" if spec.velocity == "measured" else "differentiated"
+    return Processing(
+        fs, position, parallel, rate, stride, float(border), velocity,
+        moving_speed or DEFAULT_MOVING, bandwidth, tuple(reasons),
+    )  # fmt: skip
+
+
+def _spectra(runs: Sequence[Run], fs: float) -> tuple[Array, Array]:
+    """Mean spectrum of the positions (F, n) over the runs, on one grid of frequencies."""
+    length = min(min(len(run.t) for run in runs), max(64, int(5.0 * fs)))
+    total, weight = np.zeros(1), 0.0
+    frequency = np.zeros(1)
+    for run in runs:
+        frequency, power = welch(run.q, fs, nperseg=length, axis=0, detrend="linear")
+        total, weight = total + power * len(run.t), weight + len(run.t)
+    return frequency, total / weight
+
+
+def _bandwidth(frequency: Array, power: Array) -> float:
+    """Frequency below which nearly all energy of the speed lies, the fastest joint's [Hz]."""
+    speed = power * frequency[:, None] ** 2
+    speed[frequency > 10.0] = 0.0  # noise of the encoders grows with frequency
+    share = np.cumsum(speed, axis=0) / np.maximum(speed.sum(axis=0), 1e-300)
+    moved = power.sum(axis=0) > 1e-6 * power.sum(axis=0).max()
+    return float(max(frequency[np.argmax(share[:, moved] >= _SHARE_OF_SPEED, axis=0)].max(), 0.3))
+
+
+def _position_cutoff(
+    spec: FilterSpec, frequency: Array, power: Array, fs: float, bandwidth: float, reasons: list
+) -> float | None:
+    if spec.position == "none":
+        return None
+    if spec.position != "auto":
+        if float(spec.position) >= fs / 2:
+            raise ConfigError(
+                f"measurement.filter.position: {float(spec.position):g} Hz is beyond half the "
+                f"recorded rate ({fs:g} Hz). Give a lower cut-off, or 'none'."
+            )
+        return float(spec.position)
+    floor = np.median(power[frequency > 0.3 * fs], axis=0)
+    above = power > _ABOVE_FLOOR * floor
+    last = [frequency[np.flatnonzero(~column)[0]] if not column.all() else fs for column in above.T]
+    found = float(np.median(last))
+    lowest = max(_LOWEST_POSITION, 5.0 * bandwidth)
+    chosen = float(min(max(found, lowest), _HIGHEST_POSITION, fs / 5.0))
+    reasons.append(
+        f"positions cut off at {chosen:.3g} Hz: their spectrum meets its floor at {found:.3g} Hz "
+        f"(kept within {lowest:.3g} and {min(_HIGHEST_POSITION, fs / 5):.3g} Hz)"
+    )
+    return chosen
+
+
+def _parallel_cutoff(spec: FilterSpec, bandwidth: float, fs: float, reasons: list) -> float | None:
+    if spec.parallel == "none":
+        return None
+    if spec.parallel != "auto":
+        if float(spec.parallel) >= fs / 2:
+            raise ConfigError(
+                f"measurement.filter.parallel: {float(spec.parallel):g} Hz is beyond half the "
+                f"recorded rate ({fs:g} Hz). Give a lower cut-off, or 'none'."
+            )
+        return float(spec.parallel)
+    chosen = min(
+        max(_PARALLEL_BY_BANDWIDTH * bandwidth, _LOWEST_PARALLEL), _HIGHEST_PARALLEL, fs / 5.0
+    )
+    reasons.append(
+        f"torque and columns averaged to {chosen:.3g} Hz: "
+        f"{_PARALLEL_BY_BANDWIDTH:g} times the bandwidth of the speeds ({bandwidth:.3g} Hz)"
+    )
+    return float(chosen)

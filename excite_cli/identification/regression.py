@@ -1,0 +1,91 @@
+"""The regression: torque and the columns that explain it, filtered and decimated alike."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.effects.base import Effect, Signals
+from excite_cli.identification.prepare import PreparedRun
+from excite_cli.robot.base_parameters import BaseParameters
+from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.regressor import standard_parameters
+from excite_cli.robot.rigid_body import RigidBody
+
+
+@dataclass(frozen=True)
+class RunColumns:
+    """One prepared run with its columns.
+
+    `inertial` (M, n, P) standard-parameter regressor (P = 10·n_bodies), `effects` (M, n, k) all
+    linear parameters of all effects in order, `tau` (M, n), `usable` and `moving` (M, n), `step`
+    between the samples [s]; `prepared` holds the motion at the working rate.
+    """
+
+    name: str
+    step: float
+    inertial: Array
+    effects: Array
+    tau: Array
+    usable: NDArray[np.bool_]
+    moving: NDArray[np.bool_]
+    prepared: PreparedRun
+
+
+@dataclass(frozen=True)
+class Regression:
+    """τ = Y φ + effects, run by run."""
+
+    robot: Robot
+    base: BaseParameters
+    effects: tuple[Effect, ...]
+    runs: tuple[RunColumns, ...]
+
+
+def signals_of(prepared: PreparedRun, robot: Robot, phi: Array | None = None) -> Signals:
+    """What effects may look at in a run, with the rigid-body torque at `phi` (default: URDF)."""
+    phi = standard_parameters(robot) if phi is None else phi
+    body = RigidBody(robot, phi, prepared.q, prepared.v, prepared.a)
+    return Signals(
+        prepared.t, prepared.q, prepared.v, prepared.a, body.load, body.load, body,
+        prepared.name,
+    )  # fmt: skip
+
+
+def effect_columns(effects: Sequence[Effect], signals: Signals) -> Array:
+    """Columns (T, n, k) of all linear parameters of all effects, at the working rate."""
+    n = signals.q.shape[1]
+    blocks = [np.zeros((len(signals.t), n, 0))]
+    for effect in effects:
+        block = np.zeros((len(signals.t), n, len(effect.parameters)))
+        if effect.active(signals.run):
+            block[:, list(effect.rows(n))] = effect.columns(signals)
+        blocks.append(block)
+    return np.concatenate(blocks, axis=2)
+
+
+def build_regression(
+    robot: Robot,
+    base: BaseParameters,
+    effects: Sequence[Effect],
+    runs: Sequence[PreparedRun],
+    phi: Array | None = None,
+) -> Regression:
+    """Columns of every run; effects that look at the torque see the rigid body at `phi`."""
+    found = []
+    for prepared in runs:
+        signals = signals_of(prepared, robot, phi)
+        found.append(
+            RunColumns(
+                name=prepared.name,
+                step=prepared.step,
+                inertial=prepared.averaged(signals.body.regressor),
+                effects=prepared.averaged(effect_columns(effects, signals)),
+                tau=prepared.tau,
+                usable=prepared.usable,
+                moving=prepared.moving,
+                prepared=prepared,
+            )
+        )
+    return Regression(robot, base, tuple(effects), tuple(found))

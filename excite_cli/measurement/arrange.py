@@ -1,0 +1,103 @@
+"""From a file's columns to the robot's joints: matched by name, never by position alone."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from excite_cli.errors import ConfigError, FileError, nearest
+from excite_cli.measurement.dataset import Array, Finding, Run
+from excite_cli.measurement.reader import CHANNELS, RawRun
+
+_CHANNEL_WORDS = {"q": "position", "tau": "torque", "dq": "speed"}
+
+
+def check_names(names: Mapping[str, str], joints: Sequence[str]) -> None:
+    """Raise ConfigError where `measurement.names` leads to no joint, or twice to one."""
+    for column, joint in names.items():
+        if joint not in joints:
+            raise ConfigError(
+                f"measurement.names: '{column}' is led to '{joint}', which the robot does not "
+                f"move.{nearest(joint, joints)} Moved joints: {', '.join(joints)}."
+            )
+    led = list(names.values())
+    twice = sorted({joint for joint in led if led.count(joint) > 1})
+    if twice:
+        raise ConfigError(f"measurement.names leads twice to '{twice[0]}'; each joint once.")
+
+
+def arrange(
+    raw: RawRun, joints: tuple[str, ...], names: Mapping[str, str], source: str
+) -> tuple[Run, list[Finding]]:
+    """The run with columns in the order of `joints`; what belongs to no moved joint is `extra`.
+
+    Raises
+    ------
+    FileError
+        A joint of the robot is missing, or numbered columns are not as many as joints.
+    """
+    findings = [replace(found, run=raw.name) for found in raw.findings]
+    positions = list(raw.columns["q"])
+    matched = any(names.get(name, name) in joints for name in positions)
+    if raw.numbered and not matched:
+        names = _numbered(positions, joints, source)
+        order = ", ".join(f"{number} is {joint}" for number, joint in names.items())
+        text = f"columns carry numbers, not names; taken in the robot's order: {order}"
+        findings.append(Finding("numbered", "note", text, raw.name))
+    extra: dict[str, Array] = dict(raw.others)
+    matrices: dict[str, Array] = {}
+    for channel, columns in raw.columns.items():
+        by_joint = {names.get(column, column): values for column, values in columns.items()}
+        missing = [joint for joint in joints if joint not in by_joint]
+        if not missing:
+            matrices[channel] = np.column_stack([by_joint[joint] for joint in joints])
+        elif channel in ("q", "tau"):
+            raise FileError(_missing(source, raw.name, channel, missing, list(columns)))
+        elif channel == "dq":
+            text = f"speed of {', '.join(missing)} is missing; recorded speeds are not used"
+            findings.append(Finding("no_speed", "note", text, raw.name, tuple(missing)))
+        left = [j for j in by_joint if j not in joints or missing]
+        extra.update({f"{channel}_{joint}": by_joint[joint] for joint in left})
+    if "tau" not in matrices:
+        raise FileError(_missing(source, raw.name, "tau", list(joints), []))
+    others = sorted({names.get(column, column) for column in positions} - set(joints))
+    if others:
+        text = f"joints that the robot does not move, kept as further channels: {', '.join(others)}"
+        findings.append(Finding("other_joints", "note", text, raw.name))
+    valid = matrices.pop("valid", None)
+    kept = {name: matrix for name, matrix in matrices.items() if name not in CHANNELS}
+    run = Run(
+        name=raw.name,
+        t=np.asarray(raw.t, dtype=float),
+        q=matrices["q"],
+        tau=matrices["tau"],
+        dq=matrices.get("dq"),
+        valid=None if valid is None else valid > 0.5,
+        extra={**kept, **extra},
+    )
+    return run, findings
+
+
+def _numbered(columns: list[str], joints: tuple[str, ...], source: str) -> dict[str, str]:
+    numbers = sorted(int(column) for column in columns)
+    first = numbers[0]
+    if first not in (0, 1) or numbers != list(range(first, first + len(joints))):
+        raise FileError(
+            f"{source}: its columns are numbered {', '.join(map(str, numbers))}, and the robot "
+            f"moves {len(joints)} joints ({', '.join(joints)}). Numbers 1 to {len(joints)} are "
+            "taken in this order; else name the columns by joint, or say which is which: "
+            f"measurement.names: {{'{numbers[0]}': {joints[0]}, …}}."
+        )
+    return {str(number): joint for number, joint in zip(numbers, joints, strict=True)}
+
+
+def _missing(source: str, run: str, channel: str, missing: list[str], columns: list[str]) -> str:
+    joint = missing[0]
+    where = f"{source}, run {run}" if run else source
+    rest = f" (nor of {', '.join(missing[1:])})" if len(missing) > 1 else ""
+    return (
+        f"{where}: there is no {_CHANNEL_WORDS[channel]} of joint '{joint}'{rest}."
+        f"{nearest(joint, columns, 0.5)} The file names: {', '.join(columns) or 'none'}. Say "
+        f"which is which: measurement.names: {{<name in the file>: {joint}}}, or leave the joint "
+        "out of robot.joints."
+    )

@@ -1,0 +1,137 @@
+"""Readers of measured files, and the one way from files to a `Dataset`."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.errors import ConfigError, FileError, nearest
+from excite_cli.measurement.arrange import arrange, check_names
+from excite_cli.measurement.bag_reader import BagReader
+from excite_cli.measurement.csv_reader import CsvReader
+from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
+from excite_cli.measurement.hdf5_reader import Hdf5Reader
+from excite_cli.measurement.quality import checked
+from excite_cli.measurement.reader import RawRun, Reader, ReadOptions
+from excite_cli.measurement.torque import SECONDS, check_joints, declared, to_joints
+from excite_cli.measurement.units import Limits
+
+READERS: tuple[Reader, ...] = (Hdf5Reader(), CsvReader(), BagReader())
+_EPOCH = 1e6  # s: stamps beyond count from 1970, not from the start
+
+
+def read_dataset(
+    paths: Sequence[Path],
+    spec: MeasurementSpec,
+    joint_names: tuple[str, ...],
+    limits: tuple[Array, Array, Array, Array] | None = None,
+    revolute: Array | None = None,
+) -> Dataset:
+    """Read measured files as one data set, converted and checked.
+
+    `limits`: lower, upper, velocity, effort of the moved joints, (n,) each, infinite where there is
+    none. `revolute` (n,): which joints turn (default all); angles in degrees are theirs.
+
+    Findings of severity `error` are returned with the others; `quality.raise_for_errors` turns
+    them into an exception.
+
+    Raises
+    ------
+    FileError
+        A file is missing, damaged, of no known format, or lacks what is needed.
+    ConfigError
+        `spec` names what neither robot nor file has.
+    MissingExtraError
+        A bag, and the library for bags is not installed.
+    """
+    if not paths:
+        raise FileError("No measured file is given.")
+    check_names(spec.names, joint_names)
+    check_joints(spec, joint_names)
+    turning = np.ones(len(joint_names), bool) if revolute is None else np.asarray(revolute, bool)
+    known = (
+        Limits(*limits, turning)
+        if limits is not None
+        else replace(Limits.unknown(len(joint_names)), revolute=turning)
+    )
+    channels: dict[str, str | None] = {str(key): name for key, name in spec.channels.items()}
+    options = ReadOptions(joint_names, spec.names, channels, spec.rate, spec.topic)
+    findings: list[Finding] = declared(spec, joint_names)
+    runs: list[Run] = []
+    taken: set[str] = set()
+    seen: set[str] = set()
+    for path in paths:
+        raws = reader_for(path).read(path, options)
+        seen.update(name for raw in raws for column in raw.columns.values() for name in column)
+        named = _named(raws, path, taken)
+        arranged = []
+        for raw in named:
+            run, more = arrange(raw, joint_names, spec.names, str(path))
+            run = replace(run, t=_seconds(raw, spec))
+            arranged.append(to_joints(run, spec, joint_names, turning))
+            findings += more
+        parts, more = checked(arranged, spec, joint_names, known)
+        runs += parts
+        findings += more
+    _check_all_met(spec.names, seen)
+    return Dataset(joint_names, tuple(runs), tuple(map(str, paths)), tuple(findings))
+
+
+def reader_for(path: Path) -> Reader:
+    """The reader of a file, by its name.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or no reader for it.
+    """
+    if not path.exists():
+        raise FileError(f"There is no file {path}.")
+    for reader in READERS:
+        if reader.recognises(path):
+            if path.is_dir() and not isinstance(reader, BagReader):
+                break
+            return reader
+    known = "; ".join(f"{reader.title}: {', '.join(reader.suffixes)}" for reader in READERS)
+    what = "is a folder without a bag" if path.is_dir() else "is of no known format"
+    raise FileError(
+        f"{path} {what}. Read are {known}. Other formats: export them to HDF5 or CSV; pickles are "
+        "never opened."
+    )
+
+
+def _named(raws: list[RawRun], path: Path, taken: set[str]) -> list[RawRun]:
+    """Runs with names that no other has: the group's, or the file's; both where they clash."""
+    stem = path.name.split(".")[0] or path.name
+    named = []
+    for raw in raws:
+        wished = raw.name or stem
+        name = wished if wished not in taken or not raw.name else f"{stem}:{wished}"
+        count = 2
+        unique = name
+        while unique in taken:
+            unique, count = f"{name}_{count}", count + 1
+        taken.add(unique)
+        named.append(replace(raw, name=unique))
+    return named
+
+
+def _seconds(raw: RawRun, spec: MeasurementSpec) -> Array:
+    """Stamps in seconds; those counted from 1970 start at 0, to keep their digits."""
+    t = np.asarray(raw.t, dtype=float)
+    factor = 1.0 if raw.seconds else SECONDS[spec.time]
+    finite = t[np.isfinite(t)]
+    if len(finite) and finite[0] * factor > _EPOCH:
+        t = t - finite[0]
+    return t * factor
+
+
+def _check_all_met(names: dict[str, str], seen: set[str]) -> None:
+    for name in names:
+        if name not in seen:
+            raise ConfigError(
+                f"measurement.names: no file has a joint '{name}'.{nearest(name, seen)} "
+                f"The files name: {', '.join(sorted(seen))}."
+            )

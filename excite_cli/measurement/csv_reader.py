@@ -1,0 +1,86 @@
+"""CSV: a header `t, q_<joint>, …, tau_<joint>, …[, dq_<joint>, …]` and a row per instant."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from excite_cli.errors import FileError, nearest
+from excite_cli.measurement.csv_table import read_table
+from excite_cli.measurement.dataset import Array
+from excite_cli.measurement.reader import RawRun, Reader, ReadOptions, times_from_rate
+
+_NUMBERED = re.compile(r"_?\[?(\d+)\]?$")
+
+
+class CsvReader(Reader):
+    """Text tables, packed or not."""
+
+    title = "CSV"
+    suffixes = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz")
+
+    def read(self, path: Path, wanted: ReadOptions) -> list[RawRun]:
+        """The file's only run; columns are matched by name."""
+        table = read_table(path)
+        columns = dict(table.columns)
+        words = ", ".join(list(columns)[:30])
+        if not any(_joint_of(name, wanted.called("q") or "q") for name in columns):
+            raise FileError(_no_columns(path, "q", wanted, words))
+        if not any(_joint_of(name, wanted.called("tau") or "tau") for name in columns):
+            raise FileError(_no_columns(path, "tau", wanted, words))
+        time = wanted.called("t")
+        stamped = time is not None and time in columns
+        if stamped:
+            t = columns.pop(str(time))
+        else:
+            samples = len(next(iter(columns.values())))
+            if wanted.rate is None:
+                words += nearest(time or "t", columns)
+            t = times_from_rate(path, samples, wanted, words)
+        channels, others = _by_channel(columns, wanted)
+        numbered = all(name.isdigit() for name in channels["q"])
+        return [RawRun("", t, channels, others, numbered, not stamped, table.findings)]
+
+
+def _no_columns(path: Path, channel: str, wanted: ReadOptions, words: str) -> str:
+    called = wanted.called(channel) or channel
+    return (
+        f"{path} has no columns '{called}_<joint>'; its columns: {words}. One file holds one run: "
+        "t, q_<joint>, …, tau_<joint>, … (and dq_<joint>); positions and torques in separate "
+        f"files must be joined first. A channel of another name: measurement.channels: "
+        f"{{{channel}: …}}."
+    )
+
+
+def _joint_of(column: str, channel: str) -> str:
+    """The joint in `<channel>_<joint>`, `<channel>3` or `<channel>[3]`; else ''."""
+    if not column.startswith(channel):
+        return ""
+    rest = column[len(channel) :]
+    if match := _NUMBERED.match(rest):
+        return str(int(match.group(1)))
+    return rest[1:] if rest.startswith("_") else ""
+
+
+def _by_channel(
+    columns: Mapping[str, Array], wanted: ReadOptions
+) -> tuple[dict[str, dict[str, Array]], dict[str, Array]]:
+    """Columns sorted into channel -> joint; what ends in no joint's name stands apart."""
+    channels: dict[str, dict[str, Array]] = {"q": {}}
+    others: dict[str, Array] = {}
+    called = {name: wanted.called(name) for name in ("q", "dq", "tau")}
+    names = {joint for name in columns if (joint := _joint_of(name, called["q"] or "q"))}
+    longest_first = sorted(names, key=len, reverse=True)
+    for name, values in columns.items():
+        # Longer prefixes first, so that `tau_q_…` or `dq_…` are not taken for another channel.
+        for channel, prefix in sorted(called.items(), key=lambda c: -len(c[1] or "")):
+            if prefix and (joint := _joint_of(name, prefix)):
+                channels.setdefault(channel, {})[joint] = values
+                break
+        else:
+            end = next((j for j in longest_first if name.endswith(f"_{j}")), "")
+            if end:
+                channel = wanted.channel(name[: -len(end) - 1])
+                channels.setdefault(channel, {})[end] = values
+            else:
+                others[wanted.channel(name)] = values
+    return channels, others

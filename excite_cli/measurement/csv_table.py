@@ -1,0 +1,217 @@
+"""Text tables of numbers: separators told apart, gaps and damaged rows named with their line.
+
+Nothing is evaluated; a line, a file and the unpacked size of a `.gz` have limits.
+"""
+
+import csv
+import gzip
+import re
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from excite_cli.errors import FileError
+from excite_cli.measurement.dataset import Array, Finding
+from excite_cli.measurement.reader import check_size, check_values
+
+_MAX_LINE = 2**20
+_MAX_TEXT = 2 * 2**30  # unpacked
+_BLANKS = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
+_DECIMAL_COMMA = re.compile(r"\d,\d")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Named columns (T,) of numbers; NaN where a field was empty."""
+
+    columns: dict[str, Array]
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True)
+class _Layout:
+    header: list[str]
+    separator: str | None  # None: white space
+    decimal_comma: bool
+    first_row: int  # number of lines before the first row
+
+
+def read_table(path: Path) -> Table:
+    """Read a `.csv` or `.csv.gz`; comma, semicolon, tab or white space between columns.
+
+    Raises
+    ------
+    FileError
+        No header, a column twice, a ragged row, a word among numbers, not text, or too large.
+    """
+    check_size(path)
+    try:
+        layout = _layout(path)
+        findings: list[Finding] = []
+        try:
+            values = _fast(path, layout)
+        except (ValueError, OverflowError):
+            values, findings = _careful(path, layout)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FileError(f"{path} is not a text table in UTF-8: {error}.") from error
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise FileError(f"{path} is a damaged or cut off .gz file: {error}.") from error
+    except OSError as error:
+        raise FileError(f"{path} cannot be read: {error.strerror or error}.") from error
+    if layout.decimal_comma:
+        text = "numbers are written with a decimal comma; read so"
+        findings.append(Finding("decimal_comma", "note", text))
+    return Table(values, tuple(findings))
+
+
+def _lines(path: Path) -> Iterator[str]:
+    """Lines without their ends, within limits."""
+    packed = path.name.lower().endswith(".gz")
+    with (
+        gzip.open(path, "rt", encoding="utf-8-sig", newline=None)
+        if packed
+        else path.open(encoding="utf-8-sig", newline=None)
+    ) as file:
+        total = 0
+        while line := file.readline(_MAX_LINE):
+            total += len(line)
+            if len(line) >= _MAX_LINE or total > _MAX_TEXT:
+                raise FileError(
+                    f"{path}: a line of more than {_MAX_LINE // 2**20} MiB, or more than "
+                    f"{_MAX_TEXT // 2**30} GiB of text. Cut it into several runs."
+                )
+            yield line.rstrip("\n")
+
+
+def _layout(path: Path) -> _Layout:
+    """Header and separator; a header may stand behind `#`, as numpy writes it."""
+    remark, header = "", ""
+    for count, line in enumerate(_lines(path)):
+        if not line.strip():
+            pass
+        elif line.lstrip().startswith(("#", "%")):
+            remark = line.lstrip().lstrip("#% ")
+        elif header:
+            return _laid_out(path, header, line, count)
+        elif _is_numeric(line):
+            if not remark or _is_numeric(remark):
+                raise FileError(
+                    f"{path} has no header: its first line is '{line[:60]}'. Add a line with the "
+                    "columns' names: t, q_<joint>, …, tau_<joint>, … (and dq_<joint>)."
+                )
+            return _laid_out(path, remark, line, count)
+        else:
+            header = line
+    if not header:
+        raise FileError(f"{path} is empty.")
+    raise FileError(f"{path} has a header and no rows.")
+
+
+def _is_numeric(line: str) -> bool:
+    words = [word.strip().strip('"') for word in re.split(r"[,;\s]+", line.strip()) if word]
+    try:
+        [float(word) for word in words if word.lower() not in _BLANKS]
+    except ValueError:
+        return False
+    return True
+
+
+def _laid_out(path: Path, header: str, row: str, count: int) -> _Layout:
+    separator = max((";", "\t", ","), key=header.count)
+    names = _split(header, separator if separator in header else None)
+    if names and not names[-1]:  # a separator at the end of each line
+        names = names[:-1]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice or not all(names):
+        what = f"column '{twice[0]}' is there twice" if twice else "a column has no name"
+        raise FileError(f"{path}: {what}. Give every column its own name in the header.")
+    used = separator if separator in header else None
+    comma = used != "," and bool(_DECIMAL_COMMA.search(row)) and "." not in row
+    return _Layout(names, used, comma, count)
+
+
+def _split(line: str, separator: str | None) -> list[str]:
+    if separator is None:
+        return line.split()
+    return [field.strip() for field in next(csv.reader([line], delimiter=separator))]
+
+
+def _rows(path: Path, layout: _Layout) -> Iterator[str]:
+    for number, line in enumerate(_lines(path)):
+        if number >= layout.first_row and line.strip() and not line.lstrip().startswith(("#", "%")):
+            yield line.replace(",", ".") if layout.decimal_comma else line
+
+
+def _fast(path: Path, layout: _Layout) -> dict[str, Array]:
+    """All rows whole and all fields numbers, by numpy's own parser."""
+    width = len(layout.header)
+    rows = _rows(path, layout)
+    table = np.loadtxt(rows, delimiter=layout.separator, ndmin=2, comments=None, quotechar='"')
+    if table.shape[1] != width:
+        raise ValueError("another number of columns")
+    check_values(path, table.size)
+    return {name: np.ascontiguousarray(table[:, j]) for j, name in enumerate(layout.header)}
+
+
+def _careful(path: Path, layout: _Layout) -> tuple[dict[str, Array], list[Finding]]:
+    """Row by row: empty fields become NaN, columns of words are left out, a cut last row too."""
+    width, fields, findings, numbers = len(layout.header), [], [], []
+    first = layout.first_row
+    for number, line in enumerate(_lines(path)):
+        if number < first or not line.strip() or line.lstrip().startswith(("#", "%")):
+            continue
+        row = _split(line.replace(",", ".") if layout.decimal_comma else line, layout.separator)
+        if len(row) == width + 1 and not row[-1]:
+            row = row[:-1]
+        fields.append(row)
+        numbers.append(number + 1)
+        check_values(path, len(fields) * width)
+    if fields and len(fields[-1]) < width:
+        text = f"the last row (line {numbers[-1]}) is cut off and left out: {len(fields[-1])} of "
+        findings.append(Finding("truncated", "warning", text + f"{width} fields"))
+        fields.pop()
+    for row, number in zip(fields, numbers, strict=False):
+        if len(row) != width:
+            raise FileError(
+                f"{path}, line {number}: {len(row)} fields, but the header names {width} columns. "
+                "Mend or delete that line."
+            )
+    if not fields:
+        raise FileError(f"{path} has a header and no whole rows.")
+    columns: dict[str, Array] = {}
+    words = []
+    for name, texts in zip(layout.header, zip(*fields, strict=True), strict=True):
+        values = _numbers(texts)
+        if isinstance(values, int):
+            if _any_number(texts):
+                raise FileError(
+                    f"{path}, line {numbers[values]}: '{texts[values][:40]}' in column '{name}' "
+                    "is not a number. Leave the field empty where a value is missing."
+                )
+            words.append(name)
+        else:
+            columns[name] = values
+    if words:
+        text = f"columns of words are left out: {', '.join(words)}"
+        findings.append(Finding("words", "note", text))
+    return columns, findings
+
+
+def _numbers(texts: tuple[str, ...]) -> Array | int:
+    """The column, or the index of the first field that is no number."""
+    values = np.full(len(texts), np.nan)
+    for index, text in enumerate(texts):
+        if text.lower() in _BLANKS:
+            continue
+        try:
+            values[index] = float(text)
+        except ValueError:
+            return index
+    return values
+
+
+def _any_number(texts: tuple[str, ...]) -> bool:
+    return any(text and _is_numeric(text) for text in texts[:1000])

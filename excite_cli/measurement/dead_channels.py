@@ -1,0 +1,97 @@
+"""Channels that say nothing: constant while the robot moves, or copies of another channel."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+
+
+def dead_channels(runs: Sequence[Run], joints: tuple[str, ...]) -> tuple[list[Run], list[Finding]]:
+    """Name dead and copied channels; joints held still in a single run are masked in it.
+
+    A channel is dead only if it is *exactly* constant: a sensor that works has noise.
+    """
+    held = np.array([_constant(run.q) for run in runs])  # (runs, n)
+    still = np.asarray(held.all(axis=0))
+    findings = _whole(runs, joints, still)
+    if still.all():
+        text = "no joint moves: positions are constant throughout. Is this the right channel?"
+        return list(runs), [Finding("dead", "error", text)]
+    kept = []
+    for run, stands in zip(runs, held, strict=True):
+        checked, more = _of_run(run, joints, stands, still)
+        kept.append(checked)
+        findings += more + _copies(run, joints)
+    return kept, findings
+
+
+def _constant(values: Array) -> Mask:
+    return np.asarray((values == values[0]).all(axis=0))
+
+
+def _whole(runs: Sequence[Run], joints: tuple[str, ...], still: Mask) -> list[Finding]:
+    findings = []
+    for j in np.flatnonzero(still):
+        value, joint = runs[0].q[0, j], joints[j]
+        turns = any(run.dq is not None and not _constant(run.dq)[j] for run in runs)
+        why = "its recorded speed is not: the encoder or its column is dead" if turns else (
+            "other joints move: if it was really held, leave it out of robot.joints (it is then "
+            f"locked at robot.posture: {{{joint}: {value:.4g}}}); else its encoder is dead"
+        )  # fmt: skip
+        text = f"position of {joint} is constant at {value:.6g} while {why}"
+        findings.append(Finding("dead", "error", text, "", (joint,)))
+    return findings
+
+
+def _of_run(
+    run: Run, joints: tuple[str, ...], stands: Mask, still: Mask
+) -> tuple[Run, list[Finding]]:
+    findings = []
+    silent = _constant(run.tau)
+    masked = np.zeros(len(joints), bool)
+    for j in np.flatnonzero(silent & (run.usable().any(axis=0))):
+        joint, level = joints[j], run.tau[0, j]
+        if stands[j] and not still[j]:
+            masked[j] = True
+            text = f"{joint} is held in this run and its torque constant at {level:.6g}; masked"
+            findings.append(Finding("held", "warning", text, run.name, (joint,)))
+        elif not still[j]:
+            text = (
+                f"torque of {joint} is constant at {level:.6g} while it moves: the channel is "
+                "dead, or another one was meant (measurement.channels, measurement.names)"
+            )
+            findings.append(Finding("dead", "error", text, run.name, (joint,)))
+    for j in np.flatnonzero(stands & ~silent & ~still):
+        text = f"position of {joints[j]} is constant at {run.q[0, j]:.6g} in this run"
+        findings.append(Finding("held", "note", text, run.name, (joints[j],)))
+    if masked.any():
+        run = replace(run, valid=run.usable() & ~masked)
+    if run.dq is not None:
+        dead = tuple(np.array(joints)[_constant(run.dq) & ~stands])
+        if dead:
+            text = f"recorded speed of {', '.join(dead)} is constant while its position changes; "
+            findings.append(
+                Finding("dead", "warning", text + "recorded speeds are not used", run.name, dead)
+            )
+            run = replace(run, dq=None)
+    return run, findings
+
+
+def _copies(run: Run, joints: tuple[str, ...]) -> list[Finding]:
+    """Two joints with the very same numbers: a column written twice."""
+    findings = []
+    for word, values in (("torque", run.tau), ("position", run.q)):
+        moving = ~_constant(values)
+        for j in range(len(joints)):
+            same = (values[:, j + 1 :] == values[:, j : j + 1]).all(axis=0) & moving[j]
+            for k in np.flatnonzero(same) + j + 1:
+                text = (
+                    f"{word}s of {joints[j]} and {joints[k]} are the same numbers: one column was "
+                    "written twice"
+                )
+                severity = "error" if word == "torque" else "warning"
+                pair = (joints[j], joints[k])
+                findings.append(Finding("duplicate", severity, text, run.name, pair))  # type: ignore[arg-type]
+    return findings

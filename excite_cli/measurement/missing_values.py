@@ -1,0 +1,108 @@
+"""NaN and infinite values: taken out, filled and masked, and always said."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.errors import FileError
+from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+
+
+def without_missing(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]:
+    """The run without NaN.
+
+    Rows without a time stamp or without a position are taken out (all torques depend on all
+    positions), which leaves a gap in time. Missing torques are filled between their neighbours and
+    marked as not valid, each for its own joint. Recorded speeds are filled, they are not needed.
+
+    Raises
+    ------
+    FileError
+        Nothing is left.
+    """
+    findings = []
+    stamped = np.isfinite(run.t)
+    if not stamped.all():
+        text = f"{np.count_nonzero(~stamped)} rows without a time stamp are left out"
+        findings.append(Finding("nan", "warning", text, run.name))
+    placed = np.isfinite(run.q)
+    rows = stamped & placed.all(axis=1)
+    for joint, missing in zip(joints, (~placed & stamped[:, None]).sum(axis=0), strict=True):
+        if missing:
+            text = (
+                f"position of {joint} is NaN or infinite in {_share(missing, len(run.t))}; these "
+                "instants are taken out for all joints"
+            )
+            findings.append(Finding("nan", "warning", text, run.name, (joint,)))
+    if np.count_nonzero(rows) < 2:
+        raise FileError(
+            f"Run {run.name}: no instant has a time stamp and the positions of all joints "
+            f"({', '.join(joints)}); nothing is left."
+        )
+    kept = rows_of(run, rows) if not rows.all() else run
+    kept, more = _fill_torque(kept, joints)
+    findings += more
+    if kept.dq is not None and not np.isfinite(kept.dq).all():
+        dq, more = _fill_speed(kept, joints)
+        kept, findings = replace(kept, dq=dq), findings + more
+    return kept, findings
+
+
+def _share(count: int, total: int) -> str:
+    return f"{count} of {total} samples"
+
+
+def rows_of(run: Run, rows: Mask | NDArray[np.int64]) -> Run:
+    """The chosen rows (a mask, or places in order) of all channels."""
+    return replace(
+        run,
+        t=run.t[rows],
+        q=run.q[rows],
+        tau=run.tau[rows],
+        dq=None if run.dq is None else run.dq[rows],
+        valid=None if run.valid is None else run.valid[rows],
+        extra={key: value[rows] for key, value in run.extra.items()},
+    )
+
+
+def _fill_torque(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]:
+    known = np.isfinite(run.tau)
+    if known.all():
+        return run, []
+    findings = []
+    for j, joint in enumerate(joints):
+        missing = int(np.count_nonzero(~known[:, j]))
+        if missing == len(run.t):
+            text = (
+                f"torque of {joint} is NaN or infinite throughout: the channel is dead. Leave the "
+                "run out, or the joint out of robot.joints"
+            )
+            findings.append(Finding("dead", "error", text, run.name, (joint,)))
+        elif missing:
+            text = f"torque of {joint} is NaN or infinite in {_share(missing, len(run.t))}; masked"
+            findings.append(Finding("nan", "warning", text, run.name, (joint,)))
+    return replace(run, tau=_filled(run.tau), valid=run.usable() & known), findings
+
+
+def _fill_speed(run: Run, joints: tuple[str, ...]) -> tuple[Array | None, list[Finding]]:
+    assert run.dq is not None
+    known = np.isfinite(run.dq)
+    names = tuple(np.array(joints)[~known.all(axis=0)])
+    if not known.any(axis=0).all():
+        text = f"recorded speed of {', '.join(names)} is NaN; recorded speeds are not used"
+        return None, [Finding("nan", "warning", text, run.name, names)]
+    text = f"recorded speed of {', '.join(names)} is NaN in {np.count_nonzero(~known)} places"
+    return _filled(run.dq), [Finding("nan", "note", f"{text}; filled", run.name, names)]
+
+
+def _filled(values: Array) -> Array:
+    """Linear between what is known; 0 where nothing is."""
+    filled, places = values.copy(), np.arange(len(values))
+    for column in filled.T:
+        known = np.isfinite(column)
+        if not known.any():
+            column[:] = 0.0
+        elif not known.all():
+            column[~known] = np.interp(places[~known], places[known], column[known])
+    return filled

@@ -1,0 +1,65 @@
+"""All checks of measured data, in the order in which they can be made.
+
+Missing values first, then what needs the samples as recorded (dead, stuck, saturated channels),
+then the time stamps, then what needs equidistant samples (units, order, sign). Nothing is dropped
+without a finding; findings of severity `error` mean that any diagnosis would be wrong.
+"""
+
+from collections.abc import Iterable, Sequence
+
+from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.errors import FileError
+from excite_cli.measurement.channel_order import check_order
+from excite_cli.measurement.dataset import Dataset, Finding, Run
+from excite_cli.measurement.dead_channels import dead_channels
+from excite_cli.measurement.missing_values import without_missing
+from excite_cli.measurement.saturation import mask_saturated
+from excite_cli.measurement.stamps import equidistant
+from excite_cli.measurement.stuck import mask_stuck
+from excite_cli.measurement.units import Limits, check_units
+
+
+def checked(
+    runs: Sequence[Run], spec: MeasurementSpec, joints: tuple[str, ...], limits: Limits
+) -> tuple[list[Run], list[Finding]]:
+    """Runs of one file, equidistant and masked, with everything that was seen and done."""
+    findings: list[Finding] = []
+    whole = []
+    for run in runs:
+        kept, more = without_missing(run, joints)
+        whole.append(kept)
+        findings += more
+    whole, more = dead_channels(whole, joints)
+    findings += more
+    parts: list[Run] = []
+    for run in whole:
+        for mask in (mask_saturated, mask_stuck):
+            run, more = mask(run, joints)
+            findings += more
+        even, more = equidistant(run)
+        parts += even
+        findings += more
+    findings += check_units(parts, spec, joints, limits)
+    findings += check_order(parts, joints)
+    return parts, list(dict.fromkeys(findings))
+
+
+def raise_for_errors(dataset: Dataset) -> None:
+    """Raise one FileError that lists every finding of severity `error`; else do nothing."""
+    errors = [found for found in dataset.findings if found.severity == "error"]
+    if errors:
+        lines = "".join(f"\n- {sentence(found)}" for found in errors)
+        raise FileError(f"{', '.join(dataset.sources)}: these data cannot be used:{lines}")
+
+
+def sentence(finding: Finding) -> str:
+    """`run: text.`, as it is told to a person."""
+    return f"{finding.run}: {finding.text}." if finding.run else f"{finding.text}."
+
+
+def count_by_severity(findings: Iterable[Finding]) -> dict[str, int]:
+    """How many findings of each severity, the worst first."""
+    counts = {"error": 0, "warning": 0, "note": 0}
+    for finding in findings:
+        counts[finding.severity] += 1
+    return counts

@@ -1,0 +1,81 @@
+"""Samples that repeat while the robot moves: masked, and said."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from excite_cli.measurement.dataset import Finding, Mask, Run
+from excite_cli.measurement.stretches import stretches
+
+_SHORTEST = 0.1  # s, of a single channel
+_FEWEST = 20  # samples, of a single channel
+_FROZEN_END = 10  # samples
+
+
+def mask_stuck(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]:
+    """Mark repeated samples as not valid.
+
+    Whole rows that repeat (a stale message), and torques of one joint that stand still far longer
+    than the channel's own habit of repeating values explains, while that joint moves.
+    """
+    findings: list[Finding] = []
+    valid = run.usable().copy()
+    stale = _stale(run)
+    if stale.any():
+        text = (
+            f"{np.count_nonzero(stale)} of {len(run.t)} samples repeat the one before in every "
+            "position and torque while the robot moves: stale messages; masked"
+        )
+        findings.append(Finding("stuck", "warning", text, run.name))
+        valid[stale] = False
+    same = np.vstack([np.zeros((1, len(joints)), bool), run.tau[1:] == run.tau[:-1]])
+    for j, joint in enumerate(joints):
+        if same[1:, j].all():
+            continue  # constant throughout: a dead channel
+        for start, end in _standing(run, same[:, j] & ~stale, j):
+            if not valid[start:end, j].any():
+                continue
+            text = (
+                f"torque of {joint} stands at {run.tau[start, j]:.6g} from {run.t[start]:.3f} to "
+                f"{run.t[end - 1]:.3f} s while it moves; masked"
+            )
+            findings.append(Finding("stuck", "warning", text, run.name, (joint,)))
+            valid[start:end, j] = False
+    return (replace(run, valid=valid) if findings else run), findings
+
+
+def _stale(run: Run) -> Mask:
+    """Rows equal to the one before, where the positions then catch up with a jump.
+
+    At rest, a noiseless robot repeats its rows too, and in slow motion a coarse encoder; there is
+    no jump of more than a step of the encoder when it goes on.
+    """
+    moved = np.abs(np.diff(run.q, axis=0)).max(axis=1)
+    repeated = (np.diff(run.tau, axis=0) == 0).all(axis=1) & (moved == 0)
+    # Repeats of a time stamp are duplicates, and told as such.
+    repeated = np.concatenate([[False], repeated & (np.diff(run.t) > 0)])
+    stale = np.zeros(len(run.t), bool)
+    encoder = float(moved[moved > 0].min(initial=np.inf))
+    for start, length in zip(*stretches(repeated), strict=True):
+        end = start + length
+        if end + 1 < len(run.t):
+            late = moved[end - 1] > max((1 + 0.5 * length) * moved[end], 2.5 * encoder)
+        else:
+            late = length >= _FROZEN_END
+        stale[start:end] = late
+    return stale
+
+
+def _standing(run: Run, repeats: Mask, j: int) -> list[tuple[int, int]]:
+    """Long stretches of one joint's torque, while its position changes."""
+    habit = np.count_nonzero(repeats) / len(repeats)
+    # Length that chance exceeds once in a million runs, given how often values repeat.
+    by_chance = np.log(1e-6 / len(repeats)) / np.log(min(max(habit, 1e-6), 0.999))
+    fewest = max(by_chance, _SHORTEST / max(run.step, 1e-12), _FEWEST)
+    # A coarse torque that changes slowly stands as well, and goes on by one of its own steps.
+    steps = np.abs(np.diff(run.tau[:, j]))
+    leap = 3 * float(np.median(steps[steps > 0]))
+    resumed = np.append(steps, np.inf)
+    first, lengths = stretches(repeats)
+    found = [(int(a), int(a + n)) for a, n in zip(first, lengths, strict=True) if n >= fewest]
+    return [(a, b) for a, b in found if np.ptp(run.q[a:b, j]) > 0 and resumed[b - 1] > leap]

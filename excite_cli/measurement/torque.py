@@ -1,0 +1,112 @@
+"""From what was recorded to what is meant: s, rad (m), and N·m at the joint.
+
+With m the torque of the motors (recorded, or current times the motor's constant), g the gear
+ratios and S the shares of a coupled transmission (`coupling`),
+
+    tau = (I + S) diag(g) m        and, by virtual work,        q_motor = diag(g) (I + S)ᵀ q.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.errors import ConfigError, nearest
+from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+def check_joints(spec: MeasurementSpec, joints: tuple[str, ...]) -> None:
+    """Raise ConfigError for a joint in `measurement` that the robot does not move."""
+    named: dict[str, list[str]] = {
+        "coupling": [*spec.coupling, *(k for shares in spec.coupling.values() for k in shares)],
+        "sign": list(spec.sign),
+        "position_sign": list(spec.position_sign),
+        "velocity_sign": list(spec.velocity_sign),
+        "offset": list(spec.offset),
+    }
+    for key in ("gear_ratio", "torque_constant"):
+        value = getattr(spec, key)
+        if isinstance(value, dict):
+            named[key] = list(value)
+            missing = [joint for joint in joints if joint not in value]
+            if missing:
+                raise ConfigError(
+                    f"measurement.{key}: no value for {', '.join(missing)}. Give one number for "
+                    "all joints, or one for each."
+                )
+    for key, names in named.items():
+        for name in names:
+            if name not in joints:
+                raise ConfigError(
+                    f"measurement.{key}: '{name}' is no joint that moves."
+                    f"{nearest(name, joints)} Moved joints: {', '.join(joints)}."
+                )
+    ratios = _per_joint(spec.gear_ratio, joints)
+    if not ratios.all():
+        raise ConfigError("measurement.gear_ratio: a ratio of 0 means nothing.")
+    if abs(np.linalg.det(np.eye(len(joints)) + _shares(spec, joints))) < 1e-9:
+        raise ConfigError("measurement.coupling: these shares cannot be inverted.")
+
+
+def to_joints(run: Run, spec: MeasurementSpec, joints: tuple[str, ...], revolute: Mask) -> Run:
+    """The run in s, rad (m) and N·m at the joints, as `spec` declares it."""
+    ratio, shares = _per_joint(spec.gear_ratio, joints), _shares(spec, joints)
+    angle = np.where(revolute, np.pi / 180 if spec.angle == "deg" else 1.0, 1.0)
+    q = run.q * angle * _per_joint(spec.position_sign, joints)
+    dq = None if run.dq is None else run.dq * angle * _per_joint(spec.velocity_sign, joints)
+    if spec.position == "motor":
+        back = np.linalg.inv(np.eye(len(joints)) + shares.T).T
+        q = q / ratio @ back
+        dq = None if dq is None else dq / ratio @ back
+    q = q + _per_joint(spec.offset, joints, 0.0)
+    tau = run.tau * _per_joint(spec.sign, joints)
+    if spec.torque == "current":
+        tau = tau * _per_joint(spec.torque_constant, joints)
+    if spec.torque in ("motor", "current"):
+        tau = tau * ratio
+    coupled = tau.copy()
+    for j, k in np.argwhere(shares):  # not a product with S: 0 · NaN would spread over all joints
+        coupled[:, j] += shares[j, k] * tau[:, k]
+    return replace(run, q=q, dq=dq, tau=coupled)
+
+
+def declared(spec: MeasurementSpec, joints: tuple[str, ...]) -> list[Finding]:
+    """Findings about a declaration that contradicts itself."""
+    findings = []
+    ratio = _per_joint(spec.gear_ratio, joints)
+    if spec.torque != "link" and (ratio == 1.0).all():
+        text = (
+            f"measurement.torque is '{spec.torque}', and every gear_ratio is 1: give "
+            "measurement.gear_ratio unless the motors drive the joints directly"
+        )
+        findings.append(Finding("units", "warning", text))
+    if spec.torque == "link" and spec.position == "link" and (ratio != 1.0).any():
+        text = (
+            "measurement.gear_ratio is given but not applied, for the torque is at the link; "
+            "write measurement.torque: motor if it is not"
+        )
+        findings.append(Finding("units", "warning", text))
+    if spec.torque != "current" and (_per_joint(spec.torque_constant, joints) != 1.0).any():
+        text = "measurement.torque_constant is given but not applied: torque is not 'current'"
+        findings.append(Finding("units", "warning", text))
+    return findings
+
+
+def _per_joint(
+    value: float | Mapping[str, float], joints: tuple[str, ...], other: float = 1.0
+) -> Array:
+    if isinstance(value, Mapping):
+        return np.array([float(value.get(joint, other)) for joint in joints])
+    return np.full(len(joints), float(value))
+
+
+def _shares(spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:
+    """S (n, n): row j holds the shares of other motors in joint j's torque."""
+    shares = np.zeros((len(joints), len(joints)))
+    for joint, motors in spec.coupling.items():
+        for motor, share in motors.items():
+            shares[joints.index(joint), joints.index(motor)] = share
+    return shares

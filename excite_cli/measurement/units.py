@@ -1,0 +1,232 @@
+"""Units that cannot be: milliseconds for seconds, degrees for radians, odd gains of the speed.
+
+Judged without a model of the dynamics: recorded speeds against differentiated positions, speeds
+and positions against the robot's limits, the sampling rate against any rate of a robot's bus.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+from excite_cli.measurement.speeds import Speeds, speeds
+from excite_cli.measurement.torque import SECONDS
+
+_DEGREES = 180 / np.pi
+_CLOSE = 0.2  # share by which a gain may miss the factor it is taken for
+_ODD = 0.2  # share by which a gain may miss 1
+_RATES = (20.0, 50_000.0)  # Hz, of robots' logs
+_SLOW = 0.005  # of the speed limit
+_TOO_FAST = 20.0  # times the speed limit
+_USUAL_SPEED = 3.0  # rad/s, of a robot without a limit
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the robot allows, (n,) each, infinite where nothing is known; which joints turn."""
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    effort: Array
+    revolute: Mask
+
+    @classmethod
+    def unknown(cls, n: int) -> "Limits":
+        """No limits, all joints turn."""
+        infinite = np.full(n, np.inf)
+        return cls(-infinite, infinite, infinite, infinite, np.ones(n, bool))
+
+
+def check_units(
+    runs: Sequence[Run], spec: MeasurementSpec, joints: tuple[str, ...], limits: Limits
+) -> list[Finding]:
+    """Findings about time, angles and torque of equidistant runs of one file."""
+    found = speeds(runs)
+    where = ", ".join(run.name for run in runs)
+    findings = _time_by_speed(found, spec, where) or _time_by_limits(
+        runs, found, spec, limits, where
+    )
+    if not findings:
+        findings = _angle_by_speed(found, spec, limits, where) or _angle_by_limits(
+            runs, found, spec, limits, where
+        )
+    if not findings:
+        findings = _odd_gains(found, joints, where)
+        findings += _outside(runs, joints, limits, where)
+    return findings + _torque(runs, joints, limits, where)
+
+
+def _gain(found: Speeds, among: Mask | None = None) -> float:
+    """Median gain of the recorded speeds of joints that follow their own positions; NaN if none."""
+    if found.recorded is None:
+        return float("nan")
+    follows = np.abs(np.diag(found.correlation())) > 0.8
+    if among is not None:
+        follows = follows & among
+    return float(np.median(np.abs(found.gain()[follows]))) if follows.any() else float("nan")
+
+
+def _near(value: float, factor: float) -> bool:
+    return bool(abs(value / factor - 1) < _CLOSE)
+
+
+def _unit_for(seconds: float) -> str:
+    return next((unit for unit, s in SECONDS.items() if _near(seconds, s)), "")
+
+
+def _time_by_speed(found: Speeds, spec: MeasurementSpec, where: str) -> list[Finding]:
+    gain = _gain(found)
+    unit = _unit_for(SECONDS[spec.time] / gain) if gain > 0 else ""
+    if not unit or unit == spec.time:
+        return []
+    text = (
+        f"recorded speeds are {gain:.4g} times the change of position per time: time stamps are "
+        f"in {unit}, not {spec.time}. Write measurement.time: {unit}"
+    )
+    return [Finding("units", "error", text, where)]
+
+
+def _time_by_limits(
+    runs: Sequence[Run], found: Speeds, spec: MeasurementSpec, limits: Limits, where: str
+) -> list[Finding]:
+    """Without recorded speeds: rate and speed must both be absurd, and sensible in another unit."""
+    if found.recorded is not None:
+        return []
+    rate = 1 / float(np.median([run.step for run in runs]))
+    limit = np.where(np.isfinite(limits.velocity), limits.velocity, _USUAL_SPEED)
+    share = float((found.fastest / limit).max())
+    low, high = _RATES
+    slow = rate < low and share < _SLOW
+    fast = rate > high and share > _TOO_FAST
+    if not (slow or fast):
+        return []
+    for unit, seconds in SECONDS.items():
+        factor = SECONDS[spec.time] / seconds
+        if low <= rate * factor <= high and _SLOW < share * factor < 1.5:
+            text = (
+                f"samples come at {rate:.4g} Hz and the fastest joint reaches {share:.2g} of its "
+                f"speed limit; read in {unit} it is {rate * factor:.4g} Hz and "
+                f"{share * factor:.2g}. Write measurement.time: {unit}"
+            )
+            return [Finding("units", "error", text, where)]
+    return []
+
+
+def _angle_by_speed(
+    found: Speeds, spec: MeasurementSpec, limits: Limits, where: str
+) -> list[Finding]:
+    gain = _gain(found, limits.revolute)
+    leave = "leave the speeds out (measurement.channels: {dq: null})"
+    if _near(gain, 1 / _DEGREES):
+        text = (
+            f"recorded speeds are 1/{1 / gain:.3g} of the change of position per time: positions "
+            f"are in degrees, speeds in rad/s. Write measurement.angle: deg and {leave}"
+        )
+        if spec.angle == "deg":
+            text = (
+                f"recorded speeds are 1/{1 / gain:.3g} of the change of position per time: "
+                f"positions are in degrees, speeds already in rad/s; {leave}"
+            )
+        return [Finding("units", "error", text, where)]
+    if _near(gain, _DEGREES):
+        text = (
+            f"recorded speeds are {gain:.3g} times the change of position per time: speeds are in "
+            f"degrees per second, positions in radians; {leave}"
+        )
+        return [Finding("units", "error", text, where)]
+    return []
+
+
+def _angle_by_limits(
+    runs: Sequence[Run], found: Speeds, spec: MeasurementSpec, limits: Limits, where: str
+) -> list[Finding]:
+    lowest, highest = _extremes(runs)
+    bounded = limits.revolute & np.isfinite(limits.lower) & np.isfinite(limits.upper)
+    if not bounded.any():
+        return []
+    lower, upper = limits.lower[bounded], limits.upper[bounded]
+    low, high = lowest[bounded], highest[bounded]
+    reach = np.maximum(np.abs(lower), np.abs(upper))
+    far = np.maximum(-low / reach, high / reach)
+    slack = 0.1 * (upper - lower)
+    speed = (found.fastest / limits.velocity)[bounded]
+    fits = (low / _DEGREES > lower - slack) & (high / _DEGREES < upper + slack)
+    if far.max() > 3 and fits.all() and (speed / _DEGREES).max() < 1.5:
+        worst = float(max(-low.min(), high.max()))
+        text = (
+            f"positions reach {worst:.4g}, {far.max():.3g} times the robot's limits; in degrees "
+            "they keep them. Write measurement.angle: deg"
+        )
+        return [Finding("units", "error", text, where)]
+    travel = (high - low) / (upper - lower)
+    if spec.angle == "deg" and travel.max() < 0.02 and (travel * _DEGREES).max() > 0.1:
+        text = (
+            f"positions use {travel.max():.2g} of the robot's range at most: are they in radians "
+            "already? Then write measurement.angle: rad"
+        )
+        return [Finding("units", "warning", text, where)]
+    return []
+
+
+def _extremes(runs: Sequence[Run]) -> tuple[Array, Array]:
+    return (
+        np.min([run.q.min(axis=0) for run in runs], axis=0),
+        np.max([run.q.max(axis=0) for run in runs], axis=0),
+    )
+
+
+def _odd_gains(found: Speeds, joints: tuple[str, ...], where: str) -> list[Finding]:
+    if found.recorded is None:
+        return []
+    gains, own = found.gain(), np.diag(found.correlation())
+    findings = []
+    for j in np.flatnonzero((own > 0.8) & (np.abs(gains - 1) > _ODD)):
+        text = (
+            f"recorded speed of {joints[j]} is {gains[j]:.3g} times the change of its position: "
+            "one of them has another unit or gear ratio (measurement.gear_ratio with position: "
+            "motor), or the speed is filtered"
+        )
+        findings.append(Finding("gain", "warning", text, where, (joints[j],)))
+    return findings
+
+
+def _outside(
+    runs: Sequence[Run], joints: tuple[str, ...], limits: Limits, where: str
+) -> list[Finding]:
+    lowest, highest = _extremes(runs)
+    span = np.where(np.isfinite(limits.upper - limits.lower), limits.upper - limits.lower, 0.0)
+    over = np.maximum(limits.lower - lowest, highest - limits.upper)
+    findings = []
+    for j in np.flatnonzero(over > 0.02 * span + 1e-6):
+        text = (
+            f"positions of {joints[j]} reach from {lowest[j]:.4g} to {highest[j]:.4g}, its limits "
+            f"are {limits.lower[j]:.4g} and {limits.upper[j]:.4g}: another zero "
+            "(measurement.offset), sign (measurement.position_sign) or joint (measurement.names)?"
+        )
+        findings.append(Finding("outside_limits", "warning", text, where, (joints[j],)))
+    return findings
+
+
+def _torque(
+    runs: Sequence[Run], joints: tuple[str, ...], limits: Limits, where: str
+) -> list[Finding]:
+    """Only a note: effort limits in URDFs are often placeholders."""
+    largest = np.max([np.abs(run.tau).max(axis=0) for run in runs], axis=0)
+    share = largest / limits.effort
+    j = int(np.argmax(share))
+    if share[j] > 3:
+        text = (
+            f"torque of {joints[j]} reaches {largest[j]:.4g} N·m, {share[j]:.3g} times its effort "
+            "limit: a placeholder in the URDF, or another unit"
+        )
+        return [Finding("units", "note", text, where, (joints[j],))]
+    if 0 < share.max() < 0.01:
+        text = (
+            f"torques stay below {share.max():.2g} of the effort limits: are they of the motors, "
+            "before the gears (measurement.torque: motor)?"
+        )
+        return [Finding("units", "warning", text, where)]
+    return []

@@ -1,0 +1,220 @@
+"""What the robot of one run is made of, and its making: inertias, joints, drives, instruments."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from excite_cli.errors import RobotError
+from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.regressor import PARAMETERS_PER_BODY
+from excite_cli.simulation.engine import load_mujoco
+from excite_cli.simulation.mujoco_model import Plant, build_plant, refresh
+from excite_cli.simulation.planted import Planted
+
+_STABLE = 0.25  # step times the highest frequency of springs
+_MOST_STEPS = 200
+_HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)  # flanks of a gear
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """Between a motor and its link: rotor [kg·m²], stiffness [N·m/rad], damping, play [rad].
+
+    `sensed_before`: the recorded torque is that of the motor, which also turns the rotor; otherwise
+    that which enters the gear.
+    """
+
+    rotor: float
+    sensed_before: bool
+    stiffness: float = 0.0
+    damping: float = 0.0
+    play: float = 0.0
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Dry friction `force` on v_first + direction · v_second."""
+
+    first: int
+    second: int
+    direction: float
+    force: float
+
+
+@dataclass(frozen=True)
+class Push:
+    """A force (3,) [N] on the last joint's frame, in axes of the world, from `start` to `end`."""
+
+    force: Array
+    start: float
+    end: float
+
+
+@dataclass
+class Build:
+    """One run's robot while mechanisms add to it; arrays are (n,) per moved joint.
+
+    `springs` are k and c of k q + c. `looped` effects act through their own formula at every step;
+    `compensated` ones are known to the controller;
+    `recorded` ones change what is written down. `reading` (n, 2): sharpness and level of the
+    saturation of the recorded torque.
+    """
+
+    robot: Robot
+    phi: Array
+    run: str
+    gravity: Array
+    armature: Array
+    damping: Array
+    friction: Array
+    springs: Array
+    clip: Array
+    position_offset: Array
+    reading: Array
+    delay: Array
+    gain: Array
+    offset: Array
+    soft: dict[int, Transmission] = field(default_factory=dict)
+    couplings: list[Coupling] = field(default_factory=list)
+    pushes: list[Push] = field(default_factory=list)
+    looped: list[Planted] = field(default_factory=list)
+    compensated: list[Planted] = field(default_factory=list)
+    recorded: list[Planted] = field(default_factory=list)
+
+    @classmethod
+    def bare(cls, robot: Robot, phi: Array, run: str) -> "Build":
+        """Rigid bodies only."""
+        zeros = np.zeros((8, robot.n))
+        return cls(
+            robot=robot,
+            phi=phi.copy(),
+            run=run,
+            gravity=np.array(robot.model.gravity.linear),
+            armature=zeros[0],
+            damping=zeros[1],
+            friction=zeros[2],
+            springs=np.zeros((robot.n, 2)),
+            clip=np.full(robot.n, np.inf),
+            position_offset=zeros[3],
+            reading=np.full((robot.n, 2), [0.0, np.inf]),
+            delay=zeros[4],
+            gain=zeros[5],
+            offset=zeros[6],
+        )
+
+    def link_inertia(self, joint: int) -> float:
+        """What `joint` turns at the reference posture with all others held [kg·m²]."""
+        plant = build_plant(self.robot, self.phi)
+        return float(mass_matrix(plant, self.robot.posture)[joint, joint])
+
+
+def make(build: Build, step: float) -> Plant:
+    """The compiled robot of `build`, with no step longer than `step` or than its springs allow.
+
+    Raises
+    ------
+    RobotError
+        A joint moves no inertia, or its springs are too stiff to be simulated.
+    """
+    soft = sorted(build.soft)
+    couplings = [(c.first, c.second, c.direction) for c in build.couplings]
+    plant = build_plant(build.robot, build.phi, step, soft, couplings)
+    model, motor = plant.model, plant.motor
+    model.opt.gravity[:] = build.gravity
+    model.dof_armature[motor] = build.armature
+    for j, transmission in build.soft.items():
+        gear = plant.gear[j]
+        model.dof_armature[motor[j]] = build.armature[j] + transmission.rotor
+        model.jnt_stiffness[gear] = transmission.stiffness
+        model.dof_damping[gear] = transmission.damping
+        if transmission.play > 0.0:
+            model.jnt_limited[gear] = 1
+            model.jnt_range[gear] = [-transmission.play / 2, transmission.play / 2]
+            model.jnt_solimp[gear] = _HARD
+    model.dof_damping[motor] = build.damping
+    model.dof_frictionloss[motor] = build.friction
+    for c, coupling in enumerate(build.couplings):
+        model.tendon_frictionloss[c] = coupling.force
+    stiff, constant = build.springs.T
+    model.jnt_stiffness[motor] = stiff
+    model.qpos_spring[motor] = np.divide(
+        -constant, stiff, out=np.zeros(len(stiff)), where=stiff > 0
+    )
+    _check_inertia(build, plant)
+    refresh(plant)
+    _shorten(plant, step)
+    model.jnt_solref[:] = [2 * model.opt.timestep, 1.0]
+    return plant
+
+
+def mass_matrix(plant: Plant, q: Array) -> Array:
+    """Inertia (n, n) as the motors see it with stiff transmissions, armatures included."""
+    data = plant.new_data()
+    return _full(plant, data, q)[np.ix_(plant.motor, plant.motor)]
+
+
+def mass_matrices(plant: Plant, q: Array) -> Array:
+    """As `mass_matrix`, for postures (T, n)."""
+    data = plant.new_data()
+    at = np.ix_(plant.motor, plant.motor)
+    return np.array([_full(plant, data, posture)[at] for posture in q])
+
+
+def _full(plant: Plant, data: Any, q: Array) -> Array:
+    mujoco = load_mujoco()
+    size = plant.model.nv
+    data.qpos[:] = 0.0
+    data.qpos[plant.motor] = q
+    mujoco.mj_kinematics(plant.model, data)
+    mujoco.mj_comPos(plant.model, data)
+    if plant.model.ntendon:
+        mujoco.mj_tendon(plant.model, data)
+    mujoco.mj_crb(plant.model, data)
+    full, unit = np.empty((size, size)), np.zeros(size)
+    for column in range(size):
+        unit[column] = 1.0
+        mujoco.mj_mulM(plant.model, data, full[column], unit)
+        unit[column] = 0.0
+    return full
+
+
+def _check_inertia(build: Build, plant: Plant) -> None:
+    matrix = mass_matrix(plant, build.robot.posture)
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-12))
+    worst, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    if np.diag(matrix).min() > 1e-9 and worst[0] > 1e-9:
+        return
+    light = int(np.argmin(np.diag(matrix)))
+    joint = light if np.diag(matrix)[light] <= 1e-9 else int(np.argmax(np.abs(vectors[:, 0])))
+    raise RobotError(
+        f"joint '{build.robot.joint_names[joint]}' moves no inertia and cannot be simulated. Give "
+        f"its links an inertia in the URDF, lock it, or plant a motor's inertia: --effect "
+        f"'armature@{build.robot.joint_names[joint]}=0.1'."
+    )
+
+
+def _shorten(plant: Plant, step: float) -> None:
+    """Shorten the step until the stiffest spring is followed."""
+    model = plant.model
+    stiffness = np.asarray(model.jnt_stiffness).reshape(model.njnt, -1)[:, 0]
+    if not stiffness.any():
+        return
+    full = _full(plant, plant.new_data(), np.zeros(len(plant.motor)))
+    root = np.sqrt(stiffness)
+    square = np.linalg.eigvalsh(root[:, None] * np.linalg.solve(full, np.diag(root)))
+    needed = step * np.sqrt(max(square[-1], 0.0)) / _STABLE
+    if needed > _MOST_STEPS:
+        raise RobotError(
+            f"a spring of the simulated robot swings at {np.sqrt(square[-1]):.3g} rad/s, too fast "
+            "to be followed. Take a softer one, or more inertia at its ends."
+        )
+    model.opt.timestep = step / max(1, int(np.ceil(needed)))
+    model.dof_solref[:, 0] = 2 * model.opt.timestep
+    if model.ntendon:
+        model.tendon_solref_fri[:, 0] = 2 * model.opt.timestep
+
+
+def last_body(build: Build) -> slice:
+    """Where φ holds the body that the last joint carries."""
+    return slice(len(build.phi) - PARAMETERS_PER_BODY, len(build.phi))

@@ -1,0 +1,88 @@
+"""The robot's own controller: nominal model fed forward, and feedback on the tracking error.
+
+    τ = τ_nominal(q_r, v_r, a_r) + c τ_effects(q_r, v_r, a_r) + M(q_r) (ω² e + 2 ω ė + ω³/8 ∫e)
+
+with e = q_r − q. The rigid-body part of the feed-forward knows the URDF only. The rest is that of a
+robot which its maker has tuned: M is the true inertia with rotors, so that the bandwidth ω is the
+same for every joint, and the share c of friction and springs is compensated. Without that a light
+wrist with much friction would stand still at every reversal for longer than real ones do.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from excite_cli.effects.base import Signals
+from excite_cli.robot.inverse_dynamics import InverseDynamics
+from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.rigid_body import RigidBody
+from excite_cli.simulation.build import Build, mass_matrices
+from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.mujoco_model import Plant
+
+_MASS_EVERY = 10  # control steps
+_FASTEST = 0.4  # share of the control rate that a rotor alone may be damped at
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Where the robot should be at every control step, and what the nominal model says it takes.
+
+    `t` (N,) [s] from the start of the record, `q, v, a, feed_forward` (N, n).
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    feed_forward: Array
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Factors of error, speed error and integral, and the inertia (M, n, n) that they multiply.
+
+    Each inertia is held for `every` control steps.
+    """
+
+    position: float
+    speed: float
+    integral: float
+    mass: Array
+    every: int
+
+
+def reference_of(robot: Robot, motion: PlannedMotion, t: Array) -> Reference:
+    """Reference and feed-forward at the instants `t` (N,)."""
+    q, v, a = motion.states(t)
+    return Reference(t, q, v, a, InverseDynamics(robot).torques(q, v, a))
+
+
+def compensated(build: Build, reference: Reference, share: float) -> Reference:
+    """The reference with `share` of the torque of the run's effects in its feed-forward."""
+    if not (share and build.compensated):
+        return reference
+    load = reference.feed_forward
+    body = RigidBody(build.robot, build.phi, reference.q, reference.v, reference.a)
+    signals = Signals(
+        np.maximum(reference.t, 0.0), reference.q, reference.v, reference.a, load, load, body,
+        build.run,
+    )  # fmt: skip
+    extra = np.sum([p.effect.torque(signals, p.values) for p in build.compensated], axis=0)
+    return replace(reference, feed_forward=load + share * extra)
+
+
+def gains_of(build: Build, plant: Plant, reference: Reference, bandwidth: float) -> Gains:
+    """Gains along the reference; behind a soft transmission the drive must be slower."""
+    mass = mass_matrices(plant, reference.q[::_MASS_EVERY])
+    step = float(reference.t[1] - reference.t[0])
+    for j, transmission in build.soft.items():
+        rotor = transmission.rotor + build.armature[j]
+        bandwidth = min(bandwidth, 0.5 * _FASTEST / step * rotor / float(mass[:, j, j].max()))
+    return Gains(bandwidth**2, 2.0 * bandwidth, bandwidth**3 / 8.0, mass, _MASS_EVERY)
+
+
+def control_instants(start: float, end: float, rate: float) -> Array:
+    """From `start` past `end` [s] at `rate`, with an instant at zero."""
+    first, last = int(np.floor(start * rate)), int(np.ceil(end * rate))
+    return np.arange(first, last + 1) / rate

@@ -1,0 +1,62 @@
+"""Plausible sizes for the effects that the configuration declares: the robot has them too."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from excite_cli.effects.base import Effect, Signals
+from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.regressor import standard_parameters
+from excite_cli.robot.rigid_body import RigidBody
+from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planted import Planted
+
+_SHARE = (0.03, 0.10)  # of the joint's torque RMS, per parameter
+_SAMPLES = 200
+_LEAST = 1e-3  # of the largest joint's torque RMS
+
+
+def sized(
+    robot: Robot, effects: Sequence[Effect], motions: Sequence[PlannedMotion], seed: int
+) -> tuple[Planted, ...]:
+    """Each effect with values that give 3–10 % of the joint's torque RMS on these motions.
+
+    Kinds that act on the whole robot, and defects of the data, take a twentieth of the upper end
+    of their usual range.
+    """
+    if not effects:
+        return ()
+    rng = np.random.default_rng([seed, 1])
+    signals = [_signals(robot, motion) for motion in motions]
+    load = np.sqrt(np.mean(np.concatenate([s.load for s in signals]) ** 2, axis=0))
+    load = np.maximum(load, _LEAST * load.max() + 1e-9)
+    planted = []
+    for effect in effects:
+        share = rng.uniform(*_SHARE, len(effect.parameters))
+        sign = np.where(
+            [p.nonnegative for p in effect.parameters],
+            1.0,
+            rng.choice([-1.0, 1.0], len(effect.parameters)),
+        )
+        if effect.data_defect or effect.scope == "robot":
+            shape, values = type(effect).planted(effect.parameters[0].high / 20, effect.shape)
+            effect = type(effect)(effect.joints, shape, effect.runs)
+        else:
+            unit = _per_unit(effect, signals)
+            size = share * load[list(effect.joints)].min() / np.maximum(unit, 1e-6)
+            values = sign * np.minimum(size, [p.high for p in effect.parameters])
+        planted.append(Planted(effect, values, declared=True))
+    return tuple(planted)
+
+
+def _per_unit(effect: Effect, signals: Sequence[Signals]) -> Array:
+    """RMS of each column over all rows the effect touches (P,)."""
+    columns = np.concatenate([effect.columns(s) for s in signals])
+    return np.sqrt(np.mean(columns**2, axis=(0, 1)))
+
+
+def _signals(robot: Robot, motion: PlannedMotion) -> Signals:
+    t = np.linspace(0.0, motion.trajectory.duration, _SAMPLES)
+    q, v, a = motion.states(t)
+    body = RigidBody(robot, standard_parameters(robot), q, v, a)
+    return Signals(t, q, v, a, body.load, body.load, body, motion.name)

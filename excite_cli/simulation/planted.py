@@ -1,0 +1,194 @@
+"""Effects put into the simulated robot, and the words that ask for them.
+
+`kind@joint[,joint…]=value[,name:value…][;runs:name|name]`, for example
+`coulomb_friction@elbow_joint=4`, `stribeck_friction@j2=3,stribeck_speed:0.05` or
+`payload@all=1.5;runs:motion_2`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.errors import ConfigError, nearest
+from excite_cli.robot.model import Array, Robot
+
+FORM = "kind@joint[,joint…]=value[,name:value…][;runs:name|name]"
+
+# Of these, the number people know is not the first linear parameter.
+_KNOWN_BY: Mapping[str, str] = {"torque_saturation": "level", "backlash": "gap"}
+
+# What only the simulated robot has: how its parts are built, not what is identified.
+EXTRA: Mapping[str, Mapping[str, float]] = {
+    "elasticity": {"rotor_inertia": 0.0, "damping_ratio": 0.02},
+    "backlash": {"rotor_inertia": 0.0},
+    "torque_saturation": {"actuator": 0.0},
+}
+
+
+@dataclass(frozen=True)
+class Planted:
+    """An effect with its linear parameters; `extra` are settings of its mechanism only."""
+
+    effect: Effect
+    values: Array
+    extra: Mapping[str, float] = field(default_factory=dict)
+    declared: bool = False
+
+    def named(self) -> dict[str, float]:
+        """Every number by name: linear parameters, shape, extra."""
+        linear = {
+            p.name: float(value)
+            for p, value in zip(self.effect.parameters, self.values, strict=False)
+        }
+        return {**EXTRA.get(self.effect.kind, {}), **self.extra, **self.effect.shape, **linear}
+
+    def record(self, robot: Robot) -> dict[str, object]:
+        """As plain data, for files and answers."""
+        nothing = np.zeros((len(self.values), len(self.values)))
+        return {
+            "kind": self.effect.kind,
+            "joints": [robot.joint_names[j] for j in self.effect.joints],
+            "parameters": {
+                name: {"value": value.value, "unit": value.unit}
+                for name, value in self.effect.report(self.values, nothing).items()
+            },
+            "shape": dict(self.effect.shape),
+            "values": [float(value) for value in self.values],
+            "extra": dict(self.extra),
+            "runs": list(self.effect.runs),
+            "declared": self.declared,
+        }
+
+
+def plant(
+    kind: type[Effect],
+    joints: tuple[int, ...],
+    value: float,
+    others: Mapping[str, float] | None = None,
+    runs: tuple[str, ...] = (),
+) -> Planted:
+    """One effect of `kind` on `joints`, with `value` and named `others`.
+
+    `value` is that of the first parameter; of a saturation it is the level, of backlash the gap.
+    """
+    others = dict(others or {})
+    if kind.kind in _KNOWN_BY:
+        value, others = (
+            others.pop(kind.parameters[0].name, 1.0),
+            {_KNOWN_BY[kind.kind]: value, **others},
+        )
+    extra = {name: others.pop(name) for name in EXTRA.get(kind.kind, {}) if name in others}
+    shape, values = kind.planted(value, others)
+    return Planted(kind(joints, shape, runs), values, extra)
+
+
+def parse_planted(text: str, robot: Robot, runs: Sequence[str]) -> tuple[Planted, ...]:
+    """The effects that `text` asks for; a kind local to a joint gives one for each joint named.
+
+    `runs` are the names that exist.
+
+    Raises
+    ------
+    ConfigError
+        The text has another form, or names a kind, joint, parameter or run that there is not.
+    """
+    where = f"--effect '{text}'"
+    body, *clauses = text.split(";")
+    place, equals, numbers = body.partition("=")
+    kind_name, at, joints_text = place.partition("@")
+    if not (at and equals and kind_name.strip() and joints_text.strip()):
+        raise ConfigError(
+            f"{where}: not of the form {FORM}; for example 'coulomb_friction@"
+            f"{robot.joint_names[-1]}=4'."
+        )
+    kind = kind_named(kind_name.strip(), where)
+    value, others = _numbers(numbers, kind, where)
+    chosen = _runs(clauses, runs, where)
+    places = _places(joints_text, kind, robot, where)
+    return tuple(plant(kind, joints, value, others, chosen) for joints in places)
+
+
+def _numbers(text: str, kind: type[Effect], where: str) -> tuple[float, dict[str, float]]:
+    first, *rest = text.split(",")
+    value = _number(first, where)
+    others: dict[str, float] = {}
+    allowed = allowed_names(kind)
+    for part in rest:
+        name, colon, number = (word.strip() for word in part.partition(":"))
+        if not colon:
+            raise ConfigError(f"{where}: '{part}' is not name:value.")
+        if name not in allowed and not _understood(kind, value, name):
+            raise ConfigError(
+                f"{where}: {kind.kind} has no parameter '{name}'.{nearest(name, allowed)} "
+                f"Allowed after the first value: {', '.join(allowed) or 'none'}."
+            )
+        others[name] = _number(number, where)
+    return value, others
+
+
+def allowed_names(kind: type[Effect]) -> tuple[str, ...]:
+    """Names of what may be given besides the first parameter."""
+    every = (*(p.name for p in kind.parameters), *(p.name for p in kind.shapes))
+    own = tuple(name for name in every if name != _first(kind))
+    return (*own, *EXTRA.get(kind.kind, {}))
+
+
+def _first(kind: type[Effect]) -> str:
+    return _KNOWN_BY.get(kind.kind, kind.parameters[0].name)
+
+
+def _understood(kind: type[Effect], value: float, name: str) -> bool:
+    """Whether `kind` takes `name` when planted: some say their parameters in other words too."""
+    first, second = (kind.planted(value, {name: probe}) for probe in (0.37, 0.73))
+    return first[0] != second[0] or not np.array_equal(first[1], second[1])
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise ConfigError(f"{where}: '{text.strip()}' is not a finite number.")
+    return value
+
+
+def _runs(clauses: Sequence[str], runs: Sequence[str], where: str) -> tuple[str, ...]:
+    chosen: list[str] = []
+    for clause in clauses:
+        word, colon, names = (part.strip() for part in clause.partition(":"))
+        if word != "runs" or not colon or not names:
+            raise ConfigError(f"{where}: after ';' only 'runs:name|name' is allowed.")
+        for name in (part.strip() for part in names.split("|")):
+            takes = [run for run in runs if run == name or run.startswith(f"{name}_take_")]
+            if not takes:
+                raise ConfigError(
+                    f"{where}: there is no run '{name}'.{nearest(name, runs)} "
+                    f"Runs: {', '.join(runs)}."
+                )
+            chosen += takes
+    return tuple(dict.fromkeys(chosen))
+
+
+def _places(text: str, kind: type[Effect], robot: Robot, where: str) -> list[tuple[int, ...]]:
+    everything = tuple(range(robot.n))
+    names = [name.strip() for name in text.split(",")]
+    if names == ["all"]:
+        if kind.scope == "pair":
+            return kind.places(robot)
+        return [(j,) for j in everything] if kind.scope == "joint" else [everything]
+    for name in names:
+        if name not in robot.joint_names:
+            raise ConfigError(
+                f"{where}: no moved joint '{name}'.{nearest(name, robot.joint_names)} "
+                f"Moved joints: {', '.join(robot.joint_names)}; or 'all'."
+            )
+    joints = tuple(dict.fromkeys(robot.joint_names.index(name) for name in names))
+    if kind.scope == "joint":
+        return [(j,) for j in joints]
+    if kind.scope == "pair" and len(joints) != 2:
+        raise ConfigError(f"{where}: {kind.kind} acts on two joints; name exactly two.")
+    return [joints]

@@ -1,0 +1,157 @@
+"""Plays one motion: a control step is a few array operations and one call into MuJoCo."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from excite_cli.errors import RobotError
+from excite_cli.robot.model import Array
+from excite_cli.simulation.build import Build
+from excite_cli.simulation.controller import Gains, Reference
+from excite_cli.simulation.engine import load_mujoco
+from excite_cli.simulation.looped import LoopedEffects
+from excite_cli.simulation.mujoco_model import Plant
+
+_RUNAWAY = 1e3  # rad
+_PUSHING_WIDTH = 1e-2  # rad/s
+
+
+@dataclass(frozen=True)
+class Played:
+    """What happened at the control instants `t` (N,): positions and torques of the motors (N, n).
+
+    A torque stands from its instant to the next. `step` is the physics step [s].
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    tau: Array
+    step: float
+
+
+def play(build: Build, plant: Plant, reference: Reference, gains: Gains) -> Played:
+    """Let the robot follow the reference, from rest relative to it.
+
+    Raises
+    ------
+    RobotError
+        The robot ran away.
+    """
+    mujoco = load_mujoco()
+    model = plant.model
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    data = plant.new_data()
+    rows, n = reference.q.shape
+    # Views into MuJoCo's memory; a slice, where it will do, costs less than indices.
+    motor = plant.motor if build.soft else slice(None)
+    qpos, qvel, applied = data.qpos, data.qvel, data.qfrc_applied
+    qpos[motor], qvel[motor] = reference.q[0], reference.v[0]
+    _engage(build, plant, data, reference.feed_forward[0])
+    mujoco.mj_forward(model, data)
+    effects = _Effects(build, plant, data) if build.looped else None
+    pushing = _Pushing(build, plant, data) if build.pushes else None
+    period = float(reference.t[1] - reference.t[0])
+    substeps = round(period / model.opt.timestep)
+    q, v, tau = np.empty((3, rows, n))
+    integral = np.zeros(n)
+    clip = build.clip if np.isfinite(build.clip).any() else None
+    for k in range(rows):
+        qk, vk = q[k], v[k]
+        qk[:], vk[:] = qpos[motor], qvel[motor]
+        error = reference.q[k] - qk
+        wanted = gains.position * error + gains.integral * integral
+        wanted += gains.speed * (reference.v[k] - vk)
+        torque = reference.feed_forward[k] + gains.mass[k // gains.every] @ wanted
+        error *= period
+        if clip is not None:
+            limited = np.clip(torque, -clip, clip)
+            error *= limited == torque  # the integral waits while a motor is at its limit
+            torque = limited
+        integral += error
+        tau[k] = torque
+        if effects is not None:
+            torque = torque - effects.at(reference.t[k] + 0.5 * period, qk, vk, 0.5 * period)
+        if pushing is not None:
+            pushing.at(reference.t[k])
+        applied[motor] = torque
+        mujoco.mj_step(model, data, substeps)
+    _check(build, reference, q)
+    return Played(reference.t, q, v, tau, float(model.opt.timestep))
+
+
+def _engage(build: Build, plant: Plant, data: Any, load: Array) -> None:
+    """Put soft transmissions where they stand under `load` (n,), lest they swing for long."""
+    for j, transmission in build.soft.items():
+        twist = -load[j] / transmission.stiffness if transmission.stiffness > 0.0 else 0.0
+        data.qpos[plant.gear[j]] = twist - np.sign(load[j]) * transmission.play / 2
+
+
+class _Effects:
+    """Applies looped effects: their dry part as the joints' friction loss, the rest as torque."""
+
+    def __init__(self, build: Build, plant: Plant, data: Any) -> None:
+        self._looped = LoopedEffects(build.robot, build.phi, build.run, build.looped)
+        self._motor = plant.motor if build.soft else slice(None)
+        self._load = _Load(plant, data, self._motor)
+        self._acceleration = data.qacc
+        self._friction = plant.model.dof_frictionloss
+        self._base = self._friction[self._motor].copy()
+
+    def at(self, t: float, q: Array, v: Array, ahead: float) -> Array:
+        """Torque (n,) to take off the motors', for the state `ahead` [s] of q and v."""
+        a = self._acceleration[self._motor]
+        smooth, dry = self._looped.at(t, q + ahead * v, v + ahead * a, a, self._load.now())
+        dry = self._base + dry
+        self._friction[self._motor] = np.maximum(dry, 0.0)
+        if dry.min() < 0.0:  # friction below zero pushes
+            smooth = smooth + np.minimum(dry, 0.0) * np.tanh(v / _PUSHING_WIDTH)
+        return smooth
+
+
+class _Load:
+    """Rigid-body torque that the joints carry in the state MuJoCo has just left."""
+
+    def __init__(self, plant: Plant, data: Any, motor: Any) -> None:
+        self._multiply = load_mujoco().mj_mulM
+        self._model, self._data, self._motor = plant.model, data, motor
+        self._armature = plant.model.dof_armature[motor].copy()
+        self._product = np.zeros(plant.model.nv)
+        self._acceleration, self._bias = data.qacc, data.qfrc_bias
+
+    def now(self) -> Array:
+        """(n,) [N·m]."""
+        self._multiply(self._model, self._data, self._product, self._acceleration)
+        motor = self._motor
+        carried: Array = (self._product + self._bias)[motor]
+        return carried - self._armature * self._acceleration[motor]
+
+
+class _Pushing:
+    """Applies forces to the last joint's frame while they last."""
+
+    def __init__(self, build: Build, plant: Plant, data: Any) -> None:
+        self._pushes, self._data, self._body = build.pushes, data, plant.bodies[-1]
+
+    def at(self, t: float) -> None:
+        """Set the forces of the instant `t`; MuJoCo wants them at the centre of mass."""
+        active = [push.force for push in self._pushes if push.start <= t <= push.end]
+        external = self._data.xfrc_applied[self._body]
+        external[:] = 0.0
+        if active:
+            force = np.sum(active, axis=0)
+            lever = self._data.xpos[self._body] - self._data.xipos[self._body]
+            external[:3], external[3:] = force, np.cross(lever, force)
+
+
+def _check(build: Build, reference: Reference, q: Array) -> None:
+    away = ~np.isfinite(q) | (np.abs(q - reference.q) > _RUNAWAY)
+    if not away.any():
+        return
+    k = int(np.argmax(away.any(axis=1)))
+    joint = build.robot.joint_names[int(np.argmax(away[k]))]
+    raise RobotError(
+        f"run '{build.run}': the simulated robot ran away at {reference.t[k]:.3f} s, first joint "
+        f"'{joint}'. Take smaller effects, or a slower controller."
+    )

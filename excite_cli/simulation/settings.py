@@ -1,0 +1,67 @@
+"""How a motion is played and recorded."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class SimulationSettings:
+    """Robot, controller and instruments; rates in Hz, `step` and `lead_in` in s.
+
+    `torque_noise`: standard deviation as a share of the joint's torque RMS in that run, with the
+    correlation `noise_correlation` from sample to sample. `encoder`: rad (m) a count.
+    `inertia_error`: how far the true inertias are from the URDF. `repeat`: takes of each motion,
+    `periods` of it in each. `bandwidth` of the controller [rad/s], `compensation`: the share of
+    friction and springs that it knows. `torque_limits`: the motors stop
+    at the robot's effort limits.
+    """
+
+    seed: int = 1
+    rate: float = 500.0
+    torque_noise: float = 0.01
+    noise_correlation: float = 0.0
+    encoder: float = 2e-5
+    inertia_error: float = 0.2
+    repeat: int = 1
+    periods: int = 1
+    control_rate: float = 1000.0
+    step: float = 5e-4
+    bandwidth: float = 100.0
+    compensation: float = 0.8
+    lead_in: float = 1.0
+    torque_limits: bool = False
+
+    @property
+    def physics_step(self) -> float:
+        """`step`, or the next smaller one of which a control period is a multiple [s]."""
+        period = 1.0 / self.control_rate
+        return period / np.ceil(period / self.step - 1e-9)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for what cannot be."""
+        if not 1.0 <= self.rate <= self.control_rate:
+            raise ConfigError(
+                f"rate: {self.rate:g} Hz cannot be recorded; allowed: 1 to the controller's rate, "
+                f"{self.control_rate:g} Hz."
+            )
+        if not -1.0 < self.noise_correlation < 1.0:
+            raise ConfigError(
+                f"noise correlation: {self.noise_correlation:g} is not between -1 and 1."
+            )
+        if not 0.0 <= self.inertia_error <= 0.6:
+            raise ConfigError(
+                f"inertia error: {self.inertia_error:g} is not between 0 and 0.6; 0.2 makes "
+                "inertias 10 to 30 % larger or smaller."
+            )
+        for name in ("torque_noise", "encoder"):
+            if not getattr(self, name) >= 0.0:
+                raise ConfigError(f"{name.replace('_', ' ')}: it must not be negative.")
+        for name in ("repeat", "periods"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name}: at least 1.")
+        for name in ("step", "bandwidth", "lead_in", "control_rate"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"{name.replace('_', ' ')}: it must be positive.")

@@ -1,0 +1,140 @@
+"""Motions in, measured data out: the whole simulation as one function."""
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from excite_cli.effects.base import Effect
+from excite_cli.errors import ConfigError
+from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.robot.model import Array, Robot
+from excite_cli.simulation.build import make
+from excite_cli.simulation.controller import (
+    Reference,
+    compensated,
+    control_instants,
+    gains_of,
+    reference_of,
+)
+from excite_cli.simulation.declared import sized
+from excite_cli.simulation.engine import silent_engine
+from excite_cli.simulation.mechanisms import assemble
+from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planted import Planted
+from excite_cli.simulation.play import Played, play
+from excite_cli.simulation.record import record
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.true_robot import true_inertias
+
+Progress = Callable[[str, int], None]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the simulated robot is: inertias φ (10·n_bodies,) and all its effects."""
+
+    phi: Array
+    effects: tuple[Planted, ...]
+
+    def record(self, robot: Robot) -> dict[str, object]:
+        """As plain data."""
+        return {
+            "effects": [planted.record(robot) for planted in self.effects],
+            "phi": self.phi.tolist(),
+        }
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Recorded runs, the truth behind them, and the RMS tracking error (n,) of every run [rad]."""
+
+    dataset: Dataset
+    truth: Truth
+    tracking: dict[str, Array]
+
+
+def run_names(motions: Sequence[PlannedMotion], repeat: int) -> tuple[tuple[str, ...], ...]:
+    """Names of the takes of each motion."""
+    if repeat == 1:
+        return tuple((motion.name,) for motion in motions)
+    return tuple(tuple(f"{m.name}_take_{k}" for k in range(1, repeat + 1)) for m in motions)
+
+
+def simulate(
+    robot: Robot,
+    motions: Sequence[PlannedMotion],
+    settings: SimulationSettings = SimulationSettings(),
+    effects: Sequence[Planted] = (),
+    declared: Sequence[Effect] = (),
+    progress: Progress = lambda text, done: None,
+) -> Simulation:
+    """Play `motions` on a robot that differs from the model, and record them.
+
+    `effects` are in the robot as they are; `declared` ones get sizes of their own. The same
+    arguments give the same numbers.
+
+    Raises
+    ------
+    ConfigError, RobotError, MissingExtraError
+        The request cannot be met, the robot cannot be simulated, MuJoCo is missing.
+    """
+    if settings.periods > 1 and not all(motion.periodic for motion in motions):
+        raise ConfigError("periods: only periodic motions (family: fourier) can go on.")
+    phi = true_inertias(robot, settings.inertia_error, settings.seed)
+    planted = (*sized(robot, declared, motions, settings.seed), *effects)
+    runs: list[Run] = []
+    tracking: dict[str, Array] = {}
+    with silent_engine():
+        for motion, names in zip(motions, run_names(motions, settings.repeat), strict=True):
+            taken = _takes(robot, phi, motion, names, settings, planted)
+            for run, error in taken:
+                progress(run.name, len(runs))
+                runs.append(run)
+                tracking[run.name] = error
+    dataset = Dataset(robot.joint_names, tuple(runs), ("simulated",))
+    return Simulation(dataset, Truth(phi, planted), tracking)
+
+
+def _takes(
+    robot: Robot,
+    phi: Array,
+    motion: PlannedMotion,
+    names: Sequence[str],
+    settings: SimulationSettings,
+    planted: Sequence[Planted],
+) -> Iterator[tuple[Run, Array]]:
+    """Every take of one motion with its tracking error; the channel `q_ref` is the motion itself.
+
+    Takes with the same effects differ in what is recorded, not in what happens.
+    """
+    duration = settings.periods * motion.trajectory.duration
+    end = duration + 2.0 / settings.rate
+    t = control_instants(-settings.lead_in, end, settings.control_rate)
+    reference = reference_of(robot, motion, t)
+    played: dict[tuple[bool, ...], Played] = {}
+    for name in names:
+        build = assemble(robot, phi, name, planted)
+        if settings.torque_limits:
+            build.clip = np.minimum(build.clip, robot.limits.effort)
+        active = tuple(p.effect.active(name) for p in planted)
+        if active not in played:
+            plant = make(build, settings.physics_step)
+            gains = gains_of(build, plant, reference, settings.bandwidth)
+            followed = compensated(build, reference, settings.compensation)
+            played[active] = play(build, plant, followed, gains)
+        rng = np.random.default_rng([settings.seed, 2, _number(name)])
+        run = record(build, played[active], duration, settings, rng)
+        run = replace(run, extra={"q_ref": motion.states(run.t)[0]})
+        yield run, _tracking_error(reference, played[active], duration)
+
+
+def _number(name: str) -> int:
+    """A number of the run's name, so that its noise does not depend on the other runs."""
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:4], "big")
+
+
+def _tracking_error(reference: Reference, played: Played, duration: float) -> Array:
+    inside = (reference.t >= 0.0) & (reference.t <= duration)
+    return np.sqrt(np.mean((reference.q - played.q)[inside] ** 2, axis=0))

@@ -1,0 +1,182 @@
+"""Diagnoses as HDF5: arrays as datasets, records as JSON texts under `/records`.
+
+Reading trusts nothing: a foreign or damaged file gives one message.
+"""
+
+import json
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from excite_cli.atomic import write_atomically
+from excite_cli.diagnosis.result import (
+    Absorbed,
+    Diagnosis,
+    EffectRecord,
+    Information,
+    NamedEffect,
+    Round,
+    Unexplained,
+)
+from excite_cli.errors import FileError
+from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.measurement.dataset import Finding
+from excite_cli.robot.model import Array
+
+SCHEMA = 1
+PROGRAM = "excite"
+CONTENT = "diagnosis"
+_ATTRIBUTES = ("config", "config_folder", "sealed_run")
+_ARRAYS = ("phi", "base_values", "base_std")
+_RECORDS: dict[str, Any] = {
+    "joint_names": tuple[str, ...],
+    "base_names": tuple[str, ...],
+    "declared": tuple[EffectRecord, ...],
+    "effects": tuple[NamedEffect, ...],
+    "absorbed": tuple[Absorbed, ...],
+    "unexplained": tuple[Unexplained, ...],
+    "before": Errors,
+    "after": Errors,
+    "rounds": tuple[Round, ...],
+    "findings": tuple[Finding, ...],
+    "processing": dict[str, Any],
+    "versions": dict[str, str],
+}
+_INFORMATION: dict[str, Any] = {
+    "model": tuple[EffectRecord, ...],
+    "rivals": tuple[EffectRecord, ...],
+}
+
+
+def write_diagnosis(path: Path, diagnosis: Diagnosis) -> None:
+    """Write `diagnosis`; the file appears whole or not at all."""
+    write_atomically(path, lambda temporary: _write(temporary, diagnosis))
+
+
+def read_diagnosis(path: Path) -> Diagnosis:
+    """Read a diagnosis.
+
+    Raises
+    ------
+    FileError
+        The file is missing, unreadable, not a diagnosis, damaged, or of a newer schema.
+    """
+    if not path.is_file():
+        raise FileError(f"There is no file {path}.")
+    try:
+        with h5py.File(path, "r") as file:
+            return _read(file, path)
+    except OSError as error:
+        raise FileError(f"{path} is not a readable HDF5 file ({error}).") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise FileError(f"{path} is damaged: {where or 'a record'}: {first['msg']}.") from error
+    except (KeyError, ValueError, TypeError, AttributeError, IndexError, RuntimeError) as error:
+        raise FileError(
+            f"{path} is damaged or not a diagnosis: {error}. Diagnoses are written by "
+            "`excite diagnose`."
+        ) from error
+
+
+def is_diagnosis(path: Path) -> bool:
+    """Whether `path` is a file that `write_diagnosis` wrote."""
+    if not (path.is_file() and h5py.is_hdf5(path)):
+        return False
+    with h5py.File(path, "r") as file:
+        return str(file.attrs.get("content", "")) == CONTENT
+
+
+def _write(path: Path, diagnosis: Diagnosis) -> None:
+    information = diagnosis.information
+    with h5py.File(path, "w") as file:
+        file.attrs.update(
+            {
+                "program": PROGRAM,
+                "content": CONTENT,
+                "schema": SCHEMA,
+                "robot_hash": diagnosis.fingerprint,
+                "seconds": diagnosis.seconds,
+                "units": "rad, s, N·m, kg, m",
+                **{name: getattr(diagnosis, name) for name in _ATTRIBUTES},
+            }
+        )
+        for name in _RECORDS:
+            file[f"records/{name}"] = _text(getattr(diagnosis, name))
+        for name in _ARRAYS:
+            file[name] = np.asarray(getattr(diagnosis, name), dtype=float)
+        for name in _INFORMATION:
+            file[f"information/{name}"] = _text(getattr(information, name))
+        file["information/factor"] = np.asarray(information.factor, dtype=float)
+        file["information/noise"] = np.asarray(information.noise, dtype=float)
+        file["information"].attrs["rank"] = int(information.rank)
+
+
+def _read(file: Any, path: Path) -> Diagnosis:
+    attributes = file.attrs
+    if attributes.get("program") != PROGRAM or attributes.get("content") != CONTENT:
+        raise FileError(
+            f"{path} is HDF5, but not a diagnosis of this program. Diagnoses are written by "
+            "`excite diagnose`."
+        )
+    if int(attributes["schema"]) > SCHEMA:
+        raise FileError(
+            f"{path} has schema {int(attributes['schema'])}; this version reads up to {SCHEMA}. "
+            "Update the program."
+        )
+    fields: dict[str, Any] = {name: str(attributes[name]) for name in _ATTRIBUTES}
+    fields.update({name: np.asarray(file[name], dtype=float) for name in _ARRAYS})
+    fields.update({name: _record(file, f"records/{name}", _RECORDS[name]) for name in _RECORDS})
+    group = file["information"]
+    information = Information(
+        factor=_finite(group["factor"]),
+        rank=int(group.attrs["rank"]),
+        noise=_finite(group["noise"]),
+        **{name: _record(group, name, kind) for name, kind in _INFORMATION.items()},
+    )
+    return Diagnosis(
+        fingerprint=str(attributes["robot_hash"]),
+        seconds=float(attributes["seconds"]),
+        information=information,
+        **fields,
+    )
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+def _text(value: Any) -> str:
+    """JSON of a record; numbers of NumPy become plain ones, NaN stays NaN."""
+    return json.dumps(_plain(value), ensure_ascii=False)
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "__dataclass_fields__"):
+        return _plain(asdict(value))
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return value
+
+
+def _record(group: Any, name: str, kind: Any) -> Any:
+    text = group[name][()]
+    value = json.loads(text.decode() if isinstance(text, bytes) else str(text))
+    return _adapter(kind).validate_python(value)
+
+
+def _finite(dataset: Any) -> Array:
+    array = np.asarray(dataset, dtype=float)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{dataset.name} has values that are not finite")
+    return array

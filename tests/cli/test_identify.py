@@ -1,0 +1,106 @@
+"""`excite identify` as a user runs it."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+
+from excite_cli.config.load import load_spec
+from excite_cli.effects.catalogue import declared_effects
+from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.robot.model import Robot, build_robot
+from excite_cli.simulation.true_robot import true_inertias
+from tests.cli.program import SMOKE, Program
+from tests.identification.synthetic import measured
+
+CONFIG = "arm.yaml"
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return build_robot(load_spec(SMOKE).robot, SMOKE.parent)
+
+
+@pytest.fixture(scope="module")
+def folder(robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A problem that declares friction, and three measured runs."""
+    folder = tmp_path_factory.mktemp("identify")
+    robot_part = yaml.safe_load(SMOKE.read_text())["robot"]
+    if not robot_part["urdf"].startswith("example-robot-data:"):
+        robot_part["urdf"] = str((SMOKE.parent / robot_part["urdf"]).resolve())
+    problem = {
+        "robot": robot_part,
+        "effects": [{"kind": "viscous_friction"}, {"kind": "coulomb_friction"}],
+    }
+    (folder / CONFIG).write_text(yaml.safe_dump(problem))
+    effects = declared_effects(load_spec(folder / CONFIG).effects, robot)
+    values = np.linspace(0.5, 2.0, 2 * robot.n)
+    phi = true_inertias(robot, 0.2, seed=3)
+    data = measured(robot, phi, effects, values, noise=0.1, seconds=8.0, seeds=(1, 2, 3))
+    write_dataset(folder / "data.h5", data, {})
+    return folder
+
+
+def test_json_holds_what_scripts_rely_on(folder: Path, robot: Robot, excite: Program) -> None:
+    answer = excite.answer("identify", folder / CONFIG, folder / "data.h5")
+    first = answer["parameters"][0]
+    assert {"name", "value", "std", "relative_std", "identifiable"} <= set(first)
+    friction = [p for p in answer["parameters"] if "friction" in p["name"]]
+    found = [p["value"] for p in friction]
+    assert found == pytest.approx(np.linspace(0.5, 2.0, 2 * robot.n), rel=0.1, abs=0.05)
+    error = answer["error"]
+    assert set(error) >= {
+        "mean_relative", "mean_relative_moving", "relative", "relative_moving", "rms", "rms_raw",
+    }  # fmt: skip
+    assert set(error["relative"]) == set(robot.joint_names)
+    assert answer["sealed_run"] == "r3"
+    assert 0 < error["mean_relative"] < 0.2
+
+
+def test_every_output_is_written_and_can_be_used(
+    folder: Path, robot: Robot, excite: Program
+) -> None:
+    outputs = {"-o": "fit.h5", "--urdf": "new.urdf", "--mjcf": "new.xml", "--parameters": "p.yaml"}
+    words = [word for pair in outputs.items() for word in pair]
+    run = excite("identify", folder / CONFIG, folder / "data.h5", *words, "--sealed", "r1")
+    assert run.returncode == 0, run.stderr
+    assert "Error of the torque" in run.stdout
+    assert "fixed by the data" in run.stdout
+    with h5py.File(excite.folder / "fit.h5") as file:
+        assert file.attrs["sealed_run"] == "r1"
+    again = {"robot": {"urdf": str(excite.folder / "new.urdf")}}
+    again["effects"] = yaml.safe_load((excite.folder / "p.yaml").read_text())["effects"]
+    (excite.folder / "again.yaml").write_text(yaml.safe_dump(again))
+    answer = excite.answer("identify", "again.yaml", folder / "data.h5")
+    assert len(answer["effects"]) == 2 * robot.n
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_path(str(excite.folder / "new.xml"))
+    assert (model.dof_damping > 0).all()
+
+
+def test_files_are_not_replaced_unless_said(folder: Path, excite: Program) -> None:
+    kept = excite.folder / "fit.h5"
+    kept.write_text("mine")
+    run = excite("identify", folder / CONFIG, folder / "data.h5", "-o", kept)
+    assert run.returncode == 2
+    assert "--overwrite" in run.stderr
+    assert kept.read_text() == "mine"
+    run = excite("identify", folder / CONFIG, folder / "data.h5", "-o", kept, "--overwrite")
+    assert run.returncode == 0, run.stderr
+    assert h5py.is_hdf5(kept)
+
+
+def test_bad_input_gives_one_message(folder: Path, excite: Program) -> None:
+    cases = {
+        (folder / "data.h5", "--sealed", "r7"): "there is no run 'r7'",
+        (folder / "data.h5", "-o", "x.h5", "--urdf", "x.h5"): "the same file name",
+    }
+    for words, message in cases.items():
+        run = excite("identify", folder / CONFIG, *words)
+        assert run.returncode == 2, run.stderr
+        assert message in run.stderr
+        assert "Traceback" not in run.stderr
+        assert run.stderr.strip().count("\n") <= 2
+    assert list(excite.folder.iterdir()) == []

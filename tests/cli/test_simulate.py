@@ -1,0 +1,121 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.cli.conftest import Run
+from tests.cli.program import SMOKE, Program
+
+pytest.importorskip("mujoco")
+
+EFFECTS = ("--effect", "coulomb_friction@elbow=1.5", "--effect", "payload@all=0.5;runs:motion_2")
+
+
+@pytest.fixture(scope="module")
+def simulated(
+    tmp_path_factory: pytest.TempPathFactory, cache: Path, two_motions: Run
+) -> tuple[Any, Path]:
+    """The answer of `excite simulate`, and the file."""
+    folder = tmp_path_factory.mktemp("simulate")
+    path = folder / "data.h5"
+    arguments = (SMOKE, two_motions.path, "-o", path, "--rate", "200", *EFFECTS)
+    return Program(folder, cache).answer("simulate", *arguments), path
+
+
+def test_the_answer_names_runs_effects_and_file(simulated: tuple[Any, Path]) -> None:
+    answer, path = simulated
+    assert [run["name"] for run in answer["runs"]] == ["motion_1", "motion_2"]
+    assert all(max(run["tracking_error"].values()) < 0.02 for run in answer["runs"])
+    planted = [effect for effect in answer["effects"] if not effect["declared"]]
+    assert [(e["kind"], e["joints"]) for e in planted] == [
+        ("coulomb_friction", ["elbow"]),
+        ("payload", ["shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide"]),
+    ]
+    assert planted[0]["parameters"]["coulomb"] == {"value": 1.5, "unit": "N·m"}
+    assert planted[1]["runs"] == ["motion_2"]
+    assert answer["output"] == str(path)
+
+
+def test_the_file_is_measured_data_with_its_truth(
+    simulated: tuple[Any, Path], two_motions: Run
+) -> None:
+    answer, path = simulated
+    with h5py.File(path) as file:
+        names = list(file.attrs["joint_names"])
+        truth = json.loads(file.attrs["truth"])
+        assert truth["effects"] == answer["effects"]
+        assert file.attrs["seed"] == 1
+        assert json.loads(file.attrs["settings"])["torque_noise"] == 0.01
+        assert "smoke_arm.urdf" in file.attrs["config"]
+        run = file["runs/motion_1"]
+        t, q, tau, dq = (run[key][()] for key in ("t", "q", "tau", "dq"))
+    assert names == ["shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide"]
+    assert t == pytest.approx(np.arange(1200) / 200)
+    assert q.shape == tau.shape == dq.shape == (1200, 5)
+    with h5py.File(two_motions.path) as planned:
+        wanted, times = planned["motions/1/q"][()], planned["motions/1/t"][()]
+    at = np.array([np.interp(times[:-1], t, column) for column in q.T]).T
+    assert np.abs(at - wanted[:-1]).max() < 0.03
+
+
+def test_repeats_seeds_and_chosen_motions(excite: Program, two_motions: Run) -> None:
+    def taus(path: str, *more: str) -> list[np.ndarray]:
+        run = excite("simulate", SMOKE, two_motions.path, "-o", path, "--motion", "2", *more)
+        assert run.returncode == 0, run.stderr
+        with h5py.File(excite.folder / path) as file:
+            return [file[f"runs/{name}/tau"][()] for name in file["runs"]]
+
+    first, second = taus("a.h5", "--repeat", "2", "--rate", "100")
+    assert not np.array_equal(first, second)
+    assert np.abs(first - second).max() < 0.1 * np.abs(first).max()
+    (again,) = taus("b.h5", "--rate", "100", "--torque-noise", "0", "--encoder", "0")
+    assert np.abs(first - again).max() < 0.1 * np.abs(first).max()
+    (other,) = taus("c.h5", "--rate", "100", "--torque-noise", "0", "--seed", "5")
+    assert not np.allclose(again, other, rtol=0.01)
+
+
+def test_people_get_tables_and_quiet_ones_nothing(excite: Program, two_motions: Run) -> None:
+    brief = ("--motion", "1", "--rate", "100")
+    run = excite("simulate", SMOKE, two_motions.path, "-o", "x.h5", *brief, *EFFECTS[:2])
+    assert run.returncode == 0, run.stderr
+    assert "coulomb 1.5 N·m" in run.stdout
+    assert "motion_1" in run.stdout
+    assert "tracking" in run.stdout
+    assert run.stderr == ""
+    again = excite("simulate", SMOKE, two_motions.path, "-o", "x.h5", *brief)
+    assert again.returncode == 2
+    assert "x.h5 exists already" in again.stderr
+    quiet = ("--overwrite", "--quiet")
+    run = excite("simulate", SMOKE, two_motions.path, "-o", "x.h5", *brief, *quiet)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
+    assert sorted(path.name for path in excite.folder.iterdir()) == ["x.h5"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--effect", "coulomb_friction@elbw=1"), "Did you mean 'elbow'?"),
+        (("--motion", "7"), "has no motion 7; it has 1, 2"),
+        (("--rate", "9000"), "rate: 9000 Hz cannot be recorded"),
+        (("--set", "robot.joints=[elbow]"), "moves other joints than"),
+    ],
+)
+def test_bad_input(
+    excite: Program, two_motions: Run, arguments: tuple[str, ...], words: str
+) -> None:
+    run = excite("simulate", SMOKE, two_motions.path, "-o", "x.h5", *arguments)
+    assert run.returncode == 2, run.stderr
+    assert words in run.stderr.replace("\n", " ")
+    assert not (excite.folder / "x.h5").exists()
+
+
+def test_a_config_that_converts_is_warned_about(excite: Program, two_motions: Run) -> None:
+    run = excite(
+        "simulate", SMOKE, two_motions.path, "-o", "x.h5", "--motion", "1", "--rate", "100",
+        "--set", "measurement.torque=motor", "--set", "measurement.gear_ratio=100",
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    assert "converts recorded positions or torques" in run.stderr

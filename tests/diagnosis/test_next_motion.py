@@ -1,0 +1,197 @@
+"""The motion after a diagnosis: it separates aliases, or excites what was found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from excite_cli.diagnosis.next_motion import NextMotion, next_experiment, plan_after
+from excite_cli.diagnosis.result import EffectRecord
+from excite_cli.errors import FileError
+from excite_cli.excitation.admissible import worst_margins
+from excite_cli.excitation.result import Result
+from excite_cli.excitation.run import continue_run, new_result
+from tests.diagnosis.synthetic_diagnosis import (
+    CONFIG,
+    NOISE,
+    earlier_data,
+    make_diagnosis,
+    quadratic,
+    smoke_spec,
+    viscous,
+)
+
+COULOMB = EffectRecord("coulomb_friction", ("elbow",), {}, (1.0,))
+ALL = ("shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide")
+SPRING = EffectRecord("spring", ("shoulder_pitch",), {}, (3.0, 0.2))
+
+
+def run(planned: NextMotion) -> Result:
+    return continue_run(
+        planned.problem,
+        new_result(planned.model, [("diagnosis.h5", planned.prior)], {}),
+        lambda index: lambda progress: None,
+        lambda step, current: None,
+        planned.model,
+    )
+
+
+@pytest.fixture(scope="module")
+def separate() -> NextMotion:
+    return plan_after(make_diagnosis(), smoke_spec(), CONFIG.parent)
+
+
+@pytest.fixture(scope="module")
+def separating(separate: NextMotion) -> Result:
+    return run(separate)
+
+
+def _least_squares(rows: np.ndarray, truth: np.ndarray, free: list[int]) -> float:
+    target = rows @ truth
+    left = target - rows[:, free] @ np.linalg.lstsq(rows[:, free], target, rcond=None)[0]
+    return 0.5 * float(left @ left)
+
+
+def test_purpose_and_command_without_planning() -> None:
+    found = next_experiment(make_diagnosis(), "arm.yaml", "found.h5")
+    assert found["purpose"] == "separate"
+    (pair,) = found["pairs"]
+    assert pair["effect"] == {"kind": "viscous_friction", "joints": ["elbow"], "shape": {}}
+    assert pair["alias"]["kind"] == "nonlinear_viscous_friction"
+    assert found["command"] == "excite optimize arm.yaml --after found.h5"
+    assert next_experiment(make_diagnosis(rivals=()))["purpose"] == "excite"
+
+
+def test_divergence_so_far_is_that_of_the_rows_themselves(separate: NextMotion) -> None:
+    """Both ways by least squares on the earlier rows in their own units."""
+    rows = earlier_data([viscous()], [quadratic()]).rows / NOISE
+    rank = rows.shape[1] - 2
+    first, second = np.zeros(rank + 2), np.zeros(rank + 2)
+    first[rank], second[rank + 1] = viscous().values[0], quadratic().values[0]
+    expected = min(
+        _least_squares(rows, first, [*range(rank), rank + 1]),
+        _least_squares(rows, second, [*range(rank), rank]),
+    )
+    alpha = separate.problem.still(separate.problem.robot.posture)
+    (pair,) = separate.outlook([alpha])["pairs"]
+    assert pair["kl_so_far"] == pytest.approx(expected, rel=1e-4)
+    assert expected < 3
+
+
+def test_the_motion_tells_the_pair_apart(separate: NextMotion, separating: Result) -> None:
+    assert separate.purpose == "separate"
+    assert "separates what the data cannot: viscous_friction on elbow" in separate.messages[0]
+    (motion,) = separating.motions
+    outlook = separate.outlook([motion.coefficients])
+    assert outlook["expected_kl"] > 3 > outlook["pairs"][0]["kl_so_far"]
+    assert outlook["pairs"][0]["motions_needed"] == 1
+    assert motion.improved
+    margins = worst_margins(separate.model, motion.coefficients, 700.0)
+    assert all(worst.violations == 0 for worst in margins.values())
+
+
+def test_it_separates_better_than_the_motion_that_only_excites(
+    separate: NextMotion, separating: Result
+) -> None:
+    excited = run(plan_after(make_diagnosis(rivals=()), smoke_spec(), CONFIG.parent))
+    found, other = (
+        separate.outlook([result.motions[0].coefficients])["expected_kl"]
+        for result in (separating, excited)
+    )
+    assert found > 1.3 * other
+
+
+def test_the_result_belongs_to_the_model_without_rivals(
+    separate: NextMotion, separating: Result
+) -> None:
+    assert separating.effect_names == ("viscous_friction[elbow].viscous",)
+    objective = separate.model.objective()
+    block = objective.block(separating.motions[0].coefficients)
+    whole = np.vstack([separate.prior.factor, block])
+    assert np.allclose(separating.stack.factor.T @ separating.stack.factor, whole.T @ whole)
+    stacked = separating.motions[0].stacked_condition_number
+    assert stacked == pytest.approx(np.linalg.cond(whole), rel=1e-6)
+    assert "viscous_friction" in separating.config
+    assert "nonlinear" not in separating.config
+
+
+def test_without_aliases_it_excites_on_top_of_the_data() -> None:
+    planned = plan_after(make_diagnosis([viscous(), SPRING], ()), smoke_spec(), CONFIG.parent)
+    assert planned.purpose == "excite"
+    assert "no effect has an alias" in planned.messages[0]
+    rows = earlier_data([viscous(), SPRING], ()).rows / NOISE * planned.problem.column_scales
+    assert np.allclose(planned.prior.factor.T @ planned.prior.factor, rows.T @ rows)
+    assert planned.problem.weighting.rows == pytest.approx(np.full(5, 1 / NOISE))
+    (motion,) = run(planned).motions
+    assert motion.stacked_condition_number < 0.5 * np.linalg.cond(planned.prior.factor)
+    assert planned.outlook([motion.coefficients]) == {"purpose": "excite", "pairs": []}
+
+
+def test_several_pairs_the_smallest_counts() -> None:
+    cubic = EffectRecord("nonlinear_viscous_friction", ("elbow",), {"power": 3.0}, (6.0,))
+    planned = plan_after(make_diagnosis(rivals=(quadratic(), cubic)), smoke_spec(), CONFIG.parent)
+    assert planned.problem.separation is not None
+    assert len(planned.problem.separation.directions) == 4
+    (motion,) = run(planned).motions
+    outlook = planned.outlook([motion.coefficients])
+    assert len(outlook["pairs"]) == 2
+    assert outlook["expected_kl"] == min(pair["expected_kl"] for pair in outlook["pairs"])
+    assert outlook["expected_kl"] > 3
+
+
+def test_the_same_torque_in_other_words_is_not_planned_for() -> None:
+    """Coulomb friction of asymmetric friction and an offset: no motion can tell."""
+    twin = EffectRecord("asymmetric_friction", ("elbow",), {}, (1.0, 1.0))
+    planned = plan_after(make_diagnosis([COULOMB], (twin,)), smoke_spec(), CONFIG.parent)
+    assert planned.purpose == "excite"
+    assert "no alias can be separated" in planned.messages[0]
+    assert any("no motion separates them" in message for message in planned.messages)
+
+
+@pytest.mark.parametrize(
+    ("rival", "words"),
+    [
+        (
+            EffectRecord("contact", ALL, {"start": 1.0, "end": 2.0}, (1.0, 2.0, 3.0)),
+            "a touch happens in one run",
+        ),
+        (replace(quadratic(), values=()), "holds no value"),
+        (replace(quadratic(), runs=("run_2",)), "present in recorded runs only (run_2)"),
+    ],
+)
+def test_rivals_that_no_motion_excites_are_told(rival: EffectRecord, words: str) -> None:
+    planned = plan_after(make_diagnosis(rivals=(rival,)), smoke_spec(), CONFIG.parent)
+    assert planned.purpose == "excite"
+    assert any(words in message for message in planned.messages)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"fingerprint": "other"}, "another robot"),
+        ({"information": "noise"}, "no noise level"),
+        ({"information": "factor"}, "columns"),
+    ],
+)
+def test_diagnoses_that_do_not_fit(change: dict, words: str) -> None:
+    diagnosis = make_diagnosis()
+    information = diagnosis.information
+    if change.get("information") == "noise":
+        diagnosis = replace(diagnosis, information=replace(information, noise=np.zeros(5)))
+    elif change.get("information") == "factor":
+        cut = information.factor[:, :-1]
+        diagnosis = replace(diagnosis, information=replace(information, factor=cut))
+    else:
+        diagnosis = replace(diagnosis, **change)
+    with pytest.raises(FileError, match=words):
+        plan_after(diagnosis, smoke_spec(), CONFIG.parent)
+
+
+@pytest.mark.parametrize("method", ["sqp", "slsqp"])
+def test_every_solver_separates_within_the_constraints(method: str) -> None:
+    changes = (f"optimizer.method={method}", "optimizer.max_iterations=15")
+    planned = plan_after(make_diagnosis(), smoke_spec(*changes), CONFIG.parent)
+    (motion,) = run(planned).motions
+    assert planned.outlook([motion.coefficients])["expected_kl"] > 60
+    margins = worst_margins(planned.model, motion.coefficients, 700.0)
+    assert all(worst.violations == 0 for worst in margins.values())

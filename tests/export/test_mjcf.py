@@ -1,0 +1,77 @@
+"""MuJoCo's own inverse dynamics of the exported file against Y φ + effects."""
+
+import numpy as np
+import pytest
+
+from excite_cli.config.data_spec import EffectSpec
+from excite_cli.config.spec import RobotSpec
+from excite_cli.effects.catalogue import declared_effects
+from excite_cli.errors import RobotError
+from excite_cli.export.exported import IdentifiedModel
+from excite_cli.export.mjcf import mjcf
+from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.robot.rigid_body import RigidBody
+from excite_cli.simulation.true_robot import true_inertias
+from tests.robot.random_robots import random_robot
+
+mujoco = pytest.importorskip("mujoco")
+KINDS = ("viscous_friction", "armature", "spring", "coulomb_friction", "ripple")
+
+
+def inverse(text: str, q: Array, v: Array, a: Array) -> tuple[Array, Array]:
+    """Torque without friction loss, and the friction losses."""
+    model = mujoco.MjModel.from_xml_string(text)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    data = mujoco.MjData(model)
+    torques = np.empty_like(q)
+    for t in range(len(q)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[t], v[t], a[t]
+        mujoco.mj_inverse(model, data)
+        torques[t] = data.qfrc_inverse
+    return torques, np.array(model.dof_frictionloss)
+
+
+def check(robot: Robot) -> None:
+    phi = true_inertias(robot, 0.3, seed=2)
+    effects = declared_effects(tuple(EffectSpec(kind=kind) for kind in KINDS), robot)
+    rng = np.random.default_rng(0)
+    values = tuple(rng.uniform(0.1, 2.0, len(effect.parameters)) for effect in effects)
+    exported = mjcf(robot, IdentifiedModel(phi, effects, values))
+    q, v, a = robot.draw_states(15, seed=1)
+    expected = RigidBody(robot, phi, q, v, a).load
+    n = robot.n
+    for j in range(n):
+        viscous, armature, spring = (float(values[k * n + j][0]) for k in range(3))
+        preload = float(values[2 * n + j][1])
+        expected[:, j] += viscous * v[:, j] + armature * a[:, j] + spring * q[:, j] + preload
+    found, friction = inverse(exported.text, q, v, a)
+    assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+    assert friction == pytest.approx([float(values[3 * n + j][0]) for j in range(n)])
+    assert any("ripple" in note for note in exported.notes)
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_random_trees(seed: int, floating: bool) -> None:
+    check(random_robot(seed, joints=5, floating=floating))
+
+
+def test_an_arm() -> None:
+    check(build_robot(RobotSpec(urdf="example-robot-data:ur10")))
+
+
+def test_limits_and_names_are_in_it() -> None:
+    robot = random_robot(1, joints=3)
+    phi = true_inertias(robot, 0.3, seed=2)
+    model = mujoco.MjModel.from_xml_string(mjcf(robot, IdentifiedModel(phi)).text)
+    assert [model.joint(j).name for j in range(3)] == list(robot.joint_names)
+    assert model.jnt_range[:, 0] == pytest.approx(robot.limits.lower)
+    assert model.jnt_limited.all()
+
+
+def test_an_impossible_body_is_refused() -> None:
+    robot = random_robot(1, joints=3)
+    phi = true_inertias(robot, 0.3, seed=2)
+    phi[4] = -1.0
+    with pytest.raises(RobotError, match=r"none that MuJoCo accepts.*consistent: true"):
+        mjcf(robot, IdentifiedModel(phi))

@@ -1,0 +1,86 @@
+"""Do 95 % intervals hold the truth in 95 % of cases, with noise that remembers?"""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from excite_cli.identification.covariance import Rows
+from excite_cli.identification.factors import run_factors, solve, stacked
+from excite_cli.identification.least_squares import LinearFit, fit_rows
+from excite_cli.identification.noise import noise_of
+
+JOINTS, COLUMNS, SAMPLES = 3, 6, 1000
+
+
+def slow_rows(rng: np.random.Generator, x: np.ndarray, memory: float) -> Rows:
+    t = np.arange(SAMPLES) * 0.02
+    frequency = rng.uniform(0.05, 0.5, (JOINTS, COLUMNS))
+    phase = rng.uniform(0, 6.28, (JOINTS, COLUMNS))
+    columns = np.sin(2 * np.pi * frequency * t[:, None, None] + phase)
+    mixing = np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 3.0]])
+    white = rng.normal(size=(SAMPLES, JOINTS)) @ mixing.T
+    tau = columns @ x + lfilter([1.0], [1.0, -memory], white, axis=0)
+    usable = rng.random(tau.shape) > 0.002
+    return Rows(columns, tau, usable)
+
+
+def naive(runs: list[Rows], fit: LinearFit) -> np.ndarray:
+    factors = [run_factors(run.columns, run.tau, run.usable) for run in runs]
+    return np.sqrt(np.diag(solve(stacked(factors, fit.noise)).inverse))
+
+
+@pytest.mark.parametrize("method", ["ols", "wls", "irls"])
+def test_intervals_cover_the_truth_when_noise_remembers(method: str) -> None:
+    rng = np.random.default_rng(5)
+    inside, inside_naive = [], []
+    for _ in range(60):
+        x = rng.normal(size=COLUMNS)
+        runs = [slow_rows(rng, x, 0.9) for _ in range(2)]
+        fit = fit_rows(runs, method)
+        wrong = np.abs(fit.x - x)
+        inside.append(wrong < 1.96 * np.sqrt(np.diag(fit.covariance)))
+        inside_naive.append(wrong < 1.96 * naive(runs, fit))
+    assert 0.91 <= np.mean(inside) <= 0.99
+    assert np.mean(inside_naive) < 0.6
+
+
+def test_independent_noise_gives_the_usual_intervals() -> None:
+    rng = np.random.default_rng(6)
+    runs = [slow_rows(rng, np.ones(COLUMNS), 0.0) for _ in range(2)]
+    fit = fit_rows(runs)
+    assert fit.samples == pytest.approx(fit.count.sum(), rel=0.35)
+
+
+def test_samples_that_remember_count_less() -> None:
+    rng = np.random.default_rng(7)
+    runs = [slow_rows(rng, np.ones(COLUMNS), 0.9) for _ in range(2)]
+    fit = fit_rows(runs)
+    # (1 - a)/(1 + a) = 1/19 of them, for columns slower than the noise
+    assert fit.count.sum() / 40 < fit.samples < fit.count.sum() / 5
+
+
+def test_the_noise_of_a_known_process_is_found() -> None:
+    rng = np.random.default_rng(1)
+    white = rng.normal(size=(20000, 2)) @ np.array([[1.0, 0.5], [0.0, 1.0]])
+    series = np.column_stack(
+        [
+            lfilter([1.0], [1.0, -1.2, 0.5], white[:, 0]),
+            lfilter([1.0], [1.0], white[:, 1]),
+        ]
+    )
+    usable = np.ones(series.shape, bool)
+    usable[5000:5100] = False
+    series[5000:5100] = 1e6
+    noise = noise_of(series, usable)
+    assert noise.polynomials[0][:3] == pytest.approx([1.0, -1.2, 0.5], abs=0.05)
+    assert np.abs(noise.polynomials[1][1:]).max(initial=0.0) < 0.05
+    expected = np.array([[1.0, 0.5], [0.5, 1.25]])
+    assert noise.innovation == pytest.approx(expected, abs=0.07)
+
+
+def test_a_random_walk_has_a_finite_variance() -> None:
+    walk = np.cumsum(np.random.default_rng(2).normal(size=(800, 1)), axis=0)
+    rows = Rows(np.ones((800, 1, 1)), walk, np.ones((800, 1), bool))
+    fit = fit_rows([rows])
+    assert np.isfinite(fit.covariance).all()
+    assert fit.samples < 40

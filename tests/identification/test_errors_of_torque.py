@@ -1,0 +1,64 @@
+import math
+
+import numpy as np
+import pytest
+
+from excite_cli.identification.errors_of_torque import Errors, torque_errors
+
+NAMES = ("a", "b")
+
+
+def errors(tau: np.ndarray, predicted: np.ndarray, **given: np.ndarray) -> Errors:
+    usable = given.get("usable", np.ones(tau.shape, bool))
+    moving = given.get("moving", np.ones(tau.shape, bool))
+    raw = given.get("raw", tau)
+    half = len(tau) // 2
+    parts = [slice(0, half), slice(half, None)]
+
+    def cut(x: np.ndarray) -> list[np.ndarray]:
+        return [x[part] for part in parts]
+
+    return torque_errors(
+        NAMES, cut(tau), cut(predicted), cut(usable), cut(moving), cut(raw), cut(predicted), 0.1
+    )
+
+
+def test_figures_by_hand() -> None:
+    tau = np.column_stack([np.full(40, 4.0), np.tile([3.0, -3.0], 20)])
+    predicted = tau + np.column_stack([np.full(40, 0.4), np.tile([0.0, 0.6], 20)])
+    found = errors(tau, predicted, raw=tau - 1.0)
+    assert found.relative["a"] == pytest.approx(0.1)
+    assert found.relative["b"] == pytest.approx(0.2 / math.sqrt(2))
+    assert found.mean_relative == pytest.approx((0.1 + 0.2 / math.sqrt(2)) / 2)
+    assert found.rms["a"] == pytest.approx(0.4)
+    assert found.rms_raw["a"] == pytest.approx(1.4)
+    assert found.interval == pytest.approx((found.mean_relative, found.mean_relative))
+
+
+def test_masks_decide_what_counts() -> None:
+    rng = np.random.default_rng(0)
+    tau = rng.normal(size=(60, 2))
+    predicted = tau * 0.9
+    usable = rng.random(tau.shape) > 0.3
+    tau[~usable] = np.nan
+    moving = np.zeros(tau.shape, bool)
+    moving[10:30, 0] = True
+    predicted[10:30, 0] = tau[10:30, 0] * 0.5
+    found = errors(tau, predicted, usable=usable, moving=moving)
+    assert found.relative["b"] == pytest.approx(0.1)
+    assert found.relative_moving["a"] == pytest.approx(0.5)
+    assert math.isnan(found.relative_moving["b"])
+    assert found.mean_relative_moving == pytest.approx(0.5)
+
+
+def test_the_interval_has_the_right_width() -> None:
+    """Against the spread of the figure over fresh recordings."""
+    rng = np.random.default_rng(1)
+    means, widths = [], []
+    for _ in range(60):
+        tau = np.sin(np.arange(600) * 0.05)[:, None] * [2.0, 5.0]
+        noise = np.repeat(rng.normal(size=(60, 2)), 10, axis=0)  # each value lasts a second
+        found = errors(tau, tau + 0.3 * noise)
+        means.append(found.mean_relative)
+        widths.append(found.interval[1] - found.interval[0])
+    assert np.mean(widths) == pytest.approx(2 * 1.96 * np.std(means), rel=0.3)

@@ -1,0 +1,95 @@
+import numpy as np
+import pytest
+
+from excite_cli.identification.covariance import Rows
+from excite_cli.identification.factors import run_factors, solve, stacked
+from excite_cli.identification.least_squares import fit_rows, leave_one_run_out
+from excite_cli.robot.model import Array
+
+X = np.array([2.0, -1.0, 0.5, 3.0])
+
+
+def random_rows(seed: int, noise: Array, samples: int = 300, dropped: float = 0.1) -> Rows:
+    rng = np.random.default_rng(seed)
+    columns = rng.normal(size=(samples, len(noise), len(X))) * [1.0, 100.0, 0.01, 1.0]
+    tau = columns @ X + rng.normal(size=(samples, len(noise))) * noise
+    usable = rng.random(tau.shape) > dropped
+    return Rows(columns, np.where(usable, tau, np.nan), usable)
+
+
+def stack(runs: list[Rows], sigma: Array) -> tuple[Array, Array]:
+    c = np.concatenate([(run.columns / sigma[:, None])[run.usable] for run in runs])
+    return c, np.concatenate([(run.tau / sigma)[run.usable] for run in runs])
+
+
+def test_factors_give_what_lstsq_gives() -> None:
+    runs = [random_rows(seed, np.array([1.0, 2.0])) for seed in (1, 2)]
+    sigma = np.array([0.5, 4.0])
+    factors = [run_factors(run.columns, run.tau, run.usable) for run in runs]
+    solution = solve(stacked(factors, sigma))
+    c, tau = stack(runs, sigma)
+    expected, remainder, *_ = np.linalg.lstsq(c, tau, rcond=None)
+    assert solution.x == pytest.approx(expected, rel=1e-10)
+    assert solution.inverse == pytest.approx(np.linalg.inv(c.T @ c), rel=1e-8)
+    assert solution.remainder == pytest.approx(float(remainder[0]), rel=1e-10)
+
+
+def test_a_run_left_out_equals_a_fit_without_it() -> None:
+    runs = [random_rows(seed, np.array([1.0, 2.0])) for seed in (1, 2, 3)]
+    sigma = np.array([1.0, 2.0])
+    found = leave_one_run_out(runs, sigma)
+    for out in range(3):
+        c, tau = stack([run for k, run in enumerate(runs) if k != out], sigma)
+        assert found[out] == pytest.approx(np.linalg.lstsq(c, tau, rcond=None)[0], rel=1e-9)
+
+
+def test_weighting_by_noise_beats_equal_weights() -> None:
+    noise = np.array([0.1, 10.0])
+    wrong = {}
+    for method in ("ols", "wls"):
+        fits = [fit_rows([random_rows(seed, noise)], method) for seed in range(20)]
+        wrong[method] = np.mean([np.square((fit.x - X) * [1, 100, 0.01, 1]).sum() for fit in fits])
+    assert wrong["wls"] < wrong["ols"] / 100
+    assert fits[0].noise == pytest.approx(noise, rel=0.15)
+
+
+def test_outliers_hardly_move_the_robust_fit() -> None:
+    rows = random_rows(3, np.array([1.0, 1.0]), 600)
+    bad = np.random.default_rng(0).random(rows.tau.shape) < 0.05
+    spoiled = Rows(rows.columns, rows.tau + np.where(bad, 200.0, 0.0), rows.usable)
+    scale = np.array([1, 100, 0.01, 1])
+    plain = np.linalg.norm((fit_rows([spoiled], "wls").x - X) * scale)
+    robust = np.linalg.norm((fit_rows([spoiled], "irls").x - X) * scale)
+    clean = np.linalg.norm((fit_rows([rows], "wls").x - X) * scale)
+    assert robust < 2.5 * clean
+    assert robust < plain / 5
+
+
+def test_what_no_sample_shows_is_said_and_does_no_harm() -> None:
+    rows = random_rows(1, np.array([0.001, 0.001]))
+    twin = rows.columns[:, :, :1]
+    columns = np.concatenate([rows.columns, -3 * twin, np.zeros_like(twin)], axis=2)
+    fit = fit_rows([Rows(columns, rows.tau, rows.usable)])
+    assert list(fit.seen) == [False, True, True, True, False, False]
+    assert np.isinf(np.diag(fit.covariance)[~fit.seen]).all()
+    assert fit.x[1:4] == pytest.approx(X[1:], rel=0.02)
+    assert fit.x[0] - 3 * fit.x[4] == pytest.approx(X[0], rel=0.02)  # the torque is predicted
+    assert np.isfinite(np.diag(fit.covariance)[fit.seen]).all()
+
+
+def test_a_prior_decides_where_data_are_silent_and_nowhere_else() -> None:
+    rows = random_rows(1, np.array([0.1, 0.1]))
+    columns = np.concatenate([rows.columns, np.zeros((*rows.tau.shape, 1))], axis=2)
+    prior = np.eye(5) / 2.0, np.array([0.0, 0.0, 0.0, 0.0, 7.0]) / 2.0
+    fit = fit_rows([Rows(columns, rows.tau, rows.usable)], "wls", prior)
+    assert fit.x[4] == pytest.approx(7.0)
+    assert np.sqrt(fit.covariance[4, 4]) == pytest.approx(2.0)
+    assert fit.x[:2] == pytest.approx(X[:2], abs=0.05)
+
+
+def test_exact_data_do_not_divide_by_zero() -> None:
+    rows = random_rows(1, np.zeros(2))
+    for method in ("ols", "wls", "irls"):
+        fit = fit_rows([rows], method)
+        assert fit.x == pytest.approx(X, rel=1e-7)
+        assert np.isfinite(fit.covariance).all()

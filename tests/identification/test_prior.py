@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+
+from excite_cli.identification.prior import inertial_prior, prior_rows
+from excite_cli.robot.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.robot.model import Robot
+from excite_cli.robot.regressor import standard_parameters
+from tests.robot.random_robots import random_robot
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return random_robot(2, joints=4)
+
+
+@pytest.fixture(scope="module")
+def base(robot: Robot) -> BaseParameters:
+    return find_base_parameters(robot)
+
+
+def test_on_base_parameters_it_is_the_prior_on_all_parameters(
+    robot: Robot, base: BaseParameters
+) -> None:
+    """Data and prior on φ (all of it) against data and prior on φ_B: the same φ_B, the same φ."""
+    rng = np.random.default_rng(1)
+    cad = standard_parameters(robot)
+    prior = inertial_prior(robot, cad, 0.1)
+    of_base = rng.normal(size=(30, base.rank))
+    measured = of_base @ (base.mapping @ cad * 1.3) + rng.normal(size=30)
+    full = np.vstack([of_base @ base.mapping, np.diag(1 / prior.std)])
+    phi = np.linalg.lstsq(full, np.concatenate([measured, cad / prior.std]), rcond=None)[0]
+    rows, target = prior.on_base(base)
+    short = np.linalg.lstsq(
+        np.vstack([of_base, rows]), np.concatenate([measured, target]), rcond=None
+    )[0]
+    assert short == pytest.approx(base.mapping @ phi, rel=1e-6, abs=1e-8)
+    assert prior.completed(base, short) == pytest.approx(phi, rel=1e-6, abs=1e-8)
+
+
+def test_the_completed_set_keeps_the_base_parameters(robot: Robot, base: BaseParameters) -> None:
+    cad = standard_parameters(robot)
+    prior = inertial_prior(robot, cad, 1.0)
+    values = base.mapping @ cad + np.random.default_rng(0).normal(size=base.rank)
+    assert base.mapping @ prior.completed(base, values) == pytest.approx(values, abs=1e-12)
+    assert prior.completed(base, base.mapping @ cad) == pytest.approx(cad, abs=1e-9)
+
+
+def test_zeros_of_the_urdf_may_move_a_little(robot: Robot) -> None:
+    cad = standard_parameters(robot).copy()
+    cad[2] = cad[5] = 0.0
+    cad[10:20] = 0.0
+    std = inertial_prior(robot, cad, 0.1).std
+    assert (std > 0).all()
+    assert std[0] == pytest.approx(0.1 * cad[0])
+    assert std[2] < 0.1 * cad[0]
+    assert prior_rows(robot, cad, 0.1) == pytest.approx(1 / std**2)
+    assert prior_rows(robot, cad, 0.2) == pytest.approx(0.25 / std**2)

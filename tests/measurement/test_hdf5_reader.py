@@ -1,0 +1,151 @@
+"""HDF5: what is written comes back; foreign and hostile files get a message."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from excite_cli.errors import FileError
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.measurement.reader import MAX_VALUES
+from tests.measurement.recordings import JOINTS, read, recorded, without_speed
+
+
+def flat(path: Path, names: Any = JOINTS) -> Path:
+    run = recorded()
+    with h5py.File(path, "w") as file:
+        for name in ("t", "q", "tau"):
+            file[name] = getattr(run, name)
+        if names is not None:
+            file.attrs["joint_names"] = list(names)
+    return path
+
+
+def refused(path: Path, *parts: str, **declared: Any) -> None:
+    with pytest.raises(FileError) as caught:
+        read(path, **declared)
+    for part in (str(path), *parts):
+        assert part in str(caught.value)
+
+
+def test_written_data_come_back(tmp_path: Path) -> None:
+    first = recorded(name="a")
+    valid = np.ones(first.q.shape, bool)
+    valid[40:60, 1] = False
+    first = replace(first, valid=valid, extra={"temperature": first.t + 20, "q_ref": first.q})
+    second = without_speed(recorded(name="b/1", seed=1))
+    path = tmp_path / "new" / "data.h5"
+    write_dataset(path, Dataset(JOINTS, (first, second)), {"seed": 3, "effects": ["spring"]})
+    data = read(path)
+    assert data.findings == ()
+    assert [run.name for run in data.runs] == ["a", "b/1"]
+    for run, back in zip((first, second), data.runs, strict=True):
+        for name in ("t", "q", "tau"):
+            np.testing.assert_array_equal(getattr(back, name), getattr(run, name))
+    np.testing.assert_array_equal(data.runs[0].dq, first.dq)
+    assert data.runs[1].dq is None
+    np.testing.assert_array_equal(data.runs[0].valid, valid)
+    np.testing.assert_array_equal(data.runs[0].extra["q_ref"], first.q)
+    with h5py.File(path) as file:
+        assert file.attrs["seed"] == 3
+    assert [file.name for file in path.parent.iterdir()] == ["data.h5"]
+
+
+def test_names_decide_not_positions(tmp_path: Path) -> None:
+    path = flat(tmp_path / "log.h5", [b"wrist", b"shoulder", b"elbow"])
+    back = read(path).runs[0]
+    assert back.name == "log"
+    np.testing.assert_array_equal(back.q, recorded().q[:, [1, 2, 0]])
+
+
+def test_no_joint_names(tmp_path: Path) -> None:
+    refused(flat(tmp_path / "a.h5", None), "joint_names", "never by position alone", ".attrs[")
+    refused(flat(tmp_path / "a.h5", ["x", "x", "y"]), "different names")
+    refused(flat(tmp_path / "a.h5", [1.0, 2.0, 3.0]), "as text")
+    refused(flat(tmp_path / "a.h5", ["a", "b"]), "(1600, 3)", "expected (samples, joints)")
+
+
+def _replace(path: Path, name: str, value: Any) -> None:
+    with h5py.File(path, "a") as file:
+        del file[name]
+        if value is not None:
+            file[name] = value
+
+
+def test_wrong_contents(tmp_path: Path) -> None:
+    for name, value, parts in (
+        ("tau", None, ("no dataset 'tau'", "measurement.channels: {tau")),
+        ("q", None, ("no dataset 'q'",)),
+        ("q", recorded().q.T, ("(3, 1600)",)),
+        ("tau", recorded().tau.T, ("(3, 1600)", "transposed")),
+        ("q", "words", ("does not hold numbers",)),
+        ("q", np.zeros((1600, 3, 2)), ("(1600, 3, 2)",)),
+        ("t", None, ("no time stamps 't'", "measurement.rate")),
+    ):
+        path = flat(tmp_path / "a.h5")
+        _replace(path, name, value)
+        refused(path, *parts)
+
+
+def test_rate_in_place_of_stamps(tmp_path: Path) -> None:
+    path = flat(tmp_path / "a.h5")
+    _replace(path, "t", None)
+    np.testing.assert_allclose(read(path, rate=200.0).runs[0].t, recorded().t)
+
+
+@pytest.mark.parametrize("kind", ["external", "soft", "external file", "virtual", "runs"])
+def test_links_and_foreign_storage_are_refused(tmp_path: Path, kind: str) -> None:
+    other = flat(tmp_path / "other.h5")
+    path = flat(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        del file["tau"]
+        if kind == "external":
+            file["tau"] = h5py.ExternalLink(str(other), "/tau")
+        elif kind == "soft":
+            file["tau"] = h5py.SoftLink("/q")
+        elif kind == "external file":
+            file.create_dataset("tau", (1600, 3), float, external=[("/etc/passwd", 0, 38400)])
+        elif kind == "virtual":
+            layout = h5py.VirtualLayout((1600, 3), float)
+            layout[:] = h5py.VirtualSource(str(other), "tau", (1600, 3))
+            file.create_virtual_dataset("tau", layout)
+        else:
+            file["runs"] = h5py.ExternalLink(str(other), "/")
+    refused(path, "only data in the file itself")
+
+
+def test_giant_shapes_are_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("q", (MAX_VALUES, 6), float, chunks=(1024, 6), compression="gzip")
+    assert path.stat().st_size < 100_000
+    refused(path, f"{MAX_VALUES:,}")
+
+
+def test_not_hdf5_and_not_measured(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    path.write_bytes(b"text")
+    refused(path, "not a readable HDF5 file")
+    content = flat(path).read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    refused(path, "not a readable HDF5 file")
+    with h5py.File(path, "w") as file:
+        file.create_group("motions/1")
+    refused(path, "planned motions", "excite simulate")
+    with h5py.File(path, "w") as file:
+        file.create_group("runs")
+    refused(path, "/runs has no group")
+
+
+def test_what_is_no_channel_is_said(tmp_path: Path) -> None:
+    path = flat(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        file["comment"] = "warm robot"
+        file["alias"] = h5py.SoftLink("/nowhere")
+    (found,) = read(path).findings
+    assert found.kind == "left_out"
+    assert "alias, comment" in found.text

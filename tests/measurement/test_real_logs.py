@@ -1,0 +1,107 @@
+"""Logs of three real robots: no error is found in them, and what is known of them comes out."""
+
+import gzip
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.errors import FileError
+from excite_cli.measurement.catalogue import read_dataset
+from excite_cli.measurement.channel_order import speed_lag
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.measurement.quality import raise_for_errors
+
+LOGS = Path(__file__).resolve().parents[3] / "shared" / "data"
+pytestmark = pytest.mark.skipif(not LOGS.is_dir(), reason=f"no real logs at {LOGS}")
+ROBOTS = {
+    "kr300": ("kr300.h5", "kr300.urdf"),
+    "tx40": ("tx40.h5", "tx40_mdh_modified.urdf"),
+    "ur10_cb": ("ur10_cb.h5", "ur10.urdf"),
+}
+
+
+def joints_of(robot: str) -> tuple[str, ...]:
+    with h5py.File(LOGS / robot / ROBOTS[robot][0]) as file:
+        return tuple(name.decode() for name in file.attrs["joint_names"])
+
+
+def load(robot: str, name: str | None = None, **declared: object) -> Dataset:
+    joints = joints_of(robot)
+    tree = ElementTree.parse(LOGS / robot / ROBOTS[robot][1]).getroot()
+    limits, keys = [], ("lower", "upper", "velocity", "effort")
+    for joint in joints:
+        limit = tree.find(f"joint[@name='{joint}']/limit")
+        assert limit is not None
+        limits.append([float(limit.get(key, "nan")) for key in keys])
+    columns = np.array(limits).T
+    path = LOGS / robot / (name or ROBOTS[robot][0])
+    spec = MeasurementSpec(**declared)  # type: ignore[arg-type]
+    return read_dataset([path], spec, joints, (columns[0], columns[1], columns[2], columns[3]))
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_no_false_alarm(robot: str) -> None:
+    data = load(robot)
+    assert [found for found in data.findings if found.severity != "note"] == []
+    raise_for_errors(data)
+    assert all(run.valid is None for run in data.runs)
+
+
+def test_names_and_channels() -> None:
+    data = load("kr300")
+    assert [run.name for run in data.runs] == ["A", "B", "C"]
+    assert set(data.runs[0].extra) == {"q_link", "q_ref", "tau_motor"}
+    # Its speeds come one sample (4 ms) late.
+    assert [speed_lag(run) for run in data.runs] == pytest.approx([0.004] * 3, abs=5e-4)
+
+
+@pytest.mark.parametrize("robot", ["kr300", "tx40"])
+def test_motor_torque_leads_to_joint_torque(robot: str) -> None:
+    joints = joints_of(robot)
+    with h5py.File(LOGS / robot / ROBOTS[robot][0]) as file:
+        ratio = dict(zip(joints, map(float, file.attrs["gear_ratios"]), strict=True))
+    coupling = {"joint_5": {"joint_6": 1.0}} if robot == "tx40" else {}
+    named = {"tau": "tau_motor"} | ({"q": "q_motor"} if robot == "tx40" else {})
+    position = "motor" if robot == "tx40" else "link"
+    there = load(robot, torque="motor", position=position, gear_ratio=ratio, coupling=coupling,
+                 channels=named)  # fmt: skip
+    for run, known in zip(there.runs, load(robot).runs, strict=True):
+        scale = np.abs(known.tau).max(axis=0)
+        assert (np.abs(run.tau - known.tau).max(axis=0) / scale).max() < 1e-4
+        assert np.abs(run.q - known.q - (run.q - known.q)[0]).max() < 1e-4
+
+
+def test_bag_and_hdf5_of_the_same_recording() -> None:
+    (bag,), (known,) = load("ur10_cb", "ur10_exciting_trajectory.db3").runs, load("ur10_cb").runs
+    np.testing.assert_allclose(bag.t, known.t, rtol=0, atol=2e-9)
+    np.testing.assert_array_equal(bag.q, known.q)
+    assert bag.dq is not None
+    assert known.dq is not None
+    np.testing.assert_allclose(bag.dq, known.dq, rtol=1e-6, atol=1e-7)  # stored in single
+    np.testing.assert_allclose(bag.tau, known.tau, rtol=1e-6, atol=1e-5)
+
+
+def test_motor_side_tables_say_what_they_need(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"its columns: Joint_1, .*separate files must be joined"):
+        load("tx40", "curr_data.csv.gz")
+    # Joined, as the message says: columns with their channel's name, and the rate declared.
+    tables = [
+        gzip.decompress((LOGS / "tx40" / name).read_bytes()).decode().splitlines()[:5001]
+        for name in ("pos_read_data.csv.gz", "curr_data.csv.gz")
+    ]
+    header = ",".join(f"{c}_{j}" for c in ("q", "tau") for j in range(1, 7))
+    rows = [",".join(pair) for pair in zip(tables[0][1:], tables[1][1:], strict=True)]
+    path = tmp_path / "joined.csv"
+    path.write_text("\n".join([header, *rows]))
+    ratio = dict(zip(joints_of("tx40"), (32.0, 32.0, 45.0, -48.0, 45.0, 32.0), strict=True))
+    spec = MeasurementSpec(rate=5000, torque="motor", position="motor", gear_ratio=ratio,
+                           coupling={"joint_5": {"joint_6": 1.0}})  # fmt: skip
+    data = read_dataset([path], spec, joints_of("tx40"))
+    assert [found.severity for found in data.findings] == ["note"], data.findings
+    joined, known = data.runs[0], load("tx40").runs[0]
+    same = joined.q[::5] - joined.q[0], known.q[:1000] - known.q[0]
+    assert np.abs(same[0] - same[1]).max() < 5e-3

@@ -1,0 +1,108 @@
+"""MuJoCo's inverse dynamics against Pinocchio's, on robots of every make."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.config.spec import RobotSpec
+from excite_cli.robot.inverse_dynamics import InverseDynamics
+from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.robot.regressor import standard_parameters
+from excite_cli.robot.rigid_body import RigidBody
+from excite_cli.simulation.mujoco_model import build_plant
+from excite_cli.simulation.true_robot import pseudo_inertia, ten_parameters, true_inertias
+from tests.robot.random_robots import random_robot
+
+mujoco = pytest.importorskip("mujoco")
+
+
+def mujoco_torques(robot: Robot, phi: Array, q: Array, v: Array, a: Array) -> Array:
+    plant = build_plant(robot, phi)
+    data = plant.new_data()
+    torques = np.empty_like(q)
+    for t in range(len(q)):
+        data.qpos[plant.motor], data.qvel[plant.motor], data.qacc[plant.motor] = q[t], v[t], a[t]
+        mujoco.mj_inverse(plant.model, data)
+        torques[t] = data.qfrc_inverse[plant.motor]
+    return torques
+
+
+def assert_same_dynamics(robot: Robot) -> None:
+    q, v, a = robot.draw_states(20, seed=3)
+    expected = InverseDynamics(robot).torques(q, v, a)
+    found = mujoco_torques(robot, standard_parameters(robot), q, v, a)
+    assert np.abs(found - expected).max() < 1e-9 * max(1.0, np.abs(expected).max())
+    phi = true_inertias(robot, 0.2, seed=7)
+    expected = RigidBody(robot, phi, q, v, a).regressor @ phi
+    found = mujoco_torques(robot, phi, q, v, a)
+    assert np.abs(found - expected).max() < 1e-9 * max(1.0, np.abs(expected).max())
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_random_trees(seed: int, floating: bool) -> None:
+    assert_same_dynamics(random_robot(seed, joints=6, floating=floating))
+
+
+@pytest.mark.parametrize("name", ["ur10", "panda"])
+def test_arms(name: str) -> None:
+    assert_same_dynamics(build_robot(RobotSpec(urdf=f"example-robot-data:{name}")))
+
+
+def test_a_part_of_a_humanoid_on_a_hoist() -> None:
+    joints = tuple(f"arm_{side}_{k}_joint" for side in ("left", "right") for k in range(1, 8))
+    spec = RobotSpec(
+        urdf="example-robot-data:talos",
+        joints=joints,
+        base="floating",
+        rows=("base", "joints"),
+        base_orientation=(0.1, -0.2, 0.3),
+        posture={"torso_1_joint": 0.3},
+    )
+    assert_same_dynamics(build_robot(spec))
+
+
+def test_gravity_of_the_config_pulls() -> None:
+    spec = RobotSpec(urdf="example-robot-data:ur10", gravity=(1.0, 2.0, -3.0))
+    assert_same_dynamics(build_robot(spec))
+
+
+def test_a_soft_joint_that_does_not_give_is_a_joint_with_a_rotor() -> None:
+    robot = random_robot(5, joints=4, prismatic=False)
+    phi = standard_parameters(robot)
+    q, v, a = robot.draw_states(5, seed=1)
+    plant = build_plant(robot, phi, soft=[2])
+    rotor = 0.7
+    plant.model.dof_armature[plant.motor[2]] = rotor
+    data = plant.new_data()
+    expected = InverseDynamics(robot).torques(q, v, a)
+    for t in range(len(q)):
+        data.qpos[plant.motor], data.qvel[plant.motor], data.qacc[plant.motor] = q[t], v[t], a[t]
+        mujoco.mj_inverse(plant.model, data)
+        motor = data.qfrc_inverse[plant.motor]
+        assert motor[2] == pytest.approx(expected[t, 2] + rotor * a[t, 2], abs=1e-9)
+        assert data.qfrc_inverse[plant.gear[2]] == pytest.approx(expected[t, 2], abs=1e-9)
+
+
+def test_true_inertias_are_off_by_what_was_asked_and_belong_to_bodies(tmp_path: Path) -> None:
+    robot = random_robot(2, joints=6)
+    nominal = standard_parameters(robot).reshape(-1, 10)
+    for error in (0.05, 0.2):
+        found = true_inertias(robot, error, seed=1).reshape(-1, 10)
+        off = np.abs(found[:, 0] / nominal[:, 0] - 1.0)
+        assert (off > 0.4 * error).all()
+        assert (off < 1.6 * error).all()
+        change = np.linalg.norm(found - nominal, axis=1) / np.linalg.norm(nominal, axis=1)
+        assert 0.4 * error < np.median(change) < 2 * error
+        for ten in found:
+            assert np.linalg.eigvalsh(pseudo_inertia(ten)).min() >= -1e-12
+    assert np.array_equal(true_inertias(robot, 0.0, seed=1), standard_parameters(robot))
+    again = true_inertias(robot, 0.2, seed=1)
+    assert np.array_equal(again, true_inertias(robot, 0.2, seed=1))
+    assert not np.array_equal(again, true_inertias(robot, 0.2, seed=2))
+
+
+def test_ten_parameters_invert_the_pseudo_inertia() -> None:
+    ten = standard_parameters(random_robot(1, joints=1))[:10]
+    assert ten_parameters(pseudo_inertia(ten)) == pytest.approx(ten, abs=1e-14)

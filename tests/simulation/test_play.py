@@ -1,0 +1,185 @@
+"""The robot without effects, its instruments, and what a seed decides."""
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.effects.coulomb_friction import CoulombFriction
+from excite_cli.effects.viscous_friction import ViscousFriction
+from excite_cli.errors import ConfigError, MissingExtraError, RobotError
+from excite_cli.robot.model import Robot
+from excite_cli.simulation.build import Build, make
+from excite_cli.simulation.engine import silent_engine
+from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planted import plant
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.simulate import simulate
+from excite_cli.trajectory.bspline import BSplineTrajectory
+from tests.robot.random_robots import random_robot
+from tests.simulation.arms import ELBOW, IDEAL, arm, beyond_rigid, motion, played, rms
+
+pytest.importorskip("mujoco")
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return arm()
+
+
+def test_rigid_bodies_alone_explain_the_torque_of_a_bare_robot(robot: Robot) -> None:
+    simulation = played(robot)
+    (run,) = simulation.dataset.runs
+    share = rms(beyond_rigid(robot, simulation)) / rms(run.tau)
+    assert share.max() < 2e-3, share
+    assert share[:3].max() < 5e-4, share
+
+
+def test_the_motion_is_followed_although_the_controller_knows_the_urdf_only(robot: Robot) -> None:
+    simulation = played(robot)
+    (run,) = simulation.dataset.runs
+    wanted, _, _ = motion(robot).states(run.t)
+    error = rms(wanted - run.q)
+    assert error.max() < 1e-3
+    assert simulation.tracking["motion_1"] == pytest.approx(error, rel=0.05)
+    assert np.array_equal(run.extra["q_ref"], wanted)
+    assert run.t[0] == 0.0
+    assert len(run.t) == 2000
+    assert run.dq is not None
+
+
+def test_without_mujoco_there_is_one_message(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'excite-cli\[sim\]'"):
+        played(robot)
+
+
+def test_a_floating_base_stands_still_on_its_hoist() -> None:
+    robot = random_robot(3, joints=4, floating=True, prismatic=False)
+    trajectory = motion(robot)
+    simulation = simulate(robot, [trajectory], IDEAL)
+    left = rms(beyond_rigid(robot, simulation)) / rms(simulation.dataset.runs[0].tau)
+    assert left.max() < 5e-3
+
+
+def test_odd_rates_keep_time(robot: Robot) -> None:
+    simulation = played(robot, control_rate=300.0, rate=130.0, bandwidth=40.0)
+    (run,) = simulation.dataset.runs
+    assert run.step == pytest.approx(1 / 130)
+    wanted, _, _ = motion(robot).states(run.t)
+    assert rms(wanted - run.q).max() < 5e-3
+
+
+def test_a_motion_that_is_not_periodic_is_entered_and_left(robot: Robot) -> None:
+    rng = np.random.default_rng(2)
+    trajectory = BSplineTrajectory(3.0, 10, at_rest=False)
+    planned = PlannedMotion("motion_1", trajectory, 0.4 * rng.normal(size=(10, robot.n)))
+    simulation = simulate(robot, [planned], IDEAL)
+    assert simulation.tracking["motion_1"].max() < 5e-3
+    with pytest.raises(ConfigError, match="only periodic motions"):
+        simulate(robot, [planned], replace(IDEAL, periods=2))
+
+
+def test_the_same_seed_gives_the_same_numbers(robot: Robot) -> None:
+    first, again, other = (
+        simulate(robot, [motion(robot)], SimulationSettings(seed=seed)) for seed in (1, 1, 2)
+    )
+    for name in ("t", "q", "tau", "dq"):
+        one, two = (getattr(s.dataset.runs[0], name) for s in (first, again))
+        assert np.array_equal(one, two)
+    assert np.array_equal(first.truth.phi, again.truth.phi)
+    assert not np.array_equal(first.truth.phi, other.truth.phi)
+    assert not np.array_equal(first.dataset.runs[0].tau, other.dataset.runs[0].tau)
+
+
+def test_noise_is_of_the_size_and_correlation_asked_for(robot: Robot) -> None:
+    ideal = played(robot).dataset.runs[0]
+    noisy = played(robot, torque_noise=0.02, noise_correlation=0.7).dataset.runs[0]
+    noise = noisy.tau - ideal.tau
+    assert rms(noise) / rms(ideal.tau) == pytest.approx(np.full(robot.n, 0.02), rel=0.15)
+    lagged = np.mean(noise[1:] * noise[:-1], axis=0) / np.mean(noise**2, axis=0)
+    assert lagged == pytest.approx(np.full(robot.n, 0.7), abs=0.08)
+    white = played(robot, torque_noise=0.02).dataset.runs[0].tau - ideal.tau
+    lagged = np.mean(white[1:] * white[:-1], axis=0) / np.mean(white**2, axis=0)
+    assert np.abs(lagged).max() < 0.1
+
+
+def test_encoders_count(robot: Robot) -> None:
+    step = 1e-3
+    run = played(robot, encoder=step).dataset.runs[0]
+    counts = run.q / step
+    assert np.abs(counts - np.round(counts)).max() < 1e-6
+    assert 0.2 * step < rms(run.q - played(robot).dataset.runs[0].q).max() < 0.4 * step
+    assert run.dq is not None
+    true_speed = motion(robot).states(run.t)[1]
+    assert 0.01 < rms(run.dq - true_speed)[0] < 0.5  # a drive's speed is noisy at this resolution
+
+
+def test_takes_repeat_a_motion_with_fresh_noise(robot: Robot) -> None:
+    simulation = played(robot, repeat=2, torque_noise=0.01)
+    first, second = simulation.dataset.runs
+    assert (first.name, second.name) == ("motion_1_take_1", "motion_1_take_2")
+    assert np.array_equal(first.q, second.q)
+    apart = rms(first.tau - second.tau) / rms(first.tau)
+    assert apart == pytest.approx(np.full(robot.n, 0.01 * np.sqrt(2)), rel=0.15)
+
+
+def test_periods_go_on(robot: Robot) -> None:
+    run = played(robot, periods=2).dataset.runs[0]
+    assert len(run.t) == 4000
+    assert run.q[:2000] == pytest.approx(run.q[2000:], abs=2e-3)
+
+
+def test_declared_effects_are_there_in_plausible_sizes(robot: Robot) -> None:
+    declared = [ViscousFriction((ELBOW,)), CoulombFriction((ELBOW,)), CoulombFriction((0,))]
+    simulation = simulate(robot, [motion(robot)], IDEAL, (), declared)
+    assert [p.declared for p in simulation.truth.effects] == [True] * 3
+    assert all(p.values[0] > 0 for p in simulation.truth.effects)
+    share = rms(beyond_rigid(robot, simulation)) / rms(simulation.dataset.runs[0].tau)
+    assert 0.02 < share[ELBOW] < 0.25
+    assert 0.02 < share[0] < 0.25
+    assert share[1] < 1e-3
+
+
+def test_motors_stop_at_their_limits_if_asked(robot: Robot) -> None:
+    free = played(robot).dataset.runs[0]
+    level = 0.8 * np.abs(free.tau[:, ELBOW]).max()
+    limits = replace(robot.limits, effort=np.full(robot.n, np.inf))
+    limits.effort[ELBOW] = level
+    weak = replace(robot, limits=limits)
+    run = played(weak, torque_limits=True).dataset.runs[0]
+    assert np.abs(run.tau[:, ELBOW]).max() <= level + 1e-9
+    assert np.abs(played(weak).dataset.runs[0].tau[:, ELBOW]).max() > level
+
+
+def test_a_joint_that_moves_no_inertia_is_named() -> None:
+    robot = arm()
+    empty = Build.bare(robot, np.zeros(10 * robot.n_bodies), "motion_1")
+    with (
+        silent_engine(),
+        pytest.raises(RobotError, match=r"'shoulder_pan_joint' moves no inertia(.|\n)*armature@"),
+    ):
+        make(empty, 5e-4)
+
+
+def test_a_robot_that_runs_away_is_told(robot: Robot) -> None:
+    torn = plant(kind_named("spring"), (ELBOW,), -1e5)
+    with pytest.raises(RobotError, match=r"'motion_1'.* ran away at .*joint"):
+        played(robot, torn)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"rate": 5000.0}, "rate: 5000 Hz cannot be recorded"),
+        ({"noise_correlation": 1.0}, "not between -1 and 1"),
+        ({"inertia_error": 2.0}, "not between 0 and 0.6"),
+        ({"torque_noise": -1.0}, "torque noise"),
+        ({"repeat": 0}, "repeat"),
+    ],
+)
+def test_settings_that_cannot_be(wrong: dict[str, float], words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        SimulationSettings(**wrong)  # type: ignore[arg-type]

@@ -1,0 +1,107 @@
+"""Diagnoses go to a file and come back whole; other files are refused with one message."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.errors import FileError
+from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis, write_diagnosis
+from excite_cli.store.result_file import is_result, read_result
+from tests.diagnosis.synthetic_diagnosis import make_diagnosis
+from tests.store.conftest import Stored
+
+
+@pytest.fixture(scope="module")
+def diagnosis() -> Diagnosis:
+    return make_diagnosis()
+
+
+@pytest.fixture
+def path(diagnosis: Diagnosis, tmp_path: Path) -> Path:
+    write_diagnosis(tmp_path / "diagnosis.h5", diagnosis)
+    return tmp_path / "diagnosis.h5"
+
+
+def same(first: object, second: object) -> bool:
+    """Equal to the last bit, arrays and NaN included."""
+    if isinstance(first, np.ndarray):
+        return np.array_equal(first, np.asarray(second))
+    if hasattr(first, "__dataclass_fields__"):
+        return type(first) is type(second) and all(
+            same(getattr(first, f.name), getattr(second, f.name)) for f in fields(first)
+        )
+    if isinstance(first, dict):
+        assert isinstance(second, dict)
+        return first.keys() == second.keys() and all(same(first[k], second[k]) for k in first)
+    if isinstance(first, tuple):
+        assert isinstance(second, tuple)
+        return len(first) == len(second) and all(
+            same(a, b) for a, b in zip(first, second, strict=True)
+        )
+    return first == second or (first != first and second != second)
+
+
+def test_everything_comes_back(diagnosis: Diagnosis, path: Path) -> None:
+    found = read_diagnosis(path)
+    for field in fields(Diagnosis):
+        assert same(getattr(diagnosis, field.name), getattr(found, field.name)), field.name
+
+
+def test_files_are_told_apart(stored: Stored, path: Path, tmp_path: Path) -> None:
+    text = tmp_path / "data.csv"
+    text.write_text("t,q_1,tau_1\n", encoding="utf-8")
+    assert (is_diagnosis(path), is_result(path)) == (True, False)
+    assert (is_diagnosis(stored.path), is_result(stored.path)) == (False, True)
+    assert not is_diagnosis(text)
+    assert not is_result(text)
+    with pytest.raises(FileError, match="not a diagnosis of this program"):
+        read_diagnosis(stored.path)
+    with pytest.raises(FileError, match=r"holds a diagnosis, not motions"):
+        read_result(path)
+
+
+def test_missing_foreign_and_cut_files(path: Path, tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="There is no file"):
+        read_diagnosis(tmp_path / "none.h5")
+    cut = tmp_path / "cut.h5"
+    cut.write_bytes(path.read_bytes()[:3000])
+    with pytest.raises(FileError, match="not a readable HDF5 file"):
+        read_diagnosis(cut)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("records/effects", '[{"effect": {"kind": 3}}]', "damaged"),
+        ("records/before", "{", "damaged"),
+        ("records/declared", '"none"', "damaged"),
+    ],
+)
+def test_damaged_records(path: Path, name: str, text: str, words: str) -> None:
+    with h5py.File(path, "a") as file:
+        del file[name]
+        file[name] = text
+    with pytest.raises(FileError, match=words):
+        read_diagnosis(path)
+
+
+def test_missing_and_infinite_numbers(path: Path) -> None:
+    with h5py.File(path, "a") as file:
+        file["information/factor"][0, 0] = np.nan
+    with pytest.raises(FileError, match="not finite"):
+        read_diagnosis(path)
+    with h5py.File(path, "a") as file:
+        del file["phi"]
+    with pytest.raises(FileError, match="damaged"):
+        read_diagnosis(path)
+
+
+def test_newer_schema(path: Path) -> None:
+    with h5py.File(path, "a") as file:
+        file.attrs["schema"] = 99
+    with pytest.raises(FileError, match="schema 99"):
+        read_diagnosis(path)

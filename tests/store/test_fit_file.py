@@ -1,0 +1,78 @@
+from dataclasses import fields
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from excite_cli.config.load import parse_spec
+from excite_cli.errors import FileError
+from excite_cli.identification.identify import Identification, identify
+from excite_cli.robot.base_parameters import find_base_parameters
+from excite_cli.robot.regressor import standard_parameters
+from excite_cli.store.fit_file import read_fit, write_fit
+from tests.identification.synthetic import measured
+from tests.robot.random_robots import random_robot
+
+PROBLEM = """
+robot: {urdf: x.urdf}
+effects: [{kind: viscous_friction}, {kind: stribeck_friction, joints: [joint_2]}]
+"""
+
+
+@pytest.fixture(scope="module")
+def found() -> Identification:
+    robot = random_robot(3, joints=3, prismatic=False)
+    data = measured(robot, standard_parameters(robot), noise=0.1, seconds=5.0, seeds=(1, 2, 3))
+    return identify(robot, find_base_parameters(robot), data, parse_spec(PROBLEM))
+
+
+def same(first: object, second: object) -> bool:
+    if isinstance(first, np.ndarray):
+        return isinstance(second, np.ndarray) and np.array_equal(first, second)
+    if hasattr(first, "__dataclass_fields__") and not hasattr(first, "kind"):
+        names = [field.name for field in fields(first)]  # type: ignore[arg-type]
+        return all(same(getattr(first, name), getattr(second, name)) for name in names)
+    return first == second
+
+
+def test_what_is_written_is_read(found: Identification, tmp_path: Path) -> None:
+    path = tmp_path / "fit.h5"
+    write_fit(path, found, PROBLEM, "/somewhere", "abc", ("a.h5",))
+    stored = read_fit(path)
+    assert same(stored.fit, found.fit)
+    assert stored.error == found.error
+    assert stored.training_error == found.training_error
+    assert stored.findings == found.findings
+    assert (stored.sealed_run, stored.config, stored.config_folder) == (
+        "r3",
+        PROBLEM,
+        "/somewhere",
+    )
+    assert (stored.fingerprint, stored.sources) == ("abc", ("a.h5",))
+
+
+def test_foreign_and_damaged_files_give_one_message(found: Identification, tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="no file"):
+        read_fit(tmp_path / "none.h5")
+    text = tmp_path / "text.h5"
+    text.write_text("hello")
+    with pytest.raises(FileError, match="not a readable HDF5"):
+        read_fit(text)
+    foreign = tmp_path / "foreign.h5"
+    with h5py.File(foreign, "w") as file:
+        file["x"] = 1
+    with pytest.raises(FileError, match="not a fit of this program"):
+        read_fit(foreign)
+    path = tmp_path / "fit.h5"
+    for spoil in ("parameters/values", "noise", "parameters/names"):
+        write_fit(path, found, PROBLEM, "/", "abc")
+        with h5py.File(path, "a") as file:
+            del file[spoil]
+        with pytest.raises(FileError, match="damaged"):
+            read_fit(path)
+    write_fit(path, found, PROBLEM, "/", "abc")
+    with h5py.File(path, "a") as file:
+        file.attrs["schema"] = 99
+    with pytest.raises(FileError, match="schema 99"):
+        read_fit(path)
