@@ -1,7 +1,7 @@
 """First-order friction beside its refinement, as people know it.
 
-With f_v v + f_c sgn v + c sgn v·|v|^p in a model (or a part that grows with the load), f_v and f_c
-are what is left once that term has taken its part: for a concave curve even negative. What data
+With f_v v + f_c sgn v + c sgn v·|v|^p in a model (or a part that grows with load or time), both
+f_v and f_c are what that term leaves: for a concave curve even negative. What data
 sheets and other fits call viscous and Coulomb friction is the straight line through all of it. So
 with the line α v + β sgn v nearest to the curve over the speeds in the data, f_v + c α and
 f_c + c β are reported, and the curved term stands for the deviation from the line.
@@ -15,7 +15,9 @@ from excite_cli.diagnosis.tracing import Traced
 from excite_cli.robot.model import Array
 
 _STRAIGHT = ("viscous_friction", "coulomb_friction")
-_CURVED = ("nonlinear_viscous_friction", "stribeck_friction", "load_dependent_friction")
+_CURVED = (
+    "nonlinear_viscous_friction", "stribeck_friction", "load_dependent_friction", "friction_drift",
+)  # fmt: skip
 
 
 def friction_lines(traced: Traced, start: int) -> Array:
@@ -35,9 +37,9 @@ def friction_lines(traced: Traced, start: int) -> Array:
         present = [k for k in lines if k is not None]
         if not present:
             continue
-        slope = _line(traced, i, present)
-        for k, value in zip(present, slope, strict=True):
-            transform[starts[k], starts[i]] = value
+        slopes = _line(traced, i, present)
+        for k, row in zip(present, slopes, strict=True):
+            transform[starts[k], starts[i] : starts[i] + len(row)] = row
     return transform
 
 
@@ -50,14 +52,12 @@ def _find(traced: Traced, kind: str, joints: Sequence[int]) -> int | None:
 
 
 def _line(traced: Traced, curved: int, present: Sequence[int]) -> Array:
-    """Coefficients of the line nearest to the curve over the training data."""
-    columns = np.concatenate(
-        [
-            np.concatenate([traced.candidates[k].columns[part][:, 0] for k in present], axis=1)
-            for part in range(len(traced.data.runs))
-        ]
-    )
-    curve = np.concatenate(
-        [traced.candidates[curved].columns[part][:, 0, 0] for part in range(len(traced.data.runs))]
-    )
-    return np.asarray(np.linalg.lstsq(columns, curve, rcond=1e-9)[0])
+    """Coefficients (lines, columns) of the lines nearest to the curve over the training data."""
+
+    def stacked(k: int) -> Array:
+        columns = traced.candidates[k].columns
+        masks = [run.usable[:, traced.candidates[k].rows[0]] for run in traced.data.runs]
+        return np.concatenate([c[m, 0] for c, m in zip(columns, masks, strict=True)])
+
+    lines = np.concatenate([stacked(k) for k in present], axis=1)
+    return np.asarray(np.linalg.lstsq(lines, stacked(curved), rcond=1e-9)[0])

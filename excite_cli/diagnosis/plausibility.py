@@ -1,142 +1,184 @@
-"""Could these be the robot's torques? Order and signs, judged with the URDF's inertias.
+"""Could these be the robot's torques and positions? Order and signs, judged with the URDF.
 
-Torque of every joint is regressed on what the URDF predicts for it plus friction and an offset.
-Where the torques of two joints fit the other's prediction much better, columns are swapped; where
-the fit wants a negative inertia and negative friction, a sign is. These are not effects of the
-robot, and a diagnosis of such data would be wrong from the start.
+A mistake in the file is not an effect of the robot, and a diagnosis of such data would be wrong
+from the start. So a few mistakes are tried: columns in another order, torques or positions that
+count the other way. One is told if, undone, it leaves clearly less of the torques (see
+`torque_shares`) than the data as they are, and no joint fits clearly worse.
+
+Motions must be evaluated anew when positions are exchanged; so the search goes step by step, the
+best single change (two joints exchanged, one mirrored, the whole order turned or shifted) first,
+then the next.
 """
 
-from collections.abc import Sequence
-from itertools import combinations
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
+from excite_cli.diagnosis.torque_shares import (
+    Samples,
+    columns_of,
+    own_shares_left,
+    samples_of,
+    shares_left,
+)
 from excite_cli.errors import FileError
 from excite_cli.identification.prepare import PreparedRun
+from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody
 
-_SAMPLES = 600
-# Swapped columns leave at most this share of the residual that the order in the file leaves.
-_CLEARLY_BETTER = 0.6
-_EXPLAINED = 0.5  # and explain at least half of the torque's energy
+_SAMPLES, _SEARCH_SAMPLES = 600, 150
+# Shares below this are the noise, the inertias' errors and effects: no difference is made there.
+_FLOOR = 0.05
+# Data that fit this well on every joint are what they say they are.
+_GOOD = 0.1
+# What a change must gain, in Σ log(share before / share after): as much as halving one share.
+_CLEAR = float(np.log(2.0))
+_WORSE = 0.25  # by which no joint may lose, in the same measure
+_FITS = 0.6  # share that a changed joint may have left at most
+_EQUAL = 0.35  # gains that differ by less cannot be told apart
+
+Order = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Change:
+    """What is done to the columns of the file: column `order[j]` times `sign[j]` is joint j's.
+
+    `q_*` of positions (and speeds), `tau_*` of torques.
+    """
+
+    q_order: Order
+    q_sign: Array
+    tau_order: Order
+    tau_sign: Array
+
+    @classmethod
+    def none(cls, n: int) -> "Change":
+        """The data as they are."""
+        return cls(np.arange(n), np.ones(n), np.arange(n), np.ones(n))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A change and the shares (n,) of the torques that it leaves."""
+
+    change: Change
+    left: Array
+
+    @property
+    def score(self) -> float:
+        """The smaller the better."""
+        return float(_log(self.left).sum())
 
 
 def check_plausibility(robot: Robot, runs: Sequence[PreparedRun]) -> None:
-    """Refuse data whose torque or joint order contradicts the robot.
+    """Refuse data whose order of columns or whose signs contradict the robot.
 
     Raises
     ------
     FileError
-        Columns are swapped, or the torque of a joint counts the other way.
+        Columns are in another order, or torques or positions of joints count the other way.
     """
-    q, v, a, tau = _thinned(runs)
-    names = robot.joint_names
-    problems = _wrong_order(robot, q, v, a, tau)
-    if not problems:
-        wrong = _wrong_signs(robot, q, v, a, tau)
-        if len(wrong) == robot.n and robot.n > 1:
-            problems = [
-                "the torque of every joint has the wrong sign: it opposes what the URDF's inertias "
-                "and friction ask for. Set measurement.sign to -1 for all joints "
-                f"({{{', '.join(f'{name}: -1' for name in names)}}})."
-            ]
-        else:
-            problems = [
-                f"the torque of {names[j]} has the wrong sign: it opposes what the URDF's inertias "
-                f"and friction ask for. Set measurement.sign: {{{names[j]}: -1}}, or check the "
-                "joint's axis in the URDF."
-                for j in wrong
-            ]
-    if problems:
-        raise FileError("the measured data contradict the robot: " + " ".join(problems))
-
-
-def _thinned(runs: Sequence[PreparedRun]) -> tuple[Array, Array, Array, Array]:
-    parts = []
-    total = sum(run.averages.shape[0] for run in runs)
-    for run in runs:
-        stride = max(1, total // _SAMPLES)
-        picks = run.averages[::stride]
-        parts.append([np.asarray(picks @ x) for x in (run.q, run.v, run.a)] + [run.tau[::stride]])
-    q, v, a, tau = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return q, v, a, tau
-
-
-def _wrong_order(robot: Robot, q: Array, v: Array, a: Array, tau: Array) -> list[str]:
-    """Sentences on swapped columns: of the torque alone, or of whole joints."""
-    straight = _residuals(_load(robot, q, v, a), v, tau)
-    best: tuple[float, str] | None = None
-    names = robot.joint_names
-    for i, j in combinations(range(robot.n), 2):
-        order = np.arange(robot.n)
-        order[[i, j]] = j, i
-        both = [i, j]
-        load = _load(robot, q, v, a)
-        swapped_torque = _residuals(load, v, tau[:, order])
-        load = _load(robot, q[:, order], v[:, order], a[:, order])
-        swapped_all = _residuals(load, v[:, order], tau[:, order])
-        for residual, joints, words in (
-            (swapped_torque, both, "the torque columns of {0} and {1} are swapped"),
-            (swapped_all, list(range(robot.n)), "the columns of {0} and {1} are swapped"),
-        ):
-            better = residual[joints].mean() / max(straight[joints].mean(), 1e-9)
-            clear = better < _CLEARLY_BETTER and residual[joints].max() < _EXPLAINED
-            if clear and (best is None or better < best[0]):
-                best = (better, words.format(names[i], names[j]))
-    if best is None:
-        return []
-    return [
-        f"{best[1]}: the other way round they fit the URDF with {best[0]:.0%} of the error. Name "
-        "the columns after the joints (measurement.names), in the order of the file."
+    samples = samples_of(runs, _SAMPLES)
+    dynamics = InverseDynamics(robot)
+    n = robot.n
+    columns = columns_of(dynamics, samples.q, samples.v, samples.a)
+    table = shares_left(columns, samples.tau, samples.usable)
+    straight = Verdict(Change.none(n), table[np.arange(n), np.arange(n), 0])
+    if straight.left.max() < _GOOD:
+        return
+    torques = [v for v in _torques_changed(table) if _clearly_better(v, straight)]
+    motion = _motion_changed(dynamics, samples, straight)
+    found = [v for v in (*torques, motion) if v is not None and _clearly_better(v, straight)]
+    if not found:
+        return
+    # Sorted is stable: of equals, the one that changes torques alone comes first.
+    best = min(found, key=lambda verdict: verdict.score + _EQUAL * _size(verdict.change))
+    others = [
+        verdict
+        for verdict in found
+        if verdict is not best and verdict.score < best.score + _EQUAL
     ]
+    raise FileError(_message(robot.joint_names, best, others, straight))
 
 
-def _load(robot: Robot, q: Array, v: Array, a: Array) -> Array:
-    return RigidBody(robot, standard_parameters(robot), q, v, a).load
+def _log(left: Array) -> Array:
+    return np.log(np.clip(left, _FLOOR, 1.0))
 
 
-def _columns(load: Array, v: Array) -> Array:
-    return np.stack([load, v, np.sign(v), np.ones_like(v)], axis=1)
+def _size(change: Change) -> int:
+    """How many things a person must have done wrong."""
+    n = len(change.q_sign)
+    here = np.arange(n)
+    orders = int((change.q_order != here).any()) + int(
+        (change.tau_order != change.q_order).any()
+    )
+    signs = [int((sign < 0).sum()) for sign in (change.q_sign, change.tau_sign)]
+    return orders + sum(1 if count == n else count for count in signs)
 
 
-def _size(x: Array) -> float:
-    return float(np.sqrt(np.sum(np.square(x))))
+def _clearly_better(verdict: Verdict, straight: Verdict) -> bool:
+    """Whether the change gains enough, on the joints it is about, and costs none of the others."""
+    gain = _log(straight.left) - _log(verdict.left)
+    change, here = verdict.change, np.arange(len(gain))
+    turned = (change.tau_sign < 0) & (change.q_sign > 0)
+    touched = turned | (change.tau_order != here) | (change.q_order != here)
+    touched |= change.q_sign < 0
+    return bool(
+        gain.sum() > _CLEAR
+        and gain.min() > -_WORSE
+        and (gain[turned] > _CLEAR).all()
+        and gain[touched].mean() > 0.5 * _CLEAR
+        and verdict.left[touched].max(initial=0.0) < _FITS
+    )
 
 
-def _residuals(load: Array, v: Array, tau: Array) -> Array:
-    """Share (n,) of each torque's RMS that a scaled prediction with friction leaves; scale ≥ 0."""
-    left = np.empty(tau.shape[1])
-    for j in range(tau.shape[1]):
-        x = _columns(load[:, j], v[:, j])
-        scale = np.sqrt(np.sum(x**2, axis=0)) + 1e-12
-        theta = np.linalg.lstsq(x / scale, tau[:, j], rcond=1e-8)[0]
-        if theta[0] < 0:
-            theta[1:] = np.linalg.lstsq(x[:, 1:] / scale[1:], tau[:, j], rcond=1e-8)[0]
-            theta[0] = 0.0
-        residual = tau[:, j] - (x / scale) @ theta
-        left[j] = _size(residual) / max(_size(tau[:, j]), 1e-12)
-    return left
+def _signed(left: Array) -> tuple[Array, Array]:
+    """Signs (n,) and shares (n,) from (n, 2): the other sign only where it is clearly better."""
+    other = _log(left[:, 1]) < _log(left[:, 0]) - _CLEAR
+    return np.where(other, -1.0, 1.0), np.where(other, left[:, 1], left[:, 0])
 
 
-def _wrong_signs(robot: Robot, q: Array, v: Array, a: Array, tau: Array) -> list[int]:
-    """Joints whose torque, on its own, asks for negative inertia or friction."""
-    load = _load(robot, q, v, a)
-    wrong = []
-    for j in range(robot.n):
-        x = _columns(load[:, j], v[:, j])
-        x = x - x.mean(axis=0)
-        y = tau[:, j] - tau[:, j].mean()
-        scale = np.sqrt(np.sum(x**2, axis=0)) + 1e-12
-        theta = np.linalg.lstsq(x / scale, y, rcond=1e-8)[0]
-        explained = 1.0 - _size(y - (x / scale) @ theta) / max(_size(y), 1e-12)
-        # Shares of the torque's energy that load and friction account for, with their signs.
-        parts = (x / scale) * theta
-        by_load = float(np.sign(theta[0]) * _size(parts[:, 0]))
-        by_friction = float((parts[:, 1] + parts[:, 2]) @ v[:, j])
-        friction_size = _size(parts[:, 1] + parts[:, 2])
-        signed = by_load + np.sign(by_friction) * friction_size
-        if signed < -0.5 * _size(y) and explained > 0.3:
-            wrong.append(j)
-    return wrong
+def _torques_changed(table: Array) -> Iterator[Verdict]:
+    """Torques of other signs, in another order, or both, on the motion as it is."""
+    n = len(table)
+    here = np.arange(n)
+    sign, left = _signed(table[here, here])
+    if (sign < 0).any():
+        yield Verdict(Change(here, np.ones(n), here, sign), left)
+    for cost in (_log(table[:, :, 0]), _log(table).min(axis=2) + _EQUAL):
+        # Of columns that fit equally well, each joint keeps its own.
+        order = linear_sum_assignment(cost - 1e-3 * np.eye(n))[1]
+        if (order == here).all():
+            continue
+        sign, left = _signed(table[here, order])
+        yield Verdict(Change(here, np.ones(n), order, sign), left)
+        keep = table[here, order, 0]
+        yield Verdict(Change(here, np.ones(n), order, np.ones(n)), keep)
+
+
+def _motion_changed(
+    dynamics: InverseDynamics, samples: Samples, straight: Verdict
+) -> Verdict | None:
+    """The best change of positions found step by step, with or without their torques."""
+    few = samples.thinned(_SEARCH_SAMPLES)
+    n = len(straight.left)
+    current = Change.none(n)
+    score = _judged(dynamics, few, current).score
+    for step in range(n + 1):
+        tried = [
+            _judged(dynamics, few, each)
+            for change in _next_changes(current, first=step == 0)
+            for each in _with_torques(change)
+        ]
+        best = min(tried, key=lambda verdict: verdict.score + _EQUAL * _size(verdict.change))
+        cost = best.score + _EQUAL * _size(best.change)
+        if cost > score + _EQUAL * _size(current) - 1e-9:
+            break
+        current, score = best.change, best.score
+    if _size(current) == 0:
+        return None
+    return _judged(dynamics, samples, current)

@@ -29,6 +29,7 @@ UNUSUAL = {
     "coupled_friction": 3.0,
     "nonlinear_viscous_friction": 2.0,
     "asymmetric_friction": 4.0,
+    "friction_drift": 15.0,  # within the seconds of a run, friction hardly warms up
     "stribeck_friction": 2.0,
 }
 _UNUSUAL_DEFAULT = 4.0
@@ -195,7 +196,16 @@ class Search:
             chosen = self._polish(chosen)
             if set(chosen) == before:
                 break
-        return self._pruned(chosen)
+        return self._completed(self._pruned(chosen))
+
+    def _completed(self, chosen: list[int]) -> list[int]:
+        """With both straight friction terms beside √|v|, if one of them is there."""
+        for i in chosen:
+            if self.candidates[i].effect.shape.get("power") != 0.5:
+                continue
+            if any(p in chosen for p in self.parents[i]):
+                chosen = [*chosen, *(p for p in self.parents[i] if p not in chosen)]
+        return chosen
 
     def tier(self, candidate: int) -> int:
         """When its kind is asked for."""

@@ -34,6 +34,9 @@ _USUAL = (
     "armature", "load_dependent_friction", "spring", "coupled_friction",
 )  # fmt: skip
 
+# Effects whose parameter is one by their nature, with the range in which it is believed.
+_WHOLE, _LEAST, _MOST = ("torque_saturation", "backlash"), 0.6, 1.5
+
 Progress = Callable[[str, int], None]
 
 
@@ -270,7 +273,11 @@ def _sign_check(
         for i in chosen:
             effect = candidates[i].effect
             for k, parameter in enumerate(effect.parameters):
-                if i in added and parameter.nonnegative and parameters[start + k] < 0:
+                value = parameters[start + k]
+                if i in added and parameter.nonnegative and value < 0:
+                    return False
+                # Clipping takes away all that is above the level, play all of the load.
+                if i in added and effect.kind in _WHOLE and not _LEAST <= value <= _MOST:
                     return False
             start += len(effect.parameters)
         return True

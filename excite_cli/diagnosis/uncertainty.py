@@ -40,12 +40,12 @@ def covariance_of(
             taps = np.concatenate([[1.0], -noise.coefficients[joint]])
             filtered = lfilter([noise.sigma[joint]], taps, x[::-1], axis=0)
             spread += filtered.T @ filtered
+    if data.prior_precision is not None:
+        at = np.arange(len(data.prior_precision))
+        normal[at, at] += data.prior_precision
+        spread[at, at] += data.prior_precision
     scale = np.sqrt(np.diag(normal))
     scale[scale < 1e-100] = 1.0
     normal = normal / np.outer(scale, scale)
-    if data.prior_precision is not None:
-        at = np.arange(len(data.prior_precision))
-        normal[at, at] += data.prior_precision / scale[at] ** 2
-        spread[at, at] += data.prior_precision
     inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True) / np.outer(scale, scale)
     return np.asarray(inverse @ spread @ inverse)

@@ -1,0 +1,1 @@
+"""Parts of the diagnosis battery: robots and motions, cases, judging, scoring, tables."""

@@ -1,0 +1,239 @@
+"""Cases of the battery: robot, motions, instruments, declared model, and what is planted.
+
+A case follows from (seed, index) alone. Cases come in decks of 36: every kind of the catalogue
+once, seven clean ones, two outside the catalogue, three with two effects, two that are absorbed; a
+deck is shuffled by its seed.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+
+from benchmarks.battery.motions import ROBOTS, Arm, arm, four_motions
+from benchmarks.battery.outside import OUTSIDE
+from benchmarks.battery.sizes import Ground, Sized, ground_of, size
+from excite_cli.config.data_spec import EffectSpec
+from excite_cli.config.spec import Spec
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import catalogue, declared_effects, kind_named
+from excite_cli.robot.model import Array
+from excite_cli.simulation.declared import sized
+from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.true_robot import true_inertias
+
+Group = Literal["one", "clean", "outside", "two", "absorbed"]
+
+_DECLARED = 0.65  # of the cases
+_ROBOT_SHARES = (0.45, 0.38, 0.17)
+_FRICTION = (EffectSpec(kind="viscous_friction"), EffectSpec(kind="coulomb_friction"))
+_SHOWS = 1e-3  # share of an effect's energy that the declared model must leave, to be looked for
+_ABSORBED = 1e-6  # below it nothing is left
+_SEPARATE = 0.02  # share of the second of two effects that the first one must leave
+_ALONE = ("payload", "contact", "torque_delay", "base_tilt", "backlash")  # not as one of two
+_HIDDEN = ("armature", "encoder_offset", "torque_gain", "torque_offset", "spring", "elasticity")
+_ATTEMPTS = 60
+
+
+@dataclass(frozen=True)
+class Case:
+    """All that `simulate` and `diagnose` need. `spec` holds the declared model.
+
+    `visible`: share of the effects' energy that the declared model leaves.
+    """
+
+    index: int
+    group: Group
+    robot: Arm
+    motions: tuple[PlannedMotion, ...]
+    settings: SimulationSettings
+    spec: Spec
+    planted: tuple[Sized, ...]
+    visible: tuple[float, ...]
+
+    @property
+    def has_friction(self) -> bool:
+        return bool(self.spec.effects)
+
+
+@cache
+def _deck(seed: int, number: int) -> tuple[tuple[Group, str], ...]:
+    """Group and kind of 36 cases; kinds of several effects are drawn with the case."""
+    cards: list[tuple[Group, str]] = [("one", kind) for kind in catalogue()]
+    cards += [("clean", "correlated" if k % 2 else "any") for k in range(number, number + 7)]
+    cards += [("outside", OUTSIDE[(2 * number + k) % len(OUTSIDE)].kind) for k in range(2)]
+    cards += [("two", "")] * 3 + [("absorbed", "")] * 2
+    order = np.random.default_rng([seed, 36, number]).permutation(len(cards))
+    return tuple(cards[i] for i in order)
+
+
+def label(seed: int, index: int) -> tuple[Group, str]:
+    """Group and kind of a case, without making it."""
+    length = len(catalogue()) + 14
+    return _deck(seed, index // length)[index % length]
+
+
+def make_case(seed: int, index: int) -> Case:
+    """The case of a seed and an index."""
+    group, kind = label(seed, index)
+    rng = np.random.default_rng([seed, 1, index])
+    for _ in range(_ATTEMPTS):
+        case = _attempt(seed, index, group, kind, rng)
+        if case is not None:
+            return case
+    raise RuntimeError(f"case {index} of seed {seed} ({group} {kind}) cannot be made")
+
+
+def _attempt(
+    seed: int, index: int, group: Group, kind: str, rng: np.random.Generator
+) -> Case | None:
+    of = arm(str(rng.choice(ROBOTS, p=_ROBOT_SHARES)))
+    with_friction = rng.uniform() < _DECLARED
+    if kind in ("viscous_friction", "coulomb_friction"):
+        with_friction = False
+    if group == "outside" and kind != "outside:torque_hysteresis":
+        with_friction = True  # else their friction would be half right a name
+    motions = four_motions(of.name, seed, rng)
+    settings = _settings(rng, kind == "correlated")
+    spec = of.spec.model_copy(update={"effects": _FRICTION if with_friction else ()})
+    declared = declared_effects(spec.effects, of.robot)
+    phi = true_inertias(of.robot, settings.inertia_error, settings.seed)
+    known = sized(of.robot, declared, motions, settings.seed)
+    ground = ground_of(of.robot, phi, motions, known, settings.torque_noise)
+    model = model_columns(of, declared, ground)
+    planted = _planted(group, kind, of, ground, model, with_friction, rng)
+    if planted is None:
+        return None
+    shows = tuple(left_over(model, one, ground) for one in planted)
+    return Case(index, group, of, motions, settings, spec, planted, shows)
+
+
+def _settings(rng: np.random.Generator, correlated: bool) -> SimulationSettings:
+    correlation = 0.0
+    if correlated:
+        correlation = rng.uniform(0.8, 0.95)
+    elif rng.uniform() < 0.5:
+        correlation = rng.uniform(0.5, 0.95)
+    return SimulationSettings(
+        seed=int(rng.integers(2**31)),
+        torque_noise=float(np.exp(rng.uniform(np.log(0.005), np.log(0.02)))),
+        noise_correlation=float(correlation),
+        encoder=float(2 * np.pi / 2 ** rng.integers(16, 21)),
+    )
+
+
+def _planted(
+    group: Group,
+    kind: str,
+    of: Arm,
+    ground: Ground,
+    model: Array,
+    with_friction: bool,
+    rng: np.random.Generator,
+) -> tuple[Sized, ...] | None:
+    if group == "clean":
+        return ()
+    if group == "one":
+        found = _one(kind_named(kind), of, ground, model, (_SHOWS, np.inf), rng)
+        return None if found is None else (found,)
+    if group == "outside":
+        kinds = {each.kind: each for each in OUTSIDE}
+        found = _one(kinds[kind], of, ground, model, (0.05, np.inf), rng)
+        return None if found is None else (found,)
+    if group == "absorbed":
+        hidden = [name for name in rng.permutation(_HIDDEN)]
+        for name in hidden:
+            found = _one(kind_named(str(name)), of, ground, model, (-1.0, _ABSORBED), rng)
+            if found is not None:
+                return (found,)
+        return None
+    return _two(of, ground, model, with_friction, rng)
+
+
+def _one(
+    kind: type[Effect],
+    of: Arm,
+    ground: Ground,
+    model: Array,
+    shows: tuple[float, float],
+    rng: np.random.Generator,
+) -> Sized | None:
+    """The kind at the first of its places, in random order, where it fits."""
+    places = kind.places(of.robot)
+    for at in _order(kind, places, rng):
+        found = size(kind, places[at], ground, rng)
+        if found is not None and shows[0] <= left_over(model, found, ground) < shows[1]:
+            return found
+    return None
+
+
+def _order(
+    kind: type[Effect], places: Sequence[tuple[int, ...]], rng: np.random.Generator
+) -> Iterator[int]:
+    """Places in random order; of a delay, all joints together in half of the cases."""
+    order = rng.permutation(len(places))
+    if kind.kind == "torque_delay" and rng.uniform() < 0.5:
+        order = np.concatenate([[0], order[order != 0]])
+    yield from map(int, order)
+
+
+def _two(
+    of: Arm, ground: Ground, model: Array, with_friction: bool, rng: np.random.Generator
+) -> tuple[Sized, ...] | None:
+    """Two effects of different kinds, on one joint in half of the cases, that can be told apart."""
+    excluded = set(_ALONE)
+    if with_friction:
+        excluded |= {"viscous_friction", "coulomb_friction"}
+    names = [name for name in catalogue() if name not in excluded]
+    first_name, second_name = rng.choice(names, 2, replace=False)
+    first = _one(kind_named(str(first_name)), of, ground, model, (0.01, np.inf), rng)
+    if first is None:
+        return None
+    second_kind = kind_named(str(second_name))
+    beside = np.hstack([model, _columns(first.planted.effect, ground)])
+    shares = (_SEPARATE, np.inf)
+    if rng.uniform() < 0.5:
+        places = [p for p in second_kind.places(of.robot) if set(p) & set(first.touched)]
+        for at in rng.permutation(len(places)):
+            second = size(second_kind, places[at], ground, rng)
+            if second is not None and left_over(beside, second, ground) >= shares[0]:
+                return first, second
+        return None
+    found = _one(second_kind, of, ground, beside, shares, rng)
+    return None if found is None else (first, found)
+
+
+def model_columns(of: Arm, declared: Sequence[Effect], ground: Ground) -> Array:
+    """Columns of base parameters and declared effects, rows in units of their noise."""
+    parts = [np.concatenate([s.body.regressor[:, :, of.base.selection] for s in ground.signals])]
+    weights = _weights(ground)
+    flat = (parts[0] * weights[:, None]).reshape(-1, of.base.rank)
+    return np.hstack([flat, *(_columns(effect, ground) for effect in declared)])
+
+
+def _columns(effect: Effect, ground: Ground) -> Array:
+    n = ground.robot.n
+    rows, count = list(effect.rows(n)), len(effect.parameters)
+    found = []
+    for s in ground.signals:
+        full = np.zeros((len(s.t), n, count))
+        if effect.active(s.run):
+            full[:, rows] = effect.columns(s)
+        found.append(full)
+    return (np.concatenate(found) * _weights(ground)[:, None]).reshape(-1, count)
+
+
+def left_over(model: Array, one: Sized, ground: Ground) -> float:
+    """Share of the effect's energy that the model's columns do not explain."""
+    planted = one.planted
+    torque = np.concatenate([planted.effect.torque(s, planted.values) for s in ground.signals])
+    y = (torque * _weights(ground)).ravel()
+    left = y - model @ np.linalg.lstsq(model, y, rcond=1e-9)[0]
+    return float(left @ left / max(float(y @ y), 1e-300))
+
+
+def _weights(ground: Ground) -> Array:
+    return 1.0 / np.maximum(ground.torque, 1e-3 * ground.torque.max())

@@ -1,0 +1,97 @@
+"""Robots of the battery, and well exciting random motions for them.
+
+A pool of random Fourier motions is made for every robot and seed: each is scaled until its most
+demanding joint limit (position, speed, acceleration) is used to 60–90 % on every joint, and those
+with the lowest condition number of the base regressor are kept. Collisions are not looked at: the
+simulated robot has none.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from excite_cli.config.load import load_spec
+from excite_cli.config.spec import Spec
+from excite_cli.robot.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.robot.regressor import Regressor
+from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.trajectory.fourier import FourierTrajectory
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+ROBOTS = ("ur10", "panda", "talos_arms")
+ACCELERATION = {"ur10": 10.0, "panda": 7.5, "talos_arms": 10.0}  # rad/s²
+HARMONICS, SECONDS = 5, 10.0
+_DRAWS, _KEPT = 40, 10
+_GRID = 80  # instants at which limits and regressor are evaluated
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A robot with its base parameters and its shipped configuration."""
+
+    name: str
+    robot: Robot
+    base: BaseParameters
+    spec: Spec
+
+
+@cache
+def arm(name: str) -> Arm:
+    """The robot of a shipped config by its stem."""
+    path = CONFIGS / f"{name}.yaml"
+    spec = load_spec(path, [])
+    robot = build_robot(spec.robot, path.parent)
+    return Arm(name, robot, find_base_parameters(robot), spec)
+
+
+@cache
+def pool(name: str, seed: int) -> tuple[Array, ...]:
+    """Coefficients of the best motions of a robot, the best conditioned first."""
+    of = arm(name)
+    rng = np.random.default_rng([seed, 71, ROBOTS.index(name)])
+    regressor = Regressor(of.robot)
+    basis = trajectory().basis(np.arange(_GRID) * SECONDS / _GRID)
+    drawn = []
+    for _ in range(_DRAWS):
+        coefficients = _draw(of, rng)
+        y = regressor.evaluate(*basis.states(coefficients))[:, :, of.base.selection]
+        drawn.append((float(np.linalg.cond(y.reshape(-1, of.base.rank))), coefficients))
+    drawn.sort(key=lambda each: each[0])
+    return tuple(coefficients for _, coefficients in drawn[:_KEPT])
+
+
+def four_motions(name: str, seed: int, rng: np.random.Generator) -> tuple[PlannedMotion, ...]:
+    """Four different motions of the pool, `motion_1` to `motion_4`."""
+    best = pool(name, seed)
+    chosen = rng.permutation(len(best))[:4]
+    return tuple(
+        PlannedMotion(f"motion_{k}", trajectory(), best[i]) for k, i in enumerate(chosen, start=1)
+    )
+
+
+def trajectory() -> FourierTrajectory:
+    return FourierTrajectory(HARMONICS, 2 * np.pi / SECONDS)
+
+
+def _draw(of: Arm, rng: np.random.Generator) -> Array:
+    """Random series about a random centre, every joint scaled to its own limits."""
+    n, limits = of.robot.n, of.robot.limits
+    lower, upper = (np.clip(x, -np.pi, np.pi) for x in limits.ranges())
+    slope = rng.uniform(0.3, 1.3)
+    falling = np.arange(1, HARMONICS + 1) ** -slope
+    waves = rng.normal(size=(2 * HARMONICS, n)) * np.tile(falling, 2)[:, None]
+    basis = trajectory().basis(np.arange(400) * SECONDS / 400)
+    shape = np.vstack([waves, np.zeros((1, n))])
+    q, v, a = basis.states(shape)
+    highest, lowest = q.max(axis=0), q.min(axis=0)
+    room = (upper - lower) / np.maximum(highest - lowest, 1e-12)
+    speed = limits.velocity / np.abs(v).max(axis=0)
+    push = np.minimum(limits.acceleration, ACCELERATION[of.name]) / np.abs(a).max(axis=0)
+    scale = np.min([room, speed, push], axis=0) * rng.uniform(0.6, 0.9, n)
+    shape *= scale
+    free = (lower - scale * lowest, upper - scale * highest)  # centres that keep the limits
+    shape[-1] = rng.uniform(*free)
+    return shape

@@ -1,0 +1,119 @@
+"""Real robots, from the rigid-body model alone: what each lacks is found by the installed program.
+
+Figures are those of the logs' authors: data sheets, publications, and fits with the effects known.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.program import Program
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+pytestmark = pytest.mark.skipif(
+    not DATA.is_dir(), reason=f"the real logs are not here: {DATA} does not exist"
+)
+URDF = {"kr300": "kr300.urdf", "tx40": "tx40_mdh_modified.urdf", "ur10_cb": "ur10.urdf"}
+
+
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Runs `excite diagnose --json` on a log with a config that names the URDF only."""
+    folder = tmp_path_factory.mktemp("logs")
+    program = Program(folder, folder / "cache")
+    known: dict[tuple[str, ...], Any] = {}
+
+    def run(robot: str, file: str, *options: str) -> Any:
+        key = (robot, file, *options)
+        if key not in known:
+            config = folder / f"{robot}.yaml"
+            config.write_text(f"robot: {{urdf: {DATA / robot / URDF[robot]}}}\n", encoding="utf-8")
+            known[key] = program.answer("diagnose", config, DATA / robot / file, *options)
+        return known[key]
+
+    return run
+
+
+def named(answer: Any, kind: str) -> dict[tuple[str, ...], Any]:
+    return {tuple(e["joints"]): e["parameters"] for e in answer["effects"] if e["kind"] == kind}
+
+
+class TestTx40:
+    """Published: f_v and f_s of each joint, and the coupled friction of the wrist's motors."""
+
+    VISCOUS = (8.05, 5.53, 1.97, 1.11, 1.86, 0.65)
+    COULOMB = (7.14, 8.26, 6.34, 2.48, 3.03)
+
+    def test_error(self, diagnosed: Any) -> None:
+        error = diagnosed("tx40", "tx40.h5")["error"]
+        assert error["before"]["mean_relative_moving"] > 0.9
+        assert error["after"]["mean_relative_moving"] <= 0.10
+
+    def test_friction_on_all_joints_as_published(self, diagnosed: Any) -> None:
+        answer = diagnosed("tx40", "tx40.h5")
+        viscous, coulomb = named(answer, "viscous_friction"), named(answer, "coulomb_friction")
+        for k, value in enumerate(self.VISCOUS):
+            found = viscous[(f"joint_{k + 1}",)]["viscous"]["value"]
+            assert found == pytest.approx(value, rel=0.1)
+        for k, value in enumerate(self.COULOMB):
+            found = coulomb[(f"joint_{k + 1}",)]["coulomb"]["value"]
+            assert found == pytest.approx(value, rel=0.1)
+
+    def test_the_coupled_wrist(self, diagnosed: Any) -> None:
+        coupled = named(diagnosed("tx40", "tx40.h5"), "coupled_friction")
+        assert set(coupled) == {("joint_5", "joint_6")}
+        found = coupled["joint_5", "joint_6"]
+        assert found["viscous"]["value"] == pytest.approx(0.616, rel=0.1)
+        assert found["coulomb"]["value"] == pytest.approx(1.95, rel=0.1)
+
+
+class TestUr10:
+    """Offsets of the wrist's torques; friction that saturates with speed on the first joint."""
+
+    def test_error(self, diagnosed: Any) -> None:
+        error = diagnosed("ur10_cb", "ur10_cb.h5")["error"]
+        assert error["before"]["mean_relative_moving"] > 0.8
+        assert error["after"]["mean_relative_moving"] <= 0.07
+
+    def test_names(self, diagnosed: Any) -> None:
+        answer = diagnosed("ur10_cb", "ur10_cb.h5")
+        offsets = {joint for (joint,) in named(answer, "torque_offset")}
+        assert {"wrist_1_joint", "wrist_2_joint", "wrist_3_joint"} <= offsets
+        saturating = named(answer, "nonlinear_viscous_friction")[("shoulder_pan_joint",)]
+        assert saturating["power"]["value"] < 1
+
+    def test_straight_from_the_bag(self, diagnosed: Any) -> None:
+        bag = diagnosed("ur10_cb", "ur10_exciting_trajectory.db3")
+        file = diagnosed("ur10_cb", "ur10_cb.h5")
+        assert [(e["kind"], e["joints"]) for e in bag["effects"]] == [
+            (e["kind"], e["joints"]) for e in file["effects"]
+        ]
+        assert bag["error"]["after"]["mean_relative_moving"] == pytest.approx(
+            file["error"]["after"]["mean_relative_moving"], rel=1e-3
+        )
+
+
+class TestKr300:
+    """A hydraulic spring on axis 2; armatures of the data sheet on axes 2 and 3."""
+
+    CAD = ("--set", "identification.inertias=cad")
+
+    def test_free_inertias(self, diagnosed: Any) -> None:
+        answer = diagnosed("kr300", "kr300.h5")
+        assert not named(answer, "torque_offset")
+        assert len(named(answer, "viscous_friction")) == 6
+        assert len(named(answer, "coulomb_friction")) == 6
+        assert ("axis_3",) in named(answer, "armature")
+        absorbed = {(a["kind"], tuple(a["joints"])): a["by"] for a in answer["absorbed"]}
+        assert any("axis_2" in name for name in absorbed["spring", ("axis_2",)])
+
+    @pytest.mark.parametrize("sealed", ["A", "B", "C"])
+    def test_kept_inertias(self, diagnosed: Any, sealed: str) -> None:
+        answer = diagnosed("kr300", "kr300.h5", "--sealed", sealed, *self.CAD)
+        assert answer["error"]["after"]["relative_moving"]["axis_2"] < 0.07
+        stiffness = named(answer, "spring")[("axis_2",)]["stiffness"]["value"]
+        assert stiffness == pytest.approx(7000, rel=0.1)
+        armature = named(answer, "armature")
+        assert armature[("axis_2",)]["inertia"]["value"] == pytest.approx(844, rel=0.1)
+        assert armature[("axis_3",)]["inertia"]["value"] == pytest.approx(751, rel=0.1)
