@@ -4,10 +4,21 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: run test lint bench clean
+.PHONY: run plan loop test lint bench battery clean
 
-run: $(STAMP)            ## the paper's problem on TALOS' two arms
+run: plan loop           ## plan exciting motions, then close the loop
+
+plan: $(STAMP)           ## the paper's problem on TALOS' two arms
 	$(BIN)/excite optimize configs/talos_arms.yaml -o results/talos_arms.h5 --overwrite
+
+loop: $(STAMP)           ## a UR10 with an effect its config does not know, found again
+	$(BIN)/excite optimize configs/ur10.yaml --motions 4 -o results/motions.h5 --overwrite
+	$(BIN)/excite simulate configs/ur10.yaml results/motions.h5 -o results/measured.h5 --overwrite \
+	  --effect 'load_dependent_friction@elbow_joint=0.06'
+	$(BIN)/excite diagnose configs/ur10.yaml results/measured.h5 -o results/diagnosis.h5 \
+	  --apply results/ur10_found.yaml --overwrite
+	$(BIN)/excite optimize configs/ur10.yaml --motions 1 --after results/diagnosis.h5 \
+	  -o results/next.h5 --overwrite
 
 test: $(STAMP) lint      ## lint, types, import directions, all tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -q
@@ -23,6 +34,9 @@ bench: $(STAMP)          ## cost and gradient, growth, whole motions
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.growth
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.clearance
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.motions
+
+battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about half an hour)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.diagnosis_battery --cases 66 --seed 5001
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)

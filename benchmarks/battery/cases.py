@@ -63,9 +63,12 @@ class Case:
 def _deck(seed: int, number: int) -> tuple[tuple[Group, str], ...]:
     """Group and kind of 36 cases; kinds of several effects are drawn with the case."""
     cards: list[tuple[Group, str]] = [("one", kind) for kind in catalogue()]
-    cards += [("clean", "correlated" if k % 2 else "any") for k in range(number, number + 7)]
-    cards += [("outside", OUTSIDE[(2 * number + k) % len(OUTSIDE)].kind) for k in range(2)]
-    cards += [("two", "")] * 3 + [("absorbed", "")] * 2
+    for k in range(number, number + 7):
+        cards.append(("clean", ("any", "correlated")[k % 2]))
+    for k in range(2):
+        cards.append(("outside", OUTSIDE[(2 * number + k) % len(OUTSIDE)].kind))
+    cards.extend([("two", "")] * 3)
+    cards.extend([("absorbed", "")] * 2)
     order = np.random.default_rng([seed, 36, number]).permutation(len(cards))
     return tuple(cards[i] for i in order)
 
@@ -144,7 +147,7 @@ def _planted(
         found = _one(kinds[kind], of, ground, model, (0.05, np.inf), rng)
         return None if found is None else (found,)
     if group == "absorbed":
-        hidden = [name for name in rng.permutation(_HIDDEN)]
+        hidden = list(rng.permutation(_HIDDEN))
         for name in hidden:
             found = _one(kind_named(str(name)), of, ground, model, (-1.0, _ABSORBED), rng)
             if found is not None:
@@ -189,29 +192,40 @@ def _two(
         excluded |= {"viscous_friction", "coulomb_friction"}
     names = [name for name in catalogue() if name not in excluded]
     first_name, second_name = rng.choice(names, 2, replace=False)
-    first = _one(kind_named(str(first_name)), of, ground, model, (0.01, np.inf), rng)
+    first = _one(kind_named(str(first_name)), of, ground, model, (_SEPARATE, np.inf), rng)
     if first is None:
         return None
     second_kind = kind_named(str(second_name))
-    beside = np.hstack([model, _columns(first.planted.effect, ground)])
-    shares = (_SEPARATE, np.inf)
+    places = second_kind.places(of.robot)
     if rng.uniform() < 0.5:
-        places = [p for p in second_kind.places(of.robot) if set(p) & set(first.touched)]
-        for at in rng.permutation(len(places)):
-            second = size(second_kind, places[at], ground, rng)
-            if second is not None and left_over(beside, second, ground) >= shares[0]:
-                return first, second
-        return None
-    found = _one(second_kind, of, ground, beside, shares, rng)
-    return None if found is None else (first, found)
+        places = [place for place in places if set(place) & set(first.touched)]
+    beside_first = orthonormal(np.hstack([model, _columns(first.planted.effect, ground)]))
+    for at in rng.permutation(len(places)):
+        second = size(second_kind, places[at], ground, rng)
+        if second is None or left_over(beside_first, second, ground) < _SEPARATE:
+            continue
+        beside_second = orthonormal(np.hstack([model, _columns(second.planted.effect, ground)]))
+        if left_over(beside_second, first, ground) >= _SEPARATE:
+            return first, second
+    return None
 
 
 def model_columns(of: Arm, declared: Sequence[Effect], ground: Ground) -> Array:
-    """Columns of base parameters and declared effects, rows in units of their noise."""
-    parts = [np.concatenate([s.body.regressor[:, :, of.base.selection] for s in ground.signals])]
-    weights = _weights(ground)
-    flat = (parts[0] * weights[:, None]).reshape(-1, of.base.rank)
-    return np.hstack([flat, *(_columns(effect, ground) for effect in declared)])
+    """Orthonormal basis of what base parameters and declared effects explain.
+
+    Rows are in units of their joint's torque, as the noise is.
+    """
+    inertial = np.concatenate([s.body.regressor[:, :, of.base.selection] for s in ground.signals])
+    flat = (inertial * _weights(ground)[:, None]).reshape(-1, of.base.rank)
+    return orthonormal(np.hstack([flat, *(_columns(effect, ground) for effect in declared)]))
+
+
+def orthonormal(columns: Array) -> Array:
+    """Basis of the columns' span; columns of zeros are left out."""
+    norms = np.linalg.norm(columns, axis=0)
+    columns = columns[:, norms > 1e-12 * norms.max()] / norms[norms > 1e-12 * norms.max()]
+    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    return basis[:, sizes > 1e-9 * sizes[0]]
 
 
 def _columns(effect: Effect, ground: Ground) -> Array:
@@ -227,11 +241,11 @@ def _columns(effect: Effect, ground: Ground) -> Array:
 
 
 def left_over(model: Array, one: Sized, ground: Ground) -> float:
-    """Share of the effect's energy that the model's columns do not explain."""
+    """Share of the effect's energy that the model, an orthonormal basis, does not explain."""
     planted = one.planted
     torque = np.concatenate([planted.effect.torque(s, planted.values) for s in ground.signals])
     y = (torque * _weights(ground)).ravel()
-    left = y - model @ np.linalg.lstsq(model, y, rcond=1e-9)[0]
+    left = y - model @ (model.T @ y)
     return float(left @ left / max(float(y @ y), 1e-300))
 
 

@@ -22,7 +22,7 @@ _NEAR_SHARE = 0.25  # of the cases
 _ACCEPTED = (0.9, 0.40)  # least, in units of 1.5 × noise or 3 %; and largest ratio
 _STRIBECK_EXCESS = 0.4  # at most, of the joint's torque RMS
 _STRIBECK_SPEEDS = (0.03, 0.3)  # rad/s
-_SAMPLES = 500
+_SAMPLES = 250
 
 # Kinds that say their size themselves: low, high of the first number.
 _OWN_SIZE = {
@@ -195,9 +195,7 @@ def _own_size(name: str, rng: np.random.Generator) -> Array:
     return np.array([value if name == "torque_delay" else sign * value])
 
 
-def _within(
-    kind: type[Effect], values: Array, ground: Ground, joints: tuple[int, ...]
-) -> Array:
+def _within(kind: type[Effect], values: Array, ground: Ground, joints: tuple[int, ...]) -> Array:
     """Scaled as a whole until the largest number lies in its usual range."""
     values = np.asarray(values, dtype=float)
     if kind.kind == "friction_drift":

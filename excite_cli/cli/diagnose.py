@@ -61,6 +61,8 @@ def diagnose(
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     for path in (output, apply):
         _refuse(path, overwrite)
+    if output is not None and apply is not None and output.resolve() == apply.resolve():
+        raise FileError(f"--output and --apply both name {output}. Give two names.")
     with single_threaded():
         spec = load_spec(config, overrides)
         folder = config.resolve().parent

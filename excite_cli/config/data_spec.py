@@ -1,6 +1,6 @@
 """What a YAML file may say about measured data: torque, filters, declared effects, diagnosis."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field, field_validator
 
@@ -125,7 +125,7 @@ class DiagnosisSpec(Section):
     moving_speed: Positive | None = Field(
         None, description="a joint moves above this speed [rad/s or m/s]; default 0.02"
     )
-    rounds: Annotated[Integer, Field(ge=0, le=200)] = 60
+    rounds: Integer = Field(60, ge=0, le=200, description="most effects that are added")
     block: Positive | None = Field(None, description="[s] blocks a single run is cut into")
 
     @field_validator("kinds")

@@ -23,14 +23,16 @@ def absorbed_effects(
 ) -> list[Absorbed]:
     """Candidates of which the model leaves less than 0.1 % of their energy.
 
-    The model is the declared one with the chosen effects. `names` are those of its columns. Only
-    the first parameter counts (a spring whose stiffness is absorbed is absorbed, though its preload
+    The model is the declared one with the chosen effects. `names` are those of the declared model's
+    columns; what was found is named by its own parameters. Candidates that do not show in these
+    data at all (no energy) are not absorbed by anything. Only the first parameter counts (a spring whose stiffness is absorbed is absorbed, though its preload
     may show as an offset).
     """
     at = evidence.columns(chosen)
     factor = evidence.factor(chosen)
     found: dict[tuple, Absorbed] = {}
     taken = {candidates[i].place for i in chosen}
+    names = [*names, *_found_names([candidates[i] for i in chosen], joint_names)]
     for i, c in enumerate(candidates):
         if c.place in taken or c.place in found or c.effect.runs or c.effect.kind in FIRST:
             continue
@@ -38,6 +40,8 @@ def absorbed_effects(
         main, others = block[0], block[1:]
         shared = evidence.total[at, main]
         own = float(evidence.total[main, main])
+        if own <= 0.0:
+            continue
         x = cho_solve(factor, shared)
         left = own - shared @ x
         if len(others):
@@ -49,9 +53,18 @@ def absorbed_effects(
             left -= bridge @ np.linalg.lstsq(rest, bridge, rcond=1e-9)[0]
         if left > ABSORBED * own:
             continue
-        weight = np.abs(x[: len(names)])
+        weight = np.abs(x)
         order = np.argsort(-weight)
         by = [names[k] for k in order[:_NAMED] if weight[k] > _WORTH_NAMING * weight.max()]
         joints = tuple(joint_names[j] for j in c.effect.joints)
         found[c.place] = Absorbed(c.effect.kind, joints, tuple(by), float(max(left, 0.0) / own))
     return list(found.values())
+
+
+def _found_names(found: Sequence[Candidate], joint_names: Sequence[str]) -> list[str]:
+    """Names of the columns of effects that were found."""
+    return [
+        f"{parameter.name}[{'+'.join(joint_names[j] for j in c.effect.joints)}]"
+        for c in found
+        for parameter in c.effect.parameters
+    ]

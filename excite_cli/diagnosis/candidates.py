@@ -121,7 +121,7 @@ def with_columns(
         n = signals[0].q.shape[1]
         rows = effect.rows(n)
         blocks = tuple(
-            run.averaged(effect.columns(signal))
+            run.averaged_for_fit(effect.columns(signal), rows)
             if effect.active(signal.run)
             else np.zeros((run.averages.shape[0], len(rows), len(effect.parameters)))
             for signal, run in zip(signals, runs, strict=True)

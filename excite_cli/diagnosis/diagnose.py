@@ -12,6 +12,7 @@ from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import Alias, aliases_of
 from excite_cli.diagnosis.candidates import record_of
+from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.plausibility import check_plausibility
 from excite_cli.diagnosis.prediction import errors_on
@@ -68,10 +69,14 @@ def diagnose(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )
     progress("filtering", 0)
-    training = [prepare(run, processing) for run in parts.training]
+
+    def prepared(coupled: Sequence[tuple[int, int, float]]) -> list[PreparedRun]:
+        return [prepare(run, processing, coupled) for run in parts.training]
+
+    training = prepared(())
     check_plausibility(robot, training)
     names = [run.name for run in dataset.runs]
-    traced = trace(model, spec.diagnosis, training, parts.folds, names, progress)
+    traced = trace(model, spec.diagnosis, prepared, parts.folds, names, progress)
     progress("naming", 8)
     parameters = traced.search.plain.solve(traced.chosen)
     named, rivals = _named(model, traced, parameters, processing)
@@ -151,7 +156,7 @@ def _named(
         own = slice(at, at + c.width)
         at += c.width
         rest = search.without(i, traced.chosen)
-        gain = search.white.schur(rest).gain(i)
+        gain = search.white.schur(rest).gain(i, absorbed=SHARED)
         joints = list(c.rows)
         whole = search.plain.energy_on((), joints)
         share = (

@@ -22,6 +22,8 @@ from excite_cli.robot.model import Array
 
 # A direction of a candidate of which less than this share is left is absorbed by the model.
 ABSORBED = 1e-3
+# Members of a model are judged beside each other: friction terms share nearly all they have.
+SHARED = 1e-7
 _COLLINEAR = 1e-9
 _RIDGE = 1e-11
 
@@ -162,22 +164,25 @@ class Schur:
     def __init__(self, evidence: Evidence, left: Array, cross: Array) -> None:
         self.evidence, self.matrix, self.cross = evidence, left, cross
 
-    def gain(self, *candidates: int) -> Gain:
-        """χ², degrees of freedom and the largest share left of candidates taken together."""
+    def gain(self, *candidates: int, absorbed: float = ABSORBED) -> Gain:
+        """χ², degrees of freedom and the largest share left of candidates taken together.
+
+        Directions of which less than `absorbed` is left do not count.
+        """
         e = self.evidence
         at = np.concatenate([e.blocks[i] for i in candidates]) - e.fixed
         own = e.total[np.ix_(at + e.fixed, at + e.fixed)]
         left, cross = self.matrix[np.ix_(at, at)], self.cross[at]
         if len(at) == 1:
             share = float(left[0, 0] / max(own[0, 0], 1e-300))
-            if share < ABSORBED:
+            if share < absorbed:
                 return Gain(0.0, 0, share)
             return Gain(float(cross[0] ** 2 / left[0, 0]), 1, share)
         values, vectors = np.linalg.eigh(own)
         kept = values > _COLLINEAR * values[-1]
         basis = vectors[:, kept] / np.sqrt(values[kept])
         shares, turned = np.linalg.eigh(basis.T @ left @ basis)
-        alive = shares > ABSORBED
+        alive = shares > absorbed
         if not alive.any():
             return Gain(0.0, 0, float(shares.max(initial=0.0)))
         z = turned[:, alive].T @ (basis.T @ cross)

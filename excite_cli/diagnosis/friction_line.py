@@ -31,9 +31,7 @@ def friction_lines(traced: Traced, start: int) -> Array:
         effect = traced.candidates[i].effect
         if effect.kind not in _CURVED:
             continue
-        lines = [
-            _find(traced, kind, effect.joints) for kind in ("viscous_friction", "coulomb_friction")
-        ]
+        lines = [_find(traced, kind, effect.joints) for kind in _STRAIGHT]
         present = [k for k in lines if k is not None]
         if not present:
             continue

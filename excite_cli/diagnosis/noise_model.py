@@ -74,7 +74,8 @@ def _autoregression(series: list[Array], usable: list[NDArray[np.bool_]]) -> tup
     past, now = np.concatenate(rows), np.concatenate(targets)
     count = len(now)
     if count <= 3 * most + 4:
-        return np.zeros(0), float(np.sqrt(np.mean(np.concatenate(series) ** 2)) + 1e-12)
+        kept = np.concatenate([s[u] for s, u in zip(series, usable, strict=True)])
+        return np.zeros(0), float(np.sqrt(np.mean(kept**2)) + 1e-12) if len(kept) else 1.0
     gram, cross, energy = past.T @ past, past.T @ now, float(now @ now)
     nugget = _NUGGET * energy
     gram[np.diag_indices(most)] += nugget

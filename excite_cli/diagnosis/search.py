@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.evidence import Evidence, Gain, Schur
+from excite_cli.diagnosis.evidence import SHARED, Evidence, Gain, Schur
 from excite_cli.robot.model import Array
 
 # Surprise at an effect of this kind (χ² units), where two explain the data about as well.
@@ -199,12 +199,23 @@ class Search:
         return self._completed(self._pruned(chosen))
 
     def _completed(self, chosen: list[int]) -> list[int]:
-        """With both straight friction terms beside √|v|, if one of them is there."""
+        """With both straight friction terms of a joint, where one is in and either is refined.
+
+        Small Coulomb friction may not pass on its own; without it √|v| or the friction of coupled
+        gears would stand for it, and have wrong sizes.
+        """
         for i in chosen:
-            if self.candidates[i].effect.shape.get("power") != 0.5:
+            effect = self.candidates[i].effect
+            if effect.shape.get("power") != 0.5 and effect.kind != "coupled_friction":
                 continue
-            if any(p in chosen for p in self.parents[i]):
-                chosen = [*chosen, *(p for p in self.parents[i] if p not in chosen)]
+            for joint in effect.joints:
+                own = [p for p in self.parents[i] if self.candidates[p].rows == (joint,)]
+                missing = [p for p in own if p not in chosen]
+                if len(missing) == len(own) or not missing:
+                    continue
+                more = [*chosen, *missing]
+                if self.allowed(self.plain.solve(more), more, missing) or len(effect.joints) == 1:
+                    chosen = more
         return chosen
 
     def tier(self, candidate: int) -> int:
@@ -370,7 +381,7 @@ class Search:
             weakest = None
             for i in chosen:
                 rest = [k for k in chosen if k != i]
-                gain = self.white.schur(rest).gain(i)
+                gain = self.white.schur(rest).gain(i, absorbed=SHARED)
                 if any(i in self.parents[k] for k in rest):
                     continue
                 bad = (

@@ -76,15 +76,18 @@ def shares_left(columns: Array, tau: Array, usable: Mask) -> Array:
 
 
 def own_shares_left(columns: Array, tau: Array, usable: Mask) -> Array:
-    """As `shares_left`, torque j on the columns of joint j alone: (n, 2)."""
+    """As `shares_left`, torque j on the columns of joint j alone: (…, n, 2).
+
+    `columns` (…, T, n, p), `tau` and `usable` (…, T, n), for stacks of motions.
+    """
     weight = usable.astype(float)
-    count = np.maximum(weight.sum(axis=0), 1.0)
-    y = (tau - (tau * weight).sum(axis=0) / count) * weight
-    x = columns - (np.einsum("tjp,tj->jp", columns, weight) / count[:, None])[None]
-    x = np.ascontiguousarray((x * weight[..., None]).transpose(1, 2, 0))
-    gram = x @ x.transpose(0, 2, 1)
-    product = (x @ y.T[:, :, None])[..., 0]
-    return _left(gram, product, (y**2).sum(axis=0))
+    count = np.maximum(weight.sum(axis=-2, keepdims=True), 1.0)
+    y = (tau - (tau * weight).sum(axis=-2, keepdims=True) / count) * weight
+    mean = (columns * weight[..., None]).sum(axis=-3, keepdims=True) / count[..., None]
+    x = np.moveaxis((columns - mean) * weight[..., None], -3, -1)  # (…, n, p, T)
+    gram = x @ np.swapaxes(x, -1, -2)
+    product = (x @ np.swapaxes(y, -1, -2)[..., None])[..., 0]
+    return _left(gram, product, (y**2).sum(axis=-2))
 
 
 def _left(gram: Array, product: Array, energy: Array) -> Array:

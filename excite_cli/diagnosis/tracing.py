@@ -82,12 +82,17 @@ def full_inertias(model: Model, parameters: Array) -> Array:
 def trace(
     model: Model,
     spec: DiagnosisSpec,
-    runs: Sequence[PreparedRun],
+    prepared: Callable[[Sequence[tuple[int, int, float]]], list[PreparedRun]],
     folds: Sequence[int],
     run_names: Sequence[str],
     progress: Progress,
 ) -> Traced:
-    """Find the effects that `model` lacks."""
+    """Find the effects that `model` lacks.
+
+    `prepared` gives the training parts, for coupled joints (j, k, s) that were found.
+    """
+    coupled = _coupled(model.declared)
+    runs = prepared(coupled)
     bodies = [_Body(model, run) for run in runs]
     phi = standard_parameters(model.robot)
     found: tuple[Effect, ...] = ()
@@ -128,6 +133,11 @@ def trace(
             break
         seen.append(now)
         found = traced.effects
+        if _coupled((*model.declared, *found)) != coupled:
+            coupled = _coupled((*model.declared, *found))
+            runs = prepared(coupled)
+            for body, run in zip(bodies, runs, strict=True):
+                body.take(run)
         phi = full_inertias(model, parameters)
         values = parameters[data.declared[0].shape[2] - _width(model.declared) :]
     assert traced is not None
@@ -165,6 +175,15 @@ def _usual(candidates: Sequence[Candidate], found: Sequence[int]) -> list[int]:
     return usual
 
 
+def _coupled(effects: Sequence[Effect]) -> list[tuple[int, int, float]]:
+    """Joints j, k whose gears rub on v_j + s v_k."""
+    return sorted(
+        (e.joints[0], e.joints[1], float(e.shape["direction"]))
+        for e in effects
+        if e.kind == "coupled_friction"
+    )
+
+
 def _width(effects: Sequence[Effect]) -> int:
     return sum(len(effect.parameters) for effect in effects)
 
@@ -199,7 +218,12 @@ class _Body:
         self.model, self.run = model, run
         body = RigidBody(model.robot, standard_parameters(model.robot), run.q, run.v, run.a)
         self.regressor = body.regressor
-        self.inertial = run.averaged(self.regressor)
+        self.take(run)
+
+    def take(self, run: PreparedRun) -> None:
+        """The same motion with other averages."""
+        self.run = run
+        self.inertial = run.averaged_for_fit(self.regressor)
 
     def signals(self, phi: Array, effects: Sequence[Effect], values: Array) -> Signals:
         run = self.run
@@ -249,12 +273,12 @@ def _data(
 ) -> TrainingData:
     declared, torques = [], []
     for run, body, signal in zip(runs, bodies, signals, strict=True):
-        inertial, tau = body.inertial, run.tau
+        inertial, tau = body.inertial, run.tau_fit
         if model.prior is None:
             inertial = inertial[:, :, model.base.selection]
         else:
             tau = tau - inertial @ model.prior.mean
-        effects = run.averaged(effect_columns(model.declared, signal))
+        effects = run.averaged_for_fit(effect_columns(model.declared, signal))
         declared.append(np.concatenate([inertial, effects], axis=2))
         torques.append(tau)
     precision = None
@@ -275,6 +299,10 @@ def _sign_check(
             for k, parameter in enumerate(effect.parameters):
                 value = parameters[start + k]
                 if i in added and parameter.nonnegative and value < 0:
+                    return False
+                # Torque of one joint cannot come before its cause.
+                early = effect.kind == "torque_delay" and len(effect.joints) == 1 and value < 0
+                if i in added and early:
                     return False
                 # Clipping takes away all that is above the level, play all of the load.
                 if i in added and effect.kind in _WHOLE and not _LEAST <= value <= _MOST:

@@ -50,40 +50,30 @@ def unexplained_structure(
 ) -> list[Unexplained]:
     """Joints whose residual depends on something, and on what.
 
-    `rules` are α of the family, least gain on runs left out, and inflation of χ².
+    `rules` are α of the family, least gain on runs left out, and inflation of χ². The joint with
+    the strongest structure comes first, and the others are judged with it in the model: through
+    the inertias that all rows share, it bends their residuals too.
     """
-    significance, least_gain, inflation = rules
     kept = [candidates[i] for i in chosen]
-    found = []
-    for joint in range(data.n):
-        names, columns = _quantities(data, signals, joint, joint_names)
-        features = [
-            Feature(Dependence((joint,), quantity=name), (joint,), blocks)
-            for name, blocks in zip(names, columns, strict=True)
+    features = [_features(data, signals, joint, joint_names) for joint in range(data.n)]
+    found: dict[int, Unexplained] = {}
+    while len(found) < data.n:
+        structures = [
+            _structure(data, kept, features[joint], noise, rules)
+            for joint in range(data.n)
+            if joint not in found
         ]
-        pool: list[Candidate] = [*kept, *features]
-        white = data.evidence(pool, noise)
-        plain = data.evidence(pool, NoiseModel.white(np.ones(data.n)))
-        base = list(range(len(kept)))
-        named: list[int] = []
-        tests = len(features) * data.n
-        while len(named) < _MOST_NAMED:
-            best = _best(white, plain, [*base, *named], len(kept), joint, tests,
-                         significance, least_gain, inflation)  # fmt: skip
-            if best is None:
-                break
-            named.append(best)
-        if not named:
-            continue
-        before = plain.energy_on(base, [joint])
-        share = 1.0 - plain.energy_on([*base, *named], [joint]) / max(before, 1e-300)
-        if share >= _LEAST_SHARE:
-            found.append(
-                Unexplained(
-                    joint_names[joint], tuple(names[i - len(kept)] for i in named), float(share)
-                )
-            )
-    return found
+        strongest = max(structures, key=lambda each: each.score)
+        if not strongest.named or strongest.share < _LEAST_SHARE:
+            break
+        joint = strongest.named[0].rows[0]
+        found[joint] = Unexplained(
+            joint_names[joint],
+            tuple(feature.quantity for feature in strongest.named),
+            strongest.share,
+        )
+        kept += strongest.named
+    return [found[joint] for joint in sorted(found)]
 
 
 @dataclass(frozen=True)
@@ -94,6 +84,58 @@ class Feature(Candidate):
     def width(self) -> int:
         """Number of columns."""
         return int(self.columns[0].shape[2])
+
+    @property
+    def quantity(self) -> str:
+        """What it is a function of."""
+        assert isinstance(self.effect, Dependence)
+        return self.effect.quantity
+
+
+@dataclass(frozen=True)
+class _Structure:
+    """What a joint's residual depends on, how surely, and the share of it that this explains."""
+
+    named: list[Feature]
+    score: float
+    share: float
+
+
+def _features(
+    data: TrainingData, signals: Sequence[Signals], joint: int, joint_names: Sequence[str]
+) -> list[Feature]:
+    names, columns = _quantities(data, signals, joint, joint_names)
+    return [
+        Feature(Dependence((joint,), quantity=name), (joint,), blocks)
+        for name, blocks in zip(names, columns, strict=True)
+    ]
+
+
+def _structure(
+    data: TrainingData,
+    kept: Sequence[Candidate],
+    features: list[Feature],
+    noise: NoiseModel,
+    rules: tuple[float, float, float],
+) -> _Structure:
+    """Add the features of one joint to the model with those `kept`, while they pass."""
+    joint = features[0].rows[0]
+    pool: list[Candidate] = [*kept, *features]
+    white = data.evidence(pool, noise)
+    plain = data.evidence(pool, NoiseModel.white(noise.sigma))
+    base = list(range(len(kept)))
+    named: list[int] = []
+    score = -np.inf
+    tests = len(features) * data.n
+    while len(named) < _MOST_NAMED:
+        best = _best(white, plain, [*base, *named], len(kept), joint, tests, *rules)
+        if best is None:
+            break
+        score = max(score, best[0])
+        named.append(best[1])
+    before = plain.energy_on(base, [joint])
+    share = 1.0 - plain.energy_on([*base, *named], [joint]) / max(before, 1e-300)
+    return _Structure([features[i - len(kept)] for i in named], score, float(share))
 
 
 def _best(
@@ -106,7 +148,7 @@ def _best(
     significance: float,
     least_gain: float,
     inflation: float,
-) -> int | None:
+) -> tuple[float, int] | None:
     schur = white.schur(chosen)
     best: tuple[float, int] | None = None
     for i in range(first, len(white.blocks)):
@@ -125,7 +167,7 @@ def _best(
         score = gain.chi2 / inflation - float(chi2.isf(significance / tests, gain.dof))
         if best is None or score > best[0]:
             best = (score, i)
-    return None if best is None else best[1]
+    return best
 
 
 def _quantities(
@@ -148,7 +190,10 @@ def _quantities(
     made.append(lambda s: _odd_even(s.load[:, joint] / heaviest)[:, :3])
     names.append(f"load[{joint_names[joint]}]")
     columns = [
-        tuple(run.averaged(make(s))[:, None] for s, run in zip(signals, data.runs, strict=True))
+        tuple(
+            run.averaged_for_fit(make(s)[:, None], [joint])
+            for s, run in zip(signals, data.runs, strict=True)
+        )
         for make in made
     ]
     return names, columns

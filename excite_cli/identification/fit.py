@@ -195,7 +195,7 @@ def rebuilt(regression: Regression, phi: Array) -> Regression:
     for run in regression.runs:
         signals: Signals = signals_of(run.prepared, regression.robot, phi)
         columns = effect_columns(regression.effects, signals)
-        runs.append(replace(run, effects=run.prepared.averaged(columns)))
+        runs.append(replace(run, effects=run.prepared.averaged_for_fit(columns)))
     return replace(regression, runs=tuple(runs))
 
 

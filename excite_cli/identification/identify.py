@@ -107,15 +107,16 @@ def _regression(
 
 def errors_of(found: Fit, regression: Regression) -> Errors:
     """Errors of the fit's torque on the runs of `regression`."""
-    runs = regression.runs
+    runs = [run.prepared for run in regression.runs]
+    raw = [found.predict_raw(run, regression.robot) for run in regression.runs]
     return torque_errors(
         regression.robot.joint_names,
         [run.tau for run in runs],
-        [found.predict(run, regression.base) for run in runs],
-        [run.usable for run in runs],
-        [run.moving for run in runs],
-        [run.prepared.tau_raw for run in runs],
-        [found.predict_raw(run, regression.robot) for run in runs],
+        [run.averaged(each) for run, each in zip(runs, raw, strict=True)],
+        [run.valid for run in runs],
+        [run.moving & run.valid for run in runs],
+        [run.tau_raw for run in runs],
+        raw,
         runs[0].step,
     )
 

@@ -1,18 +1,29 @@
 """From a raw run to smooth, differentiated motion, and the averages all columns go through."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_opening
+from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
 from scipy.sparse import csr_matrix
 
 from excite_cli.errors import FileError
-from excite_cli.identification.processing import GAUSSIAN, GAUSSIAN_REACH, Processing
+from excite_cli.identification.averages import (
+    apply,
+    average_rows,
+    filled,
+    interpolation,
+    reach,
+    without,
+)
+from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Run
 
-_STANDSTILL = 0.25  # s
+# Around a reversal a joint sticks: what its friction then is, only the torque itself knows.
+_STICKING = 0.02  # s
+_SMEARED = 0.5  # periods of the cut-off by which the filter smears a reversal
 _FEWEST = 8  # decimated samples a run needs to say anything
 
 
@@ -23,8 +34,11 @@ class PreparedRun:
     `t` (T,) from the run's start, `q, v, a, tau_raw` (T, n) at the working rate with borders cut;
     `averages` (M, T) gives filtered and decimated values, at `step`, of any column: A x;
     `tau` (M, n) = A tau_raw; `valid` (M, n) samples untouched by invalid ones; `moving` (M, n)
-    where the joint itself moves; `usable` (M, n) valid samples in which it does not stick: while a
-    joint stands, dry friction holds whatever it must, and its torque says nothing.
+    where the joint itself moves.
+
+    For fits every joint has averages of its own, which leave out invalid samples and those in
+    which it stands or reverses; `tau_fit` (M, n) are those of the torque, `usable` (M, n) where
+    enough is left.
     """
 
     name: str
@@ -36,23 +50,34 @@ class PreparedRun:
     averages: csr_matrix
     tau: Array
     valid: NDArray[np.bool_]
-    usable: NDArray[np.bool_]
     moving: NDArray[np.bool_]
+    fit_averages: tuple[csr_matrix, ...]
+    tau_fit: Array
+    usable: NDArray[np.bool_]
     step: float
 
     def averaged(self, columns: Array) -> Array:
         """A applied along the first axis of (T, …)."""
-        flat = columns.reshape(len(columns), int(np.prod(columns.shape[1:])))
-        return np.asarray(self.averages @ flat).reshape(self.averages.shape[0], *columns.shape[1:])
+        return apply(self.averages, columns)
+
+    def averaged_for_fit(self, columns: Array, rows: Sequence[int] | None = None) -> Array:
+        """Averages of (T, r, …), each row with those of its joint (default: joint k for row k)."""
+        joints = range(columns.shape[1]) if rows is None else rows
+        parts = [apply(self.fit_averages[j], columns[:, k]) for k, j in enumerate(joints)]
+        return np.stack(parts, axis=1)
 
 
-def prepare(run: Run, processing: Processing) -> PreparedRun:
+def prepare(
+    run: Run, processing: Processing, coupled: Sequence[tuple[int, int, float]] = ()
+) -> PreparedRun:
     """Filter, differentiate, cut borders, and average.
+
+    `coupled` (j, k, s): the gears of joints j and k rub on v_j + s v_k, which then sticks as well.
 
     Raises
     ------
     FileError
-        The run is too short for the filters.
+        The run is too short for the filters, or recorded too slowly for their cut-off.
     """
     fs, q = 1.0 / run.step, run.q
     if processing.position_cutoff is not None:
@@ -69,21 +94,28 @@ def prepare(run: Run, processing: Processing) -> PreparedRun:
     inside = slice(border, len(run.t) - border)
     keep = slice(border, len(run.t) - border, stride)
     t = run.t[keep]
-    averages, centers = _averages(len(t), run.step * stride, processing)
-    if averages.shape[0] < _FEWEST:
+    h, cutoff = run.step * stride, processing.parallel_cutoff
+    centers = _centers(len(t), h, processing)
+    if len(centers) < _FEWEST:
         raise FileError(
-            f"run '{run.name}' is too short: {run.duration:.3g} s leave {averages.shape[0]} "
+            f"run '{run.name}' is too short: {run.duration:.3g} s leave {len(centers)} "
             f"averaged samples at {processing.rate:.3g} Hz after its borders are cut; "
             f"{_FEWEST} are needed. Record longer, or raise measurement.filter.rate."
         )
+    averages = average_rows(len(t), centers, h, cutoff)
     # The torque is averaged at the full rate: picking samples first would fold its noise down.
-    of_torque = _kernel_rows(
-        len(run.t[inside]), centers * stride, run.step, processing.parallel_cutoff
-    )
-    broken = (~run.usable()[inside]).astype(float)
-    valid = np.asarray((of_torque != 0).astype(float) @ broken) == 0
+    of_torque = average_rows(len(run.t[inside]), centers * stride, run.step, cutoff)
+    recorded = run.usable()[inside]
+    valid = np.asarray((of_torque != 0).astype(float) @ (~recorded).astype(float)) == 0
     speed = np.abs(np.asarray(averages @ v[keep]))
-    step = float((centers[1] - centers[0]) * run.step * stride)
+    counted = recorded & _sliding(v, run.step, processing, coupled)[inside]
+    joints = range(run.q.shape[1])
+    for_fit = [without(of_torque, counted[:, j]) for j in joints]
+    # The very same weights for the columns: left out at the working rate, other stretches of time
+    # would be, and the torque would lag by milliseconds.
+    to_full_rate = interpolation(len(t), stride, len(counted))
+    fit_averages = tuple((each @ to_full_rate).tocsr() for each in for_fit)
+    tau = run.tau[inside]
     return PreparedRun(
         name=run.name,
         t=t,
@@ -92,54 +124,52 @@ def prepare(run: Run, processing: Processing) -> PreparedRun:
         a=a[keep],
         tau_raw=run.tau[keep],
         averages=averages,
-        tau=np.asarray(of_torque @ run.tau[inside]),
+        tau=np.asarray(of_torque @ tau),
         valid=valid,
-        usable=valid & ~_sticking(speed <= processing.moving_speed, step),
         moving=speed > processing.moving_speed,
-        step=step,
+        fit_averages=fit_averages,
+        tau_fit=np.stack([np.asarray(for_fit[j] @ tau[:, j]) for j in joints], axis=1),
+        usable=np.stack([filled(for_fit[j]) & filled(fit_averages[j]) for j in joints], axis=1),
+        step=float((centers[1] - centers[0]) * h),
     )
 
 
-def _sticking(still: NDArray[np.bool_], step: float) -> NDArray[np.bool_]:
-    """Samples (M, n) within a standstill of some length; passing through zero is none."""
-    least = max(3, round(_STANDSTILL / step))
-    return np.asarray(binary_opening(still, np.ones((least, 1)), border_value=0))
+def _sliding(
+    v: Array, h: float, processing: Processing, coupled: Sequence[tuple[int, int, float]]
+) -> NDArray[np.bool_]:
+    """Samples (T, n) in which a joint moves and is not about to reverse, nor has just done so."""
+    if coupled:
+        sums = np.stack([v[:, j] + s * v[:, k] for j, k, s in coupled], axis=1)
+        both = _sliding(np.concatenate([v, sums], axis=1), h, processing, ())
+        own = both[:, : v.shape[1]]
+        for pair, (j, k, _) in enumerate(coupled):
+            own[:, [j, k]] &= both[:, v.shape[1] + pair, None]
+        return own
+    margin = _STICKING
+    if processing.position_cutoff is not None:
+        margin = max(margin, _SMEARED / processing.position_cutoff)
+    crossing = np.zeros(v.shape, dtype=np.uint8)
+    crossing[1:] = np.signbit(v[1:]) != np.signbit(v[:-1])
+    half = round(margin / h)
+    near = maximum_filter1d(crossing, 2 * half + 1, axis=0) > 0
+    return ~near & (np.abs(v) > processing.moving_speed)
+
+
+def _centers(samples: int, h: float, processing: Processing) -> NDArray[np.intp]:
+    """Instants of the averages; their support lies within the run."""
+    stride = max(1, round(1.0 / (h * processing.rate)))
+    half = reach(h, processing.parallel_cutoff)
+    return np.arange(half, samples - half, stride)
 
 
 def _smooth(x: Array, cutoff: float, fs: float, name: str) -> Array:
+    if cutoff >= fs / 2:  # cut-offs are chosen for the rate that most runs have
+        raise FileError(
+            f"run '{name}' was recorded at {fs:.4g} Hz: too slow for the cut-off of the positions, "
+            f"{cutoff:.3g} Hz. Record all runs at one rate, or lower measurement.filter.position."
+        )
     sections = butter(4, cutoff, fs=fs, output="sos")
     pad = min(int(3 * fs / cutoff), len(x) - 2)
     if pad < 10:
         raise FileError(f"run '{name}' has only {len(x)} samples: too short for any filter.")
     return np.asarray(sosfiltfilt(sections, x, axis=0, padlen=pad))
-
-
-def _averages(
-    samples: int, h: float, processing: Processing
-) -> tuple[csr_matrix, NDArray[np.intp]]:
-    """Averages around equidistant instants whose support lies within the run, and their centres."""
-    stride = max(1, round(1.0 / (h * processing.rate)))
-    reach = _reach(h, processing.parallel_cutoff)
-    centers = np.arange(reach, samples - reach, stride)
-    return _kernel_rows(samples, centers, h, processing.parallel_cutoff), centers
-
-
-def _reach(h: float, cutoff: float | None) -> int:
-    """Half width of the average in samples of length h."""
-    return 0 if cutoff is None else max(1, int(np.ceil(GAUSSIAN_REACH * GAUSSIAN / cutoff / h)))
-
-
-def _kernel_rows(
-    samples: int, centers: NDArray[np.intp], h: float, cutoff: float | None
-) -> csr_matrix:
-    reach = _reach(h, cutoff)
-    offsets = np.arange(-reach, reach + 1)
-    width = GAUSSIAN / cutoff / h if cutoff else 1.0
-    kernel = np.exp(-0.5 * (offsets / width) ** 2)
-    kernel /= kernel.sum()
-    columns = (centers[:, None] + offsets).ravel()
-    inside = (columns >= 0) & (columns < samples)
-    rows = np.repeat(np.arange(len(centers)), len(kernel))
-    values = np.tile(kernel, len(centers))
-    shape = (len(centers), samples)
-    return csr_matrix((values[inside], (rows[inside], columns[inside])), shape)

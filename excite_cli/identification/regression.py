@@ -80,9 +80,9 @@ def build_regression(
             RunColumns(
                 name=prepared.name,
                 step=prepared.step,
-                inertial=prepared.averaged(signals.body.regressor),
-                effects=prepared.averaged(effect_columns(effects, signals)),
-                tau=prepared.tau,
+                inertial=prepared.averaged_for_fit(signals.body.regressor),
+                effects=prepared.averaged_for_fit(effect_columns(effects, signals)),
+                tau=prepared.tau_fit,
                 usable=prepared.usable,
                 moving=prepared.moving,
                 prepared=prepared,

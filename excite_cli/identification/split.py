@@ -76,7 +76,8 @@ def _blocks(run: Run, block: float | None) -> Split:
             start = i + 1
     if start < count:
         training.append(_named(run, edges[start], edges[count]))
-    share = f"{len(sealed)} blocks of {run.duration / count:.3g} s of {run.name}"
+    blocks = "1 block" if len(sealed) == 1 else f"{len(sealed)} blocks"
+    share = f"{blocks} of {run.duration / count:.3g} s of {run.name}"
     # Few folds, each of stretches spread over the run.
     folds = tuple(i % min(len(training), 4) for i in range(len(training)))
     return Split(tuple(training), tuple(sealed), share, folds)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from excite_cli.config import data_spec as data_sections
 from excite_cli.config import spec as sections
 from excite_cli.config.load import MAX_BYTES, MAX_DEPTH, load_spec, parse_spec
 from excite_cli.errors import ConfigError
@@ -51,6 +52,14 @@ LEVELS: dict[str, tuple[str, type[sections.Section]]] = {
     ),
     "optimizer": (f"{ROBOT}\noptimizer: {{@: 1}}", sections.OptimizerSpec),
     "sequence": (f"{ROBOT}\nsequence: {{@: 1}}", sections.SequenceSpec),
+    "effects.0": (f"{ROBOT}\neffects: [{{kind: spring, @: 1}}]", data_sections.EffectSpec),
+    "measurement": (f"{ROBOT}\nmeasurement: {{@: 1}}", data_sections.MeasurementSpec),
+    "measurement.filter": (
+        f"{ROBOT}\nmeasurement: {{filter: {{@: 1}}}}",
+        data_sections.FilterSpec,
+    ),
+    "identification": (f"{ROBOT}\nidentification: {{@: 1}}", data_sections.IdentificationSpec),
+    "diagnosis": (f"{ROBOT}\ndiagnosis: {{@: 1}}", data_sections.DiagnosisSpec),
 }
 
 

@@ -1,0 +1,210 @@
+"""Damaged recordings through the installed program: each mistake gets its own message."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from excite_cli.config.load import load_spec
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.robot.model import Robot, build_robot
+from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planted import plant
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.simulate import simulate
+from excite_cli.trajectory.fourier import FourierTrajectory
+from tests.cli.program import SMOKE, Program
+
+LOGS = Path(__file__).resolve().parents[3] / "shared" / "data"
+NAMES = ("shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide")
+Damage = Callable[[Run], Run]
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return build_robot(load_spec(SMOKE).robot, SMOKE.parent)
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The smoke arm, tracing three kinds only: what is tested is the reading."""
+    tree = yaml.safe_load(SMOKE.read_text())
+    tree["robot"]["urdf"] = str((SMOKE.parent / tree["robot"]["urdf"]).resolve())
+    tree["diagnosis"] = {"kinds": ["viscous_friction", "coulomb_friction", "torque_offset"]}
+    path = tmp_path_factory.mktemp("bad_data") / "arm.yaml"
+    path.write_text(yaml.safe_dump(tree))
+    return path
+
+
+@pytest.fixture(scope="module")
+def recorded(robot: Robot) -> Dataset:
+    """Two runs of an arm whose elbow has dry friction that nobody declared."""
+    friction = plant(kind_named("coulomb_friction"), (2,), 3.0)
+    trajectory = FourierTrajectory(3, 2 * np.pi / 6)
+    motions = []
+    for seed in (1, 2):
+        draw = np.random.default_rng(seed).normal(size=(trajectory.n_coefficients, robot.n))
+        coefficients = 0.15 * draw * np.array([1.0, 1.0, 1.0, 1.0, 0.1])
+        coefficients[-1] = robot.posture
+        motions.append(PlannedMotion(f"run_{seed}", trajectory, coefficients))
+    settings = SimulationSettings(rate=200.0, lead_in=0.3)
+    return simulate(robot, motions, settings, [friction]).dataset
+
+
+def damaged(recorded: Dataset, damage: Damage) -> Dataset:
+    return replace(recorded, runs=tuple(damage(replace(r, extra={})) for r in recorded.runs))
+
+
+def flipped(joint: int, *channels: str) -> Damage:
+    def damage(run: Run) -> Run:
+        sign = np.where(np.arange(run.q.shape[1]) == joint, -1.0, 1.0)
+        return replace(run, **{name: getattr(run, name) * sign for name in channels})
+
+    return damage
+
+
+def torques_in_order(*order: int) -> Damage:
+    return lambda run: replace(run, tau=run.tau[:, list(order)])
+
+
+def with_joint(channel: str, joint: int, value: float) -> Damage:
+    def damage(run: Run) -> Run:
+        column = getattr(run, channel).copy()
+        column[:, joint] = value
+        return replace(run, **{channel: column})
+
+    return damage
+
+
+def in_degrees(run: Run) -> Run:
+    turn = np.array([180 / np.pi] * 4 + [1.0])
+    return replace(run, q=run.q * turn, dq=None)
+
+
+CASES: dict[str, tuple[Damage, tuple[str, ...]]] = {
+    "milliseconds": (lambda run: replace(run, t=run.t * 1e3), ("measurement.time: ms",)),
+    "milliseconds, no speeds": (
+        lambda run: replace(run, t=run.t * 1e3, dq=None),
+        ("measurement.time: ms",),
+    ),
+    "degrees, no speeds": (in_degrees, ("measurement.angle: deg",)),
+    "degrees": (
+        lambda run: replace(run, q=in_degrees(run).q),
+        ("positions are in degrees", "measurement.angle: deg"),
+    ),
+    "dead torque": (with_joint("tau", 2, 0.0), ("torque of elbow is constant at 0",)),
+    "constant torque": (with_joint("tau", 1, 3.5), ("torque of shoulder_pitch is constant",)),
+    "dead position": (with_joint("q", 2, 0.4), ("position of elbow is constant",)),
+    "speed of other sign": (flipped(2, "dq"), ("recorded speed of elbow", "velocity_sign")),
+    "swapped torques": (
+        torques_in_order(0, 2, 1, 3, 4),
+        ("torques of shoulder_pitch and elbow are swapped",),
+    ),
+    "reversed torques": (torques_in_order(4, 3, 2, 1, 0), ("torques are in another order",)),
+    "all torque signs": (
+        lambda run: replace(run, tau=-run.tau),
+        ("torque of every joint counts the other way", "measurement.sign"),
+    ),
+    "position sign": (
+        flipped(2, "q", "dq"),
+        ("position of elbow counts the other way", "measurement.position_sign: {elbow: -1}"),
+    ),
+    **{
+        f"torque sign of {name}": (
+            flipped(j, "tau"),
+            (f"torque of {name} counts the other way", f"measurement.sign: {{{name}: -1}}"),
+        )
+        for j, name in enumerate(NAMES)
+    },
+}
+
+
+def one_clear_message(program: Program, words: tuple[str, ...], *arguments: str | Path) -> None:
+    run = program(*arguments)
+    assert run.returncode == 2, run.stdout + run.stderr
+    assert "Traceback" not in run.stderr
+    text = " ".join(run.stderr.split())
+    assert all(word in text for word in words), text
+    assert run.stdout.strip() == ""
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_mistake_has_its_message(
+    case: str, recorded: Dataset, config: Path, excite: Program
+) -> None:
+    damage, words = CASES[case]
+    write_dataset(excite.folder / "data.h5", damaged(recorded, damage), {})
+    one_clear_message(excite, words, "diagnose", config, "data.h5")
+
+
+def test_names_in_another_order_are_told_by_diagnose_and_identify(
+    recorded: Dataset, config: Path, excite: Program
+) -> None:
+    """Of an HDF5 file and of a CSV table, whose columns are matched by name."""
+    order = [0, 2, 1, 3, 4]
+    names = tuple(recorded.joint_names[j] for j in order)
+    write_dataset(excite.folder / "data.h5", replace(recorded, joint_names=names), {})
+    write_csv(excite.folder / "data.csv", recorded.runs[0], names)
+    words = ("columns of shoulder_pitch and elbow are swapped", "measurement.names")
+    for file in ("data.h5", "data.csv"):
+        one_clear_message(excite, words, "diagnose", config, file)
+    one_clear_message(excite, words, "identify", config, "data.h5")
+
+
+def write_csv(path: Path, run: Run, names: tuple[str, ...], keep: np.ndarray | None = None) -> None:
+    header = ["t", *(f"{c}_{name}" for c in ("q", "tau") for name in names)]
+    table = np.column_stack([run.t, run.q, run.tau])
+    np.savetxt(
+        path, table if keep is None else table[keep], delimiter=",", header=",".join(header),
+        comments="",
+    )  # fmt: skip
+
+
+def test_a_gap_and_missing_values_are_warned_of_and_the_diagnosis_is_right(
+    recorded: Dataset, config: Path, excite: Program
+) -> None:
+    first, second = recorded.runs
+    broken = first.tau.copy()
+    broken[400:420, 1] = np.nan
+    gap = (second.t < 2.0) | (second.t > 2.3)
+    write_csv(excite.folder / "nan.csv", replace(first, tau=broken), recorded.joint_names)
+    write_csv(excite.folder / "gap.csv", second, recorded.joint_names, gap)
+    run = excite("diagnose", config, "nan.csv", "gap.csv", "--json")
+    assert run.returncode == 0, run.stderr
+    said = " ".join(run.stderr.split())
+    assert "warning (gap" in said
+    assert "warning (nan" in said
+    import json
+
+    effects = json.loads(run.stdout)["effects"]
+    assert [(e["kind"], e["joints"]) for e in effects] == [("coulomb_friction", ["elbow"])]
+    value = effects[0]["parameters"]["coulomb"]["value"]
+    assert value == pytest.approx(3.0, rel=0.15)
+
+
+def test_a_bag_cut_short(excite: Program, config: Path) -> None:
+    pytest.importorskip("rosbags")
+    from tests.measurement.recordings import recorded as short
+    from tests.measurement.test_bag_reader import write_bag
+
+    bag = write_bag(excite.folder / "bag", short())
+    data = next(bag.glob("*.db3"))
+    cut = excite.folder / "cut.db3"
+    cut.write_bytes(data.read_bytes()[: data.stat().st_size // 2])
+    one_clear_message(excite, ("cut.db3",), "diagnose", config, "cut.db3")
+
+
+def test_a_real_bag_cut_short(excite: Program) -> None:
+    folder = LOGS / "ur10_cb"
+    if not folder.is_dir():
+        pytest.skip(f"no real logs at {LOGS}")
+    whole = (folder / "ur10_exciting_trajectory.db3").read_bytes()
+    (excite.folder / "cut.db3").write_bytes(whole[: len(whole) // 2])
+    problem = {"robot": {"urdf": str(folder / "ur10.urdf")}}
+    (excite.folder / "ur10.yaml").write_text(yaml.safe_dump(problem))
+    one_clear_message(excite, ("cut.db3",), "diagnose", "ur10.yaml", "cut.db3")

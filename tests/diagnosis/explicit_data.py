@@ -1,0 +1,171 @@
+"""Training data from plain random matrices, and what least squares says about them row by row.
+
+Nothing here uses Gram matrices: rows are whitened one at a time and stacked.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import identity
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.effects.asymmetric_friction import AsymmetricFriction
+from excite_cli.effects.base import Effect
+from excite_cli.effects.coulomb_friction import CoulombFriction
+from excite_cli.effects.viscous_friction import ViscousFriction
+from excite_cli.identification.prepare import PreparedRun
+from excite_cli.robot.model import Array
+
+STEP = 0.02
+FIXED = 4
+FOLDS = (0, 1, 0, 2)
+
+
+def prepared(
+    usable: np.ndarray, q: Array | None = None, v: Array | None = None, tau: Array | None = None
+) -> PreparedRun:
+    """A run whose averages change nothing."""
+    shape = usable.shape
+    zero = np.zeros(shape)
+    as_it_is = identity(shape[0], format="csr")
+    return PreparedRun(
+        name="run",
+        t=STEP * np.arange(shape[0]),
+        q=zero if q is None else q,
+        v=zero if v is None else v,
+        a=zero,
+        tau_raw=zero if tau is None else tau,
+        averages=as_it_is,
+        tau=zero if tau is None else tau,
+        valid=usable,
+        moving=np.ones(shape, bool),
+        fit_averages=(as_it_is,) * shape[1],
+        tau_fit=zero if tau is None else tau,
+        usable=usable,
+        step=STEP,
+    )
+
+
+def random_data(seed: int, prior: bool = False, samples: int = 60) -> TrainingData:
+    """Four parts of two joints in three folds, some rows not usable."""
+    rng = np.random.default_rng(seed)
+    usable = [rng.random((samples, 2)) > 0.03 for _ in FOLDS]
+    declared = tuple(rng.normal(size=(samples, 2, FIXED)) * [1, 5, 0.1, 2] for _ in FOLDS)
+    tau = tuple(rng.normal(size=(samples, 2)) + d @ rng.normal(size=FIXED) for d in declared)
+    precision = np.array([3.0, 0.0, 50.0, 0.5]) if prior else None
+    runs = tuple(prepared(u) for u in usable)
+    return TrainingData(runs, FOLDS, declared, tau, precision)
+
+
+def random_candidates(seed: int, samples: int = 60) -> list[Candidate]:
+    """One column on joint 0, one on joint 1, two on joint 0, one on both, one in part 1 only."""
+    rng = np.random.default_rng([seed, 7])
+
+    def made(effect: Effect, rows: tuple[int, ...], parts: Sequence[int]) -> Candidate:
+        width = len(effect.parameters)
+        columns = tuple(
+            rng.normal(size=(samples, len(rows), width)) * 3.0 * (part in parts)
+            for part in range(len(FOLDS))
+        )
+        return Candidate(effect, rows, columns)
+
+    every = range(len(FOLDS))
+    return [
+        made(ViscousFriction((0,)), (0,), every),
+        made(ViscousFriction((1,)), (1,), every),
+        made(AsymmetricFriction((0,)), (0,), every),
+        made(ViscousFriction((0, 1)), (0, 1), every),
+        made(CoulombFriction((0,), {}, ("run_1",)), (0,), (1,)),
+    ]
+
+
+def autoregression() -> NoiseModel:
+    """Of two joints, of different orders."""
+    return NoiseModel((np.array([0.9, -0.3]), np.array([0.5])), np.array([0.7, 2.0]))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """All whitened rows: x (N, columns), y (N,), fold and joint (N,) of each; blocks of columns."""
+
+    x: Array
+    y: Array
+    fold: np.ndarray
+    joint: np.ndarray
+    blocks: list[np.ndarray]
+    prior: Array
+
+    def fitted(self, chosen: Sequence[int], kept: np.ndarray | None = None) -> Array:
+        """Least squares (with the prior as rows of their own) of the model on the rows kept."""
+        at = self.columns(chosen)
+        kept = np.ones(len(self.y), bool) if kept is None else kept
+        prior = np.zeros((FIXED, len(at)))
+        prior[:, :FIXED] = np.diag(np.sqrt(self.prior))
+        x = np.concatenate([self.x[kept][:, at], prior])
+        y = np.concatenate([self.y[kept], np.zeros(FIXED)])
+        scale = np.linalg.norm(x, axis=0)
+        scale[scale == 0] = 1.0
+        return np.linalg.lstsq(x / scale, y, rcond=1e-12)[0] / scale
+
+    def columns(self, chosen: Sequence[int]) -> np.ndarray:
+        return np.concatenate([np.arange(FIXED), *(self.blocks[i] for i in chosen)]).astype(int)
+
+    def energy(
+        self, chosen: Sequence[int], joints: Sequence[int] = (0, 1), with_prior: bool = False
+    ) -> float:
+        """Of the residual on the rows of `joints`, fitted to everything."""
+        theta = self.fitted(chosen)
+        rest = self.y - self.x[:, self.columns(chosen)] @ theta
+        own = float(np.sum(rest[np.isin(self.joint, joints)] ** 2))
+        return own + with_prior * float(self.prior @ theta[:FIXED] ** 2)
+
+    def left_out(self, chosen: Sequence[int], joints: Sequence[int]) -> list[float]:
+        """Energy per fold on the rows of `joints`, fitted to the other folds."""
+        found = []
+        for fold in range(max(FOLDS) + 1):
+            theta = self.fitted(chosen, self.fold != fold)
+            rows = (self.fold == fold) & np.isin(self.joint, joints)
+            rest = self.y[rows] - self.x[rows][:, self.columns(chosen)] @ theta
+            found.append(float(rest @ rest))
+        return found
+
+    def projected(self, column: int, chosen: Sequence[int]) -> float:
+        """Energy of a column that the model cannot imitate, as a share of all of it."""
+        changed = Rows(
+            self.x, self.x[:, column], self.fold, self.joint, self.blocks, self.prior
+        )  # fmt: skip
+        whole = float(self.x[:, column] @ self.x[:, column])
+        return changed.energy(chosen, with_prior=True) / whole
+
+
+def rows_of(data: TrainingData, candidates: Sequence[Candidate], noise: NoiseModel) -> Rows:
+    """Whitened row by row: (x_t − Σ c_k x_{t−k}) / σ, where all samples it needs are usable."""
+    order = max(len(c) for c in noise.coefficients)
+    starts = FIXED + np.cumsum([0, *(c.width for c in candidates)])
+    blocks = [np.arange(starts[i], starts[i + 1]) for i in range(len(candidates))]
+    x, y, folds, joints = [], [], [], []
+    for part, fold in enumerate(data.folds):
+        samples = len(data.tau[part])
+        full = np.zeros((samples, data.n, int(starts[-1])))
+        full[:, :, :FIXED] = data.declared[part]
+        for c, block in zip(candidates, blocks, strict=True):
+            for k, joint in enumerate(c.rows):
+                full[:, joint, block] = c.columns[part][:, k]
+        for joint in range(data.n):
+            taps = noise.coefficients[joint]
+            for t in range(order, samples):
+                if not data.runs[part].usable[t - order : t + 1, joint].all():
+                    continue
+                row, torque = full[t, joint].copy(), data.tau[part][t, joint]
+                for k, tap in enumerate(taps):
+                    row -= tap * full[t - 1 - k, joint]
+                    torque -= tap * data.tau[part][t - 1 - k, joint]
+                x.append(row / noise.sigma[joint])
+                y.append(torque / noise.sigma[joint])
+                folds.append(fold)
+                joints.append(joint)
+    prior = np.zeros(FIXED) if data.prior_precision is None else data.prior_precision
+    return Rows(np.array(x), np.array(y), np.array(folds), np.array(joints), blocks, prior)

@@ -1,0 +1,180 @@
+"""Gram matrices and Schur complements against least squares on stacked rows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.evidence import ABSORBED, Evidence
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.effects.armature import Armature
+from tests.diagnosis.explicit_data import (
+    FIXED,
+    Rows,
+    autoregression,
+    random_candidates,
+    random_data,
+    rows_of,
+)
+
+CHOSEN = [(), (0,), (2,), (1, 3), (3, 0, 2), (4,), (0, 1, 2, 3, 4)]
+WHITE = NoiseModel.white(np.array([0.5, 3.0]))
+
+
+@pytest.fixture(scope="module", params=["white", "autoregression", "prior"])
+def both(request: pytest.FixtureRequest) -> tuple[Evidence, Rows]:
+    data = random_data(3, prior=request.param == "prior")
+    candidates = random_candidates(3)
+    noise = WHITE if request.param == "white" else autoregression()
+    return data.evidence(candidates, noise), rows_of(data, candidates, noise)
+
+
+@pytest.mark.parametrize("chosen", CHOSEN)
+def test_parameters_and_energies(both: tuple[Evidence, Rows], chosen: tuple[int, ...]) -> None:
+    evidence, rows = both
+    assert evidence.solve(chosen) == pytest.approx(rows.fitted(chosen), rel=1e-6, abs=1e-8)
+    assert evidence.energy(chosen) == pytest.approx(rows.energy(chosen, with_prior=True), rel=1e-8)
+    for joints in ([0], [1], [0, 1]):
+        assert evidence.energy_on(chosen, joints) == pytest.approx(
+            rows.energy(chosen, joints), rel=1e-8
+        )
+    assert evidence.energy_on(chosen, None) == pytest.approx(rows.energy(chosen), rel=1e-8)
+
+
+@pytest.mark.parametrize("chosen", [c for c in CHOSEN if 4 not in c])
+@pytest.mark.parametrize("joints", [[0], [1], [0, 1]])
+def test_errors_on_folds_left_out(
+    both: tuple[Evidence, Rows], chosen: tuple[int, ...], joints: list[int]
+) -> None:
+    evidence, rows = both
+    assert evidence.left_out(chosen, joints) == pytest.approx(
+        rows.left_out(chosen, joints), rel=1e-7
+    )
+
+
+def test_an_effect_of_one_fold_predicts_nothing_where_that_fold_is_left_out(
+    both: tuple[Evidence, Rows],
+) -> None:
+    """Its parameter cannot be known there: it is zero, and no rounding of the sums is taken."""
+    evidence, rows = both
+    found, expected = evidence.left_out((4,), [0]), rows.left_out((4,), [0])
+    without = rows.left_out((), [0])
+    assert found == pytest.approx(expected, rel=1e-3)
+    assert found[1] == pytest.approx(without[1], rel=1e-3)
+
+
+@pytest.mark.parametrize("chosen", [(), (0,), (1, 2)])
+def test_gains_are_what_the_residual_loses(
+    both: tuple[Evidence, Rows], chosen: tuple[int, ...]
+) -> None:
+    evidence, rows = both
+    schur = evidence.schur(chosen)
+    before = rows.energy(chosen, with_prior=True)
+    for i in set(range(5)) - set(chosen):
+        after = rows.energy([*chosen, i], with_prior=True)
+        gain = schur.gain(i)
+        assert gain.chi2 == pytest.approx(before - after, rel=1e-6)
+        assert gain.dof == len(rows.blocks[i])
+        single = schur.singles[i]
+        assert (single.chi2, single.dof) == (pytest.approx(gain.chi2), gain.dof)
+        if gain.dof == 1:
+            left = rows.projected(int(rows.blocks[i][0]), chosen)
+            assert gain.left == pytest.approx(left, rel=1e-8)
+            assert single.left == pytest.approx(gain.left)
+
+
+def test_gains_of_several_and_of_pairs(both: tuple[Evidence, Rows]) -> None:
+    evidence, rows = both
+    schur = evidence.schur((2,))
+    before = rows.energy((2,), with_prior=True)
+    pairs = [(0, 1), (0, 3), (1, 3), (3, 4), (0, 4)]
+    found = schur.pair_chi2(*np.array(pairs).T)
+    for pair, value in zip(pairs, found, strict=True):
+        expected = before - rows.energy([2, *pair], with_prior=True)
+        assert value == pytest.approx(expected, rel=1e-6)
+        together = schur.gain(*pair)
+        assert (together.chi2, together.dof) == (pytest.approx(expected, rel=1e-6), 2)
+
+
+def test_covariance_is_the_inverse_of_the_normal_matrix(both: tuple[Evidence, Rows]) -> None:
+    evidence, rows = both
+    chosen = (0, 3)
+    x = rows.x[:, rows.columns(chosen)]
+    normal = x.T @ x
+    normal[np.arange(FIXED), np.arange(FIXED)] += rows.prior
+    assert evidence.covariance(chosen) == pytest.approx(np.linalg.inv(normal), rel=1e-6, abs=1e-12)
+
+
+def test_what_the_model_holds_already_gains_nothing() -> None:
+    """A copy of a declared column, a combination of two candidates, and a column of zeros."""
+    data = random_data(5)
+    first, second, *_ = random_candidates(5)
+    shape = first.columns[0].shape
+    same = tuple(d[:, :1, 1:2] for d in data.declared)
+    blind = replace(first, columns=tuple(np.zeros(shape) for _ in data.tau))
+    own = replace(
+        data, declared=tuple(np.where([[[True] * 4], [[False] * 4]], d.transpose(1, 0, 2), 0)
+                             .transpose(1, 0, 2) for d in data.declared)
+    )  # fmt: skip
+    copy = Candidate(Armature((0,)), (0,), same)
+    evidence = own.evidence([first, copy, blind], WHITE)
+    schur = evidence.schur(())
+    for i in (1, 2):
+        gain = schur.gain(i)
+        assert (gain.chi2, gain.dof) == (0.0, 0)
+        assert gain.left < ABSORBED
+        assert schur.singles[i].dof == 0
+        assert evidence.energy((0, i)) == pytest.approx(evidence.energy((0,)), rel=1e-7)
+    assert np.isfinite(evidence.solve((0, 1, 2))).all()
+
+
+def test_collinear_pairs_gain_nothing_together() -> None:
+    data = random_data(6)
+    first, _, _, both_joints, _ = random_candidates(6)
+    twin = replace(first, columns=tuple(2 * c + 1e-6 for c in first.columns))
+    schur = data.evidence([first, twin, both_joints], WHITE).schur(())
+    assert schur.pair_chi2(np.array([0, 0]), np.array([1, 2]))[0] == 0.0
+    assert schur.pair_chi2(np.array([0]), np.array([2]))[0] > 0.0
+    assert schur.gain(0, 1).dof == 1
+    assert schur.gain(0, 1).chi2 == pytest.approx(schur.gain(0).chi2, rel=1e-4)
+
+
+def test_a_two_column_candidate_with_one_column_absorbed_has_one_left() -> None:
+    data = random_data(8)
+    candidates = random_candidates(8)
+    two = candidates[2]
+    held = tuple(
+        np.concatenate([c[:, :, :1], candidates[0].columns[k]], axis=2)
+        for k, c in enumerate(two.columns)
+    )
+    schur = data.evidence([candidates[0], replace(two, columns=held)], WHITE).schur((0,))
+    rows = rows_of(data, [candidates[0], replace(two, columns=held)], WHITE)
+    gain = schur.gain(1)
+    assert gain.dof == 1
+    lost = rows.energy((0,)) - rows.energy((0, 1))
+    assert gain.chi2 == pytest.approx(lost, rel=1e-6)
+
+
+def test_rows_that_are_not_usable_do_not_count() -> None:
+    data, candidates = random_data(9), random_candidates(9)
+    wild = tuple(
+        np.where(run.usable, tau, 1e6) for run, tau in zip(data.runs, data.tau, strict=True)
+    )
+    for noise in (WHITE, autoregression()):
+        one = data.evidence(candidates, noise)
+        other = replace(data, tau=wild).evidence(candidates, noise)
+        assert np.array_equal(one.raw, other.raw)
+
+
+def test_residuals_are_the_torque_less_the_model() -> None:
+    data, candidates = random_data(4), random_candidates(4)
+    chosen = (3, 2)
+    theta = np.random.default_rng(0).normal(size=FIXED + 3)
+    found = data.residuals(candidates, chosen, theta)
+    for part, rest in enumerate(found):
+        expected = data.tau[part] - data.declared[part] @ theta[:FIXED]
+        expected = expected - candidates[3].columns[part][:, :, 0] * theta[FIXED]
+        expected[:, 0] -= candidates[2].columns[part][:, 0] @ theta[FIXED + 1 :]
+        assert rest == pytest.approx(expected)
+    assert np.array_equal(data.tau[0], random_data(4).tau[0])  # untouched

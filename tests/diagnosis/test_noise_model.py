@@ -1,0 +1,153 @@
+"""Autoregressions fitted to series of known spectrum."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import chi2
+
+from excite_cli.diagnosis import noise_model
+from excite_cli.diagnosis.noise_model import HIGHEST_ORDER, NoiseModel, fit_noise
+from excite_cli.robot.model import Array
+
+TAPS = np.array([1.2, -0.5])
+SIGMA = 0.3
+
+
+def series(seed: int, samples: int = 4000, taps: Array = TAPS, sigma: float = SIGMA) -> Array:
+    """One joint, (samples, 1), after its start has been forgotten."""
+    white = np.random.default_rng(seed).normal(size=samples + 500) * sigma
+    return lfilter([1.0], np.concatenate([[1.0], -taps]), white)[500:, None]
+
+
+def all_usable(runs: list[Array]) -> list[np.ndarray]:
+    return [np.ones(run.shape, bool) for run in runs]
+
+
+def spectrum(taps: Array, sigma: float, frequency: Array) -> Array:
+    """Of an autoregression, per sample; `frequency` in cycles per sample."""
+    delays = np.exp(-2j * np.pi * np.outer(frequency, np.arange(1, len(taps) + 1)))
+    return sigma**2 / np.abs(1 - delays @ taps) ** 2
+
+
+def ljung_box(x: Array, lags: int = 20) -> float:
+    """p-value of no correlation."""
+    n = len(x)
+    r = np.array([x[k:] @ x[:-k] for k in range(1, lags + 1)]) / (x @ x)
+    return float(chi2.sf(n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1))), lags))
+
+
+def without_nugget(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(noise_model, "_NUGGET", 0.0)
+
+
+def test_coefficients_of_an_autoregression_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    without_nugget(monkeypatch)
+    runs = [series(seed) for seed in range(3)]
+    found = fit_noise(runs, all_usable(runs))
+    taps = np.zeros(HIGHEST_ORDER)
+    taps[: len(found.coefficients[0])] = found.coefficients[0]
+    assert taps[:2] == pytest.approx(TAPS, abs=0.04)
+    assert np.abs(taps[2:]).max() < 0.04
+    assert found.sigma[0] == pytest.approx(SIGMA, rel=0.02)
+
+
+def test_whitened_noise_is_white_and_of_unit_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    without_nugget(monkeypatch)
+    runs = [series(seed) for seed in range(5)]
+    found = fit_noise(runs[:3], all_usable(runs[:3]))
+    for fresh in runs[3:]:  # not those it was fitted to
+        assert ljung_box(fresh[:, 0]) < 1e-12
+        white = found.whitened(fresh[:, 0], 0)
+        assert ljung_box(white) > 1e-3
+        assert white.std() == pytest.approx(1.0, abs=0.04)
+
+
+def test_white_noise_needs_no_coefficients_of_size() -> None:
+    runs = [np.random.default_rng(k).normal(size=(2000, 2)) * [1.0, 5.0] for k in range(3)]
+    found = fit_noise(runs, all_usable(runs))
+    assert all(np.abs(c).max(initial=0.0) < 0.08 for c in found.coefficients)
+    # A little too large, by the nugget: tests err on the careful side.
+    assert found.sigma / [1.0, 5.0] == pytest.approx(np.sqrt(1.03), rel=0.03)
+
+
+def test_the_nugget_is_white_noise_added() -> None:
+    """The spectrum is that of the series with 3 % of its variance in white noise."""
+    runs = [series(seed) for seed in range(6)]
+    found = fit_noise(runs, all_usable(runs))
+    frequency = np.linspace(0.02, 0.48, 24)
+    variance = np.mean([run.var() for run in runs])
+    expected = spectrum(TAPS, SIGMA, frequency) + 0.03 * variance
+    modelled = spectrum(found.coefficients[0], found.sigma[0], frequency)
+    assert modelled == pytest.approx(expected, rel=0.2)
+
+
+def test_a_band_without_noise_is_not_trusted_without_end() -> None:
+    """Torque that somebody low-passed holds nothing at high frequency."""
+    kernel = np.hanning(41) / np.hanning(41).sum()
+    runs = [np.convolve(np.random.default_rng(k).normal(size=4000), kernel, "same")[:, None]
+            for k in range(3)]  # fmt: skip
+    found = fit_noise(runs, all_usable(runs))
+    modelled = spectrum(found.coefficients[0], found.sigma[0], np.linspace(0.1, 0.5, 50))
+    assert modelled.min() > 0.01 * np.var(runs[0])
+
+
+def test_samples_that_are_not_usable_are_not_seen() -> None:
+    runs = [series(seed, 1500) for seed in range(2)]
+    usable = all_usable(runs)
+    for mask in usable:
+        mask[100:130] = mask[[400, 777]] = False
+    wild = [np.where(mask, run, 1e9) for run, mask in zip(runs, usable, strict=True)]
+    plain, found = fit_noise(runs, usable), fit_noise(wild, usable)
+    assert np.array_equal(plain.coefficients[0], found.coefficients[0])
+    assert plain.sigma == found.sigma
+    full = fit_noise(runs, all_usable(runs))
+    assert found.sigma == pytest.approx(full.sigma, rel=0.05)
+
+
+def test_short_series_are_taken_as_white_from_usable_samples_alone() -> None:
+    runs = [series(seed, 40) for seed in range(2)]
+    usable = [np.arange(40)[:, None] % 4 > 1 for _ in runs]  # no window is whole
+    wild = [np.where(mask, run, 1e9) for run, mask in zip(runs, usable, strict=True)]
+    found = fit_noise(wild, usable)
+    kept = np.concatenate([run[mask] for run, mask in zip(runs, usable, strict=True)])
+    assert found.sigma[0] == pytest.approx(np.sqrt(np.mean(kept**2)))
+    assert len(found.coefficients[0]) == 0
+
+
+def test_a_joint_without_a_usable_sample_has_finite_noise() -> None:
+    runs = [series(0, 300)]
+    found = fit_noise(runs, [np.zeros(runs[0].shape, bool)])
+    assert np.isfinite(found.sigma).all()
+    assert found.sigma[0] > 0
+    assert not found.clean(np.zeros(300, bool)).any()
+
+
+def test_drifting_noise_gives_a_stable_model() -> None:
+    walk = [np.cumsum(np.random.default_rng(k).normal(size=(800, 1)), axis=0) for k in range(2)]
+    growing = [np.exp(np.arange(400)[:, None] / 30.0)]
+    for runs in (walk, growing):
+        found = fit_noise(runs, all_usable(runs))
+        roots = np.roots(np.concatenate([[1.0], -found.coefficients[0]]))
+        assert np.abs(roots).max(initial=0.0) < 1.0
+        assert np.isfinite(found.long_run(0))
+
+
+def test_clean_rows_are_those_whose_taps_are_all_usable() -> None:
+    model = NoiseModel((np.array([0.5, 0.1, -0.2]), np.zeros(1)), np.ones(2))
+    usable = np.random.default_rng(1).random(200) > 0.05
+    usable[0] = False
+    expected = [usable[t - 3 : t + 1].all() for t in range(3, 200)]
+    assert np.array_equal(model.clean(usable), expected)
+    x = np.random.default_rng(2).normal(size=(200, 4))
+    wild = np.where(usable[:, None], x, 1e9)
+    for joint in range(2):
+        clean = model.clean(usable)
+        assert np.array_equal(model.whitened(wild, joint)[clean], model.whitened(x, joint)[clean])
+
+
+def test_long_run_noise_is_that_of_the_mean() -> None:
+    """The variance of the mean of N samples is long_run² / N."""
+    model = NoiseModel((TAPS,), np.array([SIGMA]))
+    means = [series(seed, 2000).mean() for seed in range(400)]
+    assert np.std(means) * np.sqrt(2000) == pytest.approx(model.long_run(0), rel=0.12)
+    assert NoiseModel.white(np.array([2.0])).long_run(0) == 2.0

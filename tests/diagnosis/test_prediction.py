@@ -1,0 +1,110 @@
+"""What a model predicts for a run is what its regression says, and errors are counted from it."""
+
+import numpy as np
+import pytest
+
+from excite_cli.config.data_spec import FilterSpec
+from excite_cli.diagnosis.prediction import errors_on, predicted
+from excite_cli.effects.base import Effect
+from excite_cli.effects.coulomb_friction import CoulombFriction
+from excite_cli.effects.load_dependent_friction import LoadDependentFriction
+from excite_cli.effects.payload import Payload
+from excite_cli.effects.torque_gain import TorqueGain
+from excite_cli.effects.viscous_friction import ViscousFriction
+from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.processing import choose_processing
+from excite_cli.identification.regression import build_regression
+from excite_cli.robot.base_parameters import find_base_parameters
+from excite_cli.robot.model import Robot
+from excite_cli.robot.regressor import standard_parameters
+from excite_cli.robot.rigid_body import RigidBody
+from tests.identification.synthetic import measured
+from tests.robot.random_robots import random_robot
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return random_robot(4, joints=3, branches=False, prismatic=False)
+
+
+@pytest.fixture(scope="module")
+def runs(robot: Robot) -> list[PreparedRun]:
+    data = measured(robot, standard_parameters(robot), noise=0.5, seconds=5.0)
+    processing = choose_processing(data.runs, FilterSpec())
+    return [prepare(run, processing) for run in data.runs]
+
+
+def effects() -> tuple[Effect, ...]:
+    return (
+        ViscousFriction((0,)),
+        CoulombFriction((2,)),
+        LoadDependentFriction((1,)),
+        Payload((0, 1, 2), {}, ("r2",)),
+    )
+
+
+def test_prediction_is_columns_times_parameters(robot: Robot, runs: list[PreparedRun]) -> None:
+    """On inertias other than the URDF's; one effect looks at the load, one is in one run only."""
+    rng = np.random.default_rng(0)
+    phi = standard_parameters(robot) * rng.uniform(0.8, 1.2, 10 * robot.n_bodies)
+    kinds = effects()
+    values = rng.uniform(0.1, 0.5, sum(len(e.parameters) for e in kinds))
+    regression = build_regression(robot, find_base_parameters(robot), kinds, runs, phi)
+    for run, columns in zip(runs, regression.runs, strict=True):
+        tau = predicted(robot, phi, kinds, values, run, run.name)
+        assert tau.shape == run.q.shape
+        modelled = columns.inertial @ phi + columns.effects @ values
+        assert run.averaged_for_fit(tau) == pytest.approx(modelled, rel=1e-9, abs=1e-9)
+
+
+def test_an_effect_acts_in_its_runs_by_the_name_that_is_given(
+    robot: Robot, runs: list[PreparedRun]
+) -> None:
+    phi = standard_parameters(robot)
+    payload = (Payload((0, 1, 2), {}, ("r2",)),)
+    values = np.full(len(payload[0].parameters), 0.3)
+    one, two = (predicted(robot, phi, payload, values, runs[0], name) for name in ("r1", "r2"))
+    load = RigidBody(robot, phi, runs[0].q, runs[0].v, runs[0].a).load
+    assert np.array_equal(one, load)
+    assert np.abs(two - load).max() > 0.1
+
+
+def test_a_gain_acts_on_all_torque_that_the_robot_makes(
+    robot: Robot, runs: list[PreparedRun]
+) -> None:
+    """(1 + g)(load + friction), and no gain on the gain."""
+    phi = standard_parameters(robot)
+    kinds = (ViscousFriction((1,)), TorqueGain((1,)))
+    tau = predicted(robot, phi, kinds, np.array([3.0, 0.2]), runs[0], "r1")
+    load = RigidBody(robot, phi, runs[0].q, runs[0].v, runs[0].a).load
+    expected = load.copy()
+    expected[:, 1] = 1.2 * (load[:, 1] + 3.0 * runs[0].v[:, 1])
+    assert tau == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def test_without_effects_it_is_the_rigid_body(robot: Robot, runs: list[PreparedRun]) -> None:
+    phi = standard_parameters(robot)
+    tau = predicted(robot, phi, (), np.zeros(0), runs[0], "r1")
+    assert tau == pytest.approx(RigidBody(robot, phi, runs[0].q, runs[0].v, runs[0].a).load)
+
+
+def test_errors_are_those_of_the_residual(robot: Robot, runs: list[PreparedRun]) -> None:
+    phi = 1.05 * standard_parameters(robot)
+    found = errors_on(robot, phi, (), np.zeros(0), runs, ["r1", "r2"])
+    tau = np.concatenate([run.tau for run in runs])
+    model = np.concatenate(
+        [run.averaged(RigidBody(robot, phi, run.q, run.v, run.a).load) for run in runs]
+    )
+    moving = np.concatenate([run.moving for run in runs])
+    for j, name in enumerate(robot.joint_names):
+        error = tau[:, j] - model[:, j]
+        relative = np.linalg.norm(error) / np.linalg.norm(tau[:, j])
+        assert found.relative[name] == pytest.approx(relative)
+        assert found.rms[name] == pytest.approx(np.sqrt(np.mean(error**2)))
+        slow = moving[:, j]
+        assert found.relative_moving[name] == pytest.approx(
+            np.linalg.norm(error[slow]) / np.linalg.norm(tau[slow, j])
+        )
+        assert found.rms_raw[name] > found.rms[name]  # with the noise that averages take away
+    assert found.mean_relative == pytest.approx(np.mean(list(found.relative.values())))
+    assert found.interval[0] <= found.mean_relative <= found.interval[1]

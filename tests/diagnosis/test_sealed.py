@@ -1,0 +1,180 @@
+"""Nothing of the sealed part is used but for the errors: changed, it changes nothing else."""
+
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from excite_cli.config.load import load_spec
+from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.diagnose import diagnose
+from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.identification.split import split
+from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.robot.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.robot.model import Array, Robot, build_robot
+from tests.cli.program import SMOKE
+
+pytest.importorskip("mujoco")
+
+from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planted import plant
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.simulate import simulate
+from excite_cli.trajectory.fourier import FourierTrajectory
+
+SECONDS, RATE = 5.0, 200.0
+# What may differ: what is measured on the sealed part, and the time it took.
+FREE = {"before", "after", "seconds"}
+
+
+@pytest.fixture(scope="module")
+def spec() -> Spec:
+    # A few kinds only: every part of the program is gone through, quickly.
+    kinds = "[viscous_friction,coulomb_friction,payload,load_dependent_friction,armature,ripple]"
+    return load_spec(SMOKE, [f"diagnosis.kinds={kinds}"])
+
+
+@pytest.fixture(scope="module")
+def robot(spec: Spec) -> Robot:
+    return build_robot(spec.robot, SMOKE.parent)
+
+
+@pytest.fixture(scope="module")
+def base(robot: Robot) -> BaseParameters:
+    return find_base_parameters(robot)
+
+
+def motion(robot: Robot, number: int) -> PlannedMotion:
+    rng = np.random.default_rng(number)
+    trajectory = FourierTrajectory(4, 2 * np.pi / SECONDS)
+    lower, upper = robot.limits.ranges()
+    size = 0.04 * (upper - lower)
+    coefficients = rng.normal(size=(trajectory.n_coefficients, robot.n)) * size
+    coefficients[-1] = (lower + upper) / 2
+    return PlannedMotion(f"motion_{number}", trajectory, coefficients)
+
+
+@pytest.fixture(scope="module")
+def dataset(robot: Robot) -> Dataset:
+    """Three runs of an arm with dry friction and, in the last two, a payload."""
+    motions = [motion(robot, number) for number in (1, 2, 3)]
+    payload = plant(kind_named("payload"), tuple(range(robot.n)), 0.5, {})
+    payload = replace(
+        payload, effect=replace(payload.effect, runs=("motion_2", "motion_3"))
+    )  # fmt: skip
+    friction = plant(kind_named("coulomb_friction"), (2,), 1.5, {})
+    settings = SimulationSettings(rate=RATE, lead_in=0.5)
+    return simulate(robot, motions, settings, [friction, payload]).dataset
+
+
+def differences(one: Diagnosis, other: Diagnosis) -> list[str]:
+    """Fields that are not the same, bit by bit."""
+    return [
+        field.name
+        for field in fields(Diagnosis)
+        if not same(getattr(one, field.name), getattr(other, field.name))
+    ]
+
+
+def same(one: Any, other: Any) -> bool:
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        return one.shape == other.shape and one.tobytes() == other.tobytes()
+    if hasattr(one, "__dataclass_fields__"):
+        return all(same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    if isinstance(one, dict):
+        return list(one) == list(other) and all(same(one[k], other[k]) for k in one)
+    if isinstance(one, list | tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, float):
+        return one.hex() == other.hex()
+    return bool(one == other)
+
+
+def disturbed(run: Run, where: np.ndarray) -> Run:
+    """Other positions, speeds and torques, and masks, at the samples `where` (T,)."""
+    rng = np.random.default_rng(5)
+    n = run.q.shape[1]
+    wave = 0.03 * np.sin(2 * np.pi * 7.0 * run.t[:, None] + np.arange(n))  # a new, faster line
+    noise = rng.normal(size=run.tau.shape) * run.tau.std(axis=0)
+    q = np.where(where[:, None], run.q + wave + 1e-4 * rng.normal(size=run.q.shape), run.q)
+    tau = np.where(where[:, None], 1.3 * run.tau + noise + 2.0, run.tau)
+    valid = run.usable() & ~(where[:, None] & (rng.random(run.tau.shape) < 0.02))
+    dq = None if run.dq is None else np.where(where[:, None], 1.1 * run.dq, run.dq)
+    return replace(run, q=q, tau=tau, dq=dq, valid=valid)
+
+
+def everywhere(run: Run) -> np.ndarray:
+    return np.ones(len(run.t), bool)
+
+
+def test_a_sealed_run_is_used_for_the_errors_only(
+    robot: Robot, base: BaseParameters, spec: Spec, dataset: Dataset
+) -> None:
+    changed = replace(
+        dataset, runs=(*dataset.runs[:2], disturbed(dataset.runs[2], everywhere(dataset.runs[2])))
+    )
+    one, other = (diagnose(robot, base, data, spec) for data in (dataset, changed))
+    assert one.sealed_run == "motion_3"
+    assert one.effects  # something was chosen and fitted
+    assert set(differences(one, other)) == FREE
+    assert other.after.mean_relative > 2 * one.after.mean_relative
+
+
+def test_a_run_sealed_by_name_is_used_for_the_errors_only(
+    robot: Robot, base: BaseParameters, spec: Spec, dataset: Dataset
+) -> None:
+    first = disturbed(dataset.runs[0], everywhere(dataset.runs[0]))
+    changed = replace(dataset, runs=(first.part(0, 700, first.name), *dataset.runs[1:]))
+    one, other = (diagnose(robot, base, data, spec, "motion_1") for data in (dataset, changed))
+    assert one.sealed_run == "motion_1"
+    assert set(differences(one, other)) == FREE
+
+
+def test_training_data_do_matter(
+    robot: Robot, base: BaseParameters, spec: Spec, dataset: Dataset
+) -> None:
+    """The comparison would see a leak: a slight change of one training sample shows everywhere."""
+    run = dataset.runs[0]
+    tau = run.tau.copy()
+    tau[len(tau) // 2, 0] += 0.1
+    changed = replace(dataset, runs=(replace(run, tau=tau), *dataset.runs[1:]))
+    one, other = (diagnose(robot, base, data, spec) for data in (dataset, changed))
+    assert {"phi", "base_values", "information", "rounds", "processing"} <= set(
+        differences(one, other)
+    )
+
+
+def test_sealed_blocks_of_a_single_run_are_used_for_the_errors_only(
+    robot: Robot, base: BaseParameters, spec: Spec, dataset: Dataset
+) -> None:
+    run = joined(dataset.runs)
+    whole = replace(dataset, runs=(run,))
+    sealed = np.zeros(len(run.t), bool)
+    for block in split(whole).sealed:
+        sealed |= (run.t >= block.t[0] - 1e-9) & (run.t <= block.t[-1] + 1e-9)
+    assert 0.2 < sealed.mean() < 0.4
+    changed = replace(dataset, runs=(disturbed(run, sealed),))
+    one, other = (diagnose(robot, base, data, spec) for data in (whole, changed))
+    assert one.effects
+    assert set(differences(one, other)) == FREE
+    assert other.after.mean_relative > 1.5 * one.after.mean_relative
+
+
+def joined(runs: tuple[Run, ...]) -> Run:
+    """The first run twice as long: the motion is periodic."""
+    first = runs[0]
+    period = len(first.t) / RATE
+
+    def twice(x: Array) -> Array:
+        return np.concatenate([x, x])
+
+    t = np.concatenate([first.t, first.t + period])
+    rng = np.random.default_rng(1)
+    tau = twice(first.tau) + 0.01 * first.tau.std(axis=0) * rng.normal(size=(len(t), len(first.q[0])))
+    dq = None if first.dq is None else twice(first.dq)
+    return Run("only", t, twice(first.q), tau, dq)

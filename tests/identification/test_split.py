@@ -1,0 +1,99 @@
+"""What is fitted and what is sealed have no sample in common."""
+
+import numpy as np
+import pytest
+
+from excite_cli.errors import ConfigError
+from excite_cli.identification.split import Split, split
+from excite_cli.measurement.dataset import Dataset, Run
+
+
+def run(name: str, seconds: float, rate: float = 100.0, start: float = 0.0) -> Run:
+    """Torque that counts the samples."""
+    t = start + np.arange(0, seconds, 1 / rate)
+    count = np.arange(len(t), dtype=float)[:, None]
+    return Run(name, t, np.sin(count), count, dq=count, valid=count > 3, extra={"i": count})
+
+
+def data(*runs: Run) -> Dataset:
+    return Dataset(("a",), runs)
+
+
+def numbers(runs: tuple[Run, ...]) -> list[int]:
+    return [int(i) for each in runs for i in each.tau[:, 0]]
+
+
+def test_the_last_run_is_sealed_or_the_one_that_is_named() -> None:
+    runs = [run(name, 2.0) for name in ("one", "two", "three")]
+    found = split(data(*runs))
+    assert found.sealed_name == "three"
+    assert [each.name for each in found.sealed] == ["three"]
+    assert [each.name for each in found.training] == ["one", "two"]
+    assert (found.folds, found.n_folds) == ((0, 1), 2)
+    named = split(data(*runs), "one")
+    assert [each.name for each in named.sealed] == ["one"]
+    assert [each.name for each in named.training] == ["two", "three"]
+
+
+def test_an_unknown_run_is_named_with_the_nearest() -> None:
+    with pytest.raises(ConfigError) as error:
+        split(data(run("slow", 2.0), run("payload", 2.0)), "paylod")
+    text = str(error.value)
+    assert "--sealed: there is no run 'paylod'. Did you mean 'payload'?" in text
+    assert "Runs: slow, payload." in text
+    with pytest.raises(ConfigError, match="no run 'b'"):
+        split(data(run("motion_1", 20.0)), "b")
+
+
+def test_of_two_runs_the_one_that_trains_is_halved_for_folds() -> None:
+    found = split(data(run("one", 5.0), run("two", 4.0)))
+    assert found.folds == (0, 1)
+    assert numbers(found.training) == list(range(500))
+    assert len(found.training[0].t) == 250
+    assert found.sealed_name == "two"
+
+
+@pytest.mark.parametrize("seconds", [3.0, 5.0, 12.0, 17.3, 60.0, 200.0])
+@pytest.mark.parametrize("block", [None, 0.9])
+def test_blocks_of_a_single_run_share_nothing_and_lose_nothing(
+    seconds: float, block: float | None
+) -> None:
+    whole = run("only", seconds)
+    found = split(data(whole), block=block)
+    training, sealed = numbers(found.training), numbers(found.sealed)
+    assert not set(training) & set(sealed)
+    assert sorted(training + sealed) == list(range(len(whole.t)))
+    assert 0.2 <= len(sealed) / len(whole.t) < 0.45
+    assert len(found.folds) == len(found.training)
+    assert set(found.folds) == set(range(found.n_folds))
+    for each in (*found.training, *found.sealed):  # stretches without a hole
+        assert np.all(np.diff(each.tau[:, 0]) == 1)
+        same = np.array_equal(each.extra["i"], each.tau)
+        assert same
+        assert each.valid is not None
+        assert np.array_equal(each.valid, each.tau > 3)
+        assert np.array_equal(each.t, whole.t[each.tau[:, 0].astype(int)])
+    assert "only" in found.sealed_name
+    assert str(len(found.sealed)) in found.sealed_name
+
+
+def test_a_long_run_has_sealed_blocks_all_over() -> None:
+    found = split(data(run("only", 60.0)))
+    middles = [float(each.t.mean()) for each in found.sealed]
+    assert len(middles) == 10
+    assert np.diff(middles) == pytest.approx(6.0, abs=0.1)
+    assert found.n_folds == 4
+
+
+def test_a_run_too_short_for_blocks_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"run 'only' lasts 1\.99 s: too short to seal a part"):
+        split(data(run("only", 2.0)))
+    with pytest.raises(ConfigError, match="too short"):
+        split(data(run("only", 10.0)), block=8.0)
+
+
+def test_time_counts_from_the_start_of_the_run() -> None:
+    found: Split = split(data(run("one", 3.0, start=1e5), run("two", 3.0, start=2e5)))
+    assert found.training[0].t[0] == 0.0
+    assert found.sealed[0].t[0] == 0.0
+    assert found.training[1].t[0] == pytest.approx(1.5)
