@@ -46,6 +46,12 @@ def diagnose(
 
     Example:  excite diagnose configs/ur10.yaml measured.h5 -o diagnosis.h5 --apply better.yaml
     """
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    for path in (output, apply):
+        _refuse(path, overwrite)
+    if output is not None and apply is not None and output.resolve() == apply.resolve():
+        raise FileError(f"--output and --apply both name {output}. Give two names.")
+
     from dataclasses import replace
 
     from excite_cli.cli.diagnose_tables import answer_of, tables_of
@@ -58,11 +64,6 @@ def diagnose(
     from excite_cli.store.diagnosis_file import write_diagnosis
     from excite_cli.store.versions import versions
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    for path in (output, apply):
-        _refuse(path, overwrite)
-    if output is not None and apply is not None and output.resolve() == apply.resolve():
-        raise FileError(f"--output and --apply both name {output}. Give two names.")
     with single_threaded():
         spec = load_spec(config, overrides)
         folder = config.resolve().parent

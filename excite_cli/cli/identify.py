@@ -54,6 +54,7 @@ def identify(
     from excite_cli.cli.identify_tables import answer_of, tables_of
     from excite_cli.cli.setup import load_dataset, single_threaded
     from excite_cli.config.load import load_spec, spec_as_yaml
+    from excite_cli.diagnosis.plausibility import check_dataset
     from excite_cli.identification.identify import identify as run_identification
     from excite_cli.robot.base_parameters import find_base_parameters
     from excite_cli.robot.model import build_robot
@@ -68,6 +69,7 @@ def identify(
         robot = build_robot(spec.robot, folder)
         base = find_base_parameters(robot)
         dataset = load_dataset(terminal, robot, spec, data)
+        check_dataset(robot, dataset, spec)
         with terminal.live("identify") as show:
             found = run_identification(
                 robot, base, dataset, spec, sealed, lambda text: show(text, 0)

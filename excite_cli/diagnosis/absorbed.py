@@ -24,9 +24,9 @@ def absorbed_effects(
     """Candidates of which the model leaves less than 0.1 % of their energy.
 
     The model is the declared one with the chosen effects. `names` are those of the declared model's
-    columns; what was found is named by its own parameters. Candidates that do not show in these
-    data at all (no energy) are not absorbed by anything. Only the first parameter counts (a spring whose stiffness is absorbed is absorbed, though its preload
-    may show as an offset).
+    columns; effects that were found are named by their own parameters. What does not show in these
+    data at all is not absorbed by anything. Only the first parameter counts (a spring whose
+    stiffness is absorbed is absorbed, though its preload may show as an offset).
     """
     at = evidence.columns(chosen)
     factor = evidence.factor(chosen)

@@ -46,11 +46,13 @@ def possible_effects(
     signals: Sequence[Signals],
     residuals: Sequence[Array],
     runs: Sequence[str],
+    around: Mapping[tuple[str, tuple[int, ...], tuple[str, ...]], list[dict]],
 ) -> list[tuple[Effect, int]]:
     """All effects to be tested but those declared, and how many tests each stands for.
 
     `signals` and `residuals` (T, n) are of the training parts; `runs` the names of all runs, for
-    effects that are present in some of them only.
+    effects that are present in some of them only; `around` shapes for (kind, joints, runs) that
+    were found already.
 
     Raises
     ------
@@ -78,7 +80,12 @@ def possible_effects(
                 shapes = kind.tuned(robot, place, signals, residuals)
                 effects += [kind(place, shape) for shape in shapes]
                 tests += kind.tests_of_grid(robot, place, signals)
-        found += [(effect, max(tests, len(effects)) * len(names)) for effect in effects]
+        count = max(tests, len(effects)) * len(names)
+        for known_place, near in around.items():
+            if known_place[0] == name:
+                kept = [e for e in effects if (e.kind, e.joints, e.runs) != known_place]
+                effects = kept + [kind(known_place[1], shape, known_place[2]) for shape in near]
+        found += [(effect, count) for effect in effects]
     if not found:
         raise ConfigError("diagnosis: every effect to be looked for is declared or excluded.")
     return found
@@ -106,7 +113,14 @@ def _in_runs(
             found += [kind(place, shape, (run,)) for shape in shapes]
     if not kind.shapes:
         later = [tuple(runs[i:]) for i in range(1, len(runs) - 1)]
-        found += [kind(place, {}, chosen) for chosen in later if set(chosen) & set(trained)]
+        some = [
+            tuple(trained[i:k])
+            for i in range(len(trained))
+            for k in range(i + 2, len(trained) + 1)
+            if k - i < len(trained)
+        ]
+        together = [*later, *(each for each in some if each not in later)]
+        found += [kind(place, {}, chosen) for chosen in together if set(chosen) & set(trained)]
     return found
 
 

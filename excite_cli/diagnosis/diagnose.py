@@ -34,7 +34,7 @@ from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.split import Split, split
-from excite_cli.measurement.dataset import Dataset
+from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.robot.base_parameters import BaseParameters
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.regressor import standard_parameters
@@ -106,7 +106,7 @@ def diagnose(
         before=before,
         after=after,
         rounds=rounds_of(traced, robot.joint_names),
-        findings=dataset.findings,
+        findings=(*dataset.findings, *_assumed(traced, parts)),
         processing=_choices(processing, traced, training),
         phi=full_inertias(model, parameters),
         base_values=base_values,
@@ -184,7 +184,7 @@ def _named(
                 effect=record_of(c.effect, names, parameters[own]),
                 parameters=c.effect.report(shown[own], spread[own, own]),
                 p_value=search.p_value(i, gain),
-                share_of_residual=float(max(share, 0.0)),
+                share_of_residual=float(np.clip(share, 0.0, 1.0)),
                 gain=float(search.left_out_gain(rest, [i])),
                 aliases=tuple(records),
             )
@@ -267,6 +267,25 @@ def _information(model: Model, traced: Traced, rivals: list[tuple[Alias, Array]]
     )
 
 
+def _assumed(traced: Traced, parts: Split) -> list[Finding]:
+    """Effects of single runs leave open whether the sealed one has them: say what was assumed."""
+    names = {run_name(run.name) for run in parts.sealed}
+    found = []
+    for effect in traced.effects:
+        if effect.runs:
+            there = "is" if names & set(effect.runs) else "is not"
+            found.append(
+                Finding(
+                    "assumed",
+                    "warning",
+                    f"{effect.kind} was found in {', '.join(effect.runs)}; for the error it is "
+                    f"assumed that it {there} in the sealed {', '.join(sorted(names))}. If you "
+                    "know better, declare it under effects with its runs.",
+                )
+            )
+    return found
+
+
 def _choices(
     processing: Processing, traced: Traced, training: Sequence[PreparedRun]
 ) -> dict[str, Any]:
@@ -282,5 +301,5 @@ def _choices(
         "runs": sorted({run_name(run.name) for run in training}),
         "inflation": traced.inflation,
         "candidates": len(traced.candidates),
-        "samples": int(usable.sum()),
+        "samples": int(usable.any(axis=1).sum()),
     }

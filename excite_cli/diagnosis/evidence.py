@@ -61,6 +61,8 @@ class Evidence:
         self.norms = norms
         self.total = total / np.outer(norms, norms)
         self.prior = np.zeros(fixed) if prior is None else np.asarray(prior)
+        self._known: dict[tuple, Array] = {}
+        self._fitted: dict[tuple[int, ...], Array] = {}
 
     @property
     def torque(self) -> int:
@@ -130,25 +132,39 @@ class Evidence:
         grams = self.raw if fold is None else self.raw[fold : fold + 1]
         rows = range(grams.shape[1]) if joints is None else joints
         both = np.append(at, self.torque)
-        index = np.ix_(both, both)
+        index = (both[:, None], both)
         own = sum(grams[f, j][index] for f in range(len(grams)) for j in rows)
-        own = own / np.outer(self.norms[both], self.norms[both])
+        norms = self.norms[both]
+        own = own / (norms[:, None] * norms)
         return own[:-1, :-1], own[:-1, -1], float(own[-1, -1])
 
     def left_out(self, chosen: Sequence[int], joints: Sequence[int] | None) -> Array:
         """Energy (F,) on the rows of `joints` of each fold, fitted to all other folds."""
-        at = self.columns(chosen)
-        found = np.empty(len(self.raw))
-        index = np.ix_(at, at)
-        ridge = self._ridge(at)
-        for fold in range(len(self.raw)):
-            normal = self.total[index] - self._folds[fold][index]
-            normal[np.diag_indices(len(at))] += ridge
-            rhs = self.total[at, self.torque] - self._folds[fold][at, self.torque]
-            x = cho_solve(cho_factor(normal, check_finite=False), rhs, check_finite=False)
-            own, cross, energy = self._part(fold, joints, at)
-            found[fold] = energy - 2 * x @ cross + x @ own @ x
-        return np.maximum(found, 0.0)
+        key = (tuple(sorted(chosen)), None if joints is None else tuple(joints))
+        if key not in self._known:
+            at = self.columns(key[0])
+            x = self._without_folds(at, key[0])
+            found = np.empty(len(self.raw))
+            for fold in range(len(self.raw)):
+                own, cross, energy = self._part(fold, joints, at)
+                found[fold] = energy - 2 * x[fold] @ cross + x[fold] @ own @ x[fold]
+            self._known[key] = np.maximum(found, 0.0)
+        return self._known[key]
+
+    def _without_folds(self, at: NDArray[np.intp], chosen: tuple[int, ...]) -> Array:
+        """Parameters (F, k) fitted to all folds but one."""
+        if chosen not in self._fitted:
+            index = (at[:, None], at)
+            normal = self.total[index] - self._folds[:, at[:, None], at]
+            diagonal = np.arange(len(at))
+            normal[:, diagonal, diagonal] += self._ridge(at)
+            rhs = self.total[at, self.torque] - self._folds[:, at, self.torque]
+            self._fitted[chosen] = np.linalg.solve(normal, rhs[:, :, None])[:, :, 0]
+        return self._fitted[chosen]
+
+    def torque_energy(self, joint: int) -> float:
+        """Energy of the torque itself on a joint's rows."""
+        return float(self.raw[:, joint, -1, -1].sum())
 
     def energy_on(self, chosen: Sequence[int], joints: Sequence[int] | None) -> float:
         """Residual energy on the rows of `joints` of the model fitted to everything."""

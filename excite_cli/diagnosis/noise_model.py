@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from excite_cli.robot.model import Array
 
@@ -39,8 +38,12 @@ class NoiseModel:
 
     def whitened(self, x: Array, joint: int) -> Array:
         """Rows (M − order, …) of x (M, …), a run's rows of one joint, with unit innovations."""
-        taps = np.concatenate([[1.0], -self.coefficients[joint]]) / self.sigma[joint]
-        return np.asarray(lfilter(taps, [1.0], x, axis=0))[self.order :]
+        x, order = np.asarray(x, dtype=float), self.order
+        rest = x[order:].copy()
+        for k, c in enumerate(self.coefficients[joint], 1):  # lfilter goes column by column
+            rest -= c * x[order - k : max(len(x) - k, 0)]
+        rest /= self.sigma[joint]
+        return rest
 
     def clean(self, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Whitened rows (M − order,) that no unusable sample has touched."""
@@ -80,13 +83,14 @@ def _autoregression(series: list[Array], usable: list[NDArray[np.bool_]]) -> tup
     nugget = _NUGGET * energy
     gram[np.diag_indices(most)] += nugget
     energy += nugget
-    best, coefficients, variance = np.inf, np.zeros(0), energy / count
+    best, variance = np.inf, energy / count
+    coefficients: Array = np.zeros(0)
     for p in range(most + 1):
         c = np.linalg.lstsq(gram[:p, :p], cross[:p], rcond=1e-12)[0] if p else np.zeros(0)
-        left = max(energy - 2 * c @ cross[:p] + c @ gram[:p, :p] @ c, 1e-300)
+        left = max(float(energy - 2 * c @ cross[:p] + c @ gram[:p, :p] @ c), 1e-300)
         criterion = count * np.log(left / count) + 2 * (p + 1) * count / (count - p - 2)
         if criterion < best - 1e-9:
-            best, coefficients, variance = criterion, c, left / (count - p)
+            best, coefficients, variance = criterion, np.asarray(c), left / (count - p)
     return _stable(coefficients), float(np.sqrt(variance) + 1e-12)
 
 

@@ -10,13 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.rearranged import (
     CLEAR,
     PRICE,
+    SIGN,
     Change,
     Order,
     Verdict,
-    SIGN,
     logs,
     mirrored,
     positions_changed,
@@ -24,7 +25,9 @@ from excite_cli.diagnosis.rearranged import (
 )
 from excite_cli.diagnosis.torque_shares import columns_of, samples_of, shares_left
 from excite_cli.errors import FileError
-from excite_cli.identification.prepare import PreparedRun
+from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.processing import choose_processing
+from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array, Robot
 
@@ -32,6 +35,8 @@ _SAMPLES = 600
 _GOOD = 0.1  # data that leave less than this on every joint are what they say they are
 _WORSE = 0.3  # log of the share by which no joint may fit worse; or share of the whole gain
 _FITS = 0.6  # share that the joints concerned may have left, in the median
+# Exchanged wrists of wrong inertias may fit somewhat better: that is no evidence of an order.
+_ORDER_FITS = 0.35
 _FOREIGN = 0.85  # torques of which this is left have nothing to do with the motion
 
 
@@ -65,19 +70,38 @@ def check_plausibility(robot: Robot, runs: Sequence[PreparedRun]) -> None:
     raise FileError(_message(robot.joint_names, straight, best, rivals))
 
 
+def check_dataset(robot: Robot, dataset: Dataset, spec: Spec) -> None:
+    """As `check_plausibility`, for all runs as they were read, filtered as `spec` says.
+
+    Raises
+    ------
+    FileError
+        As `check_plausibility`; or a run is too short for the filters.
+    """
+    processing = choose_processing(
+        dataset.runs, spec.measurement.filter, spec.diagnosis.moving_speed
+    )
+    check_plausibility(robot, [prepare(run, processing) for run in dataset.runs])
+
+
 def _clearly_better(verdict: Verdict, straight: Verdict) -> bool:
     """Whether a change gains enough on the joints it is about, and costs none of the others."""
     if not verdict.change.mistakes:
         return False
     gain = logs(straight.left) - logs(verdict.left)
     touched = verdict.change.touched
+    here, left = np.arange(len(gain)), verdict.left[touched]
+    fits = bool(np.median(left) < _FITS)
+    if (verdict.change.q_order != here).any() or (verdict.change.tau_order != here).any():
+        foreign = np.median(straight.left[touched]) > _FOREIGN
+        fits = bool(left.max() < _ORDER_FITS or (foreign and np.median(left) < 1.4 * _ORDER_FITS))
     turned = (verdict.change.tau_sign < 0) & (verdict.change.q_sign > 0)
     return bool(
         gain.sum() > CLEAR * verdict.change.mistakes
         and gain.min() > -max(_WORSE, _WORSE * gain.sum())
         and (turned.all() or (gain[turned] > SIGN).all())
         and gain[touched].mean() > 0.5 * CLEAR
-        and np.median(verdict.left[touched]) < _FITS
+        and fits
     )
 
 
@@ -101,7 +125,7 @@ def _message(names: Sequence[str], straight: Verdict, best: Verdict, rivals: lis
 
 def _foreign(names: Sequence[str], straight: Verdict) -> str:
     """Torques that do not belong to the motion, for a reason that cannot be named."""
-    wrong = ", ".join(names[j] for j in np.flatnonzero(straight.left > _FITS))
+    wrong = ", ".join(names[j] for j in np.flatnonzero(straight.left > _FITS).tolist())
     return (
         f"the measured data contradict the robot: the torques of {wrong} do not fit their motion "
         "with any friction or spring, and no single exchange or sign explains it. Check the order "
@@ -128,7 +152,7 @@ def _sentences(names: Sequence[str], change: Change) -> list[str]:
         (change.tau_sign, "torque", "sign"),
         (change.q_sign, "position", "position_sign"),
     ):
-        wrong = np.flatnonzero(sign < 0)
+        wrong = np.flatnonzero(sign < 0).tolist()
         if len(wrong):
             whose = "every joint" if len(wrong) == n > 1 else ", ".join(names[j] for j in wrong)
             setting = ", ".join(f"{names[j]}: -1" for j in wrong)
@@ -138,8 +162,9 @@ def _sentences(names: Sequence[str], change: Change) -> list[str]:
     return found
 
 
-def _order(names: Sequence[str], order: Order, what: str) -> str:
+def _order(names: Sequence[str], columns: Order, what: str) -> str:
     """What stands where, and how to name it: column `order[j]` belongs to joint j."""
+    order: list[int] = columns.tolist()
     moved = [j for j in range(len(names)) if order[j] != j]
     if len(moved) == 2:
         words = f"the {what} of {names[moved[0]]} and {names[moved[1]]} are swapped"

@@ -52,9 +52,9 @@ class Change:
 
     def applied(self, samples: Samples) -> Samples:
         """The data with the change made."""
-        motion = (x[:, self.q_order] * self.q_sign for x in (samples.q, samples.v, samples.a))
+        q, v, a = (x[:, self.q_order] * self.q_sign for x in (samples.q, samples.v, samples.a))
         tau = samples.tau[:, self.tau_order] * self.tau_sign
-        return Samples(*motion, tau, samples.usable[:, self.tau_order])
+        return Samples(q, v, a, tau, samples.usable[:, self.tau_order])
 
     @property
     def mistakes(self) -> int:
@@ -90,8 +90,9 @@ class Verdict:
 def exchanges(order: Order) -> int:
     """Exchanges of two that make up an order; turned round or shifted as a whole, it is one."""
     n = len(order)
-    steps = np.diff(order) % n
-    if n > 2 and ((steps == 1).all() or (steps == n - 1).all()):
+    shifted = bool((np.diff(order) % n == 1).all())
+    reversed_ = bool((order == np.arange(n)[::-1]).all())
+    if n > 2 and (shifted or reversed_):
         return int(order[0] != 0)
     cycles = connected_components(csr_matrix((np.ones(n), (np.arange(n), order))))[0]
     return n - int(cycles)

@@ -86,14 +86,10 @@ def _suspects(
             verdict = "accepted"
         elif p > search.rules.significance:
             verdict = "not significant"
-        elif left_out < search.rules.gain:
-            verdict = "no gain on runs left out"
-        elif not search.allowed(search.plain.solve([*chosen, i]), [*chosen, i], [i]):
-            verdict = "impossible sign"
-        elif i in traced.chosen:
-            verdict = "later"
         else:
-            verdict = "another explains it"
+            verdict = search.verdict(chosen, [i])
+            if verdict == "accepted":
+                verdict = "later" if i in traced.chosen else "another explains it"
         found.append(Suspect(record_of(candidate.effect, joint_names), p, share, left_out, verdict))
         if len(found) == _SUSPECTS:
             break

@@ -51,6 +51,10 @@ FIRST = {
 }
 # It stays in beside its refinement unless it is useless there (χ² units).
 _PARENT_PRICE = 4.5
+# Play is elasticity with a dead zone: of the two, one is named for a joint.
+EXCLUDES = {"backlash": "elasticity", "elasticity": "backlash"}
+_TRANSFER = 0.15  # least share of the gain on fitted runs that runs left out must have
+_SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
 _MOST_STEPS = 80
 _TRIED = 12  # best candidates whose gain on runs left out is looked at in a step
 _PAIRED = 14  # candidates of one joint that are tried in pairs
@@ -65,29 +69,6 @@ class Rules:
     inflation: float = 1.0
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A candidate's evidence in a step: χ², p-value corrected for the family, gain left out."""
-
-    candidate: int
-    chi2: float
-    dof: int
-    p_value: float
-    gain: float
-    verdict: str
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step: what was added (and dropped), and the suspects that were looked at."""
-
-    added: tuple[int, ...]
-    dropped: tuple[int, ...]
-    suspects: tuple[Judged, ...]
-    before: tuple[int, ...]
-    after: tuple[int, ...]
-
-
 @dataclass
 class Search:
     """A search on whitened evidence; `plain` is the same data with independent samples.
@@ -100,7 +81,6 @@ class Search:
     candidates: Sequence[Candidate]
     rules: Rules
     allowed: Callable[[Array, Sequence[int], Sequence[int]], bool]
-    steps: list[Step] = field(default_factory=list)
     _thresholds: dict[tuple[int, int], float] = field(default_factory=dict)
     _most: int = _MOST_STEPS
 
@@ -175,15 +155,29 @@ class Search:
         """Share by which the RMS error on runs left out falls, on the rows that `added` touches.
 
         The better of filtered torque and whitened torque: an effect near the noise shows in the
-        second only.
+        second only. An effect of single runs is not there in others: it is judged where it is.
         """
         joints = sorted({j for i in added for j in self.white.rows_of[i]})
         best = -np.inf
         for evidence in (self.plain, self.white):
-            before = evidence.left_out(chosen, joints).sum()
-            after = evidence.left_out([*chosen, *added], joints).sum()
+            if any(self.candidates[i].effect.runs for i in added):
+                before = evidence.energy_on(chosen, joints)
+                after = evidence.energy_on([*chosen, *added], joints)
+            else:
+                before = evidence.left_out(chosen, joints).sum()
+                after = evidence.left_out([*chosen, *added], joints).sum()
             best = max(best, 1.0 - float(np.sqrt(after / max(before, 1e-300))))
         return best
+
+    def size(self, chosen: Sequence[int], added: Sequence[int]) -> float:
+        """What `added` explains, as a share of the torque's RMS on the joint where it is most."""
+        largest = 0.0
+        for joint in sorted({j for i in added for j in self.white.rows_of[i]}):
+            before = self.plain.energy_on(chosen, [joint])
+            after = self.plain.energy_on([*chosen, *added], [joint])
+            whole = self.plain.torque_energy(joint)
+            largest = max(largest, (before - after) / max(whole, 1e-300))
+        return float(np.sqrt(largest))
 
     def run(self, most: int = _MOST_STEPS) -> list[int]:
         """Search from the declared model until no step lowers J, or `most` effects are in."""
@@ -225,82 +219,71 @@ class Search:
 
     def _forward(self, chosen: list[int], tier: int) -> list[int]:
         """Add candidates up to `tier` while one (or two of a joint) passes."""
-        refused: set[tuple[int, ...]] = set()
         while len(chosen) < self._most:
-            step = self._add(chosen, tier, refused) or self._add_pair(chosen, tier, refused)
-            if step is None:
+            added = self._best_one(chosen, tier) or self._best_two(chosen, tier)
+            if not added:
                 break
-            chosen = list(step.after)
+            chosen = [*chosen, *added]
         return chosen
 
     def _free(self, chosen: Sequence[int], tier: int = 3) -> list[int]:
-        """Candidates up to `tier` whose place is not taken."""
+        """Candidates up to `tier` whose place is not taken, nor that of what excludes them."""
         taken = {self.candidates[i].place for i in chosen}
+        shut = {(EXCLUDES[kind], joints, runs) for kind, joints, runs in taken if kind in EXCLUDES}
         return [
             i
             for i, c in enumerate(self.candidates)
-            if c.place not in taken and self.tier(i) <= tier
+            if c.place not in taken and c.place not in shut and self.tier(i) <= tier
         ]
 
-    def _add(self, chosen: list[int], tier: int, refused: set[tuple[int, ...]]) -> Step | None:
+    def _best_one(self, chosen: list[int], tier: int) -> tuple[int, ...]:
+        """The candidate that saves most of those that pass."""
         schur = self.white.schur(chosen)
-        free = self._free(chosen, tier)
-        gains = {i: schur.singles[i] for i in free}
-        ranked = sorted(
-            (i for i in free if gains[i].dof),
-            key=lambda i: self.price(i, gains[i].dof) - gains[i].chi2,
-        )
-        suspects: list[Judged] = []
-        for i in ranked[:_TRIED]:
-            gain = gains[i]
-            saved = gain.chi2 - self.price(i, gain.dof)
-            if saved <= 0:
-                if len(suspects) < 5:
-                    suspects.append(self._judged(chosen, i, gain, "not significant"))
-                continue
-            if (i,) in refused or not self._in_order(schur, chosen, [i]):
-                continue
-            verdict = self._verdict(chosen, [i])
-            suspects.append(self._judged(chosen, i, gain, verdict))
-            if verdict == "accepted":
-                after = (*chosen, i)
-                step = Step((i,), (), tuple(suspects), tuple(chosen), after)
-                self.steps.append(step)
-                return step
-        return None
+        free = [i for i in self._free(chosen, tier) if schur.singles[i].dof]
+        saved = {i: schur.singles[i].chi2 - self.price(i, schur.singles[i].dof) for i in free}
+        for i in sorted(free, key=lambda i: -saved[i])[:_TRIED]:
+            if saved[i] <= 0:
+                break
+            if self._in_order(schur, chosen, [i]) and self.verdict(chosen, [i]) == "accepted":
+                return (i,)
+        return ()
 
-    def _verdict(self, chosen: Sequence[int], added: Sequence[int]) -> str:
+    def verdict(self, chosen: Sequence[int], added: Sequence[int]) -> str:
+        """`accepted`, or why `added` may not join the chosen ones."""
         together = [*chosen, *added]
-        parameters = self.plain.solve(together)
-        if not self.allowed(parameters, together, added):
+        if not self.allowed(self.plain.solve(together), together, added):
             return "impossible sign"
-        if self.left_out_gain(chosen, added) < self.rules.gain:
+        if self.size(chosen, added) < _SMALLEST:
+            return "too small to matter"
+        if not self._generalises(chosen, added):
             return "no gain on runs left out"
         return "accepted"
 
-    def _judged(self, chosen: Sequence[int], i: int, gain: Gain, verdict: str) -> Judged:
-        left_out = self.left_out_gain(chosen, [i])
-        return Judged(i, gain.chi2, gain.dof, self.p_value(i, gain), left_out, verdict)
+    def _generalises(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """Whether runs left out gain, and not far less than those fitted."""
+        gain = self.left_out_gain(chosen, added)
+        if gain < self.rules.gain:
+            return False
+        joints = sorted({j for i in added for j in self.white.rows_of[i]})
+        fitted = max(
+            1.0
+            - np.sqrt(
+                e.energy_on([*chosen, *added], joints) / max(e.energy_on(chosen, joints), 1e-300)
+            )
+            for e in (self.plain, self.white)
+        )
+        return bool(gain > _TRANSFER * fitted)
 
-    def _add_pair(self, chosen: list[int], tier: int, refused: set[tuple[int, ...]]) -> Step | None:
+    def _best_two(self, chosen: list[int], tier: int) -> tuple[int, ...]:
         """Two of one joint at once, where none passes alone."""
         schur = self.white.schur(chosen)
         ranked = sorted(self._pairs(schur, self._free(chosen, tier)), key=lambda found: -found[0])
         for saved, pair in ranked[:_TRIED]:
             if saved <= 0:
-                return None
-            if pair in refused or not self._in_order(schur, chosen, pair):
-                continue
-            if self._verdict(chosen, pair) != "accepted":
-                refused.add(pair)
-                continue
-            judged = tuple(
-                self._judged(chosen, i, schur.singles[i], "accepted together") for i in pair
-            )
-            step = Step(pair, (), judged, tuple(chosen), (*chosen, *pair))
-            self.steps.append(step)
-            return step
-        return None
+                break
+            if self._in_order(schur, chosen, pair) and self.verdict(chosen, pair) == "accepted":
+                return pair
+        return ()
 
     def _pairs(self, schur: Schur, free: Sequence[int]) -> list[tuple[float, tuple[int, int]]]:
         """What promising pairs of local candidates of one joint, of different kinds, save."""
@@ -333,13 +316,6 @@ class Search:
             better = self._best_replacement(chosen)
             if better is None:
                 return chosen
-            self.steps.append(
-                Step(
-                    tuple(i for i in better if i not in chosen),
-                    tuple(i for i in chosen if i not in better),
-                    (), tuple(chosen), tuple(better),
-                )
-            )  # fmt: skip
             chosen = better
         return chosen
 
@@ -378,19 +354,27 @@ class Search:
     def _pruned(self, chosen: list[int]) -> list[int]:
         """Without those that, with all others in, are not significant or bring nothing."""
         while True:
-            weakest = None
+            weakest: tuple[float, list[int]] | None = None
             for i in chosen:
                 rest = [k for k in chosen if k != i]
-                gain = self.white.schur(rest).gain(i, absorbed=SHARED)
-                if any(i in self.parents[k] for k in rest):
-                    continue
-                bad = (
-                    self.p_value(i, gain) > self.rules.significance
-                    or self.left_out_gain(rest, [i]) < self.rules.gain
-                    or not self.allowed(self.plain.solve(chosen), chosen, [i])
-                )
-                if bad and (weakest is None or gain.chi2 < weakest[0]):
-                    weakest = (gain.chi2, rest)
+                chi2_i = self.white.schur(rest).gain(i, absorbed=SHARED).chi2
+                if self._fails(i, rest, chosen) and (weakest is None or chi2_i < weakest[0]):
+                    weakest = (chi2_i, rest)
             if weakest is None:
                 return chosen
             chosen = weakest[1]
+
+    def _fails(self, i: int, rest: list[int], chosen: list[int]) -> bool:
+        """Whether member i does not hold beside the rest."""
+        if self._bound(i, chosen):
+            return False
+        right_sign = self.allowed(self.plain.solve(chosen), chosen, [i])
+        if any(i in self.parents[k] for k in rest):
+            return not right_sign
+        gain = self.white.schur(rest).gain(i, absorbed=SHARED)
+        return (
+            self.p_value(i, gain) > self.rules.significance
+            or not right_sign
+            or self.left_out_gain(rest, [i]) < self.rules.gain
+            or self.size(rest, [i]) < _SMALLEST
+        )

@@ -110,9 +110,9 @@ def nonnegative(gram: Array, b: Array) -> Array:
     Coordinate descent, all problems at once. The diagonal of `gram` is 1, or 0 for columns that
     are not there.
     """
-    x = np.zeros(np.broadcast_shapes(gram.shape[:-1], b.shape))
+    x: Array = np.zeros(np.broadcast_shapes(gram.shape[:-1], b.shape))
     for _ in range(_SWEEPS):
-        for p in range(x.shape[-1]):
+        for p in range(b.shape[-1]):
             slope = b[..., p] - (gram[..., p, :] * x).sum(-1)
             there = gram[..., p, p] > 0
             x[..., p] = np.where(there, np.maximum(x[..., p] + slope, 0.0), 0.0)

@@ -6,6 +6,7 @@ the model follow the fit. Every pass searches from the declared model anew, unti
 the pass before it found.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -15,6 +16,7 @@ from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis.candidates import Candidate, possible_effects, with_columns
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import inflation_of
+from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Rules, Search
 from excite_cli.diagnosis.training import KeptInertias, TrainingData
 from excite_cli.effects.base import Effect, Signals
@@ -26,14 +28,18 @@ from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.regressor import standard_parameters
 from excite_cli.robot.rigid_body import RigidBody
 
-_PASSES = 4
+_PASSES = 6
+_SETTLED = 1e-3  # change of the residual energy from pass to pass
 # Noise is what is left with all of these in, needed or not: many robots have them, and none of
 # them must be taken for noise with a long memory.
 _USUAL = (
     "viscous_friction", "coulomb_friction", "nonlinear_viscous_friction", "torque_offset",
-    "armature", "load_dependent_friction", "spring", "coupled_friction",
+    "armature", "load_dependent_friction", "spring", "coupled_friction", "torque_gain",
+    "base_tilt", "encoder_offset", "payload",
 )  # fmt: skip
 
+# What `split` adds to the name of a run for a part of it.
+_PART = re.compile(r" (?:[^ ]+-[^ ]+ s|\((?:first|second) half\))$")
 # Effects whose parameter is one by their nature, with the range in which it is believed.
 _WHOLE, _LEAST, _MOST = ("torque_saturation", "backlash"), 0.6, 1.5
 
@@ -94,54 +100,121 @@ def trace(
     coupled = _coupled(model.declared)
     runs = prepared(coupled)
     bodies = [_Body(model, run) for run in runs]
-    phi = standard_parameters(model.robot)
-    found: tuple[Effect, ...] = ()
-    values = np.zeros(0)
-    noise: NoiseModel | None = None
-    seen: list[set] = []
+    fit = _first_fit(model, folds, bodies)
     traced: Traced | None = None
     for attempt in range(_PASSES):
-        signals = [body.signals(phi, (*model.declared, *found), values) for body in bodies]
-        data = _data(model, runs, folds, bodies, signals)
-        raw = _raw_residuals(model, bodies, signals, bool(len(values)))
-        effects = possible_effects(spec, model.robot, model.declared, signals, raw, run_names)
-        candidates = with_columns(effects, signals, runs)
-        allowed = _sign_check(model, candidates)
-        carried = _carried_over(found, candidates)
-        levels = levels_of(noise) if noise is not None else _first_levels(data)
-        plain = data.evidence(candidates, NoiseModel.white(levels))
-        usual = _usual(candidates, carried)
-        left = data.residuals(candidates, usual, plain.solve(usual))
-        noise = fit_noise(left, [run.usable for run in runs])
-        white = data.evidence(candidates, noise)
-        inflation = inflation_of(data, candidates, usual, noise, white)
-        rules = Rules(spec.significance, spec.gain, inflation)
-        search = Search(white, plain, candidates, rules, allowed)
-        chosen = search.run(most=spec.rounds)
-        parameters = plain.solve(chosen)
-        traced = Traced(
-            data, tuple(candidates), noise, search, tuple(chosen), phi, tuple(signals),
-            levels, inflation,
-        )  # fmt: skip
-        now = {candidates[i].place for i in chosen}
+        traced = _one_pass(model, spec, folds, run_names, bodies, fit, attempt)
+        now = _fit_of(model, traced)
+        count = len(traced.chosen)
         progress(
-            f"pass {attempt + 1}: {len(chosen)} effects, {len(candidates)} candidates, "
-            f"inflation {inflation:.2f}",
+            f"pass {attempt + 1}: {count} effect{'s' * (count != 1)} of "
+            f"{len(traced.candidates)} candidates",
             attempt + 1,
         )
-        if seen and now == seen[-1]:
+        settled = attempt and now.places == fit.places and now.close_to(fit)
+        fit = now
+        if settled:
             break
-        seen.append(now)
-        found = traced.effects
-        if _coupled((*model.declared, *found)) != coupled:
-            coupled = _coupled((*model.declared, *found))
-            runs = prepared(coupled)
-            for body, run in zip(bodies, runs, strict=True):
+        if _coupled((*model.declared, *fit.effects)) != coupled:
+            coupled = _coupled((*model.declared, *fit.effects))
+            for body, run in zip(bodies, prepared(coupled), strict=True):
                 body.take(run)
-        phi = full_inertias(model, parameters)
-        values = parameters[data.declared[0].shape[2] - _width(model.declared) :]
     assert traced is not None
     return traced
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """The model after a pass: φ, effects found, values of declared and found ones, noise."""
+
+    phi: Array
+    effects: tuple[Effect, ...]
+    values: Array
+    levels: Array
+    energy: float
+
+    @property
+    def places(self) -> set:
+        return {(e.kind, e.joints, e.runs) for e in self.effects}
+
+    def close_to(self, other: "_Fit") -> bool:
+        change = abs(self.energy - other.energy) / max(self.energy, 1e-300)
+        return change < _SETTLED and bool(np.allclose(self.levels, other.levels, rtol=0.02))
+
+
+def _first_fit(model: Model, folds: Sequence[int], bodies: Sequence["_Body"]) -> _Fit:
+    """The declared model alone, rows weighted by what it leaves."""
+    phi, values = standard_parameters(model.robot), np.zeros(0)
+    levels = np.ones(model.robot.n)
+    for _ in range(3):
+        signals = [body.signals(phi, model.declared, values) for body in bodies]
+        data = _data(model, folds, bodies, signals)
+        evidence = data.evidence([], NoiseModel.white(levels))
+        parameters = evidence.solve(())
+        left = np.concatenate(data.residuals([], (), parameters))
+        usable = np.concatenate([run.usable for run in data.runs])
+        squares = np.where(usable, left**2, 0.0).sum(axis=0)
+        levels = np.sqrt(squares / np.maximum(usable.sum(axis=0), 1)) + 1e-9
+        phi = full_inertias(model, parameters)
+        values = _values(model, data, parameters)
+    return _Fit(phi, (), values, levels, evidence.energy(()))
+
+
+def _fit_of(model: Model, traced: Traced) -> _Fit:
+    plain = traced.search.plain
+    parameters = plain.solve(traced.chosen)
+    return _Fit(
+        full_inertias(model, parameters),
+        traced.effects,
+        _values(model, traced.data, parameters),
+        levels_of(traced.noise),
+        plain.energy(traced.chosen),
+    )
+
+
+def _values(model: Model, data: TrainingData, parameters: Array) -> Array:
+    return parameters[data.declared[0].shape[2] - _width(model.declared) :]
+
+
+def _one_pass(
+    model: Model,
+    spec: DiagnosisSpec,
+    folds: Sequence[int],
+    run_names: Sequence[str],
+    bodies: Sequence["_Body"],
+    fit: _Fit,
+    attempt: int,
+) -> Traced:
+    """Columns and noise as the last fit says, then a search from the declared model."""
+    effects = (*model.declared, *fit.effects)
+    signals = [body.signals(fit.phi, effects, fit.values) for body in bodies]
+    data = _data(model, folds, bodies, signals)
+    candidates: list[Candidate] = []
+    if spec.rounds:
+        raw = [body.run.tau_raw - s.torque for body, s in zip(bodies, signals, strict=True)]
+        found = {(e.kind, e.joints, e.runs): e for e in fit.effects}
+        shapes = {
+            place: shapes_around(effect, attempt - 1, signals)
+            for place, effect in found.items()
+            if effect.shape
+        }
+        possible = possible_effects(
+            spec, model.robot, model.declared, signals, raw, run_names, shapes
+        )
+        candidates = with_columns(possible, signals, data.runs)
+    plain = data.evidence(candidates, NoiseModel.white(fit.levels))
+    usual = _usual(candidates, _carried_over(fit.effects, candidates))
+    left = data.residuals(candidates, usual, plain.solve(usual))
+    noise = fit_noise(left, [run.usable for run in data.runs])
+    white = data.evidence(candidates, noise)
+    inflation = inflation_of(data, candidates, usual, noise, white)
+    rules = Rules(spec.significance, spec.gain, inflation)
+    search = Search(white, plain, candidates, rules, _sign_check(model, candidates))
+    chosen = search.run(most=spec.rounds)
+    return Traced(
+        data, tuple(candidates), noise, search, tuple(chosen), fit.phi, tuple(signals),
+        fit.levels, inflation,
+    )  # fmt: skip
 
 
 def _carried_over(found: Sequence[Effect], candidates: Sequence[Candidate]) -> list[int]:
@@ -169,7 +242,7 @@ def _usual(candidates: Sequence[Candidate], found: Sequence[int]) -> list[int]:
     taken = {candidates[i].place for i in found}
     usual = list(found)
     for i, c in enumerate(candidates):
-        if c.effect.kind in _USUAL and c.place not in taken:
+        if c.effect.kind in _USUAL and c.place not in taken and len(c.effect.runs) < 2:
             usual.append(i)
             taken.add(c.place)
     return usual
@@ -199,16 +272,6 @@ def levels_of(noise: NoiseModel) -> Array:
             response[t] = c[:k] @ response[t - k : t][::-1] if k else 0.0
         levels.append(sigma * np.sqrt(np.sum(response**2)))
     return np.array(levels)
-
-
-def _first_levels(data: TrainingData) -> Array:
-    """What the declared model leaves (n,) [N·m]."""
-    levels = np.std(np.concatenate(data.tau), axis=0) + 1e-9
-    for _ in range(2):
-        parameters = data.evidence([], NoiseModel.white(levels)).solve(())
-        left = np.concatenate(data.residuals([], (), parameters))
-        levels = np.sqrt(np.mean(left**2, axis=0)) + 1e-9
-    return levels
 
 
 class _Body:
@@ -244,35 +307,18 @@ class _Body:
 
 def run_name(part: str) -> str:
     """The run a part of it belongs to."""
-    return part.split(" ")[0] if part.endswith((" s", "half)")) else part
-
-
-def _raw_residuals(
-    model: Model, bodies: Sequence[_Body], signals: Sequence[Signals], fitted: bool
-) -> list[Array]:
-    """Recorded torque less the model's (T, n); before the first fit, less a quick fit."""
-    if fitted:
-        return [b.run.tau_raw - s.torque for b, s in zip(bodies, signals, strict=True)]
-    columns = [b.regressor[:, :, model.base.selection] for b in bodies]
-    rank = columns[0].shape[2]
-    gram = sum((np.einsum("tnr,tns->rs", c, c) for c in columns), np.zeros((rank, rank)))
-    cross = sum(
-        (np.einsum("tnr,tn->r", c, b.run.tau_raw) for c, b in zip(columns, bodies, strict=True)),
-        np.zeros(rank),
-    )
-    x = np.linalg.lstsq(gram, cross, rcond=1e-10)[0]
-    return [b.run.tau_raw - c @ x for b, c in zip(bodies, columns, strict=True)]
+    return _PART.sub("", part)
 
 
 def _data(
     model: Model,
-    runs: Sequence[PreparedRun],
     folds: Sequence[int],
     bodies: Sequence[_Body],
     signals: Sequence[Signals],
 ) -> TrainingData:
     declared, torques = [], []
-    for run, body, signal in zip(runs, bodies, signals, strict=True):
+    for body, signal in zip(bodies, signals, strict=True):
+        run = body.run
         inertial, tau = body.inertial, run.tau_fit
         if model.prior is None:
             inertial = inertial[:, :, model.base.selection]
@@ -284,7 +330,8 @@ def _data(
     precision = None
     if model.prior is not None:
         precision = np.concatenate([model.prior.precision, np.zeros(_width(model.declared))])
-    return TrainingData(tuple(runs), tuple(folds), tuple(declared), tuple(torques), precision)
+    runs = tuple(body.run for body in bodies)
+    return TrainingData(runs, tuple(folds), tuple(declared), tuple(torques), precision)
 
 
 def _sign_check(

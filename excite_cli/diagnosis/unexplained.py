@@ -186,6 +186,8 @@ def _quantities(
         names.append(f"v[{name}]")
         made.append(partial(_of_acceleration, k, strongest))
         names.append(f"a[{name}]")
+    made.append(partial(_of_direction_and_position, joint))
+    names.append(f"direction and q[{joint_names[joint]}]")
     heaviest = max(float(np.abs(s.load[:, joint]).max()) for s in signals) + 1e-12
     made.append(lambda s: _odd_even(s.load[:, joint] / heaviest)[:, :3])
     names.append(f"load[{joint_names[joint]}]")
@@ -205,6 +207,10 @@ def _of_position(k: int, s: Signals) -> Array:
 
 def _of_speed(k: int, scale: float, s: Signals) -> Array:
     return _odd_even(s.v[:, k] / scale)
+
+
+def _of_direction_and_position(k: int, s: Signals) -> Array:
+    return np.tanh(1e3 * s.v[:, k, None]) * _waves(s.q[:, k])
 
 
 def _of_acceleration(k: int, scale: float, s: Signals) -> Array:

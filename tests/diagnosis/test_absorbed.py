@@ -42,7 +42,9 @@ def absorbed(
         blocks = []
         for run in found.runs:
             signals = signals_of(run.prepared, robot)
-            blocks.append(run.prepared.averaged_for_fit(effect.columns(signals), effect.rows(robot.n)))
+            blocks.append(
+                run.prepared.averaged_for_fit(effect.columns(signals), effect.rows(robot.n))
+            )
         candidates.append(Candidate(effect, effect.rows(robot.n), tuple(blocks)))
     data = TrainingData(
         tuple(run.prepared for run in found.runs),

@@ -97,9 +97,7 @@ def test_places_that_are_taken_or_vetoed_are_left_out() -> None:
     both = {candidates[NAMED].place, candidates[NEAR].place}
     assert aliases_of(NAMED, [], both, candidates, white, 1.0, anything) == []
     taken = {candidates[NAMED].place}
-    vetoed = aliases_of(
-        NAMED, [], taken, candidates, white, 1.0, lambda rest, other: other != NEAR
-    )
+    vetoed = aliases_of(NAMED, [], taken, candidates, white, 1.0, lambda rest, other: other != NEAR)
     assert vetoed == []
 
 

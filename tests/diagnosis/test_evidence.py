@@ -109,7 +109,7 @@ def test_covariance_is_the_inverse_of_the_normal_matrix(both: tuple[Evidence, Ro
 def test_what_the_model_holds_already_gains_nothing() -> None:
     """A copy of a declared column, a combination of two candidates, and a column of zeros."""
     data = random_data(5)
-    first, second, *_ = random_candidates(5)
+    first = random_candidates(5)[0]
     shape = first.columns[0].shape
     same = tuple(d[:, :1, 1:2] for d in data.declared)
     blind = replace(first, columns=tuple(np.zeros(shape) for _ in data.tau))

@@ -25,9 +25,7 @@ def data_with_memory(memory: float, seed: int = 0) -> tuple[TrainingData, list[C
 
     usable = [rng.random((SAMPLES, 2)) > 0.01 for _ in range(PARTS)]
     declared = tuple(slow(SAMPLES, 2, FIXED) for _ in range(PARTS))
-    noise = [
-        lfilter([1.0], [1.0, -memory], rng.normal(size=(SAMPLES, 2)), axis=0) for _ in usable
-    ]
+    noise = [lfilter([1.0], [1.0, -memory], rng.normal(size=(SAMPLES, 2)), axis=0) for _ in usable]
     tau = tuple(d @ np.ones(FIXED) + e for d, e in zip(declared, noise, strict=True))
     runs = tuple(prepared(u) for u in usable)
     candidates = [

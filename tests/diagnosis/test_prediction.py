@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from excite_cli.config.data_spec import FilterSpec
 from excite_cli.diagnosis.prediction import errors_on, predicted
@@ -9,7 +10,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.load_dependent_friction import LoadDependentFriction
 from excite_cli.effects.payload import Payload
-from excite_cli.effects.torque_gain import TorqueGain
+from excite_cli.effects.torque_delay import TorqueDelay
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import choose_processing
@@ -69,17 +70,20 @@ def test_an_effect_acts_in_its_runs_by_the_name_that_is_given(
     assert np.abs(two - load).max() > 0.1
 
 
-def test_a_gain_acts_on_all_torque_that_the_robot_makes(
+def test_a_delay_acts_on_all_torque_that_the_robot_makes(
     robot: Robot, runs: list[PreparedRun]
 ) -> None:
-    """(1 + g)(load + friction), and no gain on the gain."""
-    phi = standard_parameters(robot)
-    kinds = (ViscousFriction((1,)), TorqueGain((1,)))
-    tau = predicted(robot, phi, kinds, np.array([3.0, 0.2]), runs[0], "r1")
-    load = RigidBody(robot, phi, runs[0].q, runs[0].v, runs[0].a).load
-    expected = load.copy()
-    expected[:, 1] = 1.2 * (load[:, 1] + 3.0 * runs[0].v[:, 1])
-    assert tau == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    """τ(t − δ) with τ = load + friction, to first order, and no delay of the delayed."""
+    phi, run = standard_parameters(robot), runs[0]
+    kinds = (ViscousFriction((1,)), TorqueDelay((1,)))
+    tau = predicted(robot, phi, kinds, np.array([30.0, 0.01]), run, "r1")
+    whole = RigidBody(robot, phi, run.q, run.v, run.a).load.copy()
+    whole[:, 1] += 30.0 * run.v[:, 1]
+    late = CubicSpline(run.t, whole[:, 1])(run.t - 0.01)
+    inside = slice(5, -5)
+    size = np.sqrt(np.mean((late - whole[:, 1])[inside] ** 2))
+    assert np.sqrt(np.mean((tau[:, 1] - late)[inside] ** 2)) < 0.05 * size
+    assert np.array_equal(tau[:, 0], RigidBody(robot, phi, run.q, run.v, run.a).load[:, 0])
 
 
 def test_without_effects_it_is_the_rigid_body(robot: Robot, runs: list[PreparedRun]) -> None:

@@ -47,9 +47,7 @@ def found(
         for run, s in zip(prepared, signals, strict=True)
     )
     phi = standard_parameters(robot)
-    tau = tuple(
-        d @ (base.mapping @ phi) + more for d, more in zip(declared, extra, strict=True)
-    )
+    tau = tuple(d @ (base.mapping @ phi) + more for d, more in zip(declared, extra, strict=True))
     data = TrainingData(tuple(prepared), (0, 1, 2), declared, tau)
     plain = data.evidence([], NoiseModel.white(np.ones(robot.n) if levels is None else levels))
     left = data.residuals([], (), plain.solve(()))
@@ -110,8 +108,6 @@ def test_white_noise_has_no_names(regression: Regression, signals: list[Signals]
 def test_noise_with_memory_has_no_names(regression: Regression, signals: list[Signals]) -> None:
     alarms = 0
     for seed in range(20):
-        extra = [
-            lfilter([1.0], [1.0, -0.8], e, axis=0) for e in white(regression, 100 + seed)
-        ]
+        extra = [lfilter([1.0], [1.0, -0.8], e, axis=0) for e in white(regression, 100 + seed)]
         alarms += bool(found(regression, signals, extra))
     assert alarms <= 2

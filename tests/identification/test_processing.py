@@ -13,9 +13,7 @@ from excite_cli.identification.processing import (
 from excite_cli.measurement.dataset import Run
 
 
-def run_of(
-    fs: float, top: float, seconds: float = 20.0, noise: float = 1e-5, seed: int = 0
-) -> Run:
+def run_of(fs: float, top: float, seconds: float = 20.0, noise: float = 1e-5, seed: int = 0) -> Run:
     """Two joints whose fastest line is at `top` [Hz], with white noise on the positions."""
     rng = np.random.default_rng(seed)
     t = np.arange(0, seconds, 1 / fs)

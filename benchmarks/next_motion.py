@@ -1,0 +1,249 @@
+"""Does the proposed next motion settle what a diagnosis left open? Through the installed program.
+
+    python -m benchmarks.next_motion [CASE…]
+
+A slow motion is played three times on a simulated robot that has a small effect; the diagnosis
+names an effect together with others that the data cannot tell from it. `optimize --after` plans
+the motion that tells them apart, the same robot plays it once, and both files are diagnosed
+together, an old take sealed. Divergences are in nats: 3 is where two effects count as told apart.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+SEALED = "motion_1_take_3"
+# One start and few iterations: a motion that separates need not be the best one.
+_BRIEF = ("optimizer.restarts=1", "optimizer.max_iterations=60")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A robot, the effect that is put into it, and how its first motion is held back.
+
+    `truth` as `simulate --effect` takes it; `known`: effects of the robot that its model declares;
+    `kind` and `joint` are the right answer.
+    """
+
+    config: str
+    truth: str
+    kind: str
+    joint: str
+    known: tuple[str, ...] = ()
+    slow: tuple[str, ...] = ("constraints.joint_limits.scale=0.15",)
+    simulated: tuple[str, ...] = ("--torque-noise", "0.03", "--seed", "2")
+
+
+_SLOWER = ("constraints.joint_limits.scale=0.1",)
+_PANDA_NOISE = ("--torque-noise", "0.02", "--seed", "2")
+# The Panda's URDF declares viscous friction; the robot has it in sizes of its own, the same in
+# both simulations (`simulate` would size them by the motion).
+_PANDA_OWN = tuple(
+    f"viscous_friction@panda_joint{j}={value}"
+    for j, value in enumerate((0.3, 3.0, 2.5, 2.0, 0.4, 0.4, 0.1), 1)
+)
+
+CASES = {
+    "viscous": Case(
+        "smoke.yaml", "viscous_friction@elbow=0.04", "viscous_friction", "elbow"
+    ),
+    "nonlinear": Case(
+        "smoke.yaml", "nonlinear_viscous_friction@elbow=0.1,power:2",
+        "nonlinear_viscous_friction", "elbow",
+    ),
+    "load": Case(
+        "smoke.yaml", "load_dependent_friction@elbow=0.003", "load_dependent_friction", "elbow"
+    ),
+    "panda": Case(
+        "panda.yaml", "coulomb_friction@panda_joint4=0.05", "coulomb_friction", "panda_joint4",
+        _PANDA_OWN, _SLOWER, _PANDA_NOISE,
+    ),
+    "panda-load": Case(
+        "panda.yaml", "load_dependent_friction@panda_joint4=0.004", "load_dependent_friction",
+        "panda_joint4", _PANDA_OWN, _SLOWER, _PANDA_NOISE,
+    ),
+}  # fmt: skip
+
+
+@dataclass
+class Outcome:
+    """What was named first, the outlook of every pair, and what was named in the end."""
+
+    first: list[dict[str, Any]]
+    pairs: list[dict[str, Any]]
+    last: list[dict[str, Any]]
+    said: str = ""
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def settled(self, case: Case) -> bool:
+        """The right effect alone, without an alias."""
+        return [_short(e) for e in self.last] == [f"{case.kind} on {case.joint}"] and not any(
+            e["alias_set"] for e in self.last
+        )
+
+
+class Program:
+    """The installed `excite`, run in a folder of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        beside = f"{Path(sys.executable).parent}{os.pathsep}{os.defpath}"
+        found = shutil.which("excite", path=beside)
+        call = "from excite_cli.cli.app import main; main()"
+        self.command = [found] if found else [sys.executable, "-c", call]
+        self.said = ""
+
+    def __call__(self, *arguments: str | Path) -> Any:
+        """What `--json` prints. Raises RuntimeError with the program's words."""
+        run = subprocess.run(
+            [*self.command, *map(str, arguments), "--json", "--no-progress"],
+            cwd=self.folder,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        self.said = run.stderr
+        if run.returncode:
+            raise RuntimeError(f"excite {' '.join(map(str, arguments))}: {run.stderr}")
+        return json.loads(run.stdout)
+
+
+def run_loop(case: Case, folder: Path) -> Outcome:
+    """The whole loop in `folder`."""
+    excite, config = Program(folder), ROOT / "configs" / case.config
+    brief = _given("--set", _BRIEF)
+    simulated = [*_given("--effect", (*case.known, case.truth)), *case.simulated]
+    simulated += ["--no-declared"] if case.known else []
+    seconds: dict[str, float] = {}
+
+    def timed(name: str, *arguments: str | Path) -> Any:
+        started = time.monotonic()
+        answer = excite(*arguments)
+        seconds[name] = time.monotonic() - started
+        return answer
+
+    timed(
+        "first", "optimize", config, "-o", "slow.h5", "--motions", "1",
+        *brief, *_given("--set", case.slow),
+    )  # fmt: skip
+    timed("play", "simulate", config, "slow.h5", "-o", "slow_data.h5", "--repeat", "3", *simulated)
+    first = timed("diagnose", "diagnose", config, "slow_data.h5", "-o", "first.h5")
+    following = timed(
+        "next", "optimize", config, "--after", "first.h5", "-o", "next.h5", "--motions", "1", *brief
+    )
+    said = excite.said
+    timed("play next", "simulate", config, "next.h5", "-o", "next_data.h5", *simulated)
+    last = timed(
+        "diagnose both", "diagnose", config, "slow_data.h5", "next_data.h5", "--sealed", SEALED,
+        "-o", "both.h5",
+    )  # fmt: skip
+    pairs = following["next_experiment"]["pairs"]
+    return Outcome(first["effects"], pairs, last["effects"], said, seconds)
+
+
+def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> float:
+    """How much better one of two kinds explains all training data than the other [nats].
+
+    ½ |χ²₁ − χ²₂| of each alone beside the declared model, inflation taken off.
+    """
+    from excite_cli.config.load import load_spec
+    from excite_cli.diagnosis.tracing import Model, trace
+    from excite_cli.effects.catalogue import declared_effects
+    from excite_cli.identification.prepare import PreparedRun, prepare
+    from excite_cli.identification.processing import choose_processing
+    from excite_cli.identification.split import split
+    from excite_cli.measurement.catalogue import read_dataset
+    from excite_cli.robot.base_parameters import find_base_parameters
+    from excite_cli.robot.model import build_robot
+
+    config = ROOT / "configs" / case.config
+    spec = load_spec(config, [f"diagnosis.kinds=[{', '.join(pair)}]"])
+    robot = build_robot(spec.robot, config.parent)
+    files = [folder / "slow_data.h5", folder / "next_data.h5"]
+    limits = robot.limits
+    data = read_dataset(
+        files,
+        spec.measurement,
+        robot.joint_names,
+        (limits.lower, limits.upper, limits.velocity, limits.effort),
+        (~robot.sliding).astype(float),
+    )
+    parts = split(data, SEALED)
+    processing = choose_processing(
+        parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
+    )
+
+    def prepared(coupled: Sequence[tuple[int, int, float]]) -> list[PreparedRun]:
+        return [prepare(run, processing, coupled) for run in parts.training]
+
+    model = Model(robot, find_base_parameters(robot), declared_effects(spec.effects, robot), None)
+    names = [run.name for run in data.runs]
+    traced = trace(model, spec.diagnosis, prepared, parts.folds, names, lambda text, done: None)
+    alone = traced.search.white.schur(()).singles
+    best = [
+        max(
+            alone[i].chi2
+            for i, c in enumerate(traced.candidates)
+            if c.effect.kind == kind
+            and [robot.joint_names[j] for j in c.effect.joints] == [case.joint]
+        )
+        for kind in pair
+    ]
+    return 0.5 * abs(best[0] - best[1]) / traced.inflation
+
+
+def report(name: str, case: Case, folder: Path) -> bool:
+    """Run a case and print it; whether the right name stands alone in the end."""
+    outcome = run_loop(case, folder)
+    print(f"{name}: {case.config}, truth {case.truth}")
+    for effect in outcome.first:
+        aliases = ", ".join(_short(alias) for alias in effect["alias_set"]) or "none"
+        print(f"  first diagnosis: {_short(effect)}; cannot be told from: {aliases}")
+    for pair in outcome.pairs:
+        kinds = tuple(pair[side].split(" on ")[0] for side in ("effect", "alias"))
+        found = measured_divergence(case, folder, (kinds[0], kinds[1]))
+        print(
+            f"  {kinds[0]} / {kinds[1]}: divergence {pair['kl_so_far']:.2f}, with the next motion "
+            f"expected {pair['expected_kl']:.1f}, measured {found:.1f}"
+        )
+    for effect in outcome.last:
+        aliases = ", ".join(_short(alias) for alias in effect["alias_set"]) or "none"
+        values = ", ".join(f"{k} {v['value']:.4g}" for k, v in effect["parameters"].items())
+        print(f"  in the end: {_short(effect)} ({values}); cannot be told from: {aliases}")
+    good = outcome.settled(case)
+    spent = ", ".join(f"{step} {value:.0f}" for step, value in outcome.seconds.items())
+    print(f"  {'the right name alone' if good else 'NOT SETTLED'}; seconds: {spent}", flush=True)
+    return good
+
+
+def main(arguments: Sequence[str] = tuple(sys.argv[1:])) -> int:
+    """Run the cases named (default: all)."""
+    good = 0
+    names = list(arguments) or list(CASES)
+    for name in names:
+        with tempfile.TemporaryDirectory() as folder:
+            good += report(name, CASES[name], Path(folder))
+    print(f"{good} of {len(names)} end with the right name alone")
+    return int(good < len(names))
+
+
+def _given(option: str, values: Sequence[str]) -> list[str]:
+    return [part for value in values for part in (option, value)]
+
+
+def _short(effect: dict[str, Any]) -> str:
+    return f"{effect['kind']} on {', '.join(effect['joints'])}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

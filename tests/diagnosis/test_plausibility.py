@@ -1,0 +1,159 @@
+"""Orders and signs judged with the URDF: caught where they can be, never a false alarm."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from excite_cli.config.load import load_spec
+from excite_cli.config.spec import RobotSpec, Spec
+from excite_cli.diagnosis.plausibility import check_dataset
+from excite_cli.diagnosis.rearranged import exchanges
+from excite_cli.diagnosis.torque_shares import nonnegative
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.errors import FileError
+from excite_cli.measurement.catalogue import read_dataset
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.simulation.planted import Planted, plant
+from tests.simulation.arms import arm, played
+
+LOGS = Path(__file__).resolve().parents[3] / "shared" / "data"
+URDFS = {"kr300": "kr300.urdf", "tx40": "tx40_mdh_modified.urdf", "ur10_cb": "ur10.urdf"}
+SPEC: Spec = load_spec(Path(__file__).resolve().parents[2] / "configs" / "ur10.yaml")
+SIZES = [10.0, 15.0, 8.0, 3.0, 2.0, 1.0]  # N·m of dry friction
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return arm()
+
+
+def friction(j: int, size: float) -> Planted:
+    return plant(kind_named("coulomb_friction"), (j,), size)
+
+
+@pytest.fixture(scope="module")
+def rubbing(robot: Robot) -> Dataset:
+    effects = [friction(j, size) for j, size in enumerate(SIZES)]
+    return played(robot, *effects, torque_noise=0.01, inertia_error=0.3).dataset
+
+
+@pytest.fixture(scope="module")
+def frictionless(robot: Robot) -> Dataset:
+    return played(robot, torque_noise=0.01, inertia_error=0.1).dataset
+
+
+def told(robot: Robot, data: Dataset) -> str:
+    try:
+        check_dataset(robot, data, SPEC)
+    except FileError as error:
+        return str(error)
+    return ""
+
+
+def changed(data: Dataset, order: Array | None = None, tau: Array | None = None,
+            q: Array | None = None, motion_order: Array | None = None) -> Dataset:  # fmt: skip
+    """Columns of torque (and motion) in another order, then with other signs."""
+    here = np.arange(len(data.joint_names))
+    order = here if order is None else order
+    motion = here if motion_order is None else motion_order
+    ones = np.ones(len(here))
+    tau, q = (ones if each is None else each for each in (tau, q))
+    runs = tuple(
+        replace(r, q=r.q[:, motion] * q, dq=None, tau=r.tau[:, order] * tau) for r in data.runs
+    )
+    return replace(data, runs=runs)
+
+
+def negative(j: int, n: int = 6) -> Array:
+    return np.where(np.arange(n) == j, -1.0, 1.0)
+
+
+def test_clean_data_raise_no_alarm(robot: Robot, rubbing: Dataset, frictionless: Dataset) -> None:
+    assert told(robot, rubbing) == ""
+    assert told(robot, frictionless) == ""
+
+
+@pytest.mark.parametrize("j", range(6))
+def test_a_torque_or_a_position_of_other_sign(robot: Robot, rubbing: Dataset, j: int) -> None:
+    name = robot.joint_names[j]
+    message = told(robot, changed(rubbing, tau=negative(j)))
+    assert f"torque of {name} counts the other way" in message
+    message = told(robot, changed(rubbing, q=negative(j)))
+    # Of light wrists, torque and position cannot be told apart, and both are named.
+    assert f"measurement.position_sign: {{{name}: -1}}" in message
+    assert j > 2 or "measurement.sign" not in message
+
+
+def test_all_torques_of_other_sign(robot: Robot, rubbing: Dataset) -> None:
+    message = told(robot, changed(rubbing, tau=-np.ones(6)))
+    assert "torque of every joint counts the other way" in message
+    assert "position" not in message.split("As they are")[0].replace("position_sign", "")
+
+
+ORDERS = {
+    "swap": [0, 2, 1, 3, 4, 5],
+    "wrist": [0, 1, 2, 5, 4, 3],
+    "shift": [1, 2, 3, 4, 5, 0],
+    "reversal": [5, 4, 3, 2, 1, 0],
+}
+
+
+@pytest.mark.parametrize("name", ORDERS)
+def test_torques_in_another_order(robot: Robot, rubbing: Dataset, name: str) -> None:
+    order = np.array(ORDERS[name])
+    message = told(robot, changed(rubbing, order=order))
+    moved = [robot.joint_names[j] for j in range(6) if order[j] != j]
+    assert "torques" in message.split("As they are")[0]
+    assert all(joint in message for joint in moved)
+    assert "counts the other way" not in message.split("As they are")[0]
+
+
+@pytest.mark.parametrize("name", ["swap", "shift", "reversal"])
+def test_whole_joints_in_another_order(robot: Robot, rubbing: Dataset, name: str) -> None:
+    order = np.array(ORDERS[name])
+    message = told(robot, changed(rubbing, order=order, motion_order=order))
+    assert "the columns" in message
+    assert "measurement.names" in message
+    j = int(np.flatnonzero(order != np.arange(6))[0])
+    # File column j carries the name of j, but holds joint order[j].
+    assert f"{robot.joint_names[j]}: {robot.joint_names[order[j]]}" in message
+
+
+def test_a_wrist_without_friction_cannot_be_judged_and_nothing_wrong_is_said(
+    robot: Robot, frictionless: Dataset
+) -> None:
+    """The last link's torque comes from a centre of mass that the URDF puts on its axis: which
+    side it is on, the sign of the torque, nobody can know. No other joint may be accused."""
+    message = told(robot, changed(frictionless, tau=negative(5)))
+    assert message == "" or "torque of wrist_3_joint counts the other way" in message
+
+
+@pytest.mark.skipif(not LOGS.is_dir(), reason=f"no real logs at {LOGS}")
+@pytest.mark.parametrize("name", URDFS)
+def test_real_logs(name: str) -> None:
+    robot = build_robot(RobotSpec(urdf=str(LOGS / name / URDFS[name])))
+    data = read_dataset([LOGS / name / f"{name}.h5"], SPEC.measurement, robot.joint_names)
+    for run in data.runs:
+        assert told(robot, replace(data, runs=(run,))) == ""
+    message = told(robot, changed(data, tau=negative(2)))
+    assert f"torque of {robot.joint_names[2]} counts the other way" in message
+
+
+def test_stacked_least_squares_against_scipy() -> None:
+    rng = np.random.default_rng(3)
+    x = rng.normal(size=(20, 30, 5))
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    y = rng.normal(size=(20, 30))
+    found = nonnegative(x.transpose(0, 2, 1) @ x, np.einsum("btp,bt->bp", x, y))
+    expected = [nnls(each, target)[0] for each, target in zip(x, y, strict=True)]
+    assert found == pytest.approx(np.array(expected), abs=1e-8)
+
+
+def test_orders_are_counted_in_exchanges() -> None:
+    counts = {(0, 1, 2, 3): 0, (1, 0, 2, 3): 1, (1, 0, 3, 2): 2, (1, 2, 0, 3): 2}
+    counts |= {(1, 2, 3, 0): 1, (3, 2, 1, 0): 1}
+    assert {order: exchanges(np.array(order)) for order in counts} == counts
