@@ -54,41 +54,36 @@ _PANDA_OWN = tuple(
 
 CASES = {
     "viscous": Case(
-        "smoke.yaml", "viscous_friction@elbow=0.04", "viscous_friction", "elbow"
+        "smoke.yaml", "viscous_friction@elbow=0.06", "viscous_friction", "elbow"
     ),
     "nonlinear": Case(
-        "smoke.yaml", "nonlinear_viscous_friction@elbow=0.1,power:2",
+        "smoke.yaml", "nonlinear_viscous_friction@elbow=0.2,power:2",
         "nonlinear_viscous_friction", "elbow",
     ),
     "load": Case(
-        "smoke.yaml", "load_dependent_friction@elbow=0.003", "load_dependent_friction", "elbow"
+        "smoke.yaml", "load_dependent_friction@elbow=0.005", "load_dependent_friction", "elbow"
     ),
     "panda": Case(
-        "panda.yaml", "coulomb_friction@panda_joint4=0.05", "coulomb_friction", "panda_joint4",
+        "panda.yaml", "coulomb_friction@panda_joint4=0.07", "coulomb_friction", "panda_joint4",
         _PANDA_OWN, _SLOWER, _PANDA_NOISE,
-    ),
-    "panda-load": Case(
-        "panda.yaml", "load_dependent_friction@panda_joint4=0.004", "load_dependent_friction",
-        "panda_joint4", _PANDA_OWN, _SLOWER, _PANDA_NOISE,
     ),
 }  # fmt: skip
 
 
 @dataclass
 class Outcome:
-    """What was named first, the outlook of every pair, and what was named in the end."""
+    """Effects named first, the outlook of every pair, effects named in the end."""
 
     first: list[dict[str, Any]]
     pairs: list[dict[str, Any]]
     last: list[dict[str, Any]]
-    said: str = ""
     seconds: dict[str, float] = field(default_factory=dict)
 
     def settled(self, case: Case) -> bool:
-        """The right effect alone, without an alias."""
-        return [_short(e) for e in self.last] == [f"{case.kind} on {case.joint}"] and not any(
-            e["alias_set"] for e in self.last
-        )
+        """Ambiguous at first; in the end the right effect alone, without an alias."""
+        right = [f"{case.kind} on {case.joint}"]
+        alone = [_short(e) for e in self.last] == right and not self.last[0]["alias_set"]
+        return bool(self.pairs) and alone
 
 
 class Program:
@@ -100,7 +95,6 @@ class Program:
         found = shutil.which("excite", path=beside)
         call = "from excite_cli.cli.app import main; main()"
         self.command = [found] if found else [sys.executable, "-c", call]
-        self.said = ""
 
     def __call__(self, *arguments: str | Path) -> Any:
         """What `--json` prints. Raises RuntimeError with the program's words."""
@@ -112,7 +106,6 @@ class Program:
             text=True,
             check=False,
         )
-        self.said = run.stderr
         if run.returncode:
             raise RuntimeError(f"excite {' '.join(map(str, arguments))}: {run.stderr}")
         return json.loads(run.stdout)
@@ -141,20 +134,20 @@ def run_loop(case: Case, folder: Path) -> Outcome:
     following = timed(
         "next", "optimize", config, "--after", "first.h5", "-o", "next.h5", "--motions", "1", *brief
     )
-    said = excite.said
     timed("play next", "simulate", config, "next.h5", "-o", "next_data.h5", *simulated)
     last = timed(
         "diagnose both", "diagnose", config, "slow_data.h5", "next_data.h5", "--sealed", SEALED,
         "-o", "both.h5",
     )  # fmt: skip
     pairs = following["next_experiment"]["pairs"]
-    return Outcome(first["effects"], pairs, last["effects"], said, seconds)
+    return Outcome(first["effects"], pairs, last["effects"], seconds)
 
 
 def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> float:
-    """How much better one of two kinds explains all training data than the other [nats].
+    """How much better the true one of two kinds explains all training data than the other [nats].
 
-    ½ |χ²₁ − χ²₂| of each alone beside the declared model, inflation taken off.
+    ½ (χ²_true − χ²_other) of each alone beside the declared model, inflation taken off; negative
+    if the data speak for the wrong one.
     """
     from excite_cli.config.load import load_spec
     from excite_cli.diagnosis.tracing import Model, trace
@@ -190,16 +183,17 @@ def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> floa
     names = [run.name for run in data.runs]
     traced = trace(model, spec.diagnosis, prepared, parts.folds, names, lambda text, done: None)
     alone = traced.search.white.schur(()).singles
-    best = [
-        max(
+    best = {
+        kind: max(
             alone[i].chi2
             for i, c in enumerate(traced.candidates)
             if c.effect.kind == kind
             and [robot.joint_names[j] for j in c.effect.joints] == [case.joint]
         )
         for kind in pair
-    ]
-    return 0.5 * abs(best[0] - best[1]) / traced.inflation
+    }
+    other = next(kind for kind in pair if kind != case.kind)
+    return 0.5 * (best[case.kind] - best[other]) / traced.inflation
 
 
 def report(name: str, case: Case, folder: Path) -> bool:
@@ -211,10 +205,13 @@ def report(name: str, case: Case, folder: Path) -> bool:
         print(f"  first diagnosis: {_short(effect)}; cannot be told from: {aliases}")
     for pair in outcome.pairs:
         kinds = tuple(pair[side].split(" on ")[0] for side in ("effect", "alias"))
-        found = measured_divergence(case, folder, (kinds[0], kinds[1]))
+        text = "neither is the truth"
+        if case.kind in kinds:
+            found = measured_divergence(case, folder, (kinds[0], kinds[1]))
+            text = f"measured {found:.1f} for the truth"
         print(
             f"  {kinds[0]} / {kinds[1]}: divergence {pair['kl_so_far']:.2f}, with the next motion "
-            f"expected {pair['expected_kl']:.1f}, measured {found:.1f}"
+            f"expected {pair['expected_kl']:.1f}, {text}"
         )
     for effect in outcome.last:
         aliases = ", ".join(_short(alias) for alias in effect["alias_set"]) or "none"
@@ -222,7 +219,8 @@ def report(name: str, case: Case, folder: Path) -> bool:
         print(f"  in the end: {_short(effect)} ({values}); cannot be told from: {aliases}")
     good = outcome.settled(case)
     spent = ", ".join(f"{step} {value:.0f}" for step, value in outcome.seconds.items())
-    print(f"  {'the right name alone' if good else 'NOT SETTLED'}; seconds: {spent}", flush=True)
+    verdict = "from an alias set to the right name alone" if good else "NOT SETTLED"
+    print(f"  {verdict}; seconds: {spent}", flush=True)
     return good
 
 
@@ -233,7 +231,7 @@ def main(arguments: Sequence[str] = tuple(sys.argv[1:])) -> int:
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
             good += report(name, CASES[name], Path(folder))
-    print(f"{good} of {len(names)} end with the right name alone")
+    print(f"{good} of {len(names)} go from an alias set to the right name alone")
     return int(good < len(names))
 
 

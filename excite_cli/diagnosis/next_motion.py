@@ -134,10 +134,11 @@ def plan_after(diagnosis: Diagnosis, spec: Spec, folder: Path) -> NextMotion:
         said.insert(0, f"the next motion separates what the data cannot: {'; '.join(names)}")
         return NextMotion(wide, problem, prior, "separate", tuple(said))
     why = "no effect has an alias" if not pairs else "no alias can be separated by a motion"
+    count = len(problem.extension.effects)
+    beside = f" with its {count} effect{'s' if count > 1 else ''}" if count else ""
     said.insert(
         0,
-        f"{why}: the next motion excites the model with its {len(problem.extension.effects)} "
-        "effects, on top of the measured data",
+        f"{why}: the next motion excites the model{beside}, on top of the measured data",
     )
     return NextMotion(problem, problem, prior, "excite", tuple(said))
 

@@ -9,6 +9,7 @@ Whatever no such mistake explains is left to the diagnosis.
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.rearranged import (
@@ -23,13 +24,16 @@ from excite_cli.diagnosis.rearranged import (
     positions_changed,
     torques_changed,
 )
-from excite_cli.diagnosis.torque_shares import columns_of, samples_of, shares_left
+from excite_cli.diagnosis.torque_shares import Samples, columns_of, samples_of, shares_left
 from excite_cli.errors import FileError
 from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.prior import inertial_prior
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.regressor import standard_parameters
+from excite_cli.robot.rigid_body import RigidBody
 
 _SAMPLES = 600
 _GOOD = 0.1  # data that leave less than this on every joint are what they say they are
@@ -37,6 +41,9 @@ _WORSE = 0.3  # log of the share by which no joint may fit worse; or share of th
 _FITS = 0.6  # share that the joints concerned may have left, in the median
 # Exchanged wrists of wrong inertias may fit somewhat better: that is no evidence of an order.
 _ORDER_FITS = 0.35
+# How wrong inertias may be [share], how far beyond that a torque must be to be judged, and from how
+# many joints on most of them suffice.
+_UNCERTAIN, _BEYOND, _MANY = 0.3, 2.0, 3
 _FOREIGN = 0.85  # torques of which this is left have nothing to do with the motion
 
 
@@ -57,7 +64,8 @@ def check_plausibility(robot: Robot, runs: Sequence[PreparedRun]) -> None:
     if straight.left.max() < _GOOD:
         return
     tried = [*torques_changed(table), *positions_changed(dynamics, samples)]
-    found = [verdict for verdict in tried if _clearly_better(verdict, straight)]
+    decided = _decided(robot, samples)
+    found = [verdict for verdict in tried if _clearly_better(verdict, straight, decided)]
     if not found:
         if np.mean(straight.left > _FOREIGN) >= 0.5:
             raise FileError(_foreign(robot.joint_names, straight))
@@ -84,9 +92,26 @@ def check_dataset(robot: Robot, dataset: Dataset, spec: Spec) -> None:
     check_plausibility(robot, [prepare(run, processing) for run in dataset.runs])
 
 
-def _clearly_better(verdict: Verdict, straight: Verdict) -> bool:
+def _decided(robot: Robot, samples: Samples) -> NDArray[np.bool_]:
+    """Joints (n,) whose torque is more than inertias that are somewhat wrong could make of it.
+
+    A wrist that carries next to nothing may have its small torque turned round by a centre of mass
+    a few millimetres off; its sign says nothing.
+    """
+    cad = standard_parameters(robot)
+    std = inertial_prior(robot, cad, _UNCERTAIN).std
+    body = RigidBody(robot, cad, samples.q, samples.v, samples.a)
+    made_up = np.sqrt(np.mean(np.square(body.regressor) @ np.square(std), axis=0))
+    measured = np.sqrt(np.mean(np.square(samples.tau), axis=0))
+    return np.asarray(measured > _BEYOND * made_up)
+
+
+def _clearly_better(verdict: Verdict, straight: Verdict, decided: NDArray[np.bool_]) -> bool:
     """Whether a change gains enough on the joints it is about, and costs none of the others."""
     if not verdict.change.mistakes:
+        return False
+    sure = decided[verdict.change.touched]
+    if not (sure.all() if len(sure) < _MANY else sure.mean() > 0.5):
         return False
     gain = logs(straight.left) - logs(verdict.left)
     touched = verdict.change.touched

@@ -8,6 +8,7 @@ from excite_cli.effects.base import Effect, Signals
 
 # By how much a shape is changed up and down, pass after pass.
 _RATIOS = (1.35, 1.15, 1.06, 1.025, 1.01)
+_LEVELS = (1.05, 1.02, 1.008, 1.003, 1.001)  # of a cut-off level, which is seen directly
 _CYCLES = (0.35, 0.15, 0.06, 0.025, 0.01)  # of a ripple, over the travelled range
 _FIXED = ("power", "direction")
 
@@ -30,6 +31,7 @@ def shapes_around(effect: Effect, attempt: int, signals: Sequence[Signals]) -> l
             change = (_RATIOS[step] - 1.0) * max(width, 0.05)
             others = [value - change, value + change]
         else:
-            others = [value / _RATIOS[step], value * _RATIOS[step]]
+            ratio = (_LEVELS if name == "level" else _RATIOS)[step]
+            others = [value / ratio, value * ratio]
         found += [{**effect.shape, name: float(other)} for other in others]
     return found

@@ -53,7 +53,7 @@ FIRST = {
 _PARENT_PRICE = 4.5
 # Play is elasticity with a dead zone: of the two, one is named for a joint.
 EXCLUDES = {"backlash": "elasticity", "elasticity": "backlash"}
-_TRANSFER = 0.15  # least share of the gain on fitted runs that runs left out must have
+_TRANSFER = 0.06  # least share of the gain on fitted runs that runs left out must have
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
 _MOST_STEPS = 80
 _TRIED = 12  # best candidates whose gain on runs left out is looked at in a step

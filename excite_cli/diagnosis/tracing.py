@@ -209,7 +209,7 @@ def _one_pass(
     white = data.evidence(candidates, noise)
     inflation = inflation_of(data, candidates, usual, noise, white)
     rules = Rules(spec.significance, spec.gain, inflation)
-    search = Search(white, plain, candidates, rules, _sign_check(model, candidates))
+    search = Search(white, plain, candidates, rules, _sign_check(model, candidates, attempt < 2))
     chosen = search.run(most=spec.rounds)
     return Traced(
         data, tuple(candidates), noise, search, tuple(chosen), fit.phi, tuple(signals),
@@ -335,9 +335,12 @@ def _data(
 
 
 def _sign_check(
-    model: Model, candidates: Sequence[Candidate]
+    model: Model, candidates: Sequence[Candidate], early_pass: bool
 ) -> Callable[[Array, Sequence[int], Sequence[int]], bool]:
     """Vetoes sets in which an added parameter that cannot be negative is."""
+
+    # At first the torque above the level is itself fitted to cut data, and too small.
+    least, most = (_LEAST, _MOST) if not early_pass else (0.3 * _LEAST, 4.0 * _MOST)
 
     def allowed(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
         start = len(parameters) - sum(candidates[i].width for i in chosen)
@@ -352,7 +355,7 @@ def _sign_check(
                 if i in added and early:
                     return False
                 # Clipping takes away all that is above the level, play all of the load.
-                if i in added and effect.kind in _WHOLE and not _LEAST <= value <= _MOST:
+                if i in added and effect.kind in _WHOLE and not least <= value <= most:
                     return False
             start += len(effect.parameters)
         return True

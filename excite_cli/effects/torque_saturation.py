@@ -11,6 +11,7 @@ import numpy as np
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
 from excite_cli.robot.model import Array, Robot
 
+_MEASURED = (0.8, 0.9, 0.95, 0.97, 0.985, 0.995)  # of a cut torque, the last ones are the level
 _QUANTILES = (0.7, 0.8, 0.9, 0.95, 0.98)
 
 
@@ -31,6 +32,26 @@ class TorqueSaturation(Effect):
         if not seen:
             return []
         levels = np.unique(np.quantile(np.concatenate(seen), _QUANTILES))
+        return [{"level": float(level)} for level in levels if level > 0]
+
+    @classmethod
+    def tuned(
+        cls,
+        robot: Robot,
+        joints: tuple[int, ...],
+        signals: Sequence[Signals],
+        residuals: Sequence[Array],
+    ) -> list[dict]:
+        """Levels where measured torque crowds: the highest that it reaches, give or take."""
+        j = joints[0]
+        measured = [
+            np.abs(s.torque[:, j] + np.asarray(r)[:, j])
+            for s, r in zip(signals, residuals, strict=True)
+            if len(s.t)
+        ]
+        if not measured:
+            return []
+        levels = np.unique(np.quantile(np.concatenate(measured), _MEASURED))
         return [{"level": float(level)} for level in levels if level > 0]
 
     def columns(self, signals: Signals) -> Array:
