@@ -104,7 +104,7 @@ def _attempt(
     spec = of.spec.model_copy(update={"effects": _FRICTION if with_friction else ()})
     declared = declared_effects(spec.effects, of.robot)
     phi = true_inertias(of.robot, settings.inertia_error, settings.seed)
-    known = sized(of.robot, declared, motions, settings.seed)
+    known = sized(of.robot, declared, settings.seed)
     ground = ground_of(of.robot, phi, motions, known, settings.torque_noise)
     model = model_columns(of, declared, ground)
     planted = _planted(group, kind, of, ground, model, with_friction, rng)

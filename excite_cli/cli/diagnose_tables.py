@@ -171,8 +171,10 @@ def _error_table(found: Diagnosis, robot: Robot) -> Table:
 
 def _verdict(found: Diagnosis) -> str:
     low, high = found.after.interval
+    count = len(found.effects)
     return (
-        f"{len(found.effects)} effects; mean error {found.before.mean_relative_moving:.2%} → "
+        f"{count} effect{'' if count == 1 else 's'}; mean error "
+        f"{found.before.mean_relative_moving:.2%} → "
         f"{found.after.mean_relative_moving:.2%} where joints move (over all samples "
         f"{found.after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}). "
         f"{found.seconds:.1f} s."

@@ -319,6 +319,10 @@ class Search:
             chosen = better
         return chosen
 
+    def _root(self, candidate: int) -> bool:
+        """√|v|, which comes near any friction and so replaces none."""
+        return self.candidates[candidate].effect.shape.get("power") == 0.5
+
     def _best_replacement(self, chosen: list[int]) -> list[int] | None:
         """The set with the lowest J that differs in one member."""
         best, found = self.cost(chosen) - 1e-6, None
@@ -343,9 +347,10 @@ class Search:
                     break
                 trial = [*rest, *move]
                 cost = self.cost(trial)  # parents are cheaper than `saved` says
+                refined = len(move) == 1 and i in self.parents[move[0]]
                 if (
                     cost < best
-                    and self._in_order(schur, rest, move)
+                    and ((refined and not self._root(move[0])) or self._in_order(schur, rest, move))
                     and self.allowed(self.plain.solve(trial), trial, move)
                 ):
                     best, found = cost, trial

@@ -8,18 +8,17 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.regressor import standard_parameters
 from excite_cli.robot.rigid_body import RigidBody
-from excite_cli.simulation.motion import PlannedMotion
 from excite_cli.simulation.planted import Planted
 
 _SHARE = (0.03, 0.10)  # of the joint's torque RMS, per parameter
-_SAMPLES = 200
+_SAMPLES, _STATES = 200, 7  # random states, and their seed
 _LEAST = 1e-3  # of the largest joint's torque RMS
 
 
-def sized(
-    robot: Robot, effects: Sequence[Effect], motions: Sequence[PlannedMotion], seed: int
-) -> tuple[Planted, ...]:
-    """Each effect with values that give 3–10 % of the joint's torque RMS on these motions.
+def sized(robot: Robot, effects: Sequence[Effect], seed: int) -> tuple[Planted, ...]:
+    """Each effect with values that give 3–10 % of the joint's torque RMS on brisk random states.
+
+    They depend on the robot and the seed alone: the same robot plays every motion.
 
     Kinds that act on the whole robot, and defects of the data, take a twentieth of the upper end
     of their usual range.
@@ -27,8 +26,8 @@ def sized(
     if not effects:
         return ()
     rng = np.random.default_rng([seed, 1])
-    signals = [_signals(robot, motion) for motion in motions]
-    load = np.sqrt(np.mean(np.concatenate([s.load for s in signals]) ** 2, axis=0))
+    signals = _signals(robot)
+    load = np.sqrt(np.mean(signals.load**2, axis=0))
     load = np.maximum(load, _LEAST * load.max() + 1e-9)
     planted = []
     for effect in effects:
@@ -49,14 +48,14 @@ def sized(
     return tuple(planted)
 
 
-def _per_unit(effect: Effect, signals: Sequence[Signals]) -> Array:
+def _per_unit(effect: Effect, signals: Signals) -> Array:
     """RMS of each column over all rows the effect touches (P,)."""
-    columns = np.concatenate([effect.columns(s) for s in signals])
-    return np.sqrt(np.mean(columns**2, axis=(0, 1)))
+    return np.asarray(np.sqrt(np.mean(effect.columns(signals) ** 2, axis=(0, 1))))
 
 
-def _signals(robot: Robot, motion: PlannedMotion) -> Signals:
-    t = np.linspace(0.0, motion.trajectory.duration, _SAMPLES)
-    q, v, a = motion.states(t)
+def _signals(robot: Robot) -> Signals:
+    q, v, a = robot.draw_states(_SAMPLES, _STATES)
+    v, a = 0.5 * v, 0.3 * a
+    t = np.linspace(0.0, 1.0, _SAMPLES)
     body = RigidBody(robot, standard_parameters(robot), q, v, a)
-    return Signals(t, q, v, a, body.load, body.load, body, motion.name)
+    return Signals(t, q, v, a, body.load, body.load, body)

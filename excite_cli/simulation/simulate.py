@@ -83,7 +83,7 @@ def simulate(
     if settings.periods > 1 and not all(motion.periodic for motion in motions):
         raise ConfigError("periods: only periodic motions (family: fourier) can go on.")
     phi = true_inertias(robot, settings.inertia_error, settings.seed)
-    planted = (*sized(robot, declared, motions, settings.seed), *effects)
+    planted = (*sized(robot, declared, settings.seed), *effects)
     runs: list[Run] = []
     tracking: dict[str, Array] = {}
     with silent_engine():
@@ -124,15 +124,17 @@ def _takes(
             gains = gains_of(build, plant, reference, settings.bandwidth)
             followed = compensated(build, reference, settings.compensation)
             played[active] = play(build, plant, followed, gains)
-        rng = np.random.default_rng([settings.seed, 2, _number(name)])
+        # Noise of its own for every run and motion, in this file and in others of the same robot.
+        numbers = [settings.seed, 2, _number(name.encode()), _number(motion.coefficients.tobytes())]
+        rng = np.random.default_rng(numbers)
         run = record(build, played[active], duration, settings, rng)
         run = replace(run, extra={"q_ref": motion.states(run.t)[0]})
         yield run, _tracking_error(reference, played[active], duration)
 
 
-def _number(name: str) -> int:
-    """A number of the run's name, so that its noise does not depend on the other runs."""
-    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:4], "big")
+def _number(data: bytes) -> int:
+    """A number of the run, so that its noise does not depend on the other runs."""
+    return int.from_bytes(hashlib.sha256(data).digest()[:4], "big")
 
 
 def _tracking_error(reference: Reference, played: Played, duration: float) -> Array:
