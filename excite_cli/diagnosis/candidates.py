@@ -13,6 +13,8 @@ from excite_cli.errors import ConfigError
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array, Robot
 
+_TOUCH = 0.1  # s: what is shorter is a blow or a fault of the record, and no contact
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -110,7 +112,8 @@ def _in_runs(
         own = [i for i, s in enumerate(signals) if s.run == run]
         shapes = kind.tuned(robot, place, [signals[i] for i in own], [residuals[i] for i in own])
         if kind.shapes or len(runs) > 1:
-            found += [kind(place, shape, (run,)) for shape in shapes]
+            long = [s for s in shapes if s.get("end", np.inf) - s.get("start", 0.0) > _TOUCH]
+            found += [kind(place, shape, (run,)) for shape in long]
     if not kind.shapes:
         later = [tuple(runs[i:]) for i in range(1, len(runs) - 1)]
         some = [

@@ -105,6 +105,10 @@ def plan_after(diagnosis: Diagnosis, spec: Spec, folder: Path) -> NextMotion:
     if not (np.all(np.isfinite(noise)) and np.all(noise > 0)):
         raise FileError("--after: the diagnosis has no noise level for every joint; make it anew.")
     weights = {j: float(1.0 / x) for j, x in zip(diagnosis.joint_names, noise, strict=True)}
+    weighting: dict[str, Any] = {"row_weights": weights}
+    if spec.criterion.column_scaling == "none":
+        # Rows in units of their noise differ by powers of ten; columns must not.
+        weighting["column_scaling"] = "unit_norm"
     robot = build_robot(spec.robot, folder)
     _check_robot(diagnosis, robot)
     model = [effect_of(record, robot.joint_names) for record in diagnosis.information.model]
@@ -113,7 +117,7 @@ def plan_after(diagnosis: Diagnosis, spec: Spec, folder: Path) -> NextMotion:
         spec.model_copy(
             update={
                 "effects": tuple(_spec_of(effect, robot) for effect in planned),
-                "criterion": spec.criterion.model_copy(update={"row_weights": weights}),
+                "criterion": spec.criterion.model_copy(update=weighting),
             }
         ),
         folder,

@@ -111,7 +111,7 @@ def _clearly_better(verdict: Verdict, straight: Verdict, decided: NDArray[np.boo
     if not verdict.change.mistakes:
         return False
     sure = decided[verdict.change.touched]
-    if not (sure.all() if len(sure) < _MANY else sure.mean() > 0.5):
+    if not (sure.all() if len(sure) < _MANY else sure.mean() >= 0.5):
         return False
     gain = logs(straight.left) - logs(verdict.left)
     touched = verdict.change.touched

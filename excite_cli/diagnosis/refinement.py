@@ -6,16 +6,15 @@ import numpy as np
 
 from excite_cli.effects.base import Effect, Signals
 
-# By how much a shape is changed up and down, pass after pass.
-_RATIOS = (1.35, 1.15, 1.06, 1.025, 1.01)
+# By how much a shape is changed up and down; passes repeat it from the best one.
+_RATIOS = (1.35, 1.15, 1.06, 1.02)
 _LEVELS = (1.05, 1.02, 1.008, 1.003, 1.001)  # of a cut-off level, which is seen directly
-_CYCLES = (0.35, 0.15, 0.06, 0.025, 0.01)  # of a ripple, over the travelled range
+_CYCLES = (0.35, 0.15, 0.06, 0.02, 0.006)  # of a ripple, over the travelled range
 _FIXED = ("power", "direction")
 
 
-def shapes_around(effect: Effect, attempt: int, signals: Sequence[Signals]) -> list[dict]:
-    """The effect's shape and neighbours of it, one parameter changed at a time."""
-    step = min(attempt, len(_RATIOS) - 1)
+def shapes_around(effect: Effect, signals: Sequence[Signals]) -> list[dict]:
+    """The effect's shape and neighbours of it, far and near, one parameter changed at a time."""
     found = [dict(effect.shape)]
     for name, value in effect.shape.items():
         if name in _FIXED:
@@ -24,14 +23,16 @@ def shapes_around(effect: Effect, attempt: int, signals: Sequence[Signals]) -> l
             j = effect.joints[0]
             low = min(float(s.q[:, j].min()) for s in signals)
             high = max(float(s.q[:, j].max()) for s in signals)
-            change = 2 * np.pi * _CYCLES[step] / max(high - low, 1e-6)
-            others = [value - change, value + change]
+            changes = [2 * np.pi * cycles / max(high - low, 1e-6) for cycles in _CYCLES]
         elif name in ("start", "end"):
-            width = abs(effect.shape["end"] - effect.shape["start"])
-            change = (_RATIOS[step] - 1.0) * max(width, 0.05)
-            others = [value - change, value + change]
+            width = max(abs(effect.shape["end"] - effect.shape["start"]), 0.05)
+            changes = [(ratio - 1.0) * width for ratio in _RATIOS]
         else:
-            ratio = (_LEVELS if name == "level" else _RATIOS)[step]
-            others = [value / ratio, value * ratio]
-        found += [{**effect.shape, name: float(other)} for other in others]
+            ratios = _LEVELS if name == "level" else _RATIOS
+            changes = [(ratio - 1.0) * value for ratio in ratios]
+        found += [
+            {**effect.shape, name: float(value + sign * change)}
+            for change in changes
+            for sign in (-1.0, 1.0)
+        ]
     return found

@@ -36,7 +36,7 @@ _UNUSUAL_DEFAULT = 4.0
 # The order in which kinds are asked for: what every robot has, what many have, the rest. A later
 # kind may still replace an earlier one.
 _FIRST_TIER = ("viscous_friction", "coulomb_friction")
-_LAST_TIER = (
+LAST_TIER = (
     "ripple", "contact", "friction_drift", "cable_force", "elasticity", "backlash",
     "torque_saturation", "asymmetric_friction",
 )  # fmt: skip
@@ -104,7 +104,7 @@ class Search:
         key = (max(dof, 1), c.tests)
         if key not in self._thresholds:
             self._thresholds[key] = float(chi2.isf(self.rules.significance / c.tests, key[0]))
-        return self.rules.inflation * (self._thresholds[key] + unusual)
+        return self.rules.inflation * self._thresholds[key] + unusual
 
     def _prices(self, chosen: Sequence[int]) -> float:
         """Price of a set: parents of members are cheap."""
@@ -215,7 +215,7 @@ class Search:
     def tier(self, candidate: int) -> int:
         """When its kind is asked for."""
         kind = self.candidates[candidate].effect.kind
-        return 1 if kind in _FIRST_TIER else 3 if kind in _LAST_TIER else 2
+        return 1 if kind in _FIRST_TIER else 3 if kind in LAST_TIER else 2
 
     def _forward(self, chosen: list[int], tier: int) -> list[int]:
         """Add candidates up to `tier` while one (or two of a joint) passes."""

@@ -138,9 +138,12 @@ def test_declared_effects_are_there_in_plausible_sizes(robot: Robot) -> None:
     assert [p.declared for p in simulation.truth.effects] == [True] * 3
     assert all(p.values[0] > 0 for p in simulation.truth.effects)
     share = rms(beyond_rigid(robot, simulation)) / rms(simulation.dataset.runs[0].tau)
-    assert 0.02 < share[ELBOW] < 0.25
-    assert 0.02 < share[0] < 0.25
+    assert 0.003 < share[ELBOW] < 0.3
+    assert 0.003 < share[0] < 0.3
     assert share[1] < 1e-3
+    slow = replace(motion(robot), coefficients=0.5 * motion(robot).coefficients)
+    other = simulate(robot, [slow], IDEAL, (), declared)
+    assert [p.values for p in other.truth.effects] == [p.values for p in simulation.truth.effects]
 
 
 def test_motors_stop_at_their_limits_if_asked(robot: Robot) -> None:
