@@ -6,6 +6,11 @@ A slow motion is played three times on a simulated robot that has a small effect
 names an effect together with others that the data cannot tell from it. `optimize --after` plans
 the motion that tells them apart, the same robot plays it once, and both files are diagnosed
 together, an old take sealed. Divergences are in nats: 3 is where two effects count as told apart.
+
+Over the seeds 1 to 5 of `simulate` (the sizes were chosen so that the first data leave it open):
+nonlinear: 5 of 5 start with an alias set that holds the truth, or the truth named; 5 of 5 settled.
+coulomb: 4 of 5 start so (seed 1 is named right at once); 4 of 4 settled.
+panda: 5 of 5 start so; 4 of 5 settled (seed 1: right name, a new alias, stribeck_friction).
 """
 
 import json
@@ -30,42 +35,29 @@ _BRIEF = ("optimizer.restarts=1", "optimizer.max_iterations=60")
 class Case:
     """A robot, the effect that is put into it, and how its first motion is held back.
 
-    `truth` as `simulate --effect` takes it; `known`: effects of the robot that its model declares;
-    `kind` and `joint` are the right answer.
+    `truth` as `simulate --effect` takes it; `kind` and `joint` are the right answer. Friction that
+    the robot's model declares is there besides, in sizes of its own.
     """
 
     config: str
     truth: str
     kind: str
     joint: str
-    known: tuple[str, ...] = ()
     slow: tuple[str, ...] = ("constraints.joint_limits.scale=0.15",)
     simulated: tuple[str, ...] = ("--torque-noise", "0.03", "--seed", "2")
 
 
-_SLOWER = ("constraints.joint_limits.scale=0.1",)
-_PANDA_NOISE = ("--torque-noise", "0.02", "--seed", "2")
-# The Panda's URDF declares viscous friction; the robot has it in sizes of its own, the same in
-# both simulations (`simulate` would size them by the motion).
-_PANDA_OWN = tuple(
-    f"viscous_friction@panda_joint{j}={value}"
-    for j, value in enumerate((0.3, 3.0, 2.5, 2.0, 0.4, 0.4, 0.1), 1)
-)
-
 CASES = {
-    "viscous": Case(
-        "smoke.yaml", "viscous_friction@elbow=0.06", "viscous_friction", "elbow"
-    ),
     "nonlinear": Case(
-        "smoke.yaml", "nonlinear_viscous_friction@elbow=0.2,power:2",
-        "nonlinear_viscous_friction", "elbow",
+        "smoke.yaml", "nonlinear_viscous_friction@elbow=0.12,power:2",
+        "nonlinear_viscous_friction", "elbow", simulated=("--torque-noise", "0.03", "--seed", "1"),
     ),
-    "load": Case(
-        "smoke.yaml", "load_dependent_friction@elbow=0.005", "load_dependent_friction", "elbow"
+    "coulomb": Case(
+        "smoke.yaml", "coulomb_friction@elbow=0.05", "coulomb_friction", "elbow"
     ),
     "panda": Case(
-        "panda.yaml", "coulomb_friction@panda_joint4=0.07", "coulomb_friction", "panda_joint4",
-        _PANDA_OWN, _SLOWER, _PANDA_NOISE,
+        "panda.yaml", "coulomb_friction@panda_joint4=0.1", "coulomb_friction", "panda_joint4",
+        ("constraints.joint_limits.scale=0.1",), ("--torque-noise", "0.02", "--seed", "2"),
     ),
 }  # fmt: skip
 
@@ -115,8 +107,7 @@ def run_loop(case: Case, folder: Path) -> Outcome:
     """The whole loop in `folder`."""
     excite, config = Program(folder), ROOT / "configs" / case.config
     brief = _given("--set", _BRIEF)
-    simulated = [*_given("--effect", (*case.known, case.truth)), *case.simulated]
-    simulated += ["--no-declared"] if case.known else []
+    simulated = ["--effect", case.truth, *case.simulated]
     seconds: dict[str, float] = {}
 
     def timed(name: str, *arguments: str | Path) -> Any:

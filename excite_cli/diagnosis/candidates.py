@@ -11,6 +11,7 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError
 from excite_cli.identification.prepare import PreparedRun
+from excite_cli.identification.processing import DEFAULT_MOVING
 from excite_cli.robot.model import Array, Robot
 
 _TOUCH = 0.1  # s: what is shorter is a blow or a fault of the record, and no contact
@@ -87,7 +88,13 @@ def possible_effects(
             if known_place[0] == name:
                 kept = [e for e in effects if (e.kind, e.joints, e.runs) != known_place]
                 effects = kept + [kind(known_place[1], shape, known_place[2]) for shape in near]
-        found += [(effect, count) for effect in effects]
+        slowest = spec.moving_speed or DEFAULT_MOVING
+        found += [
+            (effect, count)
+            for effect in effects
+            # Below the speed at which a joint counts as moving, samples are left out.
+            if effect.shape.get("stribeck_speed", np.inf) >= slowest
+        ]
     if not found:
         raise ConfigError("diagnosis: every effect to be looked for is declared or excluded.")
     return found

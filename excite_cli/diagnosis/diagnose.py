@@ -22,6 +22,7 @@ from excite_cli.diagnosis.result import (
     Information,
     NamedEffect,
 )
+from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.rounds import rounds_of
 from excite_cli.diagnosis.tracing import Model, Traced, full_inertias, run_name, trace
 from excite_cli.diagnosis.training import KeptInertias
@@ -78,7 +79,7 @@ def diagnose(
     names = [run.name for run in dataset.runs]
     traced = trace(model, spec.diagnosis, prepared, parts.folds, names, progress)
     progress("naming", 8)
-    parameters = traced.search.plain.solve(traced.chosen)
+    parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
     named, rivals = _named(model, traced, parameters, processing)
     before, after = _errors(model, traced, parameters, parts, processing)
     rules = traced.search.rules
@@ -199,7 +200,7 @@ def _errors(
     """Before (the declared model refitted) and after, on the sealed part, once."""
     sealed: list[PreparedRun] = [prepare(run, processing) for run in parts.sealed]
     names = [run_name(run.name) for run in parts.sealed]
-    declared = traced.search.plain.solve(())
+    declared = robust_solve(traced.data, traced.candidates, (), traced.levels)
     width = sum(len(e.parameters) for e in model.declared)
 
     def judge(x: Array, effects: tuple[Effect, ...], count: int) -> Errors:

@@ -25,10 +25,12 @@ UNUSUAL = {
     "torque_offset": 1.0,
     "load_dependent_friction": 1.0,
     "armature": 1.0,
-    "spring": 1.0,
+    "spring": 12.0,  # else a constant is called a preloaded spring as soon as noise bends it
     "coupled_friction": 3.0,
     "nonlinear_viscous_friction": 2.0,
     "asymmetric_friction": 4.0,
+    "contact": 60.0,  # three forces in a window of one's choice explain any event a little
+    "cable_force": 25.0,  # three smooth functions of two angles come near an offset or a spring
     "friction_drift": 15.0,  # within the seconds of a run, friction hardly warms up
     "stribeck_friction": 2.0,
 }
@@ -285,6 +287,11 @@ class Search:
                 return pair
         return ()
 
+    @staticmethod
+    def _together(one: str, other: str) -> bool:
+        """Whether two kinds may be named for one joint."""
+        return one != other and EXCLUDES.get(one) != other
+
     def _pairs(self, schur: Schur, free: Sequence[int]) -> list[tuple[float, tuple[int, int]]]:
         """What promising pairs of local candidates of one joint, of different kinds, save."""
         found = []
@@ -299,7 +306,7 @@ class Search:
                 (a, b)
                 for k, a in enumerate(own)
                 for b in own[k + 1 :]
-                if self.candidates[a].effect.kind != self.candidates[b].effect.kind
+                if self._together(self.candidates[a].effect.kind, self.candidates[b].effect.kind)
             ]
             if not pairs:
                 continue

@@ -39,6 +39,10 @@ _USUAL = (
     "base_tilt", "encoder_offset", "payload",
 )  # fmt: skip
 
+_BOUNDED = (
+    "encoder_offset", "torque_delay", "base_tilt", "torque_gain",
+)  # fmt: skip
+_BEYOND = 1.0  # times the upper end of the usual range
 _OBVIOUS, _PLAIN_TO_SEE = 8, 0.1
 # What `split` adds to the name of a run for a part of it.
 _PART = re.compile(r" (?:[^ ]+-[^ ]+ s|\((?:first|second) half\))$")
@@ -377,6 +381,10 @@ def _sign_check(
             for k, parameter in enumerate(effect.parameters):
                 value = parameters[start + k]
                 if i in added and parameter.nonnegative and value < 0:
+                    return False
+                # Sizes that do not depend on the robot's have limits: no encoder is 12° off.
+                huge = effect.kind in _BOUNDED and abs(value) > _BEYOND * parameter.high
+                if i in added and huge:
                     return False
                 # Torque of one joint cannot come before its cause.
                 early = effect.kind == "torque_delay" and len(effect.joints) == 1 and value < 0
