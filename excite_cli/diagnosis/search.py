@@ -55,6 +55,8 @@ FIRST = {
 _PARENT_PRICE = 4.5
 # Play is elasticity with a dead zone: of the two, one is named for a joint.
 EXCLUDES = {"backlash": "elasticity", "elasticity": "backlash"}
+COHERENT = ("base_tilt", "encoder_offset")
+_FIRST_ORDER = 2e-3  # of their energy: what is left beside them may be their second order
 _TRANSFER = 0.06  # least share of the gain on fitted runs that runs left out must have
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
 _MOST_STEPS = 80
@@ -181,6 +183,30 @@ class Search:
             largest = max(largest, (before - after) / max(whole, 1e-300))
         return float(np.sqrt(largest))
 
+    def _leftover(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """Whether `added` is no more than the error of a coherent effect's linear form.
+
+        Columns of a tilt or an encoder's zero are first order; what they leave of a large one
+        looks like other effects on the same joints.
+        """
+        for joint in sorted({j for i in added for j in self.white.rows_of[i]}):
+            coherent = [
+                k
+                for k in chosen
+                if self.candidates[k].effect.kind in COHERENT and joint in self.white.rows_of[k]
+            ]
+            if not coherent:
+                return False
+            after = self.plain.energy_on([*chosen, *added], [joint])
+            own = self.plain.energy_on(chosen, [joint]) - after
+            theirs = max(
+                self.plain.energy_on([c for c in [*chosen, *added] if c != k], [joint]) - after
+                for k in coherent
+            )
+            if own > _FIRST_ORDER * theirs:
+                return False
+        return True
+
     def run(self, most: int = _MOST_STEPS) -> list[int]:
         """Search from the declared model until no step lowers J, or `most` effects are in."""
         chosen: list[int] = []
@@ -257,6 +283,8 @@ class Search:
             return "impossible sign"
         if self.size(chosen, added) < _SMALLEST:
             return "too small to matter"
+        if self._leftover(chosen, added):
+            return "what a coherent effect leaves"
         if not self._generalises(chosen, added):
             return "no gain on runs left out"
         return "accepted"
@@ -389,4 +417,5 @@ class Search:
             or not right_sign
             or self.left_out_gain(rest, [i]) < self.rules.gain
             or self.size(rest, [i]) < _SMALLEST
+            or self._leftover(rest, [i])
         )

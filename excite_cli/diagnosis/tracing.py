@@ -43,6 +43,7 @@ _BOUNDED = (
     "encoder_offset", "torque_delay", "base_tilt", "torque_gain",
 )  # fmt: skip
 _BEYOND = 1.0  # times the upper end of the usual range
+_SHORTEST_DELAY = 1.5e-3  # s, of one joint alone: less is friction that lags a little
 _OBVIOUS, _PLAIN_TO_SEE = 8, 0.1
 # What `split` adds to the name of a run for a part of it.
 _PART = re.compile(r" (?:[^ ]+-[^ ]+ s|\((?:first|second) half\))$")
@@ -386,9 +387,9 @@ def _sign_check(
                 huge = effect.kind in _BOUNDED and abs(value) > _BEYOND * parameter.high
                 if i in added and huge:
                     return False
-                # Torque of one joint cannot come before its cause.
-                early = effect.kind == "torque_delay" and len(effect.joints) == 1 and value < 0
-                if i in added and early:
+                # Torque of one joint cannot come before its cause, nor a moment after it.
+                delay = effect.kind == "torque_delay" and len(effect.joints) == 1
+                if i in added and delay and value < _SHORTEST_DELAY:
                     return False
                 # Clipping takes away all that is above the level, play all of the load.
                 if i in added and effect.kind in _WHOLE and not least <= value <= most:

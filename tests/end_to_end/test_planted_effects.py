@@ -1,0 +1,50 @@
+"""Effects planted in MuJoCo robots are named: fast representatives of the battery.
+
+The cases come from a development seed; `python -m benchmarks.diagnosis_battery` judges on others.
+"""
+
+import pytest
+from threadpoolctl import threadpool_limits
+
+from benchmarks.battery.judge import Outcome, judge
+
+pytest.importorskip("mujoco")
+
+SEED = 12
+# (case, what is planted): kinds that go different ways through simulation and search.
+PLANTED = {
+    1: "armature",
+    2: "ripple",
+    6: "base_tilt",
+    10: "load_dependent_friction",
+    12: "elasticity",
+    19: "contact",
+}
+CLEAN = (7, 8)
+
+
+def outcome(index: int) -> Outcome:
+    with threadpool_limits(1):
+        return judge(SEED, index).outcome
+
+
+@pytest.mark.parametrize("index", PLANTED)
+def test_what_was_planted_is_named_and_nothing_else(index: int) -> None:
+    found = outcome(index)
+    assert [p["kind"] for p in found.planted] == [PLANTED[index]]
+    assert found.right, found.found
+    assert not found.wrong, found.found
+    assert found.ratio < 1.1  # of the error of the fit that knows the truth
+
+
+@pytest.mark.parametrize("index", CLEAN)
+def test_nothing_is_named_where_nothing_is_missing(index: int) -> None:
+    found = outcome(index)
+    assert found.planted == []
+    assert found.found == []
+
+
+def test_what_has_no_name_gets_none() -> None:
+    found = outcome(3)  # friction that depends on the position
+    assert not found.wrong, found.found
+    assert found.unexplained
