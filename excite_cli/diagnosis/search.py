@@ -57,6 +57,7 @@ _PARENT_PRICE = 4.5
 EXCLUDES = {"backlash": "elasticity", "elasticity": "backlash"}
 COHERENT = ("base_tilt", "encoder_offset")
 _FIRST_ORDER = 2e-3  # of their energy: what is left beside them may be their second order
+_FAR_MORE = 0.15  # of the error on runs left out: more than noise makes of it
 _TRANSFER = 0.06  # least share of the gain on fitted runs that runs left out must have
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
 _MOST_STEPS = 80
@@ -269,12 +270,22 @@ class Search:
         schur = self.white.schur(chosen)
         free = [i for i in self._free(chosen, tier) if schur.singles[i].dof]
         saved = {i: schur.singles[i].chi2 - self.price(i, schur.singles[i].dof) for i in free}
+        best: int | None = None
         for i in sorted(free, key=lambda i: -saved[i])[:_TRIED]:
             if saved[i] <= 0:
                 break
+            if best is not None and not self._carries_more(chosen, i, best):
+                continue
             if self._in_order(schur, chosen, [i]) and self.verdict(chosen, [i]) == "accepted":
-                return (i,)
-        return ()
+                best = i
+        return () if best is None else (best,)
+
+    def _carries_more(self, chosen: Sequence[int], one: int, other: int) -> bool:
+        """Whether `one` says far more than `other` about the same joints on runs left out."""
+        if not set(self.white.rows_of[one]) & set(self.white.rows_of[other]):
+            return False
+        gains = [self.left_out_gain(chosen, [i]) for i in (one, other)]
+        return gains[0] > gains[1] + _FAR_MORE
 
     def verdict(self, chosen: Sequence[int], added: Sequence[int]) -> str:
         """`accepted`, or why `added` may not join the chosen ones."""
@@ -354,6 +365,11 @@ class Search:
             chosen = better
         return chosen
 
+    def _loses(self, rest: Sequence[int], member: int, move: Sequence[int]) -> bool:
+        """Whether runs left out would lose by the replacement what they gained by the member."""
+        before = self.left_out_gain(rest, [member])
+        return self.left_out_gain(rest, move) < before - _FAR_MORE
+
     def _root(self, candidate: int) -> bool:
         """√|v|, which comes near any friction and so replaces none."""
         return self.candidates[candidate].effect.shape.get("power") == 0.5
@@ -382,6 +398,8 @@ class Search:
                     break
                 trial = [*rest, *move]
                 cost = self.cost(trial)  # parents are cheaper than `saved` says
+                if cost < best and self._loses(rest, i, move):
+                    continue
                 refined = len(move) == 1 and i in self.parents[move[0]]
                 if (
                     cost < best
