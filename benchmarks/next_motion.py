@@ -173,7 +173,7 @@ def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> floa
     model = Model(robot, find_base_parameters(robot), declared_effects(spec.effects, robot), None)
     names = [run.name for run in data.runs]
     traced = trace(model, spec.diagnosis, prepared, parts.folds, names, lambda text, done: None)
-    alone = traced.search.white.schur(()).singles
+    alone = traced.judge.white.schur(()).singles
     best = {
         kind: max(
             alone[i].chi2

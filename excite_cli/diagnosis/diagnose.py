@@ -14,6 +14,8 @@ from excite_cli.diagnosis.aliases import Alias, aliases_of
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.friction_line import friction_lines
+from excite_cli.diagnosis.model import KeptInertias, Model, width_of
+from excite_cli.diagnosis.modelled_run import run_name
 from excite_cli.diagnosis.plausibility import check_plausibility
 from excite_cli.diagnosis.prediction import errors_on
 from excite_cli.diagnosis.result import (
@@ -24,8 +26,7 @@ from excite_cli.diagnosis.result import (
 )
 from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.rounds import rounds_of
-from excite_cli.diagnosis.tracing import Model, Traced, full_inertias, run_name, trace
-from excite_cli.diagnosis.training import KeptInertias
+from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.uncertainty import covariance_of
 from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.effects.base import Effect
@@ -80,14 +81,17 @@ def diagnose(
     traced = trace(model, spec.diagnosis, prepared, parts.folds, names, progress)
     progress("naming", 8)
     parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
-    named, rivals = _named(model, traced, parameters, processing)
+    covariance = covariance_of(
+        traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
+    )
+    named, rivals = _named(model, traced, parameters, covariance)
     before, after = _errors(model, traced, parameters, parts, processing)
-    rules = traced.search.rules
+    rules = traced.judge.rules
     unexplained = unexplained_structure(
         traced.data, traced.candidates, traced.chosen, traced.signals, traced.noise,
         (rules.significance, rules.gain, rules.inflation), robot.joint_names,
     )  # fmt: skip
-    base_values, base_std = _base_parameters(model, traced, parameters)
+    base_values, base_std = _base_parameters(model, parameters, covariance)
     return Diagnosis(
         config="",
         config_folder="",
@@ -98,7 +102,7 @@ def diagnose(
         effects=named,
         absorbed=tuple(
             absorbed_effects(
-                traced.search.white, traced.candidates, _column_names(model),
+                traced.judge.white, traced.candidates, _column_names(model),
                 robot.joint_names, traced.chosen,
             )
         ),
@@ -109,7 +113,7 @@ def diagnose(
         rounds=rounds_of(traced, robot.joint_names),
         findings=(*dataset.findings, *_assumed(traced, parts)),
         processing=_choices(processing, traced, training),
-        phi=full_inertias(model, parameters),
+        phi=model.full_inertias(parameters),
         base_values=base_values,
         base_std=base_std,
         information=_information(model, traced, rivals),
@@ -137,13 +141,10 @@ def _column_names(model: Model) -> list[str]:
 
 
 def _named(
-    model: Model, traced: Traced, parameters: Array, processing: Processing
+    model: Model, traced: Traced, parameters: Array, covariance: Array
 ) -> tuple[tuple[NamedEffect, ...], list[tuple[Alias, Array]]]:
     """Named effects with values, evidence and aliases; and the aliases with their own values."""
-    search, names = traced.search, model.robot.joint_names
-    covariance = covariance_of(
-        traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
-    )
+    judge, names = traced.judge, model.robot.joint_names
     start = len(parameters) - sum(traced.candidates[i].width for i in traced.chosen)
     transform = friction_lines(traced, start)
     shown, spread = transform @ parameters, transform @ covariance @ transform.T
@@ -156,24 +157,24 @@ def _named(
         c = traced.candidates[i]
         own = slice(at, at + c.width)
         at += c.width
-        rest = search.without(i, traced.chosen)
-        gain = search.white.schur(rest).gain(i, absorbed=SHARED)
+        rest = judge.without(i, traced.chosen)
+        gain = judge.white.schur(rest).gain(i, absorbed=SHARED)
         joints = list(c.rows)
-        whole = search.plain.energy_on((), joints)
+        whole = judge.plain.energy_on((), joints)
         share = (
-            search.plain.energy_on(rest, joints) - search.plain.energy_on([*rest, i], joints)
+            judge.plain.energy_on(rest, joints) - judge.plain.energy_on([*rest, i], joints)
         ) / max(whole, 1e-300)
 
         def possible(others: Sequence[int], d: int) -> bool:
             together = [*others, d]
-            return search.allowed(search.plain.solve(together), together, [d])
+            return judge.allowed(judge.plain.solve(together), together, [d])
 
         aliases = aliases_of(
-            i, rest, taken, traced.candidates, search.white, traced.inflation, possible
+            i, rest, taken, traced.candidates, judge.white, traced.inflation, possible
         )
         records = []
         for alias in aliases:
-            values = search.plain.solve([*rest, alias.candidate])
+            values = judge.plain.solve([*rest, alias.candidate])
             width = traced.candidates[alias.candidate].width
             rivals.append((alias, values[-width:]))
             records.append(
@@ -184,9 +185,9 @@ def _named(
             NamedEffect(
                 effect=record_of(c.effect, names, parameters[own]),
                 parameters=c.effect.report(shown[own], spread[own, own]),
-                p_value=search.p_value(i, gain),
+                p_value=judge.p_value(i, gain),
                 share_of_residual=float(np.clip(share, 0.0, 1.0)),
-                gain=float(search.left_out_gain(rest, [i])),
+                gain=float(judge.left_out_gain(rest, [i])),
                 aliases=tuple(records),
             )
         )
@@ -201,30 +202,27 @@ def _errors(
     sealed: list[PreparedRun] = [prepare(run, processing) for run in parts.sealed]
     names = [run_name(run.name) for run in parts.sealed]
     declared = robust_solve(traced.data, traced.candidates, (), traced.levels)
-    width = sum(len(e.parameters) for e in model.declared)
+    width = model.declared_width
 
     def judge(x: Array, effects: tuple[Effect, ...], count: int) -> Errors:
         values = x[len(x) - count :] if count else np.zeros(0)
-        return errors_on(model.robot, full_inertias(model, x), effects, values, sealed, names)
+        return errors_on(model.robot, model.full_inertias(x), effects, values, sealed, names)
 
-    found = sum(len(e.parameters) for e in traced.effects)
+    found = width_of(traced.effects)
     return (
         judge(declared, model.declared, width),
         judge(parameters, (*model.declared, *traced.effects), width + found),
     )
 
 
-def _base_parameters(model: Model, traced: Traced, parameters: Array) -> tuple[Array, Array]:
-    covariance = covariance_of(
-        traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
-    )
+def _base_parameters(model: Model, parameters: Array, covariance: Array) -> tuple[Array, Array]:
     rank = model.base.rank
     if model.prior is None:
         return parameters[:rank], np.sqrt(np.maximum(np.diag(covariance)[:rank], 0.0))
     mapping = model.base.mapping
     count = mapping.shape[1]
     spread = mapping @ covariance[:count, :count] @ mapping.T
-    phi = full_inertias(model, parameters)
+    phi = model.full_inertias(parameters)
     return mapping @ phi, np.sqrt(np.maximum(np.diag(spread), 0.0))
 
 
@@ -248,9 +246,8 @@ def _information(model: Model, traced: Traced, rivals: list[tuple[Alias, Array]]
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     unit = gram / np.outer(scale, scale)
     unit[np.diag_indices(len(unit))] += 1e-12
-    parameters = traced.search.plain.solve(traced.chosen)
-    declared_width = sum(len(e.parameters) for e in model.declared)
-    at = len(parameters) - sum(c.width for c in pool[: len(traced.chosen)]) - declared_width
+    parameters = traced.judge.plain.solve(traced.chosen)
+    at = len(parameters) - sum(c.width for c in pool[: len(traced.chosen)]) - model.declared_width
     records: list[EffectRecord] = []
     for effect in (*model.declared, *traced.effects):
         width = len(effect.parameters)

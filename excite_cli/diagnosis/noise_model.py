@@ -9,10 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from excite_cli.robot.model import Array
 
 HIGHEST_ORDER = 12
+_RESPONSE = 400  # samples after which an impulse has died away
 _SHRINK = 0.995  # roots are kept within this circle
 # White noise added to the residual, as a share of its variance. Torque that somebody low-passed
 # before holds nothing at high frequency; whitening must not trust that band a million times more.
@@ -53,6 +55,15 @@ class NoiseModel:
     def long_run(self, joint: int) -> float:
         """Standard deviation of independent samples that would be as informative at frequency 0."""
         return float(self.sigma[joint] / max(1e-3, 1.0 - self.coefficients[joint].sum()))
+
+    def levels(self) -> Array:
+        """Standard deviation (n,) of the noise itself, from its response to an impulse."""
+        impulse = np.zeros(_RESPONSE)
+        impulse[0] = 1.0
+        responses = [
+            lfilter([1.0], np.concatenate([[1.0], -c]), impulse) for c in self.coefficients
+        ]
+        return self.sigma * np.sqrt(np.sum(np.square(responses), axis=1))
 
 
 def fit_noise(residuals: Sequence[Array], usable: Sequence[NDArray[np.bool_]]) -> NoiseModel:

@@ -57,16 +57,7 @@ def placebo_gains(
         local = [c for c in candidates if c.rows == (joint,) and c.width == 1]
         if not local:
             continue
-        own = [
-            np.concatenate(
-                [
-                    data.declared[part][:, joint],
-                    *(_row(candidates[i], part, joint, len(tau)) for i in chosen),
-                ],
-                axis=1,
-            )
-            for part, tau in enumerate(data.tau)
-        ]
+        own = [data.columns(candidates, chosen, part, joint) for part in range(len(data.runs))]
         for _ in range(_SHIFTS):
             cross = np.zeros((len(at), len(local)))
             square, product = np.zeros(len(local)), np.zeros(len(local))
@@ -84,10 +75,3 @@ def placebo_gains(
             good = left > 1e-2 * square
             gains += list(product[good] ** 2 / left[good])
     return np.array(gains)
-
-
-def _row(candidate: Candidate, part: int, joint: int, samples: int) -> Array:
-    """Columns (M, p) of a candidate in one joint's row."""
-    if joint not in candidate.rows:
-        return np.zeros((samples, candidate.width))
-    return candidate.columns[part][:, candidate.rows.index(joint)]

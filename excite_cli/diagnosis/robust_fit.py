@@ -44,15 +44,8 @@ def _rows(
     """Columns (rows, k) and torque (rows,) of the usable samples of a joint."""
     columns, torques = [], []
     for part, run in enumerate(data.runs):
-        own = [data.declared[part][:, joint]]
-        for i in chosen:
-            c = candidates[i]
-            if joint in c.rows:
-                own.append(c.columns[part][:, c.rows.index(joint)])
-            else:
-                own.append(np.zeros((len(own[0]), c.width)))
         usable = run.usable[:, joint]
-        columns.append(np.concatenate(own, axis=1)[usable])
+        columns.append(data.columns(candidates, chosen, part, joint)[usable])
         torques.append(data.tau[part][usable, joint])
     return np.concatenate(columns), np.concatenate(torques)
 

@@ -14,16 +14,16 @@ _SUSPECTS = 5
 
 def rounds_of(traced: Traced, joint_names: Sequence[str]) -> tuple[Round, ...]:
     """Rounds in the order of what each effect saves; the last one finds nothing more."""
-    search = traced.search
+    judge = traced.judge
     chosen: list[int] = []
     found: list[Round] = []
     left = set(traced.chosen)
     while True:
         residual = _residual(traced, chosen)
-        schur = search.white.schur(chosen)
+        schur = judge.white.schur(chosen)
         best: int | None = None
         if left:
-            best = max(left, key=lambda i: schur.singles[i].chi2 - search.price(i, 1))
+            best = max(left, key=lambda i: schur.singles[i].chi2 - judge.price(i, 1))
         suspects = _suspects(traced, chosen, best, joint_names)
         verdict = "nothing more" if best is None else _words(traced, best, joint_names)
         found.append(
@@ -50,7 +50,7 @@ def _words(traced: Traced, i: int, joint_names: Sequence[str]) -> str:
 
 def _residual(traced: Traced, chosen: Sequence[int]) -> Array:
     """RMS (n,) [N·m] of what the model with the chosen effects leaves of the training torque."""
-    x = traced.search.plain.solve(chosen)
+    x = traced.judge.plain.solve(chosen)
     left = traced.data.residuals(traced.candidates, chosen, x)
     usable = np.concatenate([run.usable for run in traced.data.runs])
     squares = np.where(usable, np.concatenate(left) ** 2, 0.0).sum(axis=0)
@@ -61,12 +61,12 @@ def _suspects(
     traced: Traced, chosen: list[int], accepted: int | None, joint_names: Sequence[str]
 ) -> tuple[Suspect, ...]:
     """The strongest candidates of a round, one per kind and place, the accepted one first."""
-    search = traced.search
-    schur = search.white.schur(chosen)
+    judge = traced.judge
+    schur = judge.white.schur(chosen)
     taken = {traced.candidates[i].place for i in chosen}
     ranked = sorted(
         (i for i, c in enumerate(traced.candidates) if c.place not in taken),
-        key=lambda i: search.price(i, schur.singles[i].dof) - schur.singles[i].chi2,
+        key=lambda i: judge.price(i, schur.singles[i].dof) - schur.singles[i].chi2,
     )
     order = ([accepted] if accepted is not None else []) + [i for i in ranked if i != accepted]
     found: list[Suspect] = []
@@ -77,17 +77,17 @@ def _suspects(
             continue
         places.add(candidate.place)
         gain = schur.singles[i]
-        p = search.p_value(i, gain)
-        left_out = search.left_out_gain(chosen, [i])
+        p = judge.p_value(i, gain)
+        left_out = judge.left_out_gain(chosen, [i])
         joints = list(candidate.rows)
-        before = search.plain.energy_on(chosen, joints)
-        share = 1.0 - search.plain.energy_on([*chosen, i], joints) / max(before, 1e-300)
+        before = judge.plain.energy_on(chosen, joints)
+        share = 1.0 - judge.plain.energy_on([*chosen, i], joints) / max(before, 1e-300)
         if i == accepted:
             verdict = "accepted"
-        elif p > search.rules.significance:
+        elif p > judge.rules.significance:
             verdict = "not significant"
         else:
-            verdict = search.verdict(chosen, [i])
+            verdict = judge.verdict(chosen, [i])
             if verdict == "accepted":
                 verdict = "later" if i in traced.chosen else "another explains it"
         found.append(Suspect(record_of(candidate.effect, joint_names), p, share, left_out, verdict))

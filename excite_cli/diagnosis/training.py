@@ -2,22 +2,30 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
 
-@dataclass(frozen=True)
-class KeptInertias:
-    """Inertias kept at the URDF's: mean φ₀ (P,) and precision (P,) of the standard parameters."""
+class Columns(Protocol):
+    """What may be added to the model: the joints it acts on, columns (M, rows, width) per part."""
 
-    mean: Array
-    precision: Array
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """Joints."""
+
+    @property
+    def columns(self) -> tuple[Array, ...]:
+        """Per part, filtered and decimated."""
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +47,21 @@ class TrainingData:
         """Number of joints."""
         return int(self.tau[0].shape[1])
 
-    def evidence(self, candidates: Sequence[Candidate], noise: NoiseModel) -> Evidence:
+    def columns(
+        self, candidates: Sequence[Columns], chosen: Sequence[int], part: int, joint: int
+    ) -> Array:
+        """Columns (M, k) of the declared model and the chosen candidates in one joint's rows."""
+        declared = self.declared[part][:, joint]
+        blocks = [declared]
+        for i in chosen:
+            c = candidates[i]
+            if joint in c.rows:
+                blocks.append(c.columns[part][:, c.rows.index(joint)])
+            else:
+                blocks.append(np.zeros((len(declared), c.width)))
+        return np.concatenate(blocks, axis=1)
+
+    def evidence(self, candidates: Sequence[Columns], noise: NoiseModel) -> Evidence:
         """Gram matrices of all columns, whitened by `noise`; linear in the number of samples."""
         fixed = self.declared[0].shape[2]
         starts = fixed + np.cumsum([0, *(c.width for c in candidates)])
@@ -52,17 +74,8 @@ class TrainingData:
                 [np.arange(fixed), *(blocks[i] for i in touching), [size - 1]]
             ).astype(np.intp)
             for part, fold in enumerate(self.folds):
-                x = np.concatenate(
-                    [
-                        self.declared[part][:, joint],
-                        *(
-                            candidates[i].columns[part][:, candidates[i].rows.index(joint)]
-                            for i in touching
-                        ),
-                        self.tau[part][:, joint, None],
-                    ],
-                    axis=1,
-                )
+                columns = self.columns(candidates, touching, part, joint)
+                x = np.hstack([columns, self.tau[part][:, joint, None]])
                 clean = noise.clean(self.runs[part].usable[:, joint])
                 white = noise.whitened(x, joint)[clean]
                 grams[fold, joint][np.ix_(active, active)] += white.T @ white
@@ -70,7 +83,7 @@ class TrainingData:
         return Evidence(grams, fixed, blocks, rows_of, self.prior_precision)
 
     def residuals(
-        self, candidates: Sequence[Candidate], chosen: Sequence[int], parameters: Array
+        self, candidates: Sequence[Columns], chosen: Sequence[int], parameters: Array
     ) -> list[Array]:
         """τ − model (M, n) of every part."""
         found = []

@@ -28,14 +28,8 @@ def covariance_of(
     normal, spread = np.zeros((size, size)), np.zeros((size, size))
     for joint in range(data.n):
         for part, run in enumerate(data.runs):
-            blocks: list[Array] = [data.declared[part][:, joint]]
-            for i in chosen:
-                c = candidates[i]
-                if joint in c.rows:
-                    blocks.append(c.columns[part][:, c.rows.index(joint)])
-                else:
-                    blocks.append(np.zeros((len(blocks[0]), c.width)))
-            x = np.concatenate(blocks, axis=1) * run.usable[:, joint, None] / levels[joint] ** 2
+            columns = data.columns(candidates, chosen, part, joint)
+            x = columns * run.usable[:, joint, None] / levels[joint] ** 2
             normal += (x * levels[joint] ** 2).T @ x
             taps = np.concatenate([[1.0], -noise.coefficients[joint]])
             filtered = lfilter([noise.sigma[joint]], taps, x[::-1], axis=0)

@@ -7,7 +7,6 @@ direction, acceleration and load of every joint, and time.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
 
 import numpy as np
 from scipy.stats import chi2
@@ -16,27 +15,12 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.result import Unexplained
-from excite_cli.diagnosis.training import TrainingData
-from excite_cli.effects.base import Effect, Parameter, Signals
+from excite_cli.diagnosis.training import Columns, TrainingData
+from excite_cli.effects.base import Signals
 from excite_cli.robot.model import Array
 
 _MOST_NAMED = 3
 _LEAST_SHARE = 0.02
-
-
-@dataclass(frozen=True)
-class Dependence(Effect):
-    """A smooth function of one quantity, with free coefficients; not an effect with a name."""
-
-    kind: ClassVar = "dependence"
-    title: ClassVar = "dependence"
-    signature: ClassVar = ""
-    parameters: ClassVar = (Parameter("c", "N·m", 0.0, 1.0),)
-    quantity: str = ""
-
-    def columns(self, signals: Signals) -> Array:
-        """Not used: the columns are made for all quantities at once."""
-        raise NotImplementedError
 
 
 def unexplained_structure(
@@ -54,7 +38,7 @@ def unexplained_structure(
     the strongest structure comes first, and the others are judged with it in the model: through
     the inertias that all rows share, it bends their residuals too.
     """
-    kept = [candidates[i] for i in chosen]
+    kept: list[Columns] = [candidates[i] for i in chosen]
     features = [_features(data, signals, joint, joint_names) for joint in range(data.n)]
     found: dict[int, Unexplained] = {}
     while len(found) < data.n:
@@ -77,19 +61,17 @@ def unexplained_structure(
 
 
 @dataclass(frozen=True)
-class Feature(Candidate):
-    """Columns of a dependence; their number is that of the columns themselves."""
+class Feature:
+    """Smooth functions of one quantity, with free coefficients; not an effect with a name."""
+
+    quantity: str
+    rows: tuple[int, ...]
+    columns: tuple[Array, ...]
 
     @property
     def width(self) -> int:
-        """Number of columns."""
+        """Number of functions."""
         return int(self.columns[0].shape[2])
-
-    @property
-    def quantity(self) -> str:
-        """What it is a function of."""
-        assert isinstance(self.effect, Dependence)
-        return self.effect.quantity
 
 
 @dataclass(frozen=True)
@@ -105,22 +87,19 @@ def _features(
     data: TrainingData, signals: Sequence[Signals], joint: int, joint_names: Sequence[str]
 ) -> list[Feature]:
     names, columns = _quantities(data, signals, joint, joint_names)
-    return [
-        Feature(Dependence((joint,), quantity=name), (joint,), blocks)
-        for name, blocks in zip(names, columns, strict=True)
-    ]
+    return [Feature(name, (joint,), blocks) for name, blocks in zip(names, columns, strict=True)]
 
 
 def _structure(
     data: TrainingData,
-    kept: Sequence[Candidate],
+    kept: Sequence[Columns],
     features: list[Feature],
     noise: NoiseModel,
     rules: tuple[float, float, float],
 ) -> _Structure:
     """Add the features of one joint to the model with those `kept`, while they pass."""
     joint = features[0].rows[0]
-    pool: list[Candidate] = [*kept, *features]
+    pool: list[Columns] = [*kept, *features]
     white = data.evidence(pool, noise)
     plain = data.evidence(pool, NoiseModel.white(noise.sigma))
     base = list(range(len(kept)))

@@ -1,0 +1,223 @@
+"""Whether an effect may join a model: price, gain on runs left out, size, sign, order.
+
+The price of a candidate is the χ² value that one of all the tests made would exceed by chance in a
+share α of diagnoses (Bonferroni), plus a little for unusual kinds: so a step that lowers residual
+energy + prices is a test with family-wise control. What joins must also lower the error on runs
+left out, be large enough to matter, and have a sign and a size that physics allows.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import chi2
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.evidence import SHARED, Evidence, Gain, Schur
+from excite_cli.diagnosis.kinds import COHERENT, FIRST, unusual
+from excite_cli.robot.model import Array
+
+# It stays in beside its refinement unless it is useless there (χ² units).
+_PARENT_PRICE = 4.5
+_FIRST_ORDER = 2e-3  # of their energy: what is left beside them may be their second order
+_FAR_MORE = 0.15  # of the error on runs left out: more than noise makes of it
+_TRANSFER = 0.06  # least share of the gain on fitted runs that runs left out must have
+_SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
+
+
+@dataclass(frozen=True)
+class Rules:
+    """α of the family, least gain (RMS) on runs left out, inflation of χ²."""
+
+    significance: float
+    gain: float
+    inflation: float = 1.0
+
+
+@dataclass
+class Judgement:
+    """Judges sets of candidates on whitened evidence; `plain` takes samples as independent.
+
+    `allowed(parameters, chosen, added)` may veto a set, for instance for negative friction.
+    """
+
+    white: Evidence
+    plain: Evidence
+    candidates: Sequence[Candidate]
+    rules: Rules
+    allowed: Callable[[Array, Sequence[int], Sequence[int]], bool]
+    _thresholds: dict[tuple[int, int], float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Look up who refines whom."""
+        at = {(c.effect.kind, c.effect.joints): i for i, c in enumerate(self.candidates)}
+        self.parents = [
+            tuple(
+                at[kind, (joint,)]
+                for kind in FIRST.get(c.effect.kind, ())
+                for joint in c.effect.joints
+                if (kind, (joint,)) in at
+            )
+            for c in self.candidates
+        ]
+
+    def price(self, candidate: int, dof: int) -> float:
+        """χ² that `candidate` must save."""
+        c = self.candidates[candidate]
+        key = (max(dof, 1), c.tests)
+        if key not in self._thresholds:
+            self._thresholds[key] = float(chi2.isf(self.rules.significance / c.tests, key[0]))
+        return self.rules.inflation * self._thresholds[key] + unusual(c.effect.kind)
+
+    def _prices(self, chosen: Sequence[int]) -> float:
+        """Price of a set: parents of members are cheap."""
+        cheap = {p for i in chosen for p in self.parents[i]}
+        return sum(
+            self.rules.inflation * _PARENT_PRICE
+            if i in cheap
+            else self.price(i, self.candidates[i].width)
+            for i in chosen
+        )
+
+    def bound(self, candidate: int, chosen: Sequence[int]) -> bool:
+        """Whether it must stay: √|v| beside no Coulomb and viscous friction is no physics."""
+        return any(
+            candidate in self.parents[k] and self.candidates[k].effect.shape.get("power") == 0.5
+            for k in chosen
+        )
+
+    def cost(self, chosen: Sequence[int]) -> float:
+        """J(S)."""
+        return self.white.energy(chosen) + self._prices(chosen)
+
+    def in_order(self, schur: Schur, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """Whether the first-order friction that `added` refines is in, or has nothing to add."""
+        for i in added:
+            for parent in self.parents[i]:
+                if parent in chosen or parent in added:
+                    continue
+                gain = schur.singles[parent]
+                if gain.chi2 > self.price(parent, gain.dof) and self.allowed(
+                    self.plain.solve([*chosen, parent]), [*chosen, parent], [parent]
+                ):
+                    return False
+        return True
+
+    def without(self, member: int, chosen: Sequence[int]) -> list[int]:
+        """The set without `member` and what refines it: first-order friction is judged alone."""
+        return [k for k in chosen if k != member and member not in self.parents[k]]
+
+    def p_value(self, candidate: int, gain: Gain) -> float:
+        """Corrected for the number of tests and the inflation."""
+        if gain.dof == 0:
+            return 1.0
+        single = chi2.sf(gain.chi2 / self.rules.inflation, gain.dof)
+        return float(min(1.0, self.candidates[candidate].tests * single))
+
+    def left_out_gain(self, chosen: Sequence[int], added: Sequence[int]) -> float:
+        """Share by which the RMS error on runs left out falls, on the rows that `added` touches.
+
+        The better of filtered torque and whitened torque: an effect near the noise shows in the
+        second only. An effect of single runs is not there in others: it is judged where it is.
+        """
+        joints = sorted({j for i in added for j in self.white.rows_of[i]})
+        best = -np.inf
+        for evidence in (self.plain, self.white):
+            if any(self.candidates[i].effect.runs for i in added):
+                before = evidence.energy_on(chosen, joints)
+                after = evidence.energy_on([*chosen, *added], joints)
+            else:
+                before = evidence.left_out(chosen, joints).sum()
+                after = evidence.left_out([*chosen, *added], joints).sum()
+            best = max(best, 1.0 - float(np.sqrt(after / max(before, 1e-300))))
+        return best
+
+    def size(self, chosen: Sequence[int], added: Sequence[int]) -> float:
+        """What `added` explains, as a share of the torque's RMS on the joint where it is most."""
+        largest = 0.0
+        for joint in sorted({j for i in added for j in self.white.rows_of[i]}):
+            before = self.plain.energy_on(chosen, [joint])
+            after = self.plain.energy_on([*chosen, *added], [joint])
+            whole = self.plain.torque_energy(joint)
+            largest = max(largest, (before - after) / max(whole, 1e-300))
+        return float(np.sqrt(largest))
+
+    def _leftover(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """Whether `added` is no more than the error of a coherent effect's linear form.
+
+        Columns of a tilt or an encoder's zero are first order; what they leave of a large one
+        looks like other effects on the same joints.
+        """
+        for joint in sorted({j for i in added for j in self.white.rows_of[i]}):
+            coherent = [
+                k
+                for k in chosen
+                if self.candidates[k].effect.kind in COHERENT and joint in self.white.rows_of[k]
+            ]
+            if not coherent:
+                return False
+            after = self.plain.energy_on([*chosen, *added], [joint])
+            own = self.plain.energy_on(chosen, [joint]) - after
+            theirs = max(
+                self.plain.energy_on([c for c in [*chosen, *added] if c != k], [joint]) - after
+                for k in coherent
+            )
+            if own > _FIRST_ORDER * theirs:
+                return False
+        return True
+
+    def carries_more(self, chosen: Sequence[int], one: int, other: int) -> bool:
+        """Whether `one` says far more than `other` about the same joints on runs left out."""
+        if not set(self.white.rows_of[one]) & set(self.white.rows_of[other]):
+            return False
+        gains = [self.left_out_gain(chosen, [i]) for i in (one, other)]
+        return gains[0] > gains[1] + _FAR_MORE
+
+    def loses(self, rest: Sequence[int], member: int, move: Sequence[int]) -> bool:
+        """Whether runs left out would lose by the replacement what they gained by the member."""
+        before = self.left_out_gain(rest, [member])
+        return self.left_out_gain(rest, move) < before - _FAR_MORE
+
+    def verdict(self, chosen: Sequence[int], added: Sequence[int]) -> str:
+        """`accepted`, or why `added` may not join the chosen ones."""
+        together = [*chosen, *added]
+        if not self.allowed(self.plain.solve(together), together, added):
+            return "impossible sign"
+        if self.size(chosen, added) < _SMALLEST:
+            return "too small to matter"
+        if self._leftover(chosen, added):
+            return "what a coherent effect leaves"
+        if not self._generalises(chosen, added):
+            return "no gain on runs left out"
+        return "accepted"
+
+    def _generalises(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """Whether runs left out gain, and not far less than those fitted."""
+        gain = self.left_out_gain(chosen, added)
+        if gain < self.rules.gain:
+            return False
+        joints = sorted({j for i in added for j in self.white.rows_of[i]})
+        fitted = max(
+            1.0
+            - np.sqrt(
+                e.energy_on([*chosen, *added], joints) / max(e.energy_on(chosen, joints), 1e-300)
+            )
+            for e in (self.plain, self.white)
+        )
+        return bool(gain > _TRANSFER * fitted)
+
+    def fails(self, i: int, rest: list[int], chosen: list[int]) -> bool:
+        """Whether member i does not hold beside the rest."""
+        if self.bound(i, chosen):
+            return False
+        right_sign = self.allowed(self.plain.solve(chosen), chosen, [i])
+        if any(i in self.parents[k] for k in rest):
+            return not right_sign
+        gain = self.white.schur(rest).gain(i, absorbed=SHARED)
+        return (
+            self.p_value(i, gain) > self.rules.significance
+            or not right_sign
+            or self.left_out_gain(rest, [i]) < self.rules.gain
+            or self.size(rest, [i]) < _SMALLEST
+            or self._leftover(rest, [i])
+        )

@@ -1,0 +1,81 @@
+"""A run as the model sees it: rigid-body quantities, signals for effects, training columns."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from excite_cli.diagnosis.model import Model
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.effects.base import Effect, Signals
+from excite_cli.identification.prepare import PreparedRun
+from excite_cli.identification.regression import effect_columns
+from excite_cli.robot.model import Array
+from excite_cli.robot.regressor import standard_parameters
+from excite_cli.robot.rigid_body import RigidBody
+
+# What `split` adds to the name of a run for a part of it.
+_PART = re.compile(r" (?:[^ ]+-[^ ]+ s|\((?:first|second) half\))$")
+
+
+class ModelledRun:
+    """A run's rigid-body quantities; the regressor is computed once."""
+
+    def __init__(self, model: Model, run: PreparedRun) -> None:
+        self.model, self.run = model, run
+        body = RigidBody(model.robot, standard_parameters(model.robot), run.q, run.v, run.a)
+        self.regressor = body.regressor
+        self.take(run)
+
+    def take(self, run: PreparedRun) -> None:
+        """The same motion with other averages."""
+        self.run = run
+        self.inertial = run.averaged_for_fit(self.regressor)
+
+    def signals(self, phi: Array, effects: Sequence[Effect], values: Array) -> Signals:
+        """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
+        run = self.run
+        body = RigidBody(self.model.robot, phi, run.q, run.v, run.a)
+        body.__dict__["regressor"] = self.regressor
+        load = body.load
+        signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run_name(run.name))
+        if not len(values):
+            return signals
+        # Defects of the measurement do not change the torque that they act upon.
+        in_robot = np.repeat(
+            [not effect.data_defect for effect in effects],
+            [len(effect.parameters) for effect in effects],
+        )
+        extra = effect_columns(effects, signals) @ np.where(in_robot, values, 0.0)
+        return replace(signals, torque=load + extra)
+
+
+def run_name(part: str) -> str:
+    """The run a part of it belongs to."""
+    return _PART.sub("", part)
+
+
+def training_data(
+    model: Model,
+    folds: Sequence[int],
+    modelled: Sequence[ModelledRun],
+    signals: Sequence[Signals],
+) -> TrainingData:
+    """Columns of the declared model and torque of every part; `folds` are left out together."""
+    declared, torques = [], []
+    for body, signal in zip(modelled, signals, strict=True):
+        run = body.run
+        inertial, tau = body.inertial, run.tau_fit
+        if model.prior is None:
+            inertial = inertial[:, :, model.base.selection]
+        else:
+            tau = tau - inertial @ model.prior.mean
+        effects = run.averaged_for_fit(effect_columns(model.declared, signal))
+        declared.append(np.concatenate([inertial, effects], axis=2))
+        torques.append(tau)
+    precision = None
+    if model.prior is not None:
+        precision = np.concatenate([model.prior.precision, np.zeros(model.declared_width)])
+    runs = tuple(body.run for body in modelled)
+    return TrainingData(runs, tuple(folds), tuple(declared), tuple(torques), precision)
