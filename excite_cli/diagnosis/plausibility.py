@@ -93,7 +93,7 @@ def check_dataset(robot: Robot, dataset: Dataset, spec: Spec) -> None:
 
 
 def _decided(robot: Robot, samples: Samples) -> NDArray[np.bool_]:
-    """Joints (n,) whose torque is more than inertias that are somewhat wrong could make of it.
+    """Joints (n,) whose torque varies more than inertias that are somewhat wrong could make of it.
 
     A wrist that carries next to nothing may have its small torque turned round by a centre of mass
     a few millimetres off; its sign says nothing.
@@ -101,8 +101,8 @@ def _decided(robot: Robot, samples: Samples) -> NDArray[np.bool_]:
     cad = standard_parameters(robot)
     std = inertial_prior(robot, cad, _UNCERTAIN).std
     body = RigidBody(robot, cad, samples.q, samples.v, samples.a)
-    made_up = np.sqrt(np.mean(np.square(body.regressor) @ np.square(std), axis=0))
-    measured = np.sqrt(np.mean(np.square(samples.tau), axis=0))
+    made_up = np.sqrt(np.var(body.regressor, axis=0) @ np.square(std))
+    measured = np.std(samples.tau, axis=0)  # a constant is an offset, whatever its sign
     return np.asarray(measured > _BEYOND * made_up)
 
 

@@ -161,6 +161,13 @@ def mass_matrices(plant: Plant, q: Array) -> Array:
     return np.array([_full(plant, data, posture)[at] for posture in q])
 
 
+def sudden_inertias(plant: Plant, q: Array) -> Array:
+    """What the motors feel of a quick push, (T, n, n): links behind soft gears do not follow."""
+    data = plant.new_data()
+    at = np.ix_(plant.motor, plant.motor)
+    return np.array([np.linalg.inv(np.linalg.inv(_full(plant, data, each))[at]) for each in q])
+
+
 def _full(plant: Plant, data: Any, q: Array) -> Array:
     mujoco = load_mujoco()
     size = plant.model.nv

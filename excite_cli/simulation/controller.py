@@ -11,17 +11,18 @@ wrist with much friction would stand still at every reversal for longer than rea
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import eigh
 
 from excite_cli.effects.base import Signals
 from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.rigid_body import RigidBody
-from excite_cli.simulation.build import Build, mass_matrices
+from excite_cli.simulation.build import Build, mass_matrices, sudden_inertias
 from excite_cli.simulation.motion import PlannedMotion
 from excite_cli.simulation.mujoco_model import Plant
 
 _MASS_EVERY = 10  # control steps
-_FASTEST = 0.4  # share of the control rate that a rotor alone may be damped at
+_FASTEST = 0.4  # share of the control rate that the quickest motion may be damped at
 
 
 @dataclass(frozen=True)
@@ -73,13 +74,29 @@ def compensated(build: Build, reference: Reference, share: float) -> Reference:
 
 
 def gains_of(build: Build, plant: Plant, reference: Reference, bandwidth: float) -> Gains:
-    """Gains along the reference; behind a soft transmission the drive must be slower."""
-    mass = mass_matrices(plant, reference.q[::_MASS_EVERY])
-    step = float(reference.t[1] - reference.t[0])
-    for j, transmission in build.soft.items():
-        rotor = transmission.rotor + build.armature[j]
-        bandwidth = min(bandwidth, 0.5 * _FASTEST / step * rotor / float(mass[:, j, j].max()))
+    """Gains along the reference; behind a soft transmission the drive must be slower.
+
+    A quick push moves rotors only, a slow one rotors and links. Gains are made for the geometric
+    mean of these two inertias, and no motion is damped by more than a share per control step.
+    """
+    postures = reference.q[::_MASS_EVERY]
+    mass = mass_matrices(plant, postures)
+    if build.soft:
+        step = float(reference.t[1] - reference.t[0])
+        mass, heavier = _between(sudden_inertias(plant, postures), mass)
+        bandwidth = min(bandwidth, 0.5 * _FASTEST / step / heavier)
     return Gains(bandwidth**2, 2.0 * bandwidth, bandwidth**3 / 8.0, mass, _MASS_EVERY)
+
+
+def _between(light: Array, heavy: Array) -> tuple[Array, float]:
+    """Geometric means (T, n, n) of inertias, and by how much they exceed the light ones at most."""
+    means, heavier = [], 1.0
+    for one, other in zip(light, heavy, strict=True):
+        ratios, vectors = eigh(other, one)
+        side = one @ vectors
+        means.append(side * np.sqrt(ratios) @ side.T)
+        heavier = max(heavier, float(np.sqrt(ratios[-1])))
+    return np.array(means), heavier
 
 
 def control_instants(start: float, end: float, rate: float) -> Array:
