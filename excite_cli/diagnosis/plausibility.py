@@ -9,7 +9,6 @@ Whatever no such mistake explains is left to the diagnosis.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.rearranged import (
@@ -41,9 +40,9 @@ _WORSE = 0.3  # log of the share by which no joint may fit worse; or share of th
 _FITS = 0.6  # share that the joints concerned may have left, in the median
 # Exchanged wrists of wrong inertias may fit somewhat better: that is no evidence of an order.
 _ORDER_FITS = 0.35
-# How wrong inertias may be [share], how far beyond that a torque must be to be judged, and from how
-# many joints on most of them suffice.
-_UNCERTAIN, _BEYOND, _MANY = 0.3, 2.0, 3
+# How wrong inertias may be [share], how far beyond that torques must be for an exchange or for
+# another sign to be judged, and from how many joints on most of them suffice.
+_UNCERTAIN, _BEYOND, _BEYOND_SIGN, _MANY = 0.3, 2.0, 2.3, 3
 _FOREIGN = 0.85  # torques of which this is left have nothing to do with the motion
 
 
@@ -64,8 +63,8 @@ def check_plausibility(robot: Robot, runs: Sequence[PreparedRun]) -> None:
     if straight.left.max() < _GOOD:
         return
     tried = [*torques_changed(table), *positions_changed(dynamics, samples)]
-    decided = _decided(robot, samples)
-    found = [verdict for verdict in tried if _clearly_better(verdict, straight, decided)]
+    excess = _excess(robot, samples)
+    found = [verdict for verdict in tried if _clearly_better(verdict, straight, excess)]
     if not found:
         if np.mean(straight.left > _FOREIGN) >= 0.5:
             raise FileError(_foreign(robot.joint_names, straight))
@@ -92,8 +91,8 @@ def check_dataset(robot: Robot, dataset: Dataset, spec: Spec) -> None:
     check_plausibility(robot, [prepare(run, processing) for run in dataset.runs])
 
 
-def _decided(robot: Robot, samples: Samples) -> NDArray[np.bool_]:
-    """Joints (n,) whose torque varies more than inertias that are somewhat wrong could make of it.
+def _excess(robot: Robot, samples: Samples) -> Array:
+    """How much more torque (n,) varies than inertias that are somewhat wrong could make it vary.
 
     A wrist that carries next to nothing may have its small torque turned round by a centre of mass
     a few millimetres off; its sign says nothing.
@@ -103,21 +102,23 @@ def _decided(robot: Robot, samples: Samples) -> NDArray[np.bool_]:
     body = RigidBody(robot, cad, samples.q, samples.v, samples.a)
     made_up = np.sqrt(np.var(body.regressor, axis=0) @ np.square(std))
     measured = np.std(samples.tau, axis=0)  # a constant is an offset, whatever its sign
-    return np.asarray(measured > _BEYOND * made_up)
+    return np.asarray(measured / np.maximum(made_up, 1e-300))
 
 
-def _clearly_better(verdict: Verdict, straight: Verdict, decided: NDArray[np.bool_]) -> bool:
+def _clearly_better(verdict: Verdict, straight: Verdict, excess: Array) -> bool:
     """Whether a change gains enough on the joints it is about, and costs none of the others."""
     if not verdict.change.mistakes:
         return False
-    sure = decided[verdict.change.touched]
+    here = np.arange(len(excess))
+    ordered = (verdict.change.q_order == here).all() and (verdict.change.tau_order == here).all()
+    sure = excess[verdict.change.touched] > (_BEYOND_SIGN if ordered else _BEYOND)
     if not (sure.all() if len(sure) < _MANY else sure.mean() >= 0.5):
         return False
     gain = logs(straight.left) - logs(verdict.left)
     touched = verdict.change.touched
-    here, left = np.arange(len(gain)), verdict.left[touched]
+    left = verdict.left[touched]
     fits = bool(np.median(left) < _FITS)
-    if (verdict.change.q_order != here).any() or (verdict.change.tau_order != here).any():
+    if not ordered:
         foreign = np.median(straight.left[touched]) > _FOREIGN
         fits = bool(left.max() < _ORDER_FITS or (foreign and np.median(left) < 1.4 * _ORDER_FITS))
     turned = (verdict.change.tau_sign < 0) & (verdict.change.q_sign > 0)
