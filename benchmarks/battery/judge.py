@@ -196,7 +196,11 @@ def answer_of(found: Diagnosis, dataset: Dataset) -> Answer:
     """The diagnosis in words."""
     return Answer(
         tuple(
-            Found(_name(each.effect), tuple(_name(alias) for alias in each.aliases))
+            Found(
+                _name(each.effect),
+                tuple(_name(alias) for alias in each.aliases),
+                bool(each.approximates),
+            )
             for each in found.effects
         ),
         tuple(Name(each.kind, each.joints) for each in found.absorbed),
@@ -243,6 +247,7 @@ def _fill(outcome: Outcome, found: Diagnosis, result: Score) -> None:
             "share": each.share_of_residual,
             "gain": each.gain,
             "verdict": verdict,
+            "approximates": each.approximates,
             "aliases": [{"kind": a.kind, "joints": list(a.joints)} for a in each.aliases],
         }
         for each, verdict in zip(found.effects, result.names, strict=True)

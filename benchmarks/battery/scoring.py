@@ -2,14 +2,16 @@
 
 `right`: the truth, or an alias set of at most three that holds it, is named, or it is told as
 absorbed. `wrong`: a name that is not true, itself or through its aliases. `extra`: plain friction
-named beside a refinement of it on a robot that has none declared; neither right nor wrong.
+named beside a refinement of it on a robot that has none declared; neither right nor wrong. What the
+diagnosis itself calls an approximation of something else is neither, too (on clean data it is a
+false alarm like any name).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-Verdict = Literal["true", "alias", "identity", "companion", "extra", "wrong"]
+Verdict = Literal["true", "alias", "identity", "companion", "extra", "approximation", "wrong"]
 
 MOST_ALIASES = 3
 PLAIN = ("viscous_friction", "coulomb_friction")
@@ -43,10 +45,11 @@ class Plant:
 
 @dataclass(frozen=True)
 class Found:
-    """A named effect with its alias set."""
+    """A named effect with its alias set, or one that is only said to come near the truth."""
 
     name: Name
     aliases: tuple[Name, ...] = ()
+    approximation: bool = False
 
 
 @dataclass(frozen=True)
@@ -108,14 +111,15 @@ def score(planted: Sequence[Plant], answer: Answer, friction: bool, joints: int)
 
 
 def _is_right(plant: Plant, answer: Answer, friction: bool, joints: int) -> bool:
-    if any(_means(found, plant.name, joints) for found in answer.found):
+    if any(_means(found, plant.name, joints) for found in answer.found if not found.approximation):
         return True
     if any(same(plant.name, name, joints) for name in answer.absorbed):
         return True
     if plant.name.kind == "torque_saturation" and set(plant.name.joints) <= set(answer.saturated):
         return True
     parts = identity(plant.name, friction)
-    return bool(parts) and all(any(f.name == part for f in answer.found) for part in parts)
+    names = [found.name for found in answer.found if not found.approximation]
+    return bool(parts) and all(part in names for part in parts)
 
 
 def identity(planted: Name, friction: bool) -> tuple[Name, ...]:
@@ -136,6 +140,8 @@ def _means(found: Found, planted: Name, joints: int) -> bool:
 def _verdict(
     found: Found, planted: Sequence[Plant], answer: Answer, friction: bool, joints: int
 ) -> Verdict:
+    if found.approximation:
+        return "approximation"
     if any(same(plant.name, found.name, joints) for plant in planted):
         return "true"
     if any(_means(found, plant.name, joints) for plant in planted):

@@ -25,9 +25,11 @@ def tables_of(
             f"… {len(found.rounds) - len(rounds)} more rounds (--verbose shows them); the last "
             "one finds nothing more."
         )
-    if found.effects:
+    if found.named:
         parts.append(_effect_table(found))
-    else:
+    if found.approximations:
+        parts.append(_approximation_table(found))
+    if not found.effects:
         parts.append("Nothing is missing: no effect of the catalogue passes.")
     parts += _absorbed(found) + _unexplained(found)
     parts.append(_error_table(found, robot))
@@ -90,7 +92,7 @@ def _effect_table(found: Diagnosis) -> Table:
     table = Table(title="What the declared model lacks", title_justify="left")
     for name in ("effect", "where", "size", "p", "share", "cannot be told from"):
         table.add_column(name, justify="right" if name in ("p", "share") else "left")
-    for named in found.effects:
+    for named in found.named:
         table.add_row(
             _title(named.effect.kind),
             _place(named.effect, len(found.joint_names)),
@@ -102,6 +104,24 @@ def _effect_table(found: Diagnosis) -> Table:
                 for alias in named.aliases
             )
             or "-",
+        )
+    return table
+
+
+def _approximation_table(found: Diagnosis) -> Table:
+    table = Table(
+        title="Approximations: they lower the error, but something else is there",
+        title_justify="left",
+    )
+    for name in ("effect", "where", "size", "share", "stands for"):
+        table.add_column(name, justify="right" if name == "share" else "left")
+    for each in found.approximations:
+        table.add_row(
+            _title(each.effect.kind),
+            _place(each.effect, len(found.joint_names)),
+            "\n".join(_value(name, value) for name, value in each.parameters.items()),
+            f"{each.share_of_residual:.2%}",
+            each.approximates.replace("[", r"\["),
         )
     return table
 
@@ -171,14 +191,19 @@ def _error_table(found: Diagnosis, robot: Robot) -> Table:
 
 def _verdict(found: Diagnosis) -> str:
     low, high = found.after.interval
-    count = len(found.effects)
     return (
-        f"{count} effect{'' if count == 1 else 's'}; mean error "
+        f"{_counted(len(found.named), 'effect')}"
+        + (f", {_counted(len(found.approximations), 'approximation')}" * bool(found.approximations))
+        + "; mean error "
         f"{found.before.mean_relative_moving:.2%} → "
         f"{found.after.mean_relative_moving:.2%} where joints move (over all samples "
         f"{found.after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}). "
         f"{found.seconds:.1f} s."
     )
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _next(experiment: dict[str, Any]) -> str:
@@ -218,7 +243,10 @@ def answer_of(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
     runs = [str(name) for name in found.processing.get("runs", [])]
     return {
         "declared_effects": [_record(record) for record in found.declared],
-        "effects": [_named(named, runs) for named in found.effects],
+        "effects": [_named(each, runs) for each in found.named],
+        "approximations": [
+            {**_named(each, runs), "stands_for": each.approximates} for each in found.approximations
+        ],
         "absorbed": [
             {"kind": a.kind, "joints": list(a.joints), "by": list(a.by), "left": a.left}
             for a in found.absorbed

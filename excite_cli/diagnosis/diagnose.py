@@ -1,7 +1,7 @@
 """From measured data to a diagnosis: split, filter, trace, name, and measure once at the end."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +12,7 @@ from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import Alias, aliases_of
 from excite_cli.diagnosis.candidates import record_of
+from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.model import KeptInertias, Model, width_of
@@ -84,13 +85,14 @@ def diagnose(
     covariance = covariance_of(
         traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
     )
-    named, rivals = _named(model, traced, parameters, covariance)
-    before, after = _errors(model, traced, parameters, parts, processing)
     rules = traced.judge.rules
     unexplained = unexplained_structure(
         traced.data, traced.candidates, traced.chosen, traced.signals, traced.noise,
         (rules.significance, rules.gain, rules.inflation), robot.joint_names,
     )  # fmt: skip
+    doubts = approximations(traced, unexplained, robot.joint_names)
+    named, rivals = _named(model, traced, parameters, covariance, doubts)
+    before, after = _errors(model, traced, parameters, parts, processing)
     base_values, base_std = _base_parameters(model, parameters, covariance)
     return Diagnosis(
         config="",
@@ -141,7 +143,7 @@ def _column_names(model: Model) -> list[str]:
 
 
 def _named(
-    model: Model, traced: Traced, parameters: Array, covariance: Array
+    model: Model, traced: Traced, parameters: Array, covariance: Array, doubts: Mapping[int, str]
 ) -> tuple[tuple[NamedEffect, ...], list[tuple[Alias, Array]]]:
     """Named effects with values, evidence and aliases; and the aliases with their own values."""
     judge, names = traced.judge, model.robot.joint_names
@@ -169,9 +171,11 @@ def _named(
             together = [*others, d]
             return judge.allowed(judge.plain.solve(together), together, [d])
 
-        aliases = aliases_of(
-            i, rest, taken, traced.candidates, judge.white, traced.inflation, possible
-        )
+        aliases = []
+        if i not in doubts:
+            aliases = aliases_of(
+                i, rest, taken, traced.candidates, judge.white, traced.inflation, possible
+            )
         records = []
         for alias in aliases:
             values = judge.plain.solve([*rest, alias.candidate])
@@ -189,6 +193,7 @@ def _named(
                 share_of_residual=float(np.clip(share, 0.0, 1.0)),
                 gain=float(judge.left_out_gain(rest, [i])),
                 aliases=tuple(records),
+                approximates=doubts.get(i, ""),
             )
         )
     order = np.argsort([-each for each in strength], kind="stable")

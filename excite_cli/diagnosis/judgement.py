@@ -14,12 +14,11 @@ from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import SHARED, Evidence, Gain, Schur
-from excite_cli.diagnosis.kinds import COHERENT, FIRST, unusual
+from excite_cli.diagnosis.kinds import FIRST, left_beside, unusual
 from excite_cli.robot.model import Array
 
 # It stays in beside its refinement unless it is useless there (χ² units).
 _PARENT_PRICE = 4.5
-_FIRST_ORDER = 2e-3  # of their energy: what is left beside them may be their second order
 _FAR_MORE = 0.15  # of the error on runs left out: more than noise makes of it
 _TRANSFER = 0.06  # least share of the gain on fitted runs that runs left out must have
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
@@ -143,28 +142,33 @@ class Judgement:
         return float(np.sqrt(largest))
 
     def _leftover(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        """Whether `added` is no more than the error of a coherent effect's linear form.
-
-        Columns of a tilt or an encoder's zero are first order; what they leave of a large one
-        looks like other effects on the same joints.
-        """
+        """Whether `added` is no more than what the form of other effects leaves of them."""
+        together = [*chosen, *added]
+        leaves = self._left_beside(together)
         for joint in sorted({j for i in added for j in self.white.rows_of[i]}):
-            coherent = [
-                k
-                for k in chosen
-                if self.candidates[k].effect.kind in COHERENT and joint in self.white.rows_of[k]
-            ]
-            if not coherent:
-                return False
-            after = self.plain.energy_on([*chosen, *added], [joint])
+            after = self.plain.energy_on(together, [joint])
             own = self.plain.energy_on(chosen, [joint]) - after
-            theirs = max(
-                self.plain.energy_on([c for c in [*chosen, *added] if c != k], [joint]) - after
-                for k in coherent
-            )
-            if own > _FIRST_ORDER * theirs:
+            left = [
+                share * (self.plain.energy_on([c for c in together if c != k], [joint]) - after)
+                for k, share in leaves.items()
+                if k in chosen and joint in self.white.rows_of[k]
+            ]
+            if own > max(left, default=0.0):
                 return False
         return True
+
+    def _left_beside(self, chosen: Sequence[int]) -> dict[int, float]:
+        """Share of their energy that the forms of chosen effects may leave, where there is any."""
+        values = self.plain.solve(chosen)
+        at = len(values) - sum(self.candidates[i].width for i in chosen)
+        found = {}
+        for i in chosen:
+            width = self.candidates[i].width
+            share = left_beside(self.candidates[i].effect.kind, values[at : at + width])
+            if share > 0.0:
+                found[i] = share
+            at += width
+        return found
 
     def carries_more(self, chosen: Sequence[int], one: int, other: int) -> bool:
         """Whether `one` says far more than `other` about the same joints on runs left out."""
@@ -186,7 +190,7 @@ class Judgement:
         if self.size(chosen, added) < _SMALLEST:
             return "too small to matter"
         if self._leftover(chosen, added):
-            return "what a coherent effect leaves"
+            return "what another effect leaves"
         if not self._generalises(chosen, added):
             return "no gain on runs left out"
         return "accepted"

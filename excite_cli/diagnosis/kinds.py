@@ -1,5 +1,9 @@
 """What goes with what among kinds of effects: order, prices, parents, exclusions."""
 
+import numpy as np
+
+from excite_cli.robot.model import Array
+
 # Surprise at an effect of this kind (χ² units), where two explain the data about as well.
 UNUSUAL = {
     "viscous_friction": 0.0,
@@ -35,8 +39,23 @@ FIRST = {
 }
 # Play is elasticity with a dead zone: of the two, one is named for a joint.
 EXCLUDES = {"backlash": "elasticity", "elasticity": "backlash"}
-# One parameter acts on many joints.
-COHERENT = ("base_tilt", "encoder_offset")
+# Columns that are first order (in an angle, a compliance, a delay) leave the second; the form of a
+# cut-off and of a play is not known exactly. What they leave looks like other effects on the same
+# joints: shares of their energy.
+_ANGLES = ("base_tilt", "encoder_offset")
+_SECOND_ORDER = 1.5  # of the first order, per rad
+_LEFT_AT_LEAST = {
+    "base_tilt": 2e-3, "encoder_offset": 2e-3, "torque_saturation": 4e-3,
+    "elasticity": 2e-2, "backlash": 1e-2, "torque_delay": 1e-2,
+}  # fmt: skip
+
+
+def left_beside(kind: str, values: Array) -> float:
+    """Share of the energy of an effect with these values that its column may leave or add."""
+    least = _LEFT_AT_LEAST.get(kind, 0.0)
+    if kind not in _ANGLES:
+        return least
+    return max(least, (_SECOND_ORDER * float(np.linalg.norm(values))) ** 2)
 
 
 def unusual(kind: str) -> float:

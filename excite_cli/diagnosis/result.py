@@ -27,6 +27,7 @@ class NamedEffect:
     `parameters` as people know them; `p_value` corrected for the family of tests;
     `share_of_residual` of the energy of the residual before, on the rows it touches;
     `gain` by which the error on runs left out fell; `aliases` what the data cannot tell it from.
+    If it is only an approximation, `approximates` says of what; else it is empty.
     """
 
     effect: EffectRecord
@@ -35,6 +36,7 @@ class NamedEffect:
     share_of_residual: float
     gain: float
     aliases: tuple[EffectRecord, ...] = ()
+    approximates: str = ""
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,10 @@ class Information:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """All that `excite diagnose` learned. `phi`: full standard parameters that fit the data."""
+    """All that `excite diagnose` learned. `phi`: full standard parameters that fit the data.
+
+    `effects`: all that were added to the declared model.
+    """
 
     config: str
     config_folder: str
@@ -118,3 +123,13 @@ class Diagnosis:
     information: Information
     versions: dict[str, str]
     seconds: float = 0.0
+
+    @property
+    def named(self) -> tuple[NamedEffect, ...]:
+        """Effects that are what their names say."""
+        return tuple(each for each in self.effects if not each.approximates)
+
+    @property
+    def approximations(self) -> tuple[NamedEffect, ...]:
+        """Effects that lower the error, but only come near what is really there."""
+        return tuple(each for each in self.effects if each.approximates)

@@ -1,7 +1,8 @@
 """What is still structured and fits no name: on what does it depend?
 
-Smooth functions of one quantity at a time are tested like any candidate: position, speed,
-direction, acceleration and load of every joint, and time.
+Smooth functions of one quantity at a time are tested like any candidate: time, position, speed and
+acceleration of every joint, the joint's own direction and load, and where its position and its load
+came from (hysteresis).
 """
 
 from collections.abc import Callable, Sequence
@@ -13,6 +14,7 @@ from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
+from excite_cli.diagnosis.history import histories
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.result import Unexplained
 from excite_cli.diagnosis.training import Columns, TrainingData
@@ -40,7 +42,8 @@ def unexplained_structure(
     the inertias that all rows share, it bends their residuals too.
     """
     kept: list[Columns] = [candidates[i] for i in chosen]
-    features = [_features(data, signals, joint, joint_names) for joint in range(data.n)]
+    past = _Past.of(signals)
+    features = [_features(data, signals, past, joint, joint_names) for joint in range(data.n)]
     found: dict[int, Unexplained] = {}
     while len(found) < data.n:
         structures = [
@@ -84,10 +87,37 @@ class _Structure:
     share: float
 
 
+@dataclass(frozen=True)
+class _Past:
+    """Histories (T, n, 3) of the positions and of the loads of every part."""
+
+    q: list[Array]
+    load: list[Array]
+
+    @classmethod
+    def of(cls, signals: Sequence[Signals]) -> "_Past":
+        return cls(histories([s.q for s in signals]), histories([s.load for s in signals]))
+
+
 def _features(
-    data: TrainingData, signals: Sequence[Signals], joint: int, joint_names: Sequence[str]
+    data: TrainingData,
+    signals: Sequence[Signals],
+    past: _Past,
+    joint: int,
+    joint_names: Sequence[str],
 ) -> list[Feature]:
     names, columns = _quantities(data, signals, joint, joint_names)
+    for name, series in (
+        (f"history of q[{joint_names[joint]}]", past.q),
+        (f"history of load[{joint_names[joint]}]", past.load),
+    ):
+        names.append(name)
+        columns.append(
+            tuple(
+                run.averaged_for_fit(x[:, None, joint], [joint])
+                for x, run in zip(series, data.runs, strict=True)
+            )
+        )
     return [Feature(name, (joint,), blocks) for name, blocks in zip(names, columns, strict=True)]
 
 

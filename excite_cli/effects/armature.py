@@ -15,6 +15,7 @@ class Armature(Effect):
     kind: ClassVar = "armature"
     title: ClassVar = "inertia of the motor (armature)"
     signature: ClassVar = "the residual is a straight line through zero over the acceleration"
+    function_of: ClassVar = ("acceleration",)
     parameters: ClassVar = (Parameter("inertia", "kg·m²", 0.01, 30.0, nonnegative=True),)
 
     def columns(self, signals: Signals) -> Array:

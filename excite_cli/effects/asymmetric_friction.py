@@ -19,6 +19,7 @@ class AsymmetricFriction(Effect):
     kind: ClassVar = "asymmetric_friction"
     title: ClassVar = "friction that differs between the directions"
     signature: ClassVar = "the residual jumps when the joint reverses, to levels of unequal height"
+    function_of: ClassVar = ("speed",)
     parameters: ClassVar = (
         Parameter("forward", "N·m", 0.05, 300.0, nonnegative=True),
         Parameter("backward", "N·m", 0.05, 300.0, nonnegative=True),

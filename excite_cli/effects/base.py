@@ -20,6 +20,7 @@ from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.rigid_body import RigidBody
 
 Scope = Literal["joint", "pair", "robot"]
+Quantity = Literal["position", "speed", "acceleration", "load", "time"]
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,9 @@ class Effect(ABC):
     scope: ClassVar[Scope] = "joint"
     parameters: ClassVar[tuple[Parameter, ...]]
     shapes: ClassVar[tuple[Parameter, ...]] = ()
+    # What of its own joints the torque is a function of: with a free function of it beside, nothing
+    # of the effect would be left.
+    function_of: ClassVar[tuple[Quantity, ...]] = ()
     simpler_than: ClassVar[tuple[str, ...]] = ()  # kinds that contain this one
     defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own

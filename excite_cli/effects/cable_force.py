@@ -18,6 +18,7 @@ class CableForce(Effect):
     kind: ClassVar = "cable_force"
     title: ClassVar = "force of a cable or hose"
     signature: ClassVar = "a joint's residual depends on a neighbour's angle, whatever the speed"
+    function_of: ClassVar = ("position",)
     scope: ClassVar[Scope] = "pair"
     parameters: ClassVar = (
         Parameter("bilinear", "N·m/rad", 0.1, 100.0),

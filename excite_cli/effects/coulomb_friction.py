@@ -13,6 +13,7 @@ class CoulombFriction(Effect):
     kind: ClassVar = "coulomb_friction"
     title: ClassVar = "Coulomb friction"
     signature: ClassVar = "the residual jumps when the joint reverses and is flat in between"
+    function_of: ClassVar = ("speed",)
     parameters: ClassVar = (Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True),)
     simpler_than: ClassVar = (
         "asymmetric_friction", "stribeck_friction", "load_dependent_friction",

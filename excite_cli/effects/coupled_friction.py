@@ -26,6 +26,7 @@ class CoupledFriction(Effect):
     kind: ClassVar = "coupled_friction"
     title: ClassVar = "friction of coupled gears"
     signature: ClassVar = "a joint's residual follows the speed of its neighbour, and the reverse"
+    function_of: ClassVar = ("speed",)
     scope: ClassVar[Scope] = "pair"
     parameters: ClassVar = (
         Parameter("viscous", "N·m·s/rad", 0.1, 100.0, nonnegative=True),

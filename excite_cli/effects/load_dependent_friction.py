@@ -18,6 +18,7 @@ class LoadDependentFriction(Effect):
     kind: ClassVar = "load_dependent_friction"
     title: ClassVar = "friction that grows with load"
     signature: ClassVar = "the jump at a reversal is the larger the more torque the joint carries"
+    function_of: ClassVar = ("speed", "load")
     parameters: ClassVar = (Parameter("ratio", "N·m/N·m", 0.005, 0.3, nonnegative=True),)
 
     def columns(self, signals: Signals) -> Array:

@@ -19,6 +19,7 @@ class NonlinearViscousFriction(Effect):
     kind: ClassVar = "nonlinear_viscous_friction"
     title: ClassVar = "friction that bends over speed"
     signature: ClassVar = "the residual is odd in the joint's speed and bends"
+    function_of: ClassVar = ("speed",)
     parameters: ClassVar = (
         Parameter("coefficient", "N·m·(s/rad)^power", 0.05, 100.0, nonnegative=True),
     )

@@ -34,6 +34,7 @@ class Ripple(Effect):
     kind: ClassVar = "ripple"
     title: ClassVar = "ripple over the angle"
     signature: ClassVar = "the residual repeats at the same angles, in both directions of travel"
+    function_of: ClassVar = ("position",)
     parameters: ClassVar = (
         Parameter("cos", "N·m", 0.02, 20.0),
         Parameter("sin", "N·m", 0.02, 20.0),

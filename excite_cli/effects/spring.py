@@ -15,6 +15,7 @@ class Spring(Effect):
     kind: ClassVar = "spring"
     title: ClassVar = "spring at the joint"
     signature: ClassVar = "the residual is a straight line over the joint's angle"
+    function_of: ClassVar = ("position",)
     parameters: ClassVar = (
         Parameter("stiffness", "N·m/rad", 0.5, 2000.0, nonnegative=True),
         Parameter("preload", "N·m", 0.1, 2000.0),

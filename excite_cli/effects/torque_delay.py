@@ -18,6 +18,7 @@ class TorqueDelay(Effect):
     kind: ClassVar = "torque_delay"
     title: ClassVar = "delay of the measured torque"
     signature: ClassVar = "the residual is the torque's rate of change, on all joints alike"
+    function_of: ClassVar = ("load",)
     scope: ClassVar[Scope] = "robot"
     parameters: ClassVar = (Parameter("delay", "s", 5e-4, 0.1),)
     data_defect: ClassVar = True

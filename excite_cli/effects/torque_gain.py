@@ -17,6 +17,7 @@ class TorqueGain(Effect):
     kind: ClassVar = "torque_gain"
     title: ClassVar = "wrong scale of the measured torque"
     signature: ClassVar = "the residual has the shape of the torque itself"
+    function_of: ClassVar = ("load",)
     parameters: ClassVar = (Parameter("gain", "1", 0.005, 0.5),)
     data_defect: ClassVar = True
 

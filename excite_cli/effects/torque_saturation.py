@@ -21,6 +21,7 @@ class TorqueSaturation(Effect):
     kind: ClassVar = "torque_saturation"
     title: ClassVar = "saturation of the measured torque"
     signature: ClassVar = "the residual is zero up to a level of torque and grows from there"
+    function_of: ClassVar = ("load",)
     parameters: ClassVar = (Parameter("sharpness", "1", 0.3, 1.5, nonnegative=True),)
     shapes: ClassVar = (Parameter("level", "N·m", 0.1, 1000.0),)
     data_defect: ClassVar = True

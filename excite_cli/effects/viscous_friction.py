@@ -12,6 +12,7 @@ class ViscousFriction(Effect):
     kind: ClassVar = "viscous_friction"
     title: ClassVar = "viscous friction"
     signature: ClassVar = "the residual is a straight line through zero over the joint's speed"
+    function_of: ClassVar = ("speed",)
     parameters: ClassVar = (Parameter("viscous", "N·m·s/rad", 0.1, 100.0, nonnegative=True),)
     simpler_than: ClassVar = ("nonlinear_viscous_friction", "friction_drift", "coupled_friction")
 

@@ -1,0 +1,100 @@
+"""Names that do not hold: effects that only come near something which is no effect we know.
+
+A line through a curve explains most of it and is no spring. So for each effect that was found, E is
+the energy it explains on the joint where it matters most, and U what is left there with structure:
+the part that depends on some quantity (`unexplained`), or what an effect of an impossible sign or
+size would explain. The effect is an approximation
+
+* if what is left is a function of the same quantity as the effect (friction: speed), and U > 0.1 E,
+* or if U > E, whatever it depends on.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from excite_cli.diagnosis.result import Unexplained
+from excite_cli.diagnosis.tracing import Traced
+
+_SAME_QUANTITY = 0.1
+_TRIED = 12  # of the strongest candidates of a joint
+
+# How the quantities of effects begin in the words of `unexplained`.
+_WORDS = {
+    "position": ("q[",),
+    "speed": ("v[", "direction and q[", "history of q["),
+    "acceleration": ("a[",),
+    "load": ("load[", "history of load["),
+    "time": ("time",),
+}
+
+
+def approximations(
+    traced: Traced, unexplained: Sequence[Unexplained], joint_names: Sequence[str]
+) -> dict[int, str]:
+    """Which chosen candidates are approximations, and of what (in words)."""
+    left = {each.joint: each for each in unexplained}
+    impossible: dict[int, tuple[float, str]] = {}
+    found: dict[int, str] = {}
+    plain = traced.judge.plain
+    for i in traced.chosen:
+        joint, explained = _strongest(traced, i)
+        name = joint_names[joint]
+        rest = plain.energy_on(traced.chosen, [joint])
+        if name in left:
+            each = left[name]
+            structure = each.share_of_residual * rest
+            same = _same_quantity(traced, i, each.depends_on, joint_names)
+            if structure > (_SAME_QUANTITY if same else 1.0) * explained:
+                found[i] = f"a function of {', '.join(each.depends_on)}"
+                continue
+        if joint not in impossible:
+            impossible[joint] = _impossible(traced, joint, rest)
+        energy, what = impossible[joint]
+        if energy > explained:
+            found[i] = f"something that also looks like {what}"
+    return found
+
+
+def _strongest(traced: Traced, i: int) -> tuple[int, float]:
+    """The joint where candidate i matters most, and the energy that it explains there."""
+    judge = traced.judge
+    rest = judge.without(i, traced.chosen)
+    shares: Mapping[int, tuple[float, float]] = {
+        j: (
+            judge.plain.energy_on(rest, [j]) - judge.plain.energy_on([*rest, i], [j]),
+            judge.plain.energy_on((), [j]),
+        )
+        for j in traced.candidates[i].rows
+    }
+    joint = max(shares, key=lambda j: shares[j][0] / max(shares[j][1], 1e-300))
+    return joint, max(shares[joint][0], 1e-300)
+
+
+def _same_quantity(
+    traced: Traced, i: int, depends_on: Sequence[str], joint_names: Sequence[str]
+) -> bool:
+    effect = traced.candidates[i].effect
+    words = tuple(word for quantity in effect.function_of for word in _WORDS[quantity])
+    own = [joint_names[j] for j in effect.joints]
+    return any(
+        text.startswith(words) and (text == "time" or any(f"[{name}]" in text for name in own))
+        for text in depends_on
+    )
+
+
+def _impossible(traced: Traced, joint: int, rest: float) -> tuple[float, str]:
+    """The most that a candidate which cannot be so would explain, and its title."""
+    judge, chosen = traced.judge, traced.chosen
+    taken = {traced.candidates[i].place for i in chosen}
+    singles = judge.plain.schur(chosen).singles
+    near = [
+        k
+        for k, c in enumerate(traced.candidates)
+        if joint in c.rows and c.place not in taken and singles[k].dof
+    ]
+    best = (0.0, "")
+    for k in sorted(near, key=lambda k: -singles[k].chi2)[:_TRIED]:
+        together = [*chosen, k]
+        energy = rest - judge.plain.energy_on(together, [joint])
+        if energy > best[0] and not judge.allowed(judge.plain.solve(together), together, [k]):
+            best = (energy, traced.candidates[k].effect.title)
+    return best
