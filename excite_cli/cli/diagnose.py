@@ -7,7 +7,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
-from excite_cli.errors import FileError
+from excite_cli.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
     from excite_cli.config.spec import Spec
@@ -16,16 +16,11 @@ if TYPE_CHECKING:
 
 def diagnose(
     config: options.Config,
-    data: Annotated[
-        list[Path], typer.Argument(help="Measured data: HDF5, CSV or bags.", show_default=False)
-    ],
+    data: options.Data,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File for the diagnosis (HDF5).")
     ] = None,
-    sealed: Annotated[
-        str | None,
-        typer.Option("--sealed", metavar="RUN", help="Run kept out. Default: the last one."),
-    ] = None,
+    sealed: options.Sealed = None,
     apply: Annotated[
         Path | None,
         typer.Option("--apply", metavar="NEW.yaml", help="Write the config with what was found."),
@@ -47,10 +42,7 @@ def diagnose(
     Example:  excite diagnose configs/ur10.yaml measured.h5 -o diagnosis.h5 --apply better.yaml
     """
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    for path in (output, apply):
-        _refuse(path, overwrite)
-    if output is not None and apply is not None and output.resolve() == apply.resolve():
-        raise FileError(f"--output and --apply both name {output}. Give two names.")
+    check_outputs({"output": output, "apply": apply}, overwrite)
 
     from dataclasses import replace
 
@@ -85,18 +77,6 @@ def diagnose(
         tables_of(found, robot, experiment, verbose),
         {**answer_of(found, experiment), "output": written},
     )
-
-
-def _refuse(path: Path | None, overwrite: bool) -> None:
-    """Refuse before the work begins."""
-    if path is None:
-        return
-    if path.is_dir():
-        raise FileError(f"{path} is a folder. Give a file name.")
-    if path.exists() and not overwrite:
-        raise FileError(
-            f"{path} exists already. Give another name, or replace it with --overwrite."
-        )
 
 
 def _apply(spec: "Spec", folder: Path, found: "Diagnosis", path: Path) -> None:

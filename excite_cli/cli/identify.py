@@ -8,7 +8,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
-from excite_cli.errors import FileError
+from excite_cli.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
     from excite_cli.export.exported import Exported
@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 
 def identify(
     config: options.Config,
-    data: Annotated[
-        list[Path], typer.Argument(help="Measured data: HDF5, CSV or bags.", show_default=False)
-    ],
+    data: options.Data,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File for the fit (HDF5).")
     ] = None,
@@ -33,10 +31,7 @@ def identify(
     parameters: Annotated[
         Path | None, typer.Option("--parameters", help="Write all parameters (YAML).")
     ] = None,
-    sealed: Annotated[
-        str | None,
-        typer.Option("--sealed", metavar="RUN", help="Run for the errors. Default: the last one."),
-    ] = None,
+    sealed: options.Sealed = None,
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,
     as_json: options.Json = False,
@@ -61,8 +56,8 @@ def identify(
     from excite_cli.store.fit_file import write_fit
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    outputs = {"fit": output, "urdf": urdf, "mjcf": mjcf, "parameters": parameters}
-    _check_outputs(outputs, overwrite)
+    exports = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
+    check_outputs({"output": output, **exports}, overwrite)
     with single_threaded():
         spec = load_spec(config, overrides)
         folder = config.resolve().parent
@@ -87,24 +82,9 @@ def identify(
         terminal.say(f"{finding.severity}{where}: {finding.text}")
     for note in notes:
         terminal.say(f"note: {note}")
-    written = {key: str(path) for key, path in outputs.items() if path is not None}
+    files = {"fit": output, **exports}
+    written = {key: str(path) for key, path in files.items() if path is not None}
     terminal.answer(tables_of(found, robot), {**answer_of(found), "output": written})
-
-
-def _check_outputs(outputs: dict[str, Path | None], overwrite: bool) -> None:
-    """Refuse before the work begins."""
-    for path in outputs.values():
-        if path is None:
-            continue
-        if path.is_dir():
-            raise FileError(f"{path} is a folder. Give a file name.")
-        if path.exists() and not overwrite:
-            raise FileError(
-                f"{path} exists already. Give another name, or replace it with --overwrite."
-            )
-    given = [path.resolve() for path in outputs.values() if path is not None]
-    if len(set(given)) < len(given):
-        raise FileError("two outputs have the same file name. Give each its own.")
 
 
 def _export(

@@ -6,6 +6,13 @@ from typing import Annotated
 import typer
 
 Config = Annotated[Path, typer.Argument(help="The problem, a YAML file.", show_default=False)]
+Data = Annotated[
+    list[Path], typer.Argument(help="Measured data: HDF5, CSV or bags.", show_default=False)
+]
+Sealed = Annotated[
+    str | None,
+    typer.Option("--sealed", metavar="RUN", help="Run kept out of the fit. Default: the last one."),
+]
 ResultFile = Annotated[Path, typer.Argument(help="A result file.", show_default=False)]
 Output = Annotated[
     Path | None,

@@ -7,6 +7,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -90,7 +91,7 @@ def simulate(
     from excite_cli.simulation.simulate import simulate as simulate_motions
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    path = _output(output, overwrite)
+    check_outputs({"output": output}, overwrite)
     with single_threaded():
         spec = load_spec(config, overrides)
         settings = SimulationSettings(
@@ -117,7 +118,7 @@ def simulate(
             )
         with terminal.live("simulating", len(names)) as show:
             simulation = simulate_motions(robot, motions, settings, planted, declared, show)
-        write_dataset(path, simulation.dataset, _attributes(simulation, settings, spec, robot))
+        write_dataset(output, simulation.dataset, _attributes(simulation, settings, spec, robot))
     records = [p.record(robot) for p in simulation.truth.effects]
     runs = [
         {
@@ -131,21 +132,9 @@ def simulate(
         for run in simulation.dataset.runs
     ]
     terminal.answer(
-        [_run_table(simulation), _effect_table(records), str(path)],
-        {"runs": runs, "effects": records, "output": str(path), "seed": settings.seed},
+        [_run_table(simulation), _effect_table(records), str(output)],
+        {"runs": runs, "effects": records, "output": str(output), "seed": settings.seed},
     )
-
-
-def _output(path: Path, overwrite: bool) -> Path:
-    from excite_cli.errors import FileError
-
-    if path.is_dir():
-        raise FileError(f"{path} is a folder. Give a file name with -o.")
-    if path.exists() and not overwrite:
-        raise FileError(
-            f"{path} exists already. Give another name with -o, or replace it with --overwrite."
-        )
-    return path
 
 
 def _motions(

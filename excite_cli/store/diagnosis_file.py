@@ -11,7 +11,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from excite_cli.atomic import write_atomically
 from excite_cli.diagnosis.result import (
@@ -23,14 +23,16 @@ from excite_cli.diagnosis.result import (
     Round,
     Unexplained,
 )
-from excite_cli.errors import FileError
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
+from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 
 SCHEMA = 1
-PROGRAM = "excite"
 CONTENT = "diagnosis"
+OWN = OwnFile(
+    "a diagnosis", "Diagnoses are written by `excite diagnose`.", SCHEMA, ("content", CONTENT)
+)
 _ATTRIBUTES = ("config", "config_folder", "sealed_run")
 _ARRAYS = ("phi", "base_values", "base_std")
 _RECORDS: dict[str, Any] = {
@@ -66,22 +68,8 @@ def read_diagnosis(path: Path) -> Diagnosis:
     FileError
         The file is missing, unreadable, not a diagnosis, damaged, or of a newer schema.
     """
-    if not path.is_file():
-        raise FileError(f"There is no file {path}.")
-    try:
-        with h5py.File(path, "r") as file:
-            return _read(file, path)
-    except OSError as error:
-        raise FileError(f"{path} is not a readable HDF5 file ({error}).") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise FileError(f"{path} is damaged: {where or 'a record'}: {first['msg']}.") from error
-    except (KeyError, ValueError, TypeError, AttributeError, IndexError, RuntimeError) as error:
-        raise FileError(
-            f"{path} is damaged or not a diagnosis: {error}. Diagnoses are written by "
-            "`excite diagnose`."
-        ) from error
+    with opened(path, OWN) as file:
+        return _read(file)
 
 
 def is_diagnosis(path: Path) -> bool:
@@ -117,18 +105,8 @@ def _write(path: Path, diagnosis: Diagnosis) -> None:
         file["information"].attrs["rank"] = int(information.rank)
 
 
-def _read(file: Any, path: Path) -> Diagnosis:
+def _read(file: Any) -> Diagnosis:
     attributes = file.attrs
-    if attributes.get("program") != PROGRAM or attributes.get("content") != CONTENT:
-        raise FileError(
-            f"{path} is HDF5, but not a diagnosis of this program. Diagnoses are written by "
-            "`excite diagnose`."
-        )
-    if int(attributes["schema"]) > SCHEMA:
-        raise FileError(
-            f"{path} has schema {int(attributes['schema'])}; this version reads up to {SCHEMA}. "
-            "Update the program."
-        )
     fields: dict[str, Any] = {name: str(attributes[name]) for name in _ATTRIBUTES}
     fields.update({name: np.asarray(file[name], dtype=float) for name in _ARRAYS})
     fields.update({name: _record(file, f"records/{name}", _RECORDS[name]) for name in _RECORDS})

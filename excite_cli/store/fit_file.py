@@ -15,16 +15,17 @@ import numpy as np
 from excite_cli.atomic import write_atomically
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
-from excite_cli.errors import FileError
 from excite_cli.identification.consistent import ConsistentParameters
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.identify import Identification
 from excite_cli.measurement.dataset import Finding
+from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 from excite_cli.store.versions import versions
 
 SCHEMA = 1
-PROGRAM, KIND = "excite", "fit"
+KIND = "fit"
+OWN = OwnFile("a fit", "Such files are written by `excite identify`.", SCHEMA, ("kind", KIND))
 _ARRAYS = ("values", "std", "relative_std", "identifiable", "essential")
 
 
@@ -127,32 +128,12 @@ def read_fit(path: Path) -> StoredFit:
     ConfigError
         An effect of it is not in the catalogue.
     """
-    if not path.is_file():
-        raise FileError(f"There is no file {path}.")
-    try:
-        with h5py.File(path, "r") as file:
-            return _read(file, path)
-    except OSError as error:
-        raise FileError(f"{path} is not a readable HDF5 file ({error}).") from error
-    except (KeyError, ValueError, TypeError, AttributeError, IndexError, RuntimeError) as error:
-        raise FileError(
-            f"{path} is damaged or not a fit of this program: {error}. Such files are written by "
-            "`excite identify`."
-        ) from error
+    with opened(path, OWN) as file:
+        return _read(file)
 
 
-def _read(file: Any, path: Path) -> StoredFit:
+def _read(file: Any) -> StoredFit:
     attributes = file.attrs
-    if attributes.get("program") != PROGRAM or attributes.get("kind") != KIND:
-        raise FileError(
-            f"{path} is HDF5, but not a fit of this program. Such files are written by "
-            "`excite identify`."
-        )
-    if int(attributes["schema"]) > SCHEMA:
-        raise FileError(
-            f"{path} has schema {int(attributes['schema'])}; this version reads up to {SCHEMA}. "
-            "Update the program."
-        )
     return StoredFit(
         config=str(attributes["config"]),
         config_folder=str(attributes["config_folder"]),

@@ -21,9 +21,14 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
+from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 
 SCHEMA = 1
-PROGRAM = "excite"
+OWN = OwnFile(
+    "a result",
+    "Result files are written by `excite optimize` and `excite compare-random`.",
+    SCHEMA,
+)
 _TABLE = [("motion", "i8"), ("own", "f8"), ("stacked", "f8")]
 
 
@@ -119,18 +124,8 @@ def read_result(path: Path) -> Result:
     FileError
         The file is missing, unreadable, not ours, damaged, or of a newer schema.
     """
-    if not path.is_file():
-        raise FileError(f"There is no file {path}.")
-    try:
-        with h5py.File(path, "r") as file:
-            return _read(file, path)
-    except OSError as error:
-        raise FileError(f"{path} is not a readable HDF5 file ({error}).") from error
-    except (KeyError, ValueError, TypeError, AttributeError, IndexError, RuntimeError) as error:
-        raise FileError(
-            f"{path} is damaged or not a result of this program: {error}. Result files are "
-            "written by `excite optimize` and `excite compare-random`."
-        ) from error
+    with opened(path, OWN) as file:
+        return _read(file, path)
 
 
 def is_result(path: Path) -> bool:
@@ -146,21 +141,11 @@ def is_result(path: Path) -> bool:
 
 def _read(file: Any, path: Path) -> Result:
     attributes = file.attrs
-    if attributes.get("program") != PROGRAM:
-        raise FileError(
-            f"{path} is HDF5, but not a result of this program. Result files are written by "
-            "`excite optimize` and `excite compare-random`."
-        )
     content = str(attributes.get("content", "motions"))
     if content != "motions":
         raise FileError(
             f"{path} holds a {content}, not motions. Motions are written by `excite optimize` and "
             "`excite compare-random`."
-        )
-    if int(attributes["schema"]) > SCHEMA:
-        raise FileError(
-            f"{path} has schema {int(attributes['schema'])}; this version reads up to {SCHEMA}. "
-            "Update the program."
         )
     base = file["base_parameters"]
     return Result(

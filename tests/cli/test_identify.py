@@ -95,7 +95,7 @@ def test_files_are_not_replaced_unless_said(folder: Path, excite: Program) -> No
 def test_bad_input_gives_one_message(folder: Path, excite: Program) -> None:
     cases = {
         (folder / "data.h5", "--sealed", "r7"): "there is no run 'r7'",
-        (folder / "data.h5", "-o", "x.h5", "--urdf", "x.h5"): "the same file name",
+        (folder / "data.h5", "-o", "x.h5", "--urdf", "x.h5"): "both name x.h5",
     }
     for words, message in cases.items():
         run = excite("identify", folder / CONFIG, *words)
