@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import SHARED, Evidence, Gain, Schur
-from excite_cli.diagnosis.kinds import FIRST, left_beside, unusual
+from excite_cli.diagnosis.kinds import EXCLUDES, FIRST, left_beside, unusual
 from excite_cli.robot.model import Array
 
 # It stays in beside its refinement unless it is useless there (χ² units).
@@ -141,8 +141,37 @@ class Judgement:
             largest = max(largest, (before - after) / max(whole, 1e-300))
         return float(np.sqrt(largest))
 
+    def too_small(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """Whether nobody would miss it."""
+        return self.size(chosen, added) < _SMALLEST
+
     def _leftover(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
         """Whether `added` is no more than what the form of other effects leaves of them."""
+        return self._small_beside(chosen, added) or self._less_than_twin(chosen, added)
+
+    def _less_than_twin(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """Whether `added` saves less than the twin of a chosen effect, or nothing beside it.
+
+        Play and elasticity exclude each other, and neither is exact: what one leaves, the other
+        explains, and so does many another effect.
+        """
+        twins = [
+            (EXCLUDES[effect.kind], effect.joints, effect.runs)
+            for effect in (self.candidates[k].effect for k in chosen)
+            if effect.kind in EXCLUDES
+        ]
+        if not twins:
+            return False
+        own = self.white.schur(chosen)
+        saved, needed = own.gain(*added, absorbed=SHARED).chi2, self._prices(added)
+        for twin in (i for i, c in enumerate(self.candidates) if c.place in twins):
+            beside = self.white.schur([*chosen, twin]).gain(*added, absorbed=SHARED).chi2
+            if beside < needed or own.gain(twin).chi2 > saved:
+                return True
+        return False
+
+    def _small_beside(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """Whether it explains less than other effects may leave on every joint it touches."""
         together = [*chosen, *added]
         leaves = self._left_beside(together)
         for joint in sorted({j for i in added for j in self.white.rows_of[i]}):
@@ -187,7 +216,7 @@ class Judgement:
         together = [*chosen, *added]
         if not self.allowed(self.plain.solve(together), together, added):
             return "impossible sign"
-        if self.size(chosen, added) < _SMALLEST:
+        if self.too_small(chosen, added):
             return "too small to matter"
         if self._leftover(chosen, added):
             return "what another effect leaves"
@@ -222,6 +251,6 @@ class Judgement:
             self.p_value(i, gain) > self.rules.significance
             or not right_sign
             or self.left_out_gain(rest, [i]) < self.rules.gain
-            or self.size(rest, [i]) < _SMALLEST
+            or self.too_small(rest, [i])
             or self._leftover(rest, [i])
         )

@@ -66,7 +66,7 @@ def check_plausibility(robot: Robot, runs: Sequence[PreparedRun]) -> None:
     excess = _excess(robot, samples)
     found = [verdict for verdict in tried if _clearly_better(verdict, straight, excess)]
     if not found:
-        if np.mean(straight.left > _FOREIGN) >= 0.5:
+        if np.mean((straight.left > _FOREIGN) & (excess > _BEYOND)) >= 0.5:
             raise FileError(_foreign(robot.joint_names, straight))
         return
     best = min(found, key=lambda verdict: verdict.cost)

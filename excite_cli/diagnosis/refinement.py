@@ -8,6 +8,7 @@ from excite_cli.effects.base import Effect, Signals
 
 # By how much a shape is changed up and down; passes repeat it from the best one.
 _RATIOS = (1.35, 1.15, 1.06, 1.02)
+_GAPS = (1.15, 1.06, 1.02, 1.007)  # a flight more or less changes much
 _LEVELS = (1.05, 1.02, 1.008, 1.003, 1.001)  # of a cut-off level, which is seen directly
 _CYCLES = (0.35, 0.15, 0.06, 0.02, 0.006)  # of a ripple, over the travelled range
 _FIXED = ("power", "direction")
@@ -28,7 +29,7 @@ def shapes_around(effect: Effect, signals: Sequence[Signals]) -> list[dict]:
             width = max(abs(effect.shape["end"] - effect.shape["start"]), 0.05)
             changes = [(ratio - 1.0) * width for ratio in _RATIOS]
         else:
-            ratios = _LEVELS if name == "level" else _RATIOS
+            ratios = {"level": _LEVELS, "gap": _GAPS}.get(name, _RATIOS)
             changes = [(ratio - 1.0) * value for ratio in ratios]
         found += [
             {**effect.shape, name: float(value + sign * change)}

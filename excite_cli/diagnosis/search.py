@@ -175,6 +175,8 @@ class Search:
                 if cost < best and self.judge.loses(rest, i, move):
                     continue
                 refined = len(move) == 1 and i in self.judge.parents[move[0]]
+                if refined and self.judge.too_small([*rest, i], move):
+                    continue
                 if (
                     cost < best
                     and (

@@ -10,7 +10,12 @@ lost in momentum meanwhile, it is given back by the impact:
 
     −load_j in flight,    +∫ load_j dt over the flight, as a blow at its end.
 
-The blow lasts one sample here; it is the parallel filter that gives it the width it has in the
+The link is accelerated by as much over M_jj, and what its motion asks of joint r changes by M_rj
+times that. Between flights the link stands half a gap behind the motor, on the side of its load:
+
+    −gap/2 · sgn(load_j) · ∂τ_r/∂q_j.
+
+The blow lasts a moment here; it is the parallel filter that gives it the width it has in the
 data. The rotor does not enter: its own motion is measured.
 """
 
@@ -25,6 +30,7 @@ from excite_cli.robot.model import Array, Robot
 
 _GAPS = 1e-3, 3e-2  # rad
 _WIDTH = 0.01  # s, of a blow in the search, about that of a filter of 20 Hz
+_FINE = 2e-3  # s, the step in which flights are followed
 _CHUNK = 64  # samples that are looked at first for the end of a flight
 
 
@@ -52,40 +58,70 @@ class Backlash(Effect):
         signals: Sequence[Signals],
         residuals: Sequence[Array],
     ) -> list[dict]:
-        """The gap whose flights and blows, smoothed a little, explain most of the residual."""
+        """The gap whose flights and blows, smoothed a little, explain most of the residuals."""
         if not any(len(s.t) > 2 for s in signals):
             return []
-        r = np.concatenate([np.asarray(x)[:, joints[0]] for x in residuals])
+        r = np.concatenate(residuals)
+        weights = 1.0 / np.maximum(np.mean(r**2, axis=0), 1e-300)
 
         def energy(gap: float) -> float:
             effect = cls(joints, {"gap": float(gap)})
-            column = np.concatenate([_smooth(effect.columns(s)[:, 0, 0], s) for s in signals])
-            fitted = max(float(column @ r), 0.0)  # a negative share is no play
-            return fitted**2 / (float(column @ column) + 1e-300)
+            column = np.concatenate([_smooth(effect.columns(s)[:, :, 0], s) for s in signals])
+            fitted = max(float(np.sum(weights * column * r)), 0.0)  # a negative share is no play
+            return fitted**2 / (float(np.sum(weights * column**2)) + 1e-300)
 
         gaps = np.geomspace(*_GAPS, 48)
         best = gaps[int(np.argmax([energy(gap) for gap in gaps]))]
-        near = best * np.geomspace(0.93, 1.07, 9)
+        near = best * np.geomspace(0.93, 1.07, 21)
         return [{"gap": float(near[int(np.argmax([energy(gap) for gap in near]))])}]
 
+    def rows(self, n: int) -> tuple[int, ...]:
+        """All joints."""
+        return tuple(range(n))
+
     def columns(self, signals: Signals) -> Array:
-        """−load_j in flight, the blow at its end, else zero, (T, 1, 1)."""
-        j, column = self.joints[0], np.zeros(len(signals.t))
-        if len(signals.t) > 2:
-            load, step = signals.load[:, j], float(signals.t[1] - signals.t[0])
-            inertia = np.maximum(signals.body.mass[:, j, j], 1e-12)
-            for first, last, closed in flights(load / inertia, self.shape["gap"], step):
-                column[first:last] = -load[first:last]
-                if closed:
-                    column[last] += load[first:last].sum()
-        return column[:, None, None]
+        """Flights, blows, and the shift of the link, in all rows, (T, n, 1)."""
+        j, body = self.joints[0], signals.body
+        if len(signals.t) < 3:
+            return np.zeros((*signals.q.shape, 1))
+        inertia = np.maximum(body.mass[:, j, j], 1e-12)
+        lost, behind = self._in_gap(signals, inertia)
+        jerked = body.mass[:, :, j] * (lost / inertia)[:, None]
+        shifted = body.by_position[:, :, j] * behind[:, None]
+        return np.asarray(jerked - shifted)[:, :, None]
+
+    def _in_gap(self, signals: Signals, inertia: Array) -> tuple[Array, Array]:
+        """What joint j lacks (T,), and how far its link is behind the motor (T,) [rad].
+
+        Flights last a few samples only, so they are followed on a finer grid, and averaged.
+        """
+        load, step = signals.load[:, self.joints[0]], float(signals.t[1] - signals.t[0])
+        finer = max(1, int(np.ceil(step / _FINE)))
+        at = np.arange((len(load) - 1) * finer + 1) / finer
+        samples = np.arange(len(load))
+        load, inertia = np.interp(at, samples, load), np.interp(at, samples, inertia)
+        lost, behind = np.zeros(len(at)), 0.5 * self.shape["gap"] * np.sign(load)
+        for first, last, closed in flights(load / inertia, self.shape["gap"], step / finer):
+            lost[first:last] = -load[first:last]
+            behind[first:last] = 0.0
+            if closed:
+                lost[last] += load[first:last].sum()
+        return _averaged(lost, finer), _averaged(behind, finer)
+
+
+def _averaged(x: Array, finer: int) -> Array:
+    """Means over the samples' own intervals, of values on a grid that is `finer` times as fine."""
+    half = finer // 2
+    padded = np.concatenate([np.zeros(half), x, np.zeros(finer - 1 - half)])
+    counts = np.concatenate([np.zeros(half), np.ones(len(x)), np.zeros(finer - 1 - half)])
+    return np.asarray(padded.reshape(-1, finer).sum(axis=1) / counts.reshape(-1, finer).sum(axis=1))
 
 
 def _smooth(column: Array, signals: Signals) -> Array:
     if len(signals.t) < 3:
         return column
     width = _WIDTH / float(signals.t[1] - signals.t[0])
-    smooth: Array = gaussian_filter1d(column, width)
+    smooth: Array = gaussian_filter1d(column, width, axis=0)
     return smooth
 
 
