@@ -68,15 +68,15 @@ class Judgement:
             self._thresholds[key] = float(chi2.isf(self.rules.significance / c.tests, key[0]))
         return self.rules.inflation * self._thresholds[key] + unusual(c.effect.kind)
 
+    def price_beside(self, candidate: int, chosen: Sequence[int], dof: int) -> float:
+        """As `price`; first-order friction is cheap beside what refines it."""
+        if any(candidate in self.parents[k] for k in chosen):
+            return self.rules.inflation * _PARENT_PRICE
+        return self.price(candidate, dof)
+
     def _prices(self, chosen: Sequence[int]) -> float:
-        """Price of a set: parents of members are cheap."""
-        cheap = {p for i in chosen for p in self.parents[i]}
-        return sum(
-            self.rules.inflation * _PARENT_PRICE
-            if i in cheap
-            else self.price(i, self.candidates[i].width)
-            for i in chosen
-        )
+        """Price of a set."""
+        return sum(self.price_beside(i, chosen, self.candidates[i].width) for i in chosen)
 
     def bound(self, candidate: int, chosen: Sequence[int]) -> bool:
         """Whether it must stay: √|v| beside no Coulomb and viscous friction is no physics."""

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from excite_cli.robot.model import Array
 
 HIGHEST_ORDER = 12
-_RESPONSE = 400  # samples after which an impulse has died away
+_RESPONSE = 2000  # samples after which an impulse has died away
 _SHRINK = 0.995  # roots are kept within this circle
 # White noise added to the residual, as a share of its variance. Torque that somebody low-passed
 # before holds nothing at high frequency; whitening must not trust that band a million times more.

@@ -53,9 +53,9 @@ class Search:
             for joint in effect.joints:
                 own = [p for p in self.judge.parents[i] if self.candidates[p].rows == (joint,)]
                 missing = [p for p in own if p not in chosen]
-                if len(missing) == len(own) or not missing:
-                    continue
                 more = [*chosen, *missing]
+                if len(missing) == len(own) or not missing or len(more) > self._most:
+                    continue
                 if (
                     self.judge.allowed(self.plain.solve(more), more, missing)
                     or len(effect.joints) == 1
@@ -67,7 +67,7 @@ class Search:
         """Add candidates up to tier `latest` while one (or two of a joint) passes."""
         while len(chosen) < self._most:
             added = self._best_one(chosen, latest) or self._best_two(chosen, latest)
-            if not added:
+            if not added or len(chosen) + len(added) > self._most:
                 break
             chosen = [*chosen, *added]
         return chosen
@@ -86,7 +86,10 @@ class Search:
         """The candidate that saves most of those that pass."""
         schur = self.white.schur(chosen)
         free = [i for i in self._free(chosen, latest) if schur.singles[i].dof]
-        saved = {i: schur.singles[i].chi2 - self.judge.price(i, schur.singles[i].dof) for i in free}
+        saved = {
+            i: schur.singles[i].chi2 - self.judge.price_beside(i, chosen, schur.singles[i].dof)
+            for i in free
+        }
         best: int | None = None
         for i in sorted(free, key=lambda i: -saved[i])[:_TRIED]:
             if saved[i] <= 0:
@@ -171,6 +174,8 @@ class Search:
                 if base - saved >= best:
                     break
                 trial = [*rest, *move]
+                if len(trial) > self._most:
+                    continue
                 cost = self.judge.cost(trial)  # parents are cheaper than `saved` says
                 if cost < best and self.judge.loses(rest, i, move):
                     continue

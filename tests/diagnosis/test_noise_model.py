@@ -151,3 +151,23 @@ def test_long_run_noise_is_that_of_the_mean() -> None:
     means = [series(seed, 2000).mean() for seed in range(400)]
     assert np.std(means) * np.sqrt(2000) == pytest.approx(model.long_run(0), rel=0.12)
     assert NoiseModel.white(np.array([2.0])).long_run(0) == 2.0
+
+
+@pytest.mark.parametrize("memory", [-0.9, 0.0, 0.5, 0.98])
+def test_level_of_a_first_order_process_is_known(memory: float) -> None:
+    """σ / √(1 − c²)."""
+    model = NoiseModel((np.array([memory]),), np.array([SIGMA]))
+    assert model.levels() == pytest.approx([SIGMA / np.sqrt(1 - memory**2)], rel=1e-6)
+
+
+def test_levels_are_those_of_each_joint() -> None:
+    """A second-order process in closed form, a first-order one and independent samples."""
+    model = NoiseModel((TAPS, np.array([0.8]), np.zeros(0)), np.array([SIGMA, 2.0, 5.0]))
+    c1, c2 = TAPS
+    variance = (1 - c2) / ((1 + c2) * ((1 - c2) ** 2 - c1**2))
+    assert model.levels() == pytest.approx([SIGMA * np.sqrt(variance), 2.0 / 0.6, 5.0], rel=1e-6)
+
+
+def test_levels_are_those_of_a_long_series() -> None:
+    model = NoiseModel((TAPS,), np.array([SIGMA]))
+    assert model.levels()[0] == pytest.approx(series(8, 100_000).std(), rel=0.02)

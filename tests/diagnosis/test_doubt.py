@@ -1,0 +1,237 @@
+"""Effects that only come near something else, by what is left beside them."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.doubt import approximations
+from excite_cli.diagnosis.judgement import Judgement, Rules
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.result import Unexplained
+from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import catalogue
+from excite_cli.robot.model import Array
+from tests.diagnosis.explicit_data import FIXED, FOLDS, prepared
+
+NAMES = ("a", "b")
+SAMPLES = 60
+ONE = NoiseModel.white(np.ones(2))
+Allowed = Callable[[Array, Sequence[int], Sequence[int]], bool]
+
+
+def effect(kind: str, *joints: int) -> Effect:
+    return catalogue()[kind](joints or (0,))
+
+
+def anything(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
+    return True
+
+
+def all_but(vetoed: int) -> Allowed:
+    """A veto of one candidate."""
+    return lambda parameters, chosen, added: vetoed not in added
+
+
+def traced(
+    data: TrainingData,
+    candidates: Sequence[Candidate],
+    chosen: Sequence[int],
+    allowed: Allowed = anything,
+) -> Traced:
+    plain = data.evidence(candidates, ONE)
+    judge = Judgement(plain, plain, candidates, Rules(0.01, 0.01), allowed)
+    return Traced(
+        data, tuple(candidates), ONE, judge, tuple(chosen), np.zeros(0), (), np.ones(2), 1.0
+    )
+
+
+def planted(
+    effects: Sequence[Effect], torque: Array, mix: Array | None = None
+) -> tuple[TrainingData, list[Candidate]]:
+    """Orthogonal columns, times `mix`, on all joints of each effect, and noise of RMS one.
+
+    `torque` (columns, joints) is the RMS of each direction in the torque: so the energies that
+    effects explain are known.
+    """
+    rng = np.random.default_rng(0)
+    count = len(torque)
+    declared, columns, tau = [], [], []
+    for _ in FOLDS:
+        free = np.linalg.qr(rng.normal(size=(SAMPLES, FIXED + count + 2)))[0] * np.sqrt(SAMPLES)
+        declared.append(np.repeat(free[:, None, :FIXED], 2, axis=1))
+        own = free[:, FIXED : FIXED + count]
+        columns.append(own if mix is None else own @ mix)
+        tau.append(own @ torque + free[:, FIXED + count :])
+    candidates, at = [], 0
+    for one in effects:
+        width = len(one.parameters)
+        candidates.append(
+            Candidate(
+                one,
+                one.joints,
+                tuple(
+                    np.repeat(x[:, None, at : at + width], len(one.joints), axis=1) for x in columns
+                ),
+            )
+        )
+        at += width
+    runs = tuple(prepared(np.ones((SAMPLES, 2), bool)) for _ in FOLDS)
+    return TrainingData(runs, FOLDS, tuple(declared), tuple(tau)), candidates
+
+
+def beside(kind: str, words: Sequence[str], energy: float, joints: tuple[int, ...] = (0,)) -> bool:
+    """Whether an effect of this energy, beside structure of energy one on joint a, is doubted.
+
+    The structure is half of the residual: of 2 per sample, with noise and what is not modelled.
+    """
+    width = len(catalogue()[kind].parameters)
+    torque = np.zeros((width + 1, 2))
+    torque[0, list(joints)] = np.sqrt(energy)
+    torque[width] = [1.0, 2.0]  # half of the residual of joint a has no candidate
+    data, candidates = planted([effect(kind, *joints)], torque)
+    left = [Unexplained("a", tuple(words), 0.5)]
+    found = approximations(traced(data, candidates, [0]), left, NAMES)
+    assert found in ({}, {0: f"a function of {', '.join(words)}"})
+    return bool(found)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "joints"),
+    [
+        ("spring", ["q[a]"], (0,)),
+        ("spring", ["time", "v[b]", "q[a]"], (0,)),  # one of them is enough
+        ("viscous_friction", ["v[a]"], (0,)),
+        ("coulomb_friction", ["direction and q[a]"], (0,)),
+        ("stribeck_friction", ["history of q[a]"], (0,)),
+        ("armature", ["a[a]"], (0,)),
+        ("torque_gain", ["load[a]"], (0,)),
+        ("load_dependent_friction", ["history of load[a]"], (0,)),
+        ("friction_drift", ["time"], (0,)),
+        ("friction_drift", ["v[a]"], (0,)),
+        ("cable_force", ["q[b]"], (0, 1)),
+    ],
+)
+def test_a_tenth_of_an_effect_left_over_its_own_quantity_is_too_much(
+    kind: str, words: list[str], joints: tuple[int, ...]
+) -> None:
+    assert beside(kind, words, 9.9, joints)
+    assert not beside(kind, words, 10.1, joints)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("spring", ["v[a]"]),
+        ("spring", ["q[b]"]),  # the position of another joint
+        ("spring", ["history of q[a]"]),
+        ("viscous_friction", ["q[a]"]),
+        ("viscous_friction", ["history of load[a]"]),
+        ("viscous_friction", ["time"]),
+        ("armature", ["v[a]", "load[a]"]),
+        ("torque_gain", ["a[a]"]),
+        ("torque_offset", ["q[a]", "time"]),  # is a function of nothing
+    ],
+)
+def test_what_depends_on_something_else_must_be_more_than_the_effect(
+    kind: str, words: list[str]
+) -> None:
+    assert beside(kind, words, 0.98)
+    assert not beside(kind, words, 1.02)
+
+
+def test_a_line_through_a_cubic_is_no_spring() -> None:
+    """Of q³ on ±1 a line explains 21/25, and 4/21 of that are left; of q³ + q it leaves less."""
+    for straight, expected in ((0.0, {0: "a function of q[a]"}), (1.0, {})):
+        rng = np.random.default_rng(2)
+        q = [rng.uniform(-1.0, 1.0, SAMPLES) for _ in FOLDS]
+        declared = tuple(rng.normal(size=(SAMPLES, 2, FIXED)) for _ in FOLDS)
+        tau = tuple(
+            np.stack([10.0 * (x**3 + straight * x), 0 * x], axis=1) + rng.normal(size=(SAMPLES, 2))
+            for x in q
+        )
+        line = tuple(np.stack([x, np.ones(SAMPLES)], axis=1)[:, None] for x in q)
+        usable = tuple(prepared(np.ones((SAMPLES, 2), bool)) for _ in FOLDS)
+        data = TrainingData(usable, FOLDS, declared, tau)
+        spring = Candidate(effect("spring"), (0,), line)
+        # What a free function of q would take off the residual, by plain least squares.
+        x = np.concatenate([np.column_stack([d[:, 0], z[:, 0]])
+                            for d, z in zip(declared, line, strict=True)])  # fmt: skip
+        position, torque = np.concatenate(q), np.concatenate(tau)[:, 0]
+        curve = np.column_stack([x, position**2, position**3])
+        left = [torque - z @ np.linalg.lstsq(z, torque, rcond=None)[0] for z in (x, curve)]
+        share = 1.0 - float(left[1] @ left[1]) / float(left[0] @ left[0])
+        record = [Unexplained("a", ("q[a]",), share)]
+        assert approximations(traced(data, [spring], [0]), record, NAMES) == expected
+
+
+def test_structure_counts_on_the_joint_where_an_effect_is_most() -> None:
+    """Of two joints the effect is most of the torque of b; of both chosen ones, b's is doubted."""
+    effects = [effect("viscous_friction", 0, 1), effect("armature", 0)]
+    torque = np.array([[3.0, 3.0], [9.0, 0.0]])
+    data, candidates = planted(effects, torque)
+    both = traced(data, candidates, [0, 1])
+    words = ("time",)
+    assert approximations(both, [Unexplained("b", words, 0.99)], NAMES) == {}
+    large = [Unexplained("b", words, 20.0)]  # of the residual's energy of one
+    assert approximations(both, large, NAMES) == {0: "a function of time"}
+    assert approximations(both, [Unexplained("a", words, 20.0)], NAMES) == {}
+
+
+def test_straight_friction_is_measured_without_what_refines_it() -> None:
+    """Beside its refinement, which shares nearly all, little of Coulomb friction would be left."""
+    mix = np.array([[1.0, 1.0], [0.0, 0.2]])
+    torque = np.array([[4.0, 0.0], [1.0, 0.0]])
+    left = [Unexplained("a", ("v[a]",), 1.0)]  # energy one
+    for kind, expected in (
+        ("load_dependent_friction", {1}),  # 16 + 1 of Coulomb, 1 of the refinement
+        ("armature", {0}),  # refines nothing: 1/26 of Coulomb's, and no function of speed
+    ):
+        data, candidates = planted([effect("coulomb_friction"), effect(kind)], torque, mix)
+        found = approximations(traced(data, candidates, [0, 1]), left, NAMES)
+        assert set(found) == expected
+
+
+@pytest.mark.parametrize("rival", [2.9, 3.1])
+def test_what_cannot_be_and_explains_more_makes_a_name_doubtful(rival: float) -> None:
+    effects = [effect("viscous_friction"), effect("armature"), effect("torque_offset")]
+    data, candidates = planted(effects, np.array([[3.0, 0.0], [rival, 0.0], [2.0, 0.0]]))
+    expected = {0: "something that also looks like inertia of the motor (armature)"}
+    found = approximations(traced(data, candidates, [0], all_but(1)), [], NAMES)
+    assert found == (expected if rival > 3.0 else {})
+    assert approximations(traced(data, candidates, [0]), [], NAMES) == {}
+    # The offset that cannot be explains less, whatever the inertia would.
+    assert approximations(traced(data, candidates, [0], all_but(2)), [], NAMES) == {}
+    # Once the inertia is in, it stands for nothing else.
+    assert approximations(traced(data, candidates, [0, 1], all_but(1)), [], NAMES) == {}
+
+
+def test_what_cannot_be_on_another_joint_is_no_matter() -> None:
+    effects = [effect("viscous_friction", 0), effect("armature", 1), effect("viscous_friction", 1)]
+    data, candidates = planted(effects, np.array([[1.0, 0.0], [0.0, 9.0], [0.0, 2.0]]))
+    found = approximations(traced(data, candidates, [0, 2], all_but(1)), [], NAMES)
+    assert set(found) == {2}
+
+
+def test_another_shape_of_a_chosen_effect_is_no_rival() -> None:
+    kind = catalogue()["stribeck_friction"]
+    effects = [kind((0,), {"stribeck_speed": 0.1}), kind((0,), {"stribeck_speed": 0.2})]
+    data, candidates = planted(effects, np.array([[1.0, 0.0], [9.0, 0.0]]))
+    assert approximations(traced(data, candidates, [0], all_but(1)), [], NAMES) == {}
+
+
+def test_structure_is_told_before_a_rival() -> None:
+    effects = [effect("viscous_friction"), effect("armature")]
+    data, candidates = planted(effects, np.array([[3.0, 0.0], [9.0, 0.0]]))
+    left = [Unexplained("a", ("v[a]", "time"), 0.5)]
+    found = approximations(traced(data, candidates, [0], all_but(1)), left, NAMES)
+    assert found == {0: "a function of v[a], time"}
+
+
+def test_without_effects_there_is_nothing_to_doubt() -> None:
+    data, candidates = planted([effect("viscous_friction")], np.array([[3.0, 0.0]]))
+    left = [Unexplained("a", ("v[a]",), 0.9)]
+    assert approximations(traced(data, candidates, [], all_but(0)), left, NAMES) == {}

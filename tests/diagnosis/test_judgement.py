@@ -1,0 +1,438 @@
+"""Prices, gains and vetoes against stacked rows, and against closed forms on orthogonal columns."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.evidence import Gain
+from excite_cli.diagnosis.judgement import Judgement, Rules
+from excite_cli.diagnosis.kinds import UNUSUAL
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.possible_sizes import possible_sizes
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import catalogue
+from excite_cli.robot.model import Array
+from tests.diagnosis.explicit_data import (
+    FIXED,
+    FOLDS,
+    Rows,
+    autoregression,
+    prepared,
+    random_candidates,
+    random_data,
+    rows_of,
+)
+
+SAMPLES = 50
+TOTAL = SAMPLES * len(FOLDS)
+RULES = Rules(0.01, 0.01)
+Allowed = Callable[[Array, Sequence[int], Sequence[int]], bool]
+
+
+def anything(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
+    return True
+
+
+def effect(kind: str, *joints: int, **shape: float) -> Effect:
+    """On joint 0 if none is named."""
+    return catalogue()[kind](joints or (0,), shape)
+
+
+def planted(
+    effects: Sequence[Effect],
+    mix: Array,
+    torque: Array,
+    noise: float = 1.0,
+    declared: float = 0.0,
+    seed: int = 0,
+) -> tuple[TrainingData, list[Candidate]]:
+    """Orthogonal directions of RMS one in every part, of which columns and torque are made.
+
+    Columns of all effects in turn are directions @ `mix` (on all their joints), torque is
+    directions @ `torque` (directions, joints), `declared` of the declared model, and noise that is
+    orthogonal to all of them and of exactly this RMS. So every fold says the same.
+    """
+    rng = np.random.default_rng(seed)
+    count = FIXED + len(mix)
+    fixed, columns, tau = [], [], []
+    for _ in FOLDS:
+        free, _ = np.linalg.qr(rng.normal(size=(SAMPLES, count + 2)))
+        free *= np.sqrt(SAMPLES)
+        fixed.append(np.repeat(free[:, None, :FIXED], 2, axis=1))
+        columns.append(free[:, FIXED:count] @ mix)
+        tau.append(free[:, FIXED:count] @ torque + noise * free[:, count:] + declared * free[:, :1])
+    candidates, at = [], 0
+    for one in effects:
+        own = slice(at, at + len(one.parameters))
+        blocks = tuple(np.repeat(c[:, None, own], len(one.joints), axis=1) for c in columns)
+        candidates.append(Candidate(one, one.joints, blocks))
+        at = own.stop
+    assert at == mix.shape[1]
+    runs = tuple(prepared(np.ones((SAMPLES, 2), bool)) for _ in FOLDS)
+    return TrainingData(runs, FOLDS, tuple(fixed), tuple(tau)), candidates
+
+
+def judge_of(
+    data: TrainingData,
+    candidates: Sequence[Candidate],
+    rules: Rules = RULES,
+    allowed: Allowed | None = None,
+) -> Judgement:
+    """Samples are independent and of unit noise; sizes are those that are possible."""
+    plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
+    veto = possible_sizes(candidates, False) if allowed is None else allowed
+    return Judgement(plain, plain, candidates, rules, veto)
+
+
+def on_joint_0(sizes: Sequence[float]) -> Array:
+    """Torque (directions, 2) of joint 0 alone."""
+    return np.stack([sizes, np.zeros(len(sizes))], axis=1)
+
+
+def orthogonal(
+    sizes: Mapping[str, float],
+    noise: float = 1.0,
+    declared: float = 0.0,
+    rules: Rules = RULES,
+    tests: int = 1,
+) -> Judgement:
+    """One-column effects of joint 0 by kind and RMS of their torque."""
+    effects = [effect(kind) for kind in sizes]
+    torque = on_joint_0(list(sizes.values()))
+    data, candidates = planted(effects, np.eye(len(effects)), torque, noise, declared)
+    return judge_of(data, [replace(c, tests=tests) for c in candidates], rules)
+
+
+@pytest.fixture(scope="module")
+def random_judge() -> tuple[Judgement, Rows, Rows]:
+    """On random columns with correlated noise; the rows of both its evidences."""
+    data = random_data(21)
+    candidates = [replace(c, tests=k + 1) for k, c in enumerate(random_candidates(21))]
+    white, plain = autoregression(), NoiseModel.white(np.array([0.9, 2.0]))
+    judge = Judgement(
+        data.evidence(candidates, white), data.evidence(candidates, plain), candidates,
+        Rules(0.05, 0.01, 1.7), anything,
+    )  # fmt: skip
+    return judge, rows_of(data, candidates, white), rows_of(data, candidates, plain)
+
+
+@pytest.mark.parametrize("kind", ["viscous_friction", "spring", "contact", "torque_gain"])
+@pytest.mark.parametrize(("tests", "inflation", "dof"), [(1, 1.0, 1), (40, 1.0, 2), (7, 2.5, 3)])
+def test_the_price_is_what_chance_makes_of_all_tests(
+    kind: str, tests: int, inflation: float, dof: int
+) -> None:
+    """The mean number of tests that χ² without an effect passes is α."""
+    one = effect(kind)
+    data, [candidate] = planted([one], np.ones((1, len(one.parameters))), np.zeros((1, 2)))
+    judge = judge_of(data, [replace(candidate, tests=tests)], Rules(0.03, 0.01, inflation))
+    threshold = (judge.price(0, dof) - UNUSUAL.get(kind, 4.0)) / inflation
+    assert tests * chi2.sf(threshold, dof) == pytest.approx(0.03)
+    assert judge.price(0, 0) == judge.price(0, 1)
+
+
+def test_thresholds_of_candidates_with_other_tests_are_their_own() -> None:
+    judge = orthogonal({"viscous_friction": 0.0, "coulomb_friction": 0.0})
+    judge.candidates = [replace(c, tests=k) for c, k in zip(judge.candidates, (1, 50), strict=True)]
+    assert judge.price(0, 1) == pytest.approx(chi2.isf(0.01, 1))
+    assert judge.price(1, 1) == pytest.approx(chi2.isf(0.01 / 50, 1))
+    assert judge.price(0, 2) == pytest.approx(chi2.isf(0.01, 2))
+
+
+def test_cost_is_residual_energy_and_prices(random_judge: tuple[Judgement, Rows, Rows]) -> None:
+    """Whitened; Coulomb friction (4) is cheap beside what refines it (2), dear without."""
+    judge, rows, _ = random_judge
+    prices = [1.7 * chi2.isf(0.05 / (k + 1), 1 + (k == 2)) + 4.0 * (k == 2) for k in range(5)]
+    for chosen in ([], [0], [2], [3, 1], [4], [4, 2], [0, 1, 2, 3, 4]):
+        price = sum(prices[i] for i in chosen)
+        if {2, 4} <= set(chosen):
+            price += 1.7 * 4.5 - prices[4]
+        assert judge.cost(chosen) == pytest.approx(rows.energy(chosen) + price, rel=1e-8)
+
+
+def test_p_values_are_corrected_for_tests_and_inflation(
+    random_judge: tuple[Judgement, Rows, Rows],
+) -> None:
+    judge, rows, _ = random_judge
+    schur = judge.white.schur([1])
+    for i, dof in ((0, 1), (2, 2), (3, 1)):
+        lost = rows.energy([1]) - rows.energy([1, i])
+        expected = min(1.0, (i + 1) * chi2.sf(lost / 1.7, dof))
+        assert judge.p_value(i, schur.gain(i)) == pytest.approx(expected, rel=1e-5)
+    assert judge.p_value(3, Gain(30.0, 1, 1.0)) == pytest.approx(4 * chi2.sf(30.0 / 1.7, 1))
+    assert judge.p_value(3, Gain(1e-3, 1, 1.0)) == 1.0  # a probability
+    assert judge.p_value(3, Gain(0.0, 0, 0.0)) == 1.0
+
+
+def test_gains_on_runs_left_out_are_those_of_explicit_fits() -> None:
+    """Fold by fold on stacked rows, whitened or not, on the joints that are touched."""
+    better = []
+    for seed in range(3):
+        data, candidates = random_data(seed), random_candidates(seed)
+        noises = (NoiseModel.white(np.ones(2)), autoregression())
+        plain, white = (data.evidence(candidates, noise) for noise in noises)
+        judge = Judgement(white, plain, candidates, RULES, anything)
+        for chosen, added, joints in (
+            ([], [0], [0]),
+            ([0], [1], [1]),
+            ([1], [2], [0]),
+            ([2], [3], [0, 1]),
+            ([3], [0, 1], [0, 1]),
+        ):
+            gains = []
+            for noise in noises:
+                rows = rows_of(data, candidates, noise)
+                before = sum(rows.left_out(chosen, joints))
+                gains.append(1 - np.sqrt(sum(rows.left_out([*chosen, *added], joints)) / before))
+            assert judge.left_out_gain(chosen, added) == pytest.approx(max(gains), abs=1e-9)
+            better.append(gains[0] > gains[1])
+    assert any(better)
+    assert not all(better)
+
+
+def test_an_effect_of_some_runs_is_judged_where_it_is(
+    random_judge: tuple[Judgement, Rows, Rows],
+) -> None:
+    judge, *both = random_judge
+    for chosen in ([], [0]):
+        expected = max(
+            1 - np.sqrt(rows.energy([*chosen, 4], [0]) / rows.energy(chosen, [0])) for rows in both
+        )
+        assert judge.left_out_gain(chosen, [4]) == pytest.approx(expected)
+        assert expected > 0
+
+
+def test_size_is_the_share_of_the_torque_where_it_is_most(
+    random_judge: tuple[Judgement, Rows, Rows],
+) -> None:
+    judge, _, rows = random_judge
+    for chosen, added, joints in (([], [0], (0,)), ([1], [3], (0, 1)), ([3], [1, 2], (0, 1))):
+        shares = [
+            (rows.energy(chosen, [j]) - rows.energy([*chosen, *added], [j]))
+            / np.sum(rows.y[rows.joint == j] ** 2)
+            for j in joints
+        ]
+        assert judge.size(chosen, added) == pytest.approx(np.sqrt(max(shares)), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "noise", "declared", "expected"),
+    [
+        ("viscous_friction", 1.0, 1.0, 1.0, "accepted"),
+        ("viscous_friction", -1.0, 1.0, 1.0, "impossible sign"),
+        ("torque_offset", -1.0, 1.0, 1.0, "accepted"),
+        # 1 / √(1² + declared²) is 0.1 % of the torque, then 0.25 %.
+        ("viscous_friction", 1.0, 0.1, 1000.0, "too small to matter"),
+        ("viscous_friction", 1.0, 0.1, 400.0, "accepted"),
+        # 1 − 1 / √(1 + size²) is 0.5 % of the error, then 1.1 %.
+        ("viscous_friction", 0.1, 1.0, 1.0, "no gain on runs left out"),
+        ("viscous_friction", 0.15, 1.0, 1.0, "accepted"),
+    ],
+)
+def test_verdicts(kind: str, size: float, noise: float, declared: float, expected: str) -> None:
+    judge = orthogonal({kind: size}, noise, declared)
+    assert judge.verdict([], [0]) == expected
+
+
+@pytest.mark.parametrize(
+    ("kind", "angle", "left"),
+    [
+        ("encoder_offset", 0.1, 0.0225),  # (1.5 · 0.1)²
+        ("encoder_offset", -0.1, 0.0225),
+        ("encoder_offset", 0.01, 2e-3),
+        ("elasticity", 0.1, 2e-2),
+        ("torque_gain", 0.1, 0.0),
+    ],
+)
+def test_no_effect_is_what_another_leaves(kind: str, angle: float, left: float) -> None:
+    """One of RMS 100 leaves so much of its energy; a spring of size beside it is no angle."""
+    energy = left * 100.0**2
+    effects = [effect("spring"), effect(kind), effect("torque_offset"), effect("armature")]
+    mix = np.diag([1.0, 1.0, 100.0 / abs(angle), 1.0, 1.0])
+    for share, expected in ((0.98, energy == 0.0), (1.02, True)):
+        size = np.sqrt(share * energy) if energy else 1.0
+        torque = np.array([50.0, 9.0, 100.0 * np.sign(angle), size, 0.0])
+        data, candidates = planted(effects, mix, on_joint_0(list(torque)), noise=0.1)
+        judge = judge_of(data, candidates)
+        words = "accepted" if expected else "what another effect leaves"
+        assert judge.verdict([0, 1], [2]) == words
+        assert judge.fails(2, [0, 1], [0, 1, 2]) != expected
+    assert judge.verdict([0], [2]) != "what another effect leaves"  # it is not in
+
+
+def test_what_two_effects_leave_is_not_added_up() -> None:
+    effects = [effect("elasticity"), effect("torque_delay"), effect("torque_offset")]
+    mix = np.diag([1e5, 1e4, 1.0])  # 2 % and 1 % of 100² are 200 and 100
+    for energy, expected in ((150.0, "what another effect leaves"), (250.0, "accepted")):
+        torque = on_joint_0([100.0, 100.0, np.sqrt(energy)])
+        judge = judge_of(*planted(effects, mix, torque, noise=0.1))
+        assert judge.verdict([0, 1], [2]) == expected
+
+
+def test_an_effect_leaves_nothing_on_other_joints() -> None:
+    """One of joint 0 leaves something there; an effect of both joints is more on joint 1."""
+    effects = [effect("elasticity", 0), effect("torque_offset", 1), effect("base_tilt", 0, 1)]
+    mix = np.diag([1e5, 1.0, 100.0, 1.0])
+    torque = np.array([[100.0, 0.0], [0.0, 1.0], [5.0, 5.0], [0.0, 0.0]])
+    judge = judge_of(*planted(effects, mix, torque, noise=0.1))
+    assert judge.verdict([0], [1]) == "accepted"
+    assert judge.verdict([0], [2]) == "accepted"
+    torque[2] = [5.0, 0.0]
+    data, candidates = planted([effects[0], effect("torque_offset")], mix[:2, :2], torque[[0, 2]],
+                               noise=0.1)  # fmt: skip
+    assert judge_of(data, candidates).verdict([0], [1]) == "what another effect leaves"
+
+
+def test_inertias_bent_on_one_joint_leave_nothing_to_effects_of_another() -> None:
+    """Without elasticity, which looks like a declared column, joint 1 would be explained worse."""
+    effects = [effect("elasticity", 0), effect("torque_offset", 1)]
+    data, (first, second) = planted(effects, np.diag([1e5, 1.0]), np.diag([100.0, 1.0]), noise=0.1)
+    bent = tuple(c + 1e5 * d[:, :1, :1] for c, d in zip(first.columns, data.declared, strict=True))
+    for tau, declared in zip(data.tau, data.declared, strict=True):
+        tau[:, 0] += 100.0 * declared[:, 0, 0]
+    judge = judge_of(data, [replace(first, columns=bent), second])
+    assert 0.02 * judge.plain.energy_on([1], [1]) > TOTAL
+    assert judge.verdict([0], [1]) == "accepted"
+
+
+@pytest.mark.parametrize(("transferred", "expected"), [(0.03, False), (0.12, True)])
+def test_runs_left_out_gain_not_far_less_than_those_fitted(
+    transferred: float, expected: bool
+) -> None:
+    """Fold 0 (parts 0 and 2) has all of the effect, the others a share of it and weak columns.
+
+    With fold 0 left out, the error falls by that share only; fitted, it is gone.
+    """
+    data, [candidate] = planted([effect("torque_offset")], np.eye(1), np.zeros((1, 2)), noise=0.01)
+    strength, value = (1.0, 0.01, 1.0, 0.01), (1.0, transferred, 1.0, transferred)
+    columns = tuple(c * s for c, s in zip(candidate.columns, strength, strict=True))
+    tau = tuple(
+        t + v * np.pad(c[:, :, 0], ((0, 0), (0, 1)))
+        for t, v, c in zip(data.tau, value, columns, strict=True)
+    )
+    data, candidate = replace(data, tau=tau), replace(candidate, columns=columns)
+    judge = judge_of(data, [candidate], Rules(0.01, 0.01))
+    assert judge.left_out_gain([], [0]) == pytest.approx(transferred, abs=0.01)
+    words = "accepted" if expected else "no gain on runs left out"
+    assert judge.verdict([], [0]) == words
+
+
+FRICTION = {"viscous_friction": 0.0, "coulomb_friction": 0.0, "load_dependent_friction": 0.0}
+
+
+def test_first_order_friction_comes_before_what_refines_it() -> None:
+    judge = orthogonal({**FRICTION, "viscous_friction": 3.0, "coulomb_friction": 3.0})
+    schur = judge.white.schur([])
+    assert not judge.in_order(schur, [], [2])  # Coulomb friction is there and not in
+    assert judge.in_order(schur, [], [0])
+    assert judge.in_order(schur, [], [2, 1])
+    assert judge.in_order(judge.white.schur([1]), [1], [2])
+    assert not judge.in_order(judge.white.schur([0]), [0], [2])
+
+
+@pytest.mark.parametrize(("energy", "waits"), [(0.9, False), (1.1, True)])
+def test_a_refinement_waits_for_what_is_worth_its_price(energy: float, waits: bool) -> None:
+    price = chi2.isf(0.01 / 20, 1)
+    sizes = {**FRICTION, "coulomb_friction": np.sqrt(energy * price / TOTAL)}
+    judge = orthogonal(sizes, tests=20)
+    assert judge.in_order(judge.white.schur([]), [], [2]) != waits
+
+
+def test_a_refinement_does_not_wait_for_friction_that_cannot_be() -> None:
+    judge = orthogonal({**FRICTION, "coulomb_friction": -3.0})
+    assert judge.in_order(judge.white.schur([]), [], [2])
+
+
+def test_parents_are_those_of_the_same_joint() -> None:
+    effects = [
+        effect("coulomb_friction", 1),
+        effect("viscous_friction", 1),
+        effect("asymmetric_friction", 1),
+        effect("coulomb_friction", 0),
+        effect("torque_offset", 1),
+        effect("nonlinear_viscous_friction", 0, power=2.0),
+        effect("coupled_friction", 0, 1),
+        effect("armature", 1),
+    ]
+    width = sum(len(each.parameters) for each in effects)
+    judge = judge_of(*planted(effects, np.eye(width), np.zeros((width, 2))))
+    found = [set(parents) for parents in judge.parents]
+    assert found == [set(), set(), {0, 4}, set(), set(), {3}, {3, 1, 0}, set()]
+    every = list(range(8))
+    assert judge.without(0, every) == [1, 3, 4, 5, 7]
+    assert judge.without(3, every) == [0, 1, 2, 4, 7]
+    assert judge.without(2, every) == [0, 1, 3, 4, 5, 6, 7]
+
+
+@pytest.mark.parametrize(("power", "bound"), [(0.5, True), (2.0, False)])
+def test_root_friction_binds_both_straight_terms(power: float, bound: bool) -> None:
+    effects = [
+        effect("viscous_friction"),
+        effect("coulomb_friction"),
+        effect("nonlinear_viscous_friction", power=power),
+        effect("spring"),
+    ]
+    torque = on_joint_0([-1.0, 0.01, 1.0, 1.0, 0.0])
+    judge = judge_of(*planted(effects, np.eye(5), torque))
+    every = [0, 1, 2, 3]
+    assert [judge.bound(i, every) for i in every] == [bound, bound, False, False]
+    assert not judge.bound(0, [0, 1, 3])
+    # Bound ones stay whatever they are; other parents unless they cannot be.
+    assert judge.fails(0, [1, 2, 3], every) != bound
+    assert not judge.fails(1, [0, 2, 3], every)
+    assert judge.fails(0, [1, 3], [0, 1, 3])
+    assert judge.fails(1, [0, 3], [0, 1, 3])
+
+
+@pytest.mark.parametrize(
+    ("size", "noise", "declared", "tests", "inflation", "fails"),
+    [
+        (0.2, 1.0, 1.0, 1, 1.0, False),  # χ² = 0.2² · 200
+        (0.2, 1.0, 1.0, 10, 1.0, True),
+        (0.2, 1.0, 1.0, 1, 2.0, True),
+        (-1.0, 1.0, 1.0, 1, 1.0, True),
+        (0.6, 5.0, 1.0, 1, 1.0, True),  # gains 0.7 %
+        (1.0, 0.1, 1000.0, 1, 1.0, True),  # 0.1 % of the torque
+        (1.0, 0.1, 400.0, 1, 1.0, False),
+    ],
+)
+def test_members_that_do_not_hold(
+    size: float, noise: float, declared: float, tests: int, inflation: float, fails: bool
+) -> None:
+    sizes = {"viscous_friction": size, "armature": 2.0}
+    judge = orthogonal(sizes, noise, declared, Rules(0.01, 0.01, inflation), tests)
+    assert judge.fails(0, [1], [0, 1]) == fails
+
+
+def test_members_that_share_nearly_all_they_have_hold_if_they_are_significant() -> None:
+    """Friction terms at an angle of 0.01: each alone nearly says what the other does."""
+    mix = np.array([[1.0, 1.0], [0.0, 0.01]])
+    effects = [effect("viscous_friction"), effect("coulomb_friction")]
+    torque = on_joint_0([200.0, 1.0])  # 100 of each
+    judge = judge_of(*planted(effects, mix, torque))
+    assert judge.plain.solve([0, 1])[FIXED:] == pytest.approx([100.0, 100.0], rel=1e-4)
+    assert not judge.fails(0, [1], [0, 1])
+    assert not judge.fails(1, [0], [0, 1])
+
+
+def test_carrying_far_more_is_by_the_error_on_runs_left_out() -> None:
+    """Errors fall from √(1 + a² + b²) to √(1 + b²) or √(1 + a²)."""
+    for a, b in ((3.0, 1.0), (2.0, 1.0), (1.5, 1.0), (1.3, 1.0), (1.0, 2.0)):
+        judge = orthogonal({"viscous_friction": a, "armature": b})
+        whole = np.sqrt(1 + a**2 + b**2)
+        ahead = (np.sqrt(1 + a**2) - np.sqrt(1 + b**2)) / whole
+        assert judge.carries_more([], 0, 1) == (ahead > 0.15)
+        # A replacement of one by the other would lose as much.
+        assert judge.loses([], 0, [1]) == (ahead > 0.15)
+        assert not judge.loses([], 0, [0, 1])
+
+
+def test_effects_of_other_joints_are_not_compared() -> None:
+    effects = [effect("viscous_friction", 0), effect("viscous_friction", 1)]
+    judge = judge_of(*planted(effects, np.eye(2), np.diag([9.0, 0.0])))
+    assert judge.left_out_gain([], [0]) > 0.5
+    assert not judge.carries_more([], 0, 1)

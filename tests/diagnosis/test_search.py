@@ -1,0 +1,341 @@
+"""The search against all subsets of a few candidates, and what it must never choose."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain, combinations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.judgement import Judgement, Rules
+from excite_cli.diagnosis.kinds import FIRST, UNUSUAL
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.possible_sizes import possible_sizes
+from excite_cli.diagnosis.search import Search
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import catalogue
+from excite_cli.robot.model import Array
+from tests.diagnosis.explicit_data import FIXED, FOLDS, Rows, prepared, rows_of
+
+SAMPLES = 40
+ONE = NoiseModel.white(np.ones(2))
+NO_VETO = Rules(0.01, -1.0)
+
+
+def anything(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
+    return True
+
+
+def effect(kind: str, *joints: int, **shape: float) -> Effect:
+    """On joint 0 if none is named."""
+    return catalogue()[kind](joints or (0,), shape)
+
+
+def planted(
+    effects: Sequence[Effect],
+    values: Array | Sequence[float],
+    mix: Array | None = None,
+    seed: int = 0,
+) -> tuple[TrainingData, list[Candidate]]:
+    """Random columns of RMS near one, times `mix`, in the torque with these values, and noise.
+
+    `mix` (columns, columns) makes columns of effects from independent ones; noise is of RMS one.
+    """
+    rng = np.random.default_rng(seed)
+    count = len(values)
+    mix = np.eye(count) if mix is None else mix
+    declared = tuple(rng.normal(size=(SAMPLES, 2, FIXED)) for _ in FOLDS)
+    every = [rng.normal(size=(SAMPLES, 2, count)) @ mix for _ in FOLDS]
+    base = rng.normal(size=FIXED)
+    tau = [d @ base + rng.normal(size=(SAMPLES, 2)) for d in declared]
+    candidates, at = [], 0
+    for one in effects:
+        width, joints = len(one.parameters), list(one.joints)
+        blocks = tuple(x[:, joints, at : at + width] for x in every)
+        for torque, block in zip(tau, blocks, strict=True):
+            torque[:, joints] += block @ np.asarray(values[at : at + width])
+        candidates.append(Candidate(one, one.joints, blocks, tests=len(effects)))
+        at += width
+    assert at == count
+    runs = tuple(prepared(np.ones((SAMPLES, 2), bool)) for _ in FOLDS)
+    return TrainingData(runs, FOLDS, declared, tuple(tau)), candidates
+
+
+def search(
+    data: TrainingData,
+    candidates: Sequence[Candidate],
+    rules: Rules = NO_VETO,
+    signs: bool = False,
+    most: int = 80,
+) -> set[int]:
+    evidence = data.evidence(candidates, ONE)
+    allowed = possible_sizes(candidates, False) if signs else anything
+    found = Search(Judgement(evidence, evidence, candidates, rules, allowed), most).run()
+    assert len(found) == len(set(found))
+    return set(found)
+
+
+def cost(rows: Rows, candidates: Sequence[Candidate], chosen: Sequence[int]) -> float:
+    """J: residual energy on stacked rows, and prices; a parent beside a child costs 4.5."""
+    price = 0.0
+    for i in chosen:
+        own = candidates[i].effect
+        children = [candidates[k].effect for k in chosen if k != i]
+        if any(own.kind in FIRST.get(child.kind, ()) for child in children):
+            price += 4.5
+        else:
+            family = chi2.isf(0.01 / candidates[i].tests, candidates[i].width)
+            price += family + UNUSUAL.get(own.kind, 4.0)
+    return rows.energy(chosen) + price
+
+
+def cheapest(data: TrainingData, candidates: Sequence[Candidate]) -> set[int]:
+    """The set of least J of all sets in which no place is taken twice."""
+    rows, count = rows_of(data, candidates, ONE), len(candidates)
+    sets = chain.from_iterable(combinations(range(count), k) for k in range(count + 1))
+    valid = [s for s in sets if len({candidates[i].place for i in s}) == len(s)]
+    assert len(valid) > 2 ** (count - 1)
+    return set(min(valid, key=lambda s: cost(rows, candidates, list(s))))
+
+
+# No one refines another; two shapes of the last kind share a place.
+LOCAL_AND_COHERENT = [
+    effect("viscous_friction", 0),
+    effect("coulomb_friction", 0),
+    effect("torque_offset", 0),
+    effect("armature", 1),
+    effect("spring", 1),
+    effect("viscous_friction", 0, 1),
+    effect("ripple", 0, periods=1.0),
+    effect("ripple", 0, periods=2.0),
+]
+FRICTION = [
+    effect("viscous_friction"),
+    effect("coulomb_friction"),
+    effect("torque_offset"),
+    effect("load_dependent_friction"),
+    effect("asymmetric_friction"),
+    effect("nonlinear_viscous_friction", power=2.0),
+]
+
+
+def random_case(
+    effects: Sequence[Effect], seed: int, weakest: float
+) -> tuple[TrainingData, list[Candidate]]:
+    """Columns that are nearly orthogonal; about half of the effects are there."""
+    rng = np.random.default_rng([seed, 1])
+    widths = [len(each.parameters) for each in effects]
+    there = rng.random(len(effects)) < 0.5
+    count = sum(widths)
+    sizes = rng.uniform(weakest, 1.0, count) * rng.choice([-1.0, 1.0], count)
+    mix = np.eye(count) + 0.15 * rng.normal(size=(count, count))
+    return planted(effects, np.repeat(there, widths) * sizes, mix, seed)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_set_of_least_cost_is_found(seed: int) -> None:
+    data, candidates = random_case(LOCAL_AND_COHERENT, seed, 0.1)
+    assert search(data, candidates) == cheapest(data, candidates)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_nearly_the_least_cost_is_found_among_friction_and_what_refines_it(seed: int) -> None:
+    """J may fall a little by a useless child that makes its parent cheap: that is not followed."""
+    data, candidates = random_case(FRICTION, seed, 0.5)
+    rows = rows_of(data, candidates, ONE)
+    found, best = (sorted(s) for s in (search(data, candidates), cheapest(data, candidates)))
+    assert cost(rows, candidates, found) < cost(rows, candidates, best) + 2.0
+    assert set(found) <= set(best)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (4, 3, 2, 1, 0), (2, 0, 4, 1, 3)])
+def test_the_order_of_candidates_does_not_matter(order: tuple[int, ...]) -> None:
+    data, candidates = random_case(LOCAL_AND_COHERENT[:5], 3, 0.1)
+    expected = search(data, candidates)
+    found = search(data, [candidates[i] for i in order])
+    assert {order[i] for i in found} == expected != set()
+
+
+def test_noise_has_no_names() -> None:
+    """Forty free looks at every seed; alarms in a share α of all seeds, at most 5 of 100."""
+    effects = [effect("viscous_friction", joint) for joint in (0, 1) for _ in range(20)]
+    alarms = 0
+    for seed in range(100):
+        data, candidates = planted(effects, np.zeros(40), seed=seed)
+        alarms += bool(search(data, candidates))
+    assert alarms <= 5
+
+
+def test_nothing_is_found_where_there_is_nothing_to_look_for() -> None:
+    data, _ = planted([effect("viscous_friction")], [1.0])
+    assert search(data, []) == set()
+
+
+def opposed(seed: int = 0) -> tuple[TrainingData, list[Candidate]]:
+    """Two columns at an angle of 0.2, one in the torque and the other taken off it; and a third."""
+    effects = [effect("viscous_friction"), effect("armature"), effect("torque_offset")]
+    data, candidates = planted(effects, [0.0, 0.0, 0.0], seed=seed)
+    nearly = []
+    for k, tau in enumerate(data.tau):
+        one, other = (c.columns[k][:, 0, 0] for c in candidates[:2])
+        across = other - one * (one @ other) / (one @ one)
+        nearly.append((np.cos(0.2) * one + np.sin(0.2) * across)[:, None, None])
+        tau[:, 0] += 3.5 * (one - nearly[k][:, 0, 0])
+    return data, [candidates[0], replace(candidates[1], columns=tuple(nearly)), candidates[2]]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_effects_that_hide_each_other_are_found_together(seed: int) -> None:
+    """χ² of each alone is N a² (1 − ρ)², less than noise, of both 2 N a² (1 − ρ), about 80."""
+    data, candidates = opposed(seed)
+    alone = data.evidence(candidates, ONE).schur([])
+    assert max(alone.singles[0].chi2, alone.singles[1].chi2) < 8.0
+    assert search(data, candidates, Rules(0.01, 0.01)) == {0, 1}
+
+
+def test_of_two_that_hide_each_other_both_must_be_possible() -> None:
+    data, candidates = opposed()
+    assert search(data, candidates, signs=True) == set()  # no armature is negative
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_an_impossible_sign_is_never_chosen(sign: float) -> None:
+    """Friction that drives is explained by what comes near it and may have any sign."""
+    effects = [
+        effect("viscous_friction"),
+        effect("ripple", periods=1.0),
+        effect("coulomb_friction"),
+    ]
+    mix = np.eye(4)
+    mix[0, 1] = 1.0  # the ripple has the same, and a part of its own
+    data, candidates = planted(effects, [sign, 0.0, 0.0, 0.0], mix)
+    assert search(data, candidates, signs=True) == ({0} if sign > 0 else {1})
+    assert search(data, candidates, signs=False) == {0}
+    assert search(data, candidates[::2], signs=True) == ({0} if sign > 0 else set())
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_all_that_is_chosen_has_a_possible_sign_beside_all_others(seed: int) -> None:
+    data, candidates = random_case(LOCAL_AND_COHERENT, seed, 0.1)
+    found = sorted(search(data, candidates, signs=True))
+    values = data.evidence(candidates, ONE).solve(found)
+    assert possible_sizes(candidates, False)(values, found, found)
+
+
+@pytest.mark.parametrize("most", [0, 1, 2, 3])
+def test_no_more_effects_are_added_than_allowed(most: int) -> None:
+    """Weak friction of a joint makes room for a strong spring."""
+    effects = [effect("viscous_friction"), effect("spring", 1), effect("coulomb_friction", 1)]
+    data, candidates = planted(effects, [1.0, 2.0, 2.0, 0.5])
+    assert search(data, candidates, most=most) == set(range(most))
+
+
+def test_gains_on_runs_left_out_are_demanded() -> None:
+    data, candidates = planted([effect("viscous_friction"), effect("armature")], [0.5, 2.0])
+    gain = 1.0 - 1.0 / np.sqrt(1.0 + 0.5**2)  # of the weaker one, once the other is in
+    assert search(data, candidates, Rules(0.01, 0.5 * gain)) == {0, 1}
+    assert search(data, candidates, Rules(0.01, 2.0 * gain)) == {1}
+
+
+@pytest.mark.parametrize("stronger", ["backlash", "elasticity"])
+def test_play_and_elasticity_are_never_both_named_for_a_joint(stronger: str) -> None:
+    """Both are in the torque of joint 0, one each in those of the others."""
+    effects = [effect("backlash", 0), effect("elasticity", 0), effect("backlash", 1)]
+    values = [2.0, 1.0, 1.5] if stronger == "backlash" else [1.0, 2.0, 1.5]
+    found = search(*planted(effects, values))
+    assert found == {0 if stronger == "backlash" else 1, 2}
+
+
+def test_one_shape_of_a_kind_is_chosen_at_a_place() -> None:
+    effects = [effect("stribeck_friction", stribeck_speed=k / 10) for k in range(1, 5)]
+    found = search(*planted(effects, [1.0, 1.0, 2.0, 1.0]))
+    assert found == {2}
+
+
+def test_one_coherent_effect_wins_over_many_local_ones() -> None:
+    """Of joint 0 alone a local one explains the same: two parameters for one."""
+    data, [both] = planted([effect("torque_delay", 0, 1)], [0.6])
+    local = [
+        Candidate(
+            effect("torque_delay", joint), (joint,), tuple(c[:, [joint]] for c in both.columns)
+        )
+        for joint in (0, 1)
+    ]
+    assert search(data, [*local, both]) == {2}
+    assert search(data, local) == {0, 1}
+
+
+@pytest.mark.parametrize(("kind", "found"), [("asymmetric_friction", set()), ("spring", {1})])
+def test_refinements_wait_for_first_order_friction(kind: str, found: set[int]) -> None:
+    """Coulomb friction of another sign in some runs is significant, but says nothing of others.
+
+    So it is not in, and what refines it waits, however much it would explain.
+    """
+    data, candidates = planted([effect("coulomb_friction"), effect(kind)], [0.0, 1.0, 1.0])
+    for part, value in enumerate((2.0, -0.7, 2.0, -0.7)):
+        data.tau[part][:, :1] += value * candidates[0].columns[part][:, :, 0]
+    assert data.evidence(candidates, ONE).schur([]).singles[0].chi2 > 15.0
+    assert search(data, candidates) == found
+
+
+@pytest.mark.parametrize(("power", "found"), [(0.5, {0, 1, 2}), (2.0, {2})])
+def test_root_friction_replaces_no_straight_friction_and_keeps_both_terms(
+    power: float, found: set[int]
+) -> None:
+    """A refinement that comes near Coulomb friction, which is not there, and may replace it."""
+    effects = [
+        effect("viscous_friction"),
+        effect("coulomb_friction"),
+        effect("nonlinear_viscous_friction", power=power),
+    ]
+    mix = np.eye(3)
+    mix[1, 2] = 1.0
+    data, candidates = planted(effects, [0.0, 0.0, 1.0], mix)
+    assert search(data, candidates) == found
+
+
+def test_root_friction_alone_waits_for_nothing() -> None:
+    effects = [effect("viscous_friction"), effect("nonlinear_viscous_friction", power=0.5)]
+    assert search(*planted(effects, [0.0, 1.0])) == {1}
+
+
+@pytest.mark.parametrize(("power", "found"), [(0.5, {0}), (2.0, {1})])
+def test_root_friction_that_fits_a_little_better_does_not_take_the_place(
+    power: float, found: set[int]
+) -> None:
+    """Beside Coulomb friction it is not worth its price; alone it lowers J a little."""
+    effects = [
+        effect("coulomb_friction"),
+        effect("nonlinear_viscous_friction", power=power),
+    ]
+    data, candidates = planted(effects, [0.0, 1.0], np.array([[1.0, 1.0], [0.0, 0.2]]), seed=1)
+    assert 3.0 < data.evidence(candidates, ONE).schur([0]).singles[1].chi2 < 9.0
+    assert search(data, candidates) == found
+
+
+def test_one_that_stands_for_two_is_replaced_by_both() -> None:
+    """Neither is worth its price beside it, nor are both: only their exchange lowers J."""
+    effects = [effect("armature"), effect("torque_offset"), effect("torque_gain")]
+    half, part = np.sqrt(0.5 * 0.9), np.sqrt(0.1)
+    mix = np.array([[1.0, 0.0, half], [0.0, 1.0, half], [0.0, 0.0, part]])
+    data, candidates = planted(effects, [0.65, 0.65, 0.0], mix, seed=7)
+    beside = data.evidence(candidates, ONE).schur([2])
+    assert max(beside.singles[0].chi2, beside.singles[1].chi2) < 8.0
+    assert beside.gain(0, 1).chi2 < 18.0
+    assert search(data, candidates) == cheapest(data, candidates) == {0, 1}
+
+
+def test_a_pair_does_not_exceed_what_is_allowed() -> None:
+    """One effect of a pair stands for both until the other replaces it by two."""
+    data, candidates = planted([effect("armature", 1), effect("coulomb_friction", 1)], [2.0, 1.0])
+    assert len(search(data, candidates, most=1)) == 1
+    assert search(data, candidates, most=2) == {0, 1}
+
+
+def test_weak_first_order_friction_is_cheap_beside_what_refines_it() -> None:
+    """No step that adds a parent of a chosen effect and passes may be left undone."""
+    data, candidates = random_case(FRICTION, 28, 0.1)
+    assert search(data, candidates) == {0, 1, 4}
