@@ -9,7 +9,7 @@ size would explain. The effect is an approximation
 * or if U > E, whatever it depends on.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from excite_cli.diagnosis.result import Unexplained
 from excite_cli.diagnosis.tracing import Traced
@@ -55,18 +55,15 @@ def approximations(
 
 
 def _strongest(traced: Traced, i: int) -> tuple[int, float]:
-    """The joint where candidate i matters most, and the energy that it explains there."""
+    """The joint where candidate i explains most, in units of the noise, and that energy."""
     judge = traced.judge
     rest = judge.without(i, traced.chosen)
-    shares: Mapping[int, tuple[float, float]] = {
-        j: (
-            judge.plain.energy_on(rest, [j]) - judge.plain.energy_on([*rest, i], [j]),
-            judge.plain.energy_on((), [j]),
-        )
+    explained = {
+        j: judge.plain.energy_on(rest, [j]) - judge.plain.energy_on([*rest, i], [j])
         for j in traced.candidates[i].rows
     }
-    joint = max(shares, key=lambda j: shares[j][0] / max(shares[j][1], 1e-300))
-    return joint, max(shares[joint][0], 1e-300)
+    joint = max(explained, key=lambda j: explained[j])
+    return joint, max(explained[joint], 1e-300)
 
 
 def _same_quantity(

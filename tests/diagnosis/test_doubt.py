@@ -90,7 +90,8 @@ def beside(kind: str, words: Sequence[str], energy: float, joints: tuple[int, ..
     """
     width = len(catalogue()[kind].parameters)
     torque = np.zeros((width + 1, 2))
-    torque[0, list(joints)] = np.sqrt(energy)
+    torque[0, list(joints)] = 0.999 * np.sqrt(energy)
+    torque[0, joints[0]] = np.sqrt(energy)
     torque[width] = [1.0, 2.0]  # half of the residual of joint a has no candidate
     data, candidates = planted([effect(kind, *joints)], torque)
     left = [Unexplained("a", tuple(words), 0.5)]
@@ -169,9 +170,9 @@ def test_a_line_through_a_cubic_is_no_spring() -> None:
 
 
 def test_structure_counts_on_the_joint_where_an_effect_is_most() -> None:
-    """Of two joints the effect is most of the torque of b; of both chosen ones, b's is doubted."""
+    """The effect explains more on b than on a, where another explains most of the torque."""
     effects = [effect("viscous_friction", 0, 1), effect("armature", 0)]
-    torque = np.array([[3.0, 3.0], [9.0, 0.0]])
+    torque = np.array([[3.0, 4.0], [9.0, 0.0]])
     data, candidates = planted(effects, torque)
     both = traced(data, candidates, [0, 1])
     words = ("time",)
