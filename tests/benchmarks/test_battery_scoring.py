@@ -112,3 +112,13 @@ def test_saturation_may_be_told_by_the_checks_of_the_data() -> None:
     there = [plant("torque_saturation", "j2")]
     assert score(there, Answer((), saturated=("j2",)), True, JOINTS).right
     assert not score(there, Answer((), saturated=("j1",)), True, JOINTS).right
+
+
+def test_an_approximation_is_neither_right_nor_wrong_but_is_seen() -> None:
+    there = [plant("spring", "j2")]
+    near = Found(Name("spring", ("j2",)), approximation=True)
+    result = score(there, Answer((near,)), True, JOINTS)
+    assert result.names == ("approximation",)
+    assert not result.right
+    assert not result.wrong
+    assert result.detected

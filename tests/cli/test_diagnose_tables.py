@@ -1,0 +1,45 @@
+"""What people and scripts see of a diagnosis: names apart from approximations."""
+
+from dataclasses import replace
+from io import StringIO
+
+import pytest
+from rich.console import Console
+
+from excite_cli.cli.diagnose_tables import answer_of, tables_of
+from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.robot.model import build_robot
+from tests.diagnosis.synthetic_diagnosis import CONFIG, make_diagnosis, smoke_spec
+
+NEXT = {"purpose": "excite", "command": "excite optimize", "pairs": []}
+REASON = "a function of v[elbow]"
+
+
+@pytest.fixture(scope="module")
+def doubted() -> Diagnosis:
+    """The one effect that was found is only an approximation."""
+    found = make_diagnosis(rivals=())
+    first = replace(found.effects[0], approximates=REASON)
+    processing = {
+        "samples": 10, "rate": 20.0, "position_cutoff": 8.0, "candidates": 3, "inflation": 1.0,
+    }  # fmt: skip
+    return replace(found, effects=(first, *found.effects[1:]), processing=processing)
+
+
+def test_an_approximation_is_no_name_for_scripts(doubted: Diagnosis) -> None:
+    answer = answer_of(doubted, NEXT)
+    assert answer["effects"] == []
+    (told,) = answer["approximations"]
+    assert (told["kind"], told["stands_for"]) == ("viscous_friction", REASON)
+
+
+def test_an_approximation_has_a_table_of_its_own(doubted: Diagnosis) -> None:
+    robot = build_robot(smoke_spec().robot, CONFIG.parent)
+    console = Console(width=200, record=True, file=StringIO())
+    for part in tables_of(doubted, robot, NEXT, verbose=False):
+        console.print(part)
+    text = console.export_text()
+    assert "Approximations: they lower the error, but something else is there" in text
+    assert REASON in text
+    assert "What the declared model lacks" not in text
+    assert "0 effects, 1 approximation" in text
