@@ -20,6 +20,7 @@ data. The rotor does not enter: its own motion is measured.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -31,7 +32,7 @@ from excite_cli.robot.model import Array, Robot
 _GAPS = 1e-3, 3e-2  # rad
 _WIDTH = 0.01  # s, of a blow in the search, about that of a filter of 20 Hz
 _FINE = 2e-3  # s, the step in which flights are followed
-_CHUNK = 64  # samples that are looked at first for the end of a flight
+_CHUNK = 256  # samples that are looked at first for the end of a flight
 
 
 class Backlash(Effect):
@@ -63,10 +64,12 @@ class Backlash(Effect):
             return []
         r = np.concatenate(residuals)
         weights = 1.0 / np.maximum(np.mean(r**2, axis=0), 1e-300)
+        motions = [_Motion.of(s, joints[0]) for s in signals]
 
         def energy(gap: float) -> float:
-            effect = cls(joints, {"gap": float(gap)})
-            column = np.concatenate([_smooth(effect.columns(s)[:, :, 0], s) for s in signals])
+            column = np.concatenate(
+                [_smooth(motion.column(gap), s) for motion, s in zip(motions, signals, strict=True)]
+            )
             fitted = max(float(np.sum(weights * column * r)), 0.0)  # a negative share is no play
             return fitted**2 / (float(np.sum(weights * column**2)) + 1e-300)
 
@@ -81,40 +84,67 @@ class Backlash(Effect):
 
     def columns(self, signals: Signals) -> Array:
         """Flights, blows, and the shift of the link, in all rows, (T, n, 1)."""
-        j, body = self.joints[0], signals.body
-        if len(signals.t) < 3:
-            return np.zeros((*signals.q.shape, 1))
-        inertia = np.maximum(body.mass[:, j, j], 1e-12)
-        lost, behind = self._in_gap(signals, inertia)
-        jerked = body.mass[:, :, j] * (lost / inertia)[:, None]
-        shifted = body.by_position[:, :, j] * behind[:, None]
-        return np.asarray(jerked - shifted)[:, :, None]
+        return _Motion.of(signals, self.joints[0]).column(self.shape["gap"])[:, :, None]
 
-    def _in_gap(self, signals: Signals, inertia: Array) -> tuple[Array, Array]:
-        """What joint j lacks (T,), and how far its link is behind the motor (T,) [rad].
 
-        Flights last a few samples only, so they are followed on a finer grid, and averaged.
-        """
-        load, step = signals.load[:, self.joints[0]], float(signals.t[1] - signals.t[0])
+@dataclass(frozen=True)
+class _Motion:
+    """What of a motion does not depend on the gap.
+
+    `load` and `acceleration` of the link in flight on a grid that is `finer` times as fine, with
+    steps of `step` [s]: flights last a few samples only. `pull` (T, n) is M_rj / M_jj, `slope`
+    (T, n) is ∂τ_r/∂q_j.
+    """
+
+    load: Array
+    acceleration: Array
+    finer: int
+    step: float
+    pull: Array
+    slope: Array
+
+    @classmethod
+    def of(cls, signals: Signals, j: int) -> "_Motion":
+        load = signals.load[:, j]
+        if len(load) < 3:
+            zero = np.zeros_like(signals.q)
+            return cls(np.zeros(len(load)), np.zeros(len(load)), 1, 1.0, zero, zero)
+        step = float(signals.t[1] - signals.t[0])
         finer = max(1, int(np.ceil(step / _FINE)))
-        at = np.arange((len(load) - 1) * finer + 1) / finer
-        samples = np.arange(len(load))
-        load, inertia = np.interp(at, samples, load), np.interp(at, samples, inertia)
-        lost, behind = np.zeros(len(at)), 0.5 * self.shape["gap"] * np.sign(load)
-        for first, last, closed in flights(load / inertia, self.shape["gap"], step / finer):
-            lost[first:last] = -load[first:last]
+        inertia = np.maximum(signals.body.mass[:, j, j], 1e-12)
+        at, samples = np.arange((len(load) - 1) * finer + 1) / finer, np.arange(len(load))
+        fine = np.interp(at, samples, load)
+        return cls(
+            fine,
+            fine / np.interp(at, samples, inertia),
+            finer,
+            step / finer,
+            signals.body.mass[:, :, j] / inertia[:, None],
+            signals.body.by_position[:, :, j],
+        )
+
+    def column(self, gap: float) -> Array:
+        """The effect (T, n) of a gap [rad]."""
+        lost, behind = np.zeros(len(self.load)), 0.5 * gap * np.sign(self.load)
+        for first, last, closed in flights(self.acceleration, gap, self.step):
+            lost[first:last] = -self.load[first:last]
             behind[first:last] = 0.0
             if closed:
-                lost[last] += load[first:last].sum()
-        return _averaged(lost, finer), _averaged(behind, finer)
+                lost[last] += self.load[first:last].sum()
+        lost, behind = _averaged(lost, self.finer), _averaged(behind, self.finer)
+        return np.asarray(self.pull * lost[:, None] - self.slope * behind[:, None])
 
 
 def _averaged(x: Array, finer: int) -> Array:
     """Means over the samples' own intervals, of values on a grid that is `finer` times as fine."""
     half = finer // 2
-    padded = np.concatenate([np.zeros(half), x, np.zeros(finer - 1 - half)])
-    counts = np.concatenate([np.zeros(half), np.ones(len(x)), np.zeros(finer - 1 - half)])
-    return np.asarray(padded.reshape(-1, finer).sum(axis=1) / counts.reshape(-1, finer).sum(axis=1))
+    padded = np.zeros(len(x) + finer - 1)
+    padded[half : half + len(x)] = x
+    means = padded.reshape(-1, finer).sum(axis=1)
+    means[1:-1] /= finer
+    means[0] /= finer - half  # at the ends, half of the interval lies outside
+    means[-1] /= half + 1
+    return np.asarray(means)
 
 
 def _smooth(column: Array, signals: Signals) -> Array:
