@@ -91,15 +91,13 @@ class Backlash(Effect):
 class _Motion:
     """What of a motion does not depend on the gap.
 
-    `load` and `acceleration` of the link in flight on a grid that is `finer` times as fine, with
-    steps of `step` [s]: flights last a few samples only. `pull` (T, n) is M_rj / M_jj, `slope`
-    (T, n) is ∂τ_r/∂q_j.
+    `load` and `flights` are on a grid that is `finer` times as fine, since flights last a few
+    samples only. `pull` (T, n) is M_rj / M_jj, `slope` (T, n) is ∂τ_r/∂q_j.
     """
 
     load: Array
-    acceleration: Array
+    flights: "Flights"
     finer: int
-    step: float
     pull: Array
     slope: Array
 
@@ -108,7 +106,8 @@ class _Motion:
         load = signals.load[:, j]
         if len(load) < 3:
             zero = np.zeros_like(signals.q)
-            return cls(np.zeros(len(load)), np.zeros(len(load)), 1, 1.0, zero, zero)
+            nothing = np.zeros(len(load))
+            return cls(nothing, Flights(nothing, 1.0), 1, zero, zero)
         step = float(signals.t[1] - signals.t[0])
         finer = max(1, int(np.ceil(step / _FINE)))
         inertia = np.maximum(signals.body.mass[:, j, j], 1e-12)
@@ -116,9 +115,8 @@ class _Motion:
         fine = np.interp(at, samples, load)
         return cls(
             fine,
-            fine / np.interp(at, samples, inertia),
+            Flights(fine / np.interp(at, samples, inertia), step / finer),
             finer,
-            step / finer,
             signals.body.mass[:, :, j] / inertia[:, None],
             signals.body.by_position[:, :, j],
         )
@@ -126,7 +124,7 @@ class _Motion:
     def column(self, gap: float) -> Array:
         """The effect (T, n) of a gap [rad]."""
         lost, behind = np.zeros(len(self.load)), 0.5 * gap * np.sign(self.load)
-        for first, last, closed in flights(self.acceleration, gap, self.step):
+        for first, last, closed in self.flights.across(gap):
             lost[first:last] = -self.load[first:last]
             behind[first:last] = 0.0
             if closed:
@@ -155,37 +153,52 @@ def _smooth(column: Array, signals: Signals) -> Array:
     return smooth
 
 
-def flights(acceleration: Array, gap: float, step: float) -> list[tuple[int, int, bool]]:
-    """Flights across a gap: first sample, first one after it, and whether a flank was met.
+class Flights:
+    """Flights of a link across gaps of any size.
 
     Parameters
     ----------
     acceleration: (T,) δ'' of the angle between motor and link, in flight [rad/s²]
-    gap: [rad]
     step: [s]
     """
-    negative = acceleration < 0
-    changes = np.flatnonzero(negative[1:] != negative[:-1]) + 1
-    count, found, k = len(acceleration), [], 0
-    while k < len(changes):
-        first = int(changes[k])
-        last, closed = _end(acceleration, first, gap, step)
-        found.append((first, last, closed))
-        k = int(np.searchsorted(changes, last, side="right")) if last < count else len(changes)
-    return found
 
+    def __init__(self, acceleration: Array, step: float) -> None:
+        self._acceleration, self._step = acceleration, step
+        negative = acceleration < 0
+        self._changes = np.flatnonzero(negative[1:] != negative[:-1]) + 1
+        self._paths: dict[int, Array] = {}
 
-def _end(acceleration: Array, first: int, gap: float, step: float) -> tuple[int, bool]:
-    """The first sample at a flank again; the end of the run if there is none."""
-    side = -1.0 if acceleration[first] < 0 else 1.0
-    size, count = _CHUNK, len(acceleration)
-    while True:
-        part = side * acceleration[first : first + size]
-        crossed = np.cumsum(np.cumsum(part)) * step**2
-        at_flank = np.flatnonzero((crossed >= gap) | (crossed < 0.0))
-        if len(at_flank):
-            end = first + int(at_flank[0]) + 1
-            return (end, True) if end < count else (count, False)
-        if first + size >= count:
-            return count, False
-        size *= 4
+    def across(self, gap: float) -> list[tuple[int, int, bool]]:
+        """First sample of each flight, first one after it, and whether a flank was met."""
+        count, found, k = len(self._acceleration), [], 0
+        while k < len(self._changes):
+            first = int(self._changes[k])
+            last, closed = self._end(first, gap)
+            found.append((first, last, closed))
+            if last >= count:
+                break
+            k = int(np.searchsorted(self._changes, last, side="right"))
+        return found
+
+    def _end(self, first: int, gap: float) -> tuple[int, bool]:
+        """The first sample at a flank again; the end of the run if there is none."""
+        farthest = self._path(first, gap)
+        end = first + int(np.searchsorted(farthest, gap)) + 1
+        count = len(self._acceleration)
+        return (end, True) if end < count and end <= first + len(farthest) else (count, False)
+
+    def _path(self, first: int, gap: float) -> Array:
+        """How far the link has been from its flank, until it is back (∞) or beyond the gap."""
+        known = self._paths.get(first)
+        count = len(self._acceleration)
+        while known is None or (known[-1] < gap and first + len(known) < count):
+            size = _CHUNK if known is None else 4 * len(known)
+            part = self._acceleration[first : first + size]
+            side = -1.0 if part[0] < 0 else 1.0
+            crossed = np.cumsum(np.cumsum(side * part)) * self._step**2
+            back = np.flatnonzero(crossed < 0.0)
+            known = np.maximum.accumulate(crossed[: back[0]] if len(back) else crossed)
+            if len(back):
+                known = np.append(known, np.inf)
+            self._paths[first] = known
+        return known

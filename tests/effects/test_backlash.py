@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.signal import butter, sosfiltfilt
 
-from excite_cli.effects.backlash import Backlash, flights
+from excite_cli.effects.backlash import Backlash, Flights
 from excite_cli.effects.base import Signals
 from excite_cli.robot.model import Array, Robot
 from tests.effects.motions import signals_at
@@ -23,7 +23,7 @@ def test_flight_lasts_as_the_gap_asks() -> None:
     step, rate, gap = 1e-4, 30.0, 0.01
     t = step * np.arange(-2000, 4000)
     for side in (1.0, -1.0):
-        ((first, last, closed),) = flights(side * rate * t, gap, step)
+        ((first, last, closed),) = Flights(side * rate * t, step).across(gap)
         assert closed
         assert (last - first) * step == pytest.approx((6 * gap / rate) ** (1 / 3), abs=3e-4)
 
@@ -33,15 +33,15 @@ def test_flight_ends_where_the_link_comes_back() -> None:
     step = 1e-3
     t = step * np.arange(9000)
     acceleration = np.concatenate([[-1e-9], np.cos(t) - 0.2])
-    ((first, last, closed), *_) = flights(acceleration, 10.0, step)
+    ((first, last, closed), *_) = Flights(acceleration, step).across(10.0)
     assert (first, closed) == (1, True)
     back = brentq(lambda x: 1 - np.cos(x) - 0.1 * x**2, 3.0, 6.0)
     assert (last - first) * step == pytest.approx(back, abs=0.01)
 
 
 def test_flight_that_outlasts_the_run_has_no_blow() -> None:
-    assert flights(np.array([-1.0, 1.0, 1.0, 1.0]), 1.0, 1e-3) == [(1, 4, False)]
-    assert flights(np.ones(5), 1.0, 1e-3) == []
+    assert Flights(np.array([-1.0, 1.0, 1.0, 1.0]), 1e-3).across(1.0) == [(1, 4, False)]
+    assert Flights(np.ones(5), 1e-3).across(1.0) == []
 
 
 @cache
