@@ -12,8 +12,8 @@ cases about that only.
 
 Development used seeds below 1000. The first judgements led to changes, so they count as development
 since: 26 cases of seed 5001, all 66 of 7001 and of 9001. The figures that are quoted are those of
-seed 11001, 130 cases, run once, after the last change. The next ones need another seed from 5000
-on.
+seed 11001, 130 cases, run once, after the last change of what a diagnosis finds. The next ones need
+another seed from 5000 on.
 """
 
 import argparse

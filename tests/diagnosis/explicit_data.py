@@ -14,6 +14,7 @@ from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.asymmetric_friction import AsymmetricFriction
 from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.identification.prepare import PreparedRun
@@ -22,6 +23,16 @@ from excite_cli.robot.model import Array
 STEP = 0.02
 FIXED = 4
 FOLDS = (0, 1, 0, 2)
+
+
+def anything(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
+    """Vetoes nothing."""
+    return True
+
+
+def effect(kind: str, *joints: int, **shape: float) -> Effect:
+    """On joint 0 if none is named."""
+    return catalogue()[kind](joints or (0,), shape)
 
 
 def prepared(

@@ -15,7 +15,7 @@ from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.robot.model import Array
-from tests.diagnosis.explicit_data import FIXED, FOLDS, prepared
+from tests.diagnosis.explicit_data import FIXED, FOLDS, anything, prepared
 
 NAMES = ("a", "b")
 SAMPLES = 60
@@ -25,10 +25,6 @@ Allowed = Callable[[Array, Sequence[int], Sequence[int]], bool]
 
 def effect(kind: str, *joints: int) -> Effect:
     return catalogue()[kind](joints or (0,))
-
-
-def anything(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
-    return True
 
 
 def all_but(vetoed: int) -> Allowed:

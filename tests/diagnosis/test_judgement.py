@@ -15,13 +15,14 @@ from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import possible_sizes
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import catalogue
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import (
     FIXED,
     FOLDS,
     Rows,
+    anything,
     autoregression,
+    effect,
     prepared,
     random_candidates,
     random_data,
@@ -32,15 +33,6 @@ SAMPLES = 50
 TOTAL = SAMPLES * len(FOLDS)
 RULES = Rules(0.01, 0.01)
 Allowed = Callable[[Array, Sequence[int], Sequence[int]], bool]
-
-
-def anything(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
-    return True
-
-
-def effect(kind: str, *joints: int, **shape: float) -> Effect:
-    """On joint 0 if none is named."""
-    return catalogue()[kind](joints or (0,), shape)
 
 
 def planted(

@@ -16,22 +16,12 @@ from excite_cli.diagnosis.possible_sizes import possible_sizes
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import catalogue
 from excite_cli.robot.model import Array
-from tests.diagnosis.explicit_data import FIXED, FOLDS, Rows, prepared, rows_of
+from tests.diagnosis.explicit_data import FIXED, FOLDS, Rows, anything, effect, prepared, rows_of
 
 SAMPLES = 40
 ONE = NoiseModel.white(np.ones(2))
 NO_VETO = Rules(0.01, -1.0)
-
-
-def anything(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
-    return True
-
-
-def effect(kind: str, *joints: int, **shape: float) -> Effect:
-    """On joint 0 if none is named."""
-    return catalogue()[kind](joints or (0,), shape)
 
 
 def planted(
