@@ -15,15 +15,10 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from excite_cli.config.spec import (
-    ConstraintsSpec,
-    DiscSpec,
-    FourierSpec,
-    JointLimitsSpec,
-    OptimizerSpec,
-    RobotSpec,
-    Spec,
-)
+from excite_cli.config.constraints_spec import ConstraintsSpec, DiscSpec, JointLimitsSpec
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.config.spec import OptimizerSpec, Spec
+from excite_cli.config.trajectory_spec import FourierSpec
 from excite_cli.errors import ExciteError
 from excite_cli.excitation.motion import Progress
 from excite_cli.excitation.problem import Problem, build_problem

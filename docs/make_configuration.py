@@ -9,12 +9,13 @@ from typing import Any, get_args
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from excite_cli.config.spec import Section, Spec
+from excite_cli.config.section import Section
+from excite_cli.config.spec import Spec
 
 TARGET = Path(__file__).parent / "configuration.md"
 HEAD = """# Every key of the YAML file
 
-Made by `python -m docs.make_configuration` from `excite_cli/config/spec.py`; a test keeps it up to
+Made by `python -m docs.make_configuration` from the classes in `excite_cli/config/`; a test keeps it up to
 date. `excite schema` prints the same as JSON Schema for editors. Unknown keys are errors.
 """
 

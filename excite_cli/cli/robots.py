@@ -23,7 +23,7 @@ def robots(
     """
     from rich.table import Table
 
-    from excite_cli.config.spec import RobotSpec
+    from excite_cli.config.robot_spec import RobotSpec
     from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots
     from excite_cli.robot.model import build_robot, links_by_joint
 

@@ -10,7 +10,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from excite_cli.config.spec import Section, Spec
+from excite_cli.config.section import Section
+from excite_cli.config.spec import Spec
 from excite_cli.errors import nearest
 
 _ALLOWED = {

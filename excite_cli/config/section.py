@@ -1,5 +1,6 @@
 """What all sections of a problem share: numbers with their limits, and a strict base class."""
 
+from collections.abc import Callable
 from typing import Annotated, Any, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
@@ -67,3 +68,14 @@ def _sections_in(annotation: Any) -> list[type[Section]]:
     if isinstance(annotation, type) and issubclass(annotation, Section):
         return [annotation]
     return [kind for inner in get_args(annotation) for kind in _sections_in(inner)]
+
+
+def kind_by(key: str, default: str) -> Callable[[Any], Any]:
+    """Tells which kind of section is meant: what stands under `key`, else `default`."""
+
+    def kind(value: Any) -> Any:
+        if isinstance(value, dict):
+            return value.get(key, default)
+        return getattr(value, key, default)
+
+    return kind

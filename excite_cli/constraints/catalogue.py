@@ -2,7 +2,12 @@
 
 import numpy as np
 
-from excite_cli.config.spec import ConstraintsSpec, DiscSpec, JointLimitsSpec, PolygonSpec
+from excite_cli.config.constraints_spec import (
+    ConstraintsSpec,
+    DiscSpec,
+    JointLimitsSpec,
+    PolygonSpec,
+)
 from excite_cli.constraints.balance import Balance
 from excite_cli.constraints.base import Array, Constraint
 from excite_cli.constraints.joint_bound import JointBound

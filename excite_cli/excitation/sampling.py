@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from excite_cli.config.spec import GridSpec, SamplingSpec, Spec
+from excite_cli.config.spec import Spec
+from excite_cli.config.trajectory_spec import GridSpec, SamplingSpec
 from excite_cli.constraints.base import Array
 from excite_cli.errors import ConfigError
 from excite_cli.trajectory.base import Trajectory

@@ -8,7 +8,7 @@ badly is cut across a main axis. Everything is in the frame of the joint that ca
 import numpy as np
 import pinocchio as pin
 
-from excite_cli.config.spec import CapsuleSpec, SelfCollisionSpec
+from excite_cli.config.constraints_spec import CapsuleSpec, SelfCollisionSpec
 from excite_cli.errors import ConfigError, RobotError, nearest
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.capsule_cache import capsule_key, store_capsules, stored_capsules

@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.config.spec import SelfCollisionSpec
+from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.mesh_distances import MeshDistances
 from excite_cli.robot.model import Robot

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from excite_cli.config.spec import JointLimits, RobotSpec
+from excite_cli.config.robot_spec import JointLimits, RobotSpec
 from excite_cli.errors import ConfigError, RobotError, nearest
 from excite_cli.robot.description import UNBOUNDED, RobotDescription, load_description
 

@@ -1,6 +1,6 @@
 """All trajectory families by their name in the YAML file."""
 
-from excite_cli.config.spec import BSplineSpec, FourierSpec
+from excite_cli.config.trajectory_spec import BSplineSpec, FourierSpec
 from excite_cli.trajectory.base import Trajectory
 from excite_cli.trajectory.bspline import BSplineTrajectory
 from excite_cli.trajectory.fourier import FourierTrajectory

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from excite_cli.config.spec import (
+from excite_cli.config.constraints_spec import (
     ConstraintsSpec,
     DiscSpec,
     JointLimitsSpec,
     PolygonSpec,
-    RobotSpec,
     SelfCollisionSpec,
     TorqueSpec,
 )
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.errors import ConfigError

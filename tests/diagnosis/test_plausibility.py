@@ -8,7 +8,8 @@ import pytest
 from scipy.optimize import nnls
 
 from excite_cli.config.load import load_spec
-from excite_cli.config.spec import RobotSpec, Spec
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.plausibility import check_dataset
 from excite_cli.diagnosis.rearranged import exchanges
 from excite_cli.diagnosis.torque_shares import nonnegative

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from excite_cli.config.spec import RobotSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.effects.base import Signals
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.robot.model import Array, Robot, build_robot

@@ -4,17 +4,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from excite_cli.config.spec import (
-    ConstraintsSpec,
-    FourierSpec,
-    GridSpec,
-    JointLimitsSpec,
-    OptimizerSpec,
-    RobotSpec,
-    SamplingSpec,
-    Spec,
-    TorqueSpec,
-)
+from excite_cli.config.constraints_spec import ConstraintsSpec, JointLimitsSpec, TorqueSpec
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.config.spec import OptimizerSpec, Spec
+from excite_cli.config.trajectory_spec import FourierSpec, GridSpec, SamplingSpec
 from excite_cli.constraints.base import Array
 from excite_cli.errors import ConfigError, MissingExtraError
 from excite_cli.excitation.motion import Outcome, Progress

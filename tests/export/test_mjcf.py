@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import EffectSpec
-from excite_cli.config.spec import RobotSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import RobotError
 from excite_cli.export.exported import IdentifiedModel

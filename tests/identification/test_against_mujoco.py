@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.load import parse_spec
-from excite_cli.config.spec import RobotSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.identify import Identification, identify
 from excite_cli.robot.base_parameters import find_base_parameters

@@ -164,7 +164,7 @@ def test_the_pseudo_inertia_of_point_masses() -> None:
 
 
 def test_the_kuka_whose_urdf_has_an_impossible_wrist(kr300: Path) -> None:
-    from excite_cli.config.spec import RobotSpec
+    from excite_cli.config.robot_spec import RobotSpec
     from excite_cli.robot.model import build_robot
 
     robot = build_robot(RobotSpec(urdf=str(kr300 / "kr300.urdf")))

@@ -147,7 +147,7 @@ def test_errors_on_other_runs_reach_the_noise(
 
 def test_the_kuka_with_its_inertias_kept(kr300: Path) -> None:
     """Spring and armatures of the data sheets come out of the log (see its README)."""
-    from excite_cli.config.spec import RobotSpec
+    from excite_cli.config.robot_spec import RobotSpec
     from excite_cli.measurement.dataset import Dataset, Run
     from excite_cli.robot.model import build_robot
 

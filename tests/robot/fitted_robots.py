@@ -5,7 +5,8 @@ import tempfile
 from functools import cache
 from unittest import mock
 
-from excite_cli.config.spec import RobotSpec, SelfCollisionSpec
+from excite_cli.config.constraints_spec import SelfCollisionSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.robot.capsules import Capsule, fit_capsules
 from excite_cli.robot.collision_pairs import CollisionPairs, choose_pairs
 from excite_cli.robot.model import Robot, build_robot

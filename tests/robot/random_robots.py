@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from excite_cli.config.spec import RobotSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.robot.model import Array, Robot, build_robot
 
 Rows = tuple[Literal["joints", "base"], ...]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.config.spec import RobotSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.excitation.differences import relative_error
 from excite_cli.robot.adjoint import FictitiousInertiaAdjoint
 from excite_cli.robot.block_form import block_pull_back

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.config.spec import RobotSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.robot import base_parameters as module
 from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import Robot, build_robot

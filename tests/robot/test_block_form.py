@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.config.spec import RobotSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.robot.block_form import block_pull_back, block_regressor
 from excite_cli.robot.block_kinematics import body_jacobians, body_motions, joints_of
 from excite_cli.robot.model import Array, Robot, build_robot

@@ -4,7 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.config.spec import CapsuleSpec, RobotSpec, SelfCollisionSpec
+from excite_cli.config.constraints_spec import CapsuleSpec, SelfCollisionSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.robot import capsules as module
 from excite_cli.robot.capsules import fit_capsules, link_joints

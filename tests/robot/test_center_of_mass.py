@@ -5,7 +5,7 @@ import pinocchio as pin
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.config.spec import RobotSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.excitation.differences import central_differences, relative_error
 from excite_cli.robot.center_of_mass import CenterOfMass
 from excite_cli.robot.forward_kinematics import BatchKinematics

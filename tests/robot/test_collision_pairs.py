@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from excite_cli.config.spec import SelfCollisionSpec
+from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.clearance import Clearance
 from excite_cli.robot.collision_pairs import CollisionPairs, choose_pairs

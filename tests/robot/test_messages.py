@@ -6,15 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from excite_cli.config.spec import (
-    ConstraintsSpec,
-    GridSpec,
-    JointLimits,
-    RobotSpec,
-    SamplingSpec,
-    SelfCollisionSpec,
-    Spec,
-)
+from excite_cli.config.constraints_spec import ConstraintsSpec, SelfCollisionSpec
+from excite_cli.config.robot_spec import JointLimits, RobotSpec
+from excite_cli.config.spec import Spec
+from excite_cli.config.trajectory_spec import GridSpec, SamplingSpec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.robot.model import Robot, build_robot

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from excite_cli.config.spec import RobotSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Array, Robot, build_robot

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.config.spec import RobotSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.robot.regressor import standard_parameters

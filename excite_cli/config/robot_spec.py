@@ -1,0 +1,80 @@
+"""What a YAML file may say about the robot."""
+
+from typing import Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from excite_cli.config.section import Finite, NonNegative, Positive, Section, Vector3
+
+
+class JointLimits(Section):
+    """Limits of one joint that replace those of the URDF."""
+
+    position: tuple[Finite, Finite] | None = Field(None, description="lower, upper [rad or m]")
+    velocity: Positive | None = Field(None, description="largest speed [rad/s or m/s]")
+    acceleration: Positive | None = Field(None, description="largest acceleration [rad/s²]")
+    effort: Positive | None = Field(None, description="largest torque [N·m or N]")
+
+    @field_validator("position")
+    @classmethod
+    def _ordered(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
+        if value is not None and value[0] >= value[1]:
+            raise ValueError(f"the lower limit {value[0]:g} is not below the upper {value[1]:g}")
+        return value
+
+
+class PayloadSpec(Section):
+    """Something rigid that a link carries: its mass and the capsule that contains it."""
+
+    link: str = Field(description="link that carries it; see `excite robots`")
+    mass: NonNegative = Field(0.0, description="[kg]")
+    center: Vector3 = Field((0.0, 0.0, 0.0), description="centre of mass in the link [m]")
+    inertia: tuple[NonNegative, NonNegative, NonNegative] = Field(
+        (0.0, 0.0, 0.0), description="Ixx, Iyy, Izz about the centre of mass, link axes [kg·m²]"
+    )
+    start: Vector3 = Field(description="one end of the capsule's axis, in the link [m]")
+    end: Vector3 = Field(description="the other end [m]")
+    radius: Positive = Field(description="of the capsule [m]")
+
+
+class RobotSpec(Section):
+    """Which robot, which of its joints move, and where the others stand."""
+
+    urdf: str = Field(description="path relative to this file, or example-robot-data:<name>")
+    package_dirs: tuple[str, ...] = Field(
+        (), description="folders in which package:// names of the URDF are looked up"
+    )
+    joints: Literal["all"] | tuple[str, ...] = Field("all", description="moved joints")
+    posture: dict[str, Finite] = Field(
+        default_factory=dict,
+        description="joint values [rad or m] at which unmoved joints are locked and motions start",
+    )
+    base: Literal["fixed", "floating"] = "fixed"
+    base_orientation: tuple[Finite, Finite, Finite] = Field(
+        (0.0, 0.0, 0.0), description="roll, pitch, yaw of the base [rad]"
+    )
+    rows: tuple[Literal["joints", "base"], ...] = Field(
+        ("joints",), description="measured rows: joint torques, the wrench at the base, or both"
+    )
+    gravity: Vector3 = Field((0.0, 0.0, -9.81), description="[m/s²] in the world frame")
+    limits: dict[str, JointLimits] = Field(default_factory=dict)
+    payload: PayloadSpec | None = None
+
+    @field_validator("joints")
+    @classmethod
+    def _some_joints(cls, value: Any) -> Any:
+        if value != "all":
+            if not value:
+                raise ValueError("name at least one joint, or write 'all'")
+            twice = sorted({j for j in value if list(value).count(j) > 1})
+            if twice:
+                raise ValueError(f"named twice: {', '.join(twice)}")
+        return value
+
+    @model_validator(mode="after")
+    def _rows_fit_base(self) -> "RobotSpec":
+        if not self.rows or len(set(self.rows)) != len(self.rows):
+            raise ValueError("rows must name 'joints', 'base' or both, each once")
+        if "base" in self.rows and self.base == "fixed":
+            raise ValueError("rows: 'base' needs base: floating (a fixed base has no wrench row)")
+        return self

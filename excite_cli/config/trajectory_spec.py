@@ -1,0 +1,89 @@
+"""What a YAML file may say about trajectories and the instants at which they are judged."""
+
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field, StrictBool, Tag, model_validator
+
+from excite_cli.config.section import (
+    Duration,
+    Finite,
+    Frequency,
+    Integer,
+    Positive,
+    Samples,
+    Section,
+    kind_by,
+)
+
+Posture = Literal["posture"] | dict[str, Finite]
+
+
+class FourierSpec(Section):
+    """Fourier series of Eq. 50."""
+
+    family: Literal["fourier"] = "fourier"
+    harmonics: Integer = Field(5, ge=1, le=100, description="N")
+    base_frequency: Frequency = Field(0.785398, description="ω [rad/s]")
+    at_rest: StrictBool = Field(False, description="no velocity or acceleration at start and end")
+    start: Posture | None = Field(
+        None,
+        description="where the motion starts and ends [rad or m], `posture`: at robot.posture; "
+        "joints not named are at robot.posture; needs at_rest",
+    )
+
+    @model_validator(mode="after")
+    def _enough_harmonics(self) -> "FourierSpec":
+        if self.at_rest and self.harmonics < 3:
+            raise ValueError("at_rest needs at least 3 harmonics")
+        if self.start is not None and not self.at_rest:
+            raise ValueError("start needs at_rest: true")
+        return self
+
+
+class BSplineSpec(Section):
+    """Clamped B-spline."""
+
+    family: Literal["bspline"]
+    duration: Duration = Field(description="[s]")
+    control_points: Integer = Field(12, ge=4, le=500)
+    degree: Integer = Field(5, ge=3, le=9)
+    at_rest: StrictBool = Field(True, description="no velocity or acceleration at start and end")
+    start: Posture | None = Field(
+        None,
+        description="where the motion starts [rad or m], `posture`: at robot.posture; joints not "
+        "named are at robot.posture; needs at_rest",
+    )
+    end: Posture | None = Field(None, description="where it ends; as start")
+
+    @model_validator(mode="after")
+    def _enough_points(self) -> "BSplineSpec":
+        needed = self.degree + 1 + (4 if self.at_rest else 0)
+        if self.control_points < needed:
+            raise ValueError(f"degree {self.degree} needs at least {needed} control points")
+        if (self.start is not None or self.end is not None) and not self.at_rest:
+            raise ValueError("start and end need at_rest: true")
+        return self
+
+
+TrajectorySpec = Annotated[
+    Annotated[FourierSpec, Tag("fourier")] | Annotated[BSplineSpec, Tag("bspline")],
+    Discriminator(kind_by("family", "fourier")),
+]
+
+
+class GridSpec(Section):
+    """Equidistant instants from the start; what is not given follows from the trajectory."""
+
+    samples: Samples | None = Field(None, description="default: see sampling")
+    step: Positive | None = Field(None, description="[s]; default: duration / samples")
+
+
+class SamplingSpec(Section):
+    """Instants at which cost and constraints are evaluated.
+
+    By default they cover the whole trajectory: the cost with 40 samples (or two per coefficient),
+    the constraints every 0.02 s (at least 100, at most 1000 samples).
+    """
+
+    cost: GridSpec = GridSpec()
+    constraints: GridSpec = GridSpec()
