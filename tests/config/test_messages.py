@@ -4,62 +4,99 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.config import data_spec as data_sections
-from excite_cli.config import spec as sections
+from excite_cli.config import (
+    constraints_spec,
+    data_spec,
+    robot_spec,
+    spec,
+    trajectory_spec,
+)
 from excite_cli.config.load import MAX_BYTES, MAX_DEPTH, load_spec, parse_spec
+from excite_cli.config.section import Section
 from excite_cli.errors import ConfigError
 
 ROBOT = "robot: {urdf: arm.urdf}"
 CAPSULE = "{start: [0, 0, 0], end: [0, 0, 1], radius: 0.1}"
 
 # path of the section, YAML with one unknown key @, the section's class
-LEVELS: dict[str, tuple[str, type[sections.Section]]] = {
-    "": (f"{ROBOT}\n@: 1", sections.Spec),
-    "robot": ("robot: {urdf: arm.urdf, @: 1}", sections.RobotSpec),
+LEVELS: dict[str, tuple[str, type[Section]]] = {
+    "": (f"{ROBOT}\n@: 1", spec.Spec),
+    "robot": ("robot: {urdf: arm.urdf, @: 1}", robot_spec.RobotSpec),
     "robot.limits.elbow": (
         "robot: {urdf: arm.urdf, limits: {elbow: {@: 1}}}",
-        sections.JointLimits,
+        robot_spec.JointLimits,
     ),
-    "trajectory": (f"{ROBOT}\ntrajectory: {{@: 1}}", sections.FourierSpec),
-    "sampling": (f"{ROBOT}\nsampling: {{@: 1}}", sections.SamplingSpec),
+    "trajectory": (f"{ROBOT}\ntrajectory: {{@: 1}}", trajectory_spec.FourierSpec),
+    "sampling": (f"{ROBOT}\nsampling: {{@: 1}}", trajectory_spec.SamplingSpec),
     "sampling.cost": (
         f"{ROBOT}\nsampling: {{cost: {{samples: 9, step: 0.1, @: 1}}}}",
-        sections.GridSpec,
+        trajectory_spec.GridSpec,
     ),
     "sampling.constraints": (
         f"{ROBOT}\nsampling: {{constraints: {{samples: 9, step: 0.1, @: 1}}}}",
-        sections.GridSpec,
+        trajectory_spec.GridSpec,
     ),
-    "criterion": (f"{ROBOT}\ncriterion: {{@: 1}}", sections.CriterionSpec),
-    "constraints": (f"{ROBOT}\nconstraints: {{@: 1}}", sections.ConstraintsSpec),
+    "criterion": (f"{ROBOT}\ncriterion: {{@: 1}}", spec.CriterionSpec),
+    "constraints": (f"{ROBOT}\nconstraints: {{@: 1}}", constraints_spec.ConstraintsSpec),
     "constraints.joint_limits": (
         f"{ROBOT}\nconstraints: {{joint_limits: {{@: 1}}}}",
-        sections.JointLimitsSpec,
+        constraints_spec.JointLimitsSpec,
     ),
-    "constraints.torque": (f"{ROBOT}\nconstraints: {{torque: {{@: 1}}}}", sections.TorqueSpec),
+    "constraints.torque": (
+        f"{ROBOT}\nconstraints: {{torque: {{@: 1}}}}",
+        constraints_spec.TorqueSpec,
+    ),
+    "constraints.contact": (
+        f"{ROBOT}\nconstraints: {{contact: {{@: 1}}}}",
+        constraints_spec.ContactSpec,
+    ),
+    "constraints.surroundings": (
+        f"{ROBOT}\nconstraints: {{surroundings: {{floor: 0, @: 1}}}}",
+        constraints_spec.SurroundingsSpec,
+    ),
+    "constraints.surroundings.boxes.table": (
+        f"{ROBOT}\nconstraints: {{surroundings: {{boxes: {{table: "
+        "{size: [1, 1, 1], position: [0, 0, 0], @: 1}}}}",
+        constraints_spec.BoxSpec,
+    ),
+    "constraints.surroundings.walls.left": (
+        f"{ROBOT}\nconstraints: {{surroundings: {{walls: {{left: "
+        "{point: [0, 1, 0], normal: [0, -1, 0], @: 1}}}}",
+        constraints_spec.WallSpec,
+    ),
+    "uncertainty": (f"{ROBOT}\nuncertainty: {{@: 1}}", uncertainty_spec.UncertaintySpec),
+    "uncertainty.bodies.elbow": (
+        f"{ROBOT}\nuncertainty: {{bodies: {{elbow: {{@: 1}}}}}}",
+        uncertainty_spec.BodyUncertaintySpec,
+    ),
+    "robot.payload": (
+        "robot: {urdf: arm.urdf, payload: {link: hand, start: [0, 0, 0], end: [0, 0, 1], "
+        "radius: 0.1, @: 1}}",
+        robot_spec.PayloadSpec,
+    ),
     "constraints.balance": (
         f"{ROBOT}\nconstraints: {{balance: {{kind: disc, radius: 0.1, @: 1}}}}",
-        sections.DiscSpec,
+        constraints_spec.DiscSpec,
     ),
     "constraints.self_collision": (
         f"{ROBOT}\nconstraints: {{self_collision: {{@: 1}}}}",
-        sections.SelfCollisionSpec,
+        constraints_spec.SelfCollisionSpec,
     ),
     "constraints.self_collision.capsules.hand": (
         f"{ROBOT}\nconstraints: {{self_collision: {{capsules: {{hand: "
         "{start: [0, 0, 0], end: [0, 0, 1], radius: 0.1, @: 1}}}}",
-        sections.CapsuleSpec,
+        constraints_spec.CapsuleSpec,
     ),
-    "optimizer": (f"{ROBOT}\noptimizer: {{@: 1}}", sections.OptimizerSpec),
-    "sequence": (f"{ROBOT}\nsequence: {{@: 1}}", sections.SequenceSpec),
-    "effects.0": (f"{ROBOT}\neffects: [{{kind: spring, @: 1}}]", data_sections.EffectSpec),
-    "measurement": (f"{ROBOT}\nmeasurement: {{@: 1}}", data_sections.MeasurementSpec),
+    "optimizer": (f"{ROBOT}\noptimizer: {{@: 1}}", spec.OptimizerSpec),
+    "sequence": (f"{ROBOT}\nsequence: {{@: 1}}", spec.SequenceSpec),
+    "effects.0": (f"{ROBOT}\neffects: [{{kind: spring, @: 1}}]", data_spec.EffectSpec),
+    "measurement": (f"{ROBOT}\nmeasurement: {{@: 1}}", data_spec.MeasurementSpec),
     "measurement.filter": (
         f"{ROBOT}\nmeasurement: {{filter: {{@: 1}}}}",
-        data_sections.FilterSpec,
+        data_spec.FilterSpec,
     ),
-    "identification": (f"{ROBOT}\nidentification: {{@: 1}}", data_sections.IdentificationSpec),
-    "diagnosis": (f"{ROBOT}\ndiagnosis: {{@: 1}}", data_sections.DiagnosisSpec),
+    "identification": (f"{ROBOT}\nidentification: {{@: 1}}", data_spec.IdentificationSpec),
+    "diagnosis": (f"{ROBOT}\ndiagnosis: {{@: 1}}", data_spec.DiagnosisSpec),
 }
 
 
@@ -89,23 +126,24 @@ def test_unknown_key_names_path_nearest_word_and_allowed_keys(path: str) -> None
 
 def test_every_section_is_covered() -> None:
     known = {section for _, section in LEVELS.values()}
-    defined = set(sections.Section.__subclasses__())
-    assert defined - known == {sections.BSplineSpec, sections.PolygonSpec}  # tested below
+    defined = set(Section.__subclasses__())
+    tested_below = {trajectory_spec.BSplineSpec, constraints_spec.PolygonSpec}
+    assert defined - known == tested_below
 
 
 @pytest.mark.parametrize(
     ("text", "path", "foreign", "section"),
     [
         ("trajectory: {family: bspline, duration: 3, harmonics: 3}",
-         "trajectory.harmonics", "base_frequency", sections.BSplineSpec),
+         "trajectory.harmonics", "base_frequency", trajectory_spec.BSplineSpec),
         ("trajectory: {duration: 3}", "trajectory.duration", "control_points",
-         sections.FourierSpec),
+         trajectory_spec.FourierSpec),
         ("constraints: {balance: {kind: polygon, vertices: [[0, 0], [0, 1], [1, 0]], radius: 1}}",
-         "constraints.balance.radius", "center", sections.PolygonSpec),
+         "constraints.balance.radius", "center", constraints_spec.PolygonSpec),
     ],
 )  # fmt: skip
 def test_keys_of_another_kind_are_not_offered(
-    text: str, path: str, foreign: str, section: type[sections.Section]
+    text: str, path: str, foreign: str, section: type[Section]
 ) -> None:
     message = told(f"{ROBOT}\n{text}")
     assert message.startswith(f"arm.yaml: {path}: unknown key.")
