@@ -10,6 +10,7 @@ from excite_cli.config import (
     robot_spec,
     spec,
     trajectory_spec,
+    uncertainty_spec,
 )
 from excite_cli.config.load import MAX_BYTES, MAX_DEPTH, load_spec, parse_spec
 from excite_cli.config.section import Section
