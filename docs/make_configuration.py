@@ -15,8 +15,8 @@ from excite_cli.config.spec import Spec
 TARGET = Path(__file__).parent / "configuration.md"
 HEAD = """# Every key of the YAML file
 
-Made by `python -m docs.make_configuration` from the classes in `excite_cli/config/`; a test keeps it up to
-date. `excite schema` prints the same as JSON Schema for editors. Unknown keys are errors.
+Made by `python -m docs.make_configuration` from the classes in `excite_cli/config/`; a test keeps
+it up to date. `excite schema` prints the same as JSON Schema for editors. Unknown keys are errors.
 """
 
 
