@@ -11,6 +11,7 @@ from excite_cli.cli.check import check
 from excite_cli.cli.compare_random import compare_random
 from excite_cli.cli.console import INTERRUPTED, run_guarded
 from excite_cli.cli.diagnose import diagnose
+from excite_cli.cli.export import export
 from excite_cli.cli.identify import identify
 from excite_cli.cli.optimize import optimize
 from excite_cli.cli.report import report
@@ -46,6 +47,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "identify": identify,
     "simulate": simulate,
     "diagnose": diagnose,
+    "export": export,
     "report": report,
     "robots": robots,
     "schema": schema,

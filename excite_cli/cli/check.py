@@ -1,93 +1,201 @@
-"""`excite check`: every motion of a file against every constraint, on a grid of its own."""
+"""`excite check`: every motion of a file against every constraint, by other means."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 
+if TYPE_CHECKING:
+    from excite_cli.excitation.certificate import Path as MotionPath
+    from excite_cli.excitation.inspection import Inspection
+    from excite_cli.excitation.problem import Problem
+    from excite_cli.trajectory.chain import Segment
+
+# Stored samples may differ from the motion by rounding only.
+_SAME = 1e-6
+
 
 def check(
     config: options.Config,
-    file: options.ResultFile,
+    file: options.MotionFile,
     rate: Annotated[float, typer.Option("--rate", min=1.0, help="Instants per second [Hz].")] = 1e3,
+    random: Annotated[
+        int, typer.Option("--random", min=0, max=10_000_000, help="Random instants beside them.")
+    ] = 0,
+    meshes: Annotated[
+        bool, typer.Option("--meshes/--no-meshes", help="Look at the collision meshes, too.")
+    ] = True,
+    slow: Annotated[
+        float | None,
+        typer.Option(
+            "--slow",
+            metavar="SHARE",
+            help="Judge the motions slowed to a share of the limits of speed and acceleration.",
+        ),
+    ] = None,
     overrides: options.Set = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Re-evaluate the motions of a result file at controller rate.
+    """Judge motions before a robot plays them: results, CSV, ROS 2, MoveIt, NumPy, measured data.
 
-    Exit status 1: a constraint is broken. Joint bounds of a Fourier series are proved at every
-    instant where its samples allow (Ehlich and Zeller); all else holds at the instants checked.
+    Margins are taken at controller rate (and at random instants); between them every constraint is
+    proved with bounds that share nothing with the optimiser's kinematics; the collision meshes are
+    looked at by Pinocchio and coal. A verdict is `proved` (at every instant), `sampled` (no
+    violation seen, with the reason why it is not proved) or `BROKEN`. Exit status 1: something is
+    broken.
 
-    Example:  excite check configs/talos_arms.yaml talos_arms.h5 --rate 1000
+    Example:  excite check configs/talos_arms.yaml talos_arms.h5 --random 100000
     """
-    from rich.table import Table
-
+    from excite_cli.cli.motions import load_motions
     from excite_cli.cli.setup import load_problem, single_threaded
-    from excite_cli.cli.tables import worst_data
-    from excite_cli.config.load import parse_spec
-    from excite_cli.errors import FileError
-    from excite_cli.excitation.admissible import proved_constraints, worst_margins
-    from excite_cli.store.result_file import read_result
+    from excite_cli.excitation.admissible import path_of
+    from excite_cli.excitation.inspection import Look, inspect, mesh_check_of
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with single_threaded():
-        result = read_result(file)
         problem = load_problem(terminal, config, overrides)
-        if result.joint_names != problem.robot.joint_names:
-            raise FileError(
-                f"{file} moves other joints than {config}: {', '.join(result.joint_names)}."
-            )
-        shape = (problem.trajectory.n_coefficients, problem.robot.n)
-        stored = parse_spec(result.config, f"the config stored in {file}").trajectory
-        same = stored == problem.spec.trajectory
-        if not same or any(motion.coefficients.shape != shape for motion in result.motions):
-            raise FileError(f"{file} has motions of another trajectory section than {config}.")
-        table = Table(title=f"Margins at {rate:g} Hz", title_justify="left")
-        for name in (
-            "motion",
-            "constraint",
-            "worst margin",
-            "unit",
-            "where",
-            "time [s]",
-            "verdict",
-        ):
-            right = name in ("motion", "worst margin", "time [s]")
-            table.add_column(name, justify="right" if right else "left")
-        data, broken = [], 0
-        for motion in result.motions:
-            margins = worst_margins(problem, motion.coefficients, rate)
-            proved = proved_constraints(problem, motion.coefficients)
-            violations = sum(worst.violations for worst in margins.values())
-            broken += violations
-            for constraint in problem.constraints:
-                worst = margins[constraint.name]
-                verdict = "BROKEN" if worst.margin < 0 else "sampled"
-                verdict = "proved" if proved[constraint.name] else verdict
-                table.add_row(
-                    str(motion.index),
-                    constraint.name,
-                    f"{worst.margin:.5f}",
-                    worst.unit,
-                    worst.label,
-                    f"{worst.time:.3f}",
-                    verdict,
-                )
-            data.append(
-                {
-                    "index": motion.index,
-                    "margins": {name: worst.margin for name, worst in margins.items()},
-                    "worst": {name: worst_data(worst) for name, worst in margins.items()},
-                    "violations": violations,
-                    "certified": proved,
-                }
-            )
+        segments = load_motions(terminal, file, problem.robot, problem.spec)
+        _require_same_trajectory(file, config, problem)
+        checker = mesh_check_of(problem) if meshes else None
+        look = Look(rate, random, problem.spec.seed)
+        data, found = [], []
+        with terminal.live("", len(segments)) as show:
+            for index, segment in enumerate(segments, start=1):
+                show(f"motion {index}/{len(segments)}", index - 1)
+                played = _slowed(terminal, problem, segment, slow)
+                path = path_of(problem, played.trajectory, played.coefficients)
+                inspection = inspect(problem, path, checker, look)
+                off = _mismatch(problem, file, index, path) if slow is None else (0.0, 0.0)
+                found.append((segment.name, inspection, off))
+                data.append(_data(index, segment.name, inspection, off))
+    broken = sum(motion["violations"] for motion in data)
+    table = _table(found, f"Margins at {rate:g} Hz" + (f" and {random} instants" if random else ""))
+    notes = [note for name, inspection, off in found for note in _notes(name, inspection, off)]
     summary = f"{broken} violations" if broken else "No violation."
-    terminal.answer([table, summary], {"motions": data, "rate": rate})
+    terminal.answer([table, *notes, summary], {"motions": data, "rate": rate, "random": random})
     if broken:
         raise typer.Exit(1)
+
+
+def _require_same_trajectory(file: Path, config: Path, problem: "Problem") -> None:
+    """A result must have been made with the trajectory section of the config."""
+    from excite_cli.config.load import parse_spec
+    from excite_cli.errors import FileError
+    from excite_cli.store.result_file import is_result, read_result
+
+    if not is_result(file):
+        return
+    stored = parse_spec(read_result(file).config, f"the config stored in {file}").trajectory
+    if stored != problem.spec.trajectory:
+        raise FileError(f"{file} has motions of another trajectory section than {config}.")
+
+
+def _slowed(
+    terminal: Terminal, problem: "Problem", segment: "Segment", share: float | None
+) -> "Segment":
+    from dataclasses import replace
+
+    from excite_cli.excitation.time_scaling import PaceLimits, slowing
+
+    if share is None:
+        return segment
+    limits = PaceLimits.of(problem.constraints, problem.robot.n)
+    pace = slowing(limits, segment.trajectory, segment.coefficients, share)
+    terminal.say(f"{segment.name}: judged at {100 * pace:.4g} % of its pace")
+    return replace(segment, trajectory=segment.trajectory.slowed(pace))
+
+
+def _mismatch(
+    problem: "Problem", file: Path, index: int, path: "MotionPath"
+) -> tuple[float, float]:
+    """By how much the samples stored in a result differ from its coefficients, and when."""
+    from excite_cli.excitation.inspection import largest_mismatch
+    from excite_cli.store.result_file import is_result, read_samples
+
+    if not is_result(file):
+        return 0.0, 0.0
+    t, *stored = read_samples(file)[index]
+    return largest_mismatch(path, t, stored)
+
+
+def _data(
+    index: int, name: str, inspection: "Inspection", off: tuple[float, float]
+) -> dict[str, Any]:
+    from excite_cli.cli.tables import worst_data
+
+    margins = inspection.margins
+    data: dict[str, Any] = {
+        "index": index,
+        "name": name,
+        "margins": {key: worst.margin for key, worst in margins.items()},
+        "worst": {key: worst_data(worst) for key, worst in margins.items()},
+        "violations": inspection.violations + (off[0] > _SAME),
+        "certified": inspection.certified,
+        "verdicts": {
+            key: {"state": state, "reason": reason}
+            for key, (state, reason) in inspection.states.items()
+        },
+        "samples_differ": {"share": off[0], "time": off[1]},
+    }
+    if inspection.meshes is not None:
+        gaps, times = inspection.meshes.gaps, inspection.meshes.times
+        data["meshes"] = {
+            "pairs": gaps.pairs,
+            "beyond": gaps.beyond,
+            "near": [
+                {
+                    "links": [gap.first, gap.second],
+                    "distance": gap.distance,
+                    "time": float(times[gap.index]),
+                    "touching": gap.touching,
+                    "not_judged": gap.standing,
+                }
+                for gap in gaps.near
+            ],
+            "always_in_contact": [list(pair) for pair in gaps.always],
+        }
+    return data
+
+
+def _table(found: "list[tuple[str, Inspection, tuple[float, float]]]", title: str) -> Any:
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for name in ("motion", "constraint", "worst margin", "unit", "where", "time [s]", "verdict"):
+        right = name in ("worst margin", "time [s]")
+        table.add_column(name, justify="right" if right else "left")
+    for name, inspection, _ in found:
+        margins = inspection.margins
+        for key, (state, _) in inspection.states.items():
+            worst = margins.get(key)
+            row = ["> 0.02", "m", "all pairs", ""]
+            if worst is not None:
+                row = [f"{worst.margin:.5f}", worst.unit, worst.label, f"{worst.time:.4f}"]
+            table.add_row(name, key, *row, "BROKEN" if state == "broken" else state)
+    return table
+
+
+def _notes(name: str, inspection: "Inspection", off: tuple[float, float]) -> list[str]:
+    """Why something is not proved, and what else one should know."""
+    notes = [
+        f"{name}: {key} is not proved: {reason}."
+        for key, (state, reason) in inspection.states.items()
+        if state == "sampled"
+    ]
+    if inspection.meshes is not None:
+        notes += [
+            f"{name}: meshes of {gap.first} and {gap.second} touch; not judged ({gap.standing})."
+            for gap in inspection.meshes.told
+        ]
+    if off[0] > _SAME:
+        notes.append(
+            f"{name}: BROKEN: the samples stored in the file differ from its coefficients by "
+            f"{off[0]:.2g} of the largest value at {off[1]:.4f} s; someone changed one of them."
+        )
+    return notes

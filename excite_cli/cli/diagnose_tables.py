@@ -5,6 +5,7 @@ from typing import Any
 
 from rich.table import Table
 
+from excite_cli.cli.noise_floor_words import above_the_floor, floor_cells, floor_columns
 from excite_cli.diagnosis.result import Diagnosis, EffectRecord, NamedEffect, Round
 from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
@@ -33,6 +34,7 @@ def tables_of(
         parts.append("Nothing is missing: no effect of the catalogue passes.")
     parts += _absorbed(found) + _unexplained(found)
     parts.append(_error_table(found, robot))
+    parts += above_the_floor(found.after, found.noise_floor)
     parts.append(_verdict(found))
     parts.append(_next(experiment))
     return parts
@@ -161,7 +163,7 @@ def _error_table(found: Diagnosis, robot: Robot) -> Table:
         title=f"Error of the torque on data never used ({found.sealed_run})", title_justify="left"
     )
     names = ("joint", "before", "after", "moving, before", "moving, after", "RMS before",
-             "RMS after", "unit")  # fmt: skip
+             "RMS after", *floor_columns(found.noise_floor), "unit")  # fmt: skip
     for name in names:
         table.add_column(name, justify="left" if name in ("joint", "unit") else "right")
     before, after = found.before, found.after
@@ -174,6 +176,7 @@ def _error_table(found: Diagnosis, robot: Robot) -> Table:
             f"{after.relative_moving[joint]:.2%}",
             f"{before.rms[joint]:.4g}",
             f"{after.rms[joint]:.4g}",
+            *floor_cells(found.noise_floor, joint),
             "N" if sliding else "N·m",
         )
     table.add_section()
@@ -183,7 +186,7 @@ def _error_table(found: Diagnosis, robot: Robot) -> Table:
         f"{after.mean_relative:.2%}",
         f"{before.mean_relative_moving:.2%}",
         f"{after.mean_relative_moving:.2%}",
-        "", "", "",
+        *[""] * (len(names) - 5),
         style="bold",
     )  # fmt: skip
     return table
@@ -257,6 +260,7 @@ def answer_of(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
             "before": found.before.as_data(),
             "after": found.after.as_data(),
         },
+        "noise_floor": found.noise_floor,
         "next_experiment": experiment,
         "findings": [asdict(finding) for finding in found.findings],
         "processing": found.processing,

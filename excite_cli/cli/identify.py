@@ -1,19 +1,13 @@
 """`excite identify`: parameters of the declared model from measured data."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.outputs import check_outputs
-
-if TYPE_CHECKING:
-    from excite_cli.export.exported import Exported
-    from excite_cli.identification.fit import Fit
-    from excite_cli.robot.model import Robot
 
 
 def identify(
@@ -47,6 +41,7 @@ def identify(
     Example:  excite identify configs/ur10.yaml measured.h5 -o fit.h5 --urdf identified.urdf
     """
     from excite_cli.cli.identify_tables import answer_of, tables_of
+    from excite_cli.cli.models import write_models
     from excite_cli.cli.setup import load_dataset, single_threaded
     from excite_cli.config.load import load_spec, spec_as_yaml
     from excite_cli.diagnosis.plausibility import check_dataset
@@ -76,7 +71,7 @@ def identify(
             sources = tuple(map(str, data))
             fingerprint = robot.fingerprint()
             write_fit(output, found, spec_as_yaml(spec), str(folder), fingerprint, sources)
-        notes += _export(robot, found.fit, urdf, mjcf, parameters)
+        notes += write_models(robot, found.fit, urdf, mjcf, parameters)
     for finding in found.findings[len(dataset.findings) :]:
         where = f" ({finding.run})" if finding.run else ""
         terminal.say(f"{finding.severity}{where}: {finding.text}")
@@ -85,35 +80,3 @@ def identify(
     files = {"fit": output, **exports}
     written = {key: str(path) for key, path in files.items() if path is not None}
     terminal.answer(tables_of(found, robot), {**answer_of(found), "output": written})
-
-
-def _export(
-    robot: "Robot", fit: "Fit", urdf: Path | None, mjcf: Path | None, parameters: Path | None
-) -> list[str]:
-    """Write what was asked for; return what must be said about it."""
-    from excite_cli.atomic import write_atomically
-    from excite_cli.export.exported import IdentifiedModel
-    from excite_cli.export.mjcf import mjcf as as_mjcf
-    from excite_cli.export.parameters import parameters_yaml
-    from excite_cli.export.urdf import updated_urdf
-
-    count = range(len(fit.effects))
-    values = tuple(fit.consistent_effect_values(i) for i in count)
-    model = IdentifiedModel(fit.best_phi(), fit.effects, values)
-    writers: list[tuple[Path | None, Callable[..., Exported]]] = [
-        (urdf, updated_urdf),
-        (mjcf, as_mjcf),
-    ]
-    notes = []
-    for path, writer in writers:
-        if path is not None:
-            exported = writer(robot, model)
-            write_atomically(path, _text_writer(exported.text))
-            notes += [f"{path}: {note}" for note in exported.notes]
-    if parameters is not None:
-        write_atomically(parameters, _text_writer(parameters_yaml(robot, fit)))
-    return notes
-
-
-def _text_writer(text: str) -> Any:
-    return lambda path: path.write_text(text, encoding="utf-8")

@@ -4,6 +4,7 @@ from typing import Any
 
 from rich.table import Table
 
+from excite_cli.cli.noise_floor_words import above_the_floor, floor_cells, floor_columns
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.identify import Identification
@@ -24,7 +25,8 @@ def tables_of(found: Identification, robot: Robot) -> list[Table | str]:
         sentences.append(_consistency(fit))
     return [
         _parameter_table(fit),
-        error_table(found.error, found.training_error, robot),
+        error_table(found.error, found.training_error, robot, found.noise_floor),
+        *above_the_floor(found.error, found.noise_floor),
         *sentences,
     ]
 
@@ -59,10 +61,14 @@ def _short(value: float, digits: int) -> str:
     return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
 
 
-def error_table(error: Errors, training: Errors, robot: Robot) -> Table:
-    """Errors per joint on the sealed part, and on the training part beside them."""
+def error_table(
+    error: Errors, training: Errors, robot: Robot, floor: dict[str, float] | None = None
+) -> Table:
+    """Errors per joint on the sealed part, and the training part's and the noise floor beside."""
     table = Table(title="Error of the torque", title_justify="left")
-    for name in ("joint", "relative", "moving", "RMS", "RMS as recorded", "unit", "training"):
+    names = ("joint", "relative", "moving", "RMS", *floor_columns(floor), "RMS as recorded",
+             "unit", "training")  # fmt: skip
+    for name in names:
         table.add_column(name, justify="left" if name in ("joint", "unit") else "right")
     for joint, sliding in zip(robot.joint_names, robot.sliding, strict=True):
         table.add_row(
@@ -70,6 +76,7 @@ def error_table(error: Errors, training: Errors, robot: Robot) -> Table:
             f"{error.relative[joint]:.2%}",
             f"{error.relative_moving[joint]:.2%}",
             f"{error.rms[joint]:.4g}",
+            *floor_cells(floor, joint),
             f"{error.rms_raw[joint]:.4g}",
             "N" if sliding else "N·m",
             f"{training.relative[joint]:.2%}",
@@ -107,6 +114,7 @@ def answer_of(found: Identification) -> dict[str, Any]:
         "sealed_run": found.sealed_run,
         "error": found.error.as_data(),
         "training_error": found.training_error.as_data(),
+        "noise_floor": found.noise_floor,
         "samples": {"count": fit.count, "independent": fit.samples},
         "noise": dict(zip(fit.joint_names, map(float, fit.noise), strict=True)),
         "consistent": None

@@ -19,7 +19,14 @@ def optimize(
         list[Path] | None,
         typer.Option(
             "--prior",
-            help="Result file or measured data stacked as earlier data (may be repeated).",
+            help="Result file, motion (CSV, .npz, …) or measured data stacked as earlier data (may "
+            "be repeated).",
+        ),
+    ] = None,
+    start: Annotated[
+        Path | None,
+        typer.Option(
+            "--start", help="Motions from which the search starts: a result file, CSV, .npz, …"
         ),
     ] = None,
     after: Annotated[
@@ -47,6 +54,7 @@ def optimize(
     """
     from rich.table import Table
 
+    from excite_cli.cli.motions import load_motions
     from excite_cli.cli.setup import (
         load_next_motion,
         load_priors,
@@ -97,6 +105,9 @@ def optimize(
             )
             result = new_result(problem, stacks, versions(), config.resolve().parent)
         total = problem.spec.sequence.motions
+        starts = (
+            load_motions(terminal, start, problem.robot, problem.spec) if start is not None else []
+        )
         with terminal.live("", problem.spec.optimizer.max_iterations) as show:
 
             def report(index: int) -> ProgressCallback:
@@ -123,9 +134,11 @@ def optimize(
                 )
 
             if following is None:
-                result = continue_run(problem, result, report, store)
+                result = continue_run(problem, result, report, store, starts=starts)
             else:
-                result = continue_run(following.problem, result, report, store, following.model)
+                result = continue_run(
+                    following.problem, result, report, store, following.model, starts
+                )
     outlook = following.outlook([m.coefficients for m in result.motions]) if following else None
     tables: list[Table | str] = [motion_table(result.motions), f"{path}"]
     if outlook is not None and outlook["pairs"]:

@@ -14,6 +14,13 @@ Sealed = Annotated[
     typer.Option("--sealed", metavar="RUN", help="Run kept out of the fit. Default: the last one."),
 ]
 ResultFile = Annotated[Path, typer.Argument(help="A result file.", show_default=False)]
+MotionFile = Annotated[
+    Path,
+    typer.Argument(
+        help="A result file, or a motion: CSV, .npz, ROS 2 YAML, MoveIt JSON, rosbag2.",
+        show_default=False,
+    ),
+]
 Output = Annotated[
     Path | None,
     typer.Option("--output", "-o", help="Result file. Default: <config name>.h5 here."),

@@ -145,6 +145,7 @@ def _rebuilt(file: Path, result: "Result", config: Path | None) -> "Problem":
     FileError
         The file holds no motion, its URDF is not found, or the robot is not the one it had.
     """
+    from excite_cli.cli.setup import fit_knowledge
     from excite_cli.config.load import load_spec, parse_spec
     from excite_cli.errors import FileError
     from excite_cli.excitation.problem import build_problem
@@ -166,7 +167,7 @@ def _rebuilt(file: Path, result: "Result", config: Path | None) -> "Problem":
             f"{(folder / urdf).resolve()}. Relative paths start from the config: give the YAML "
             "file it was made with, --config CONFIG.yaml."
         )
-    problem = build_problem(spec, folder)
+    problem = build_problem(spec, folder, fit_knowledge(spec, folder))
     reason = matches(problem, result)
     if reason:
         raise FileError(

@@ -1,4 +1,4 @@
-"""`excite simulate`: motions of a result file, played on a robot that differs from its model."""
+"""`excite simulate`: planned motions, played on a robot that differs from its model."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,14 +14,13 @@ if TYPE_CHECKING:
 
     from excite_cli.config.spec import Spec
     from excite_cli.robot.model import Robot
-    from excite_cli.simulation.motion import PlannedMotion
     from excite_cli.simulation.settings import SimulationSettings
     from excite_cli.simulation.simulate import Simulation
 
 
 def simulate(
     config: options.Config,
-    file: options.ResultFile,
+    file: options.MotionFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="The data file, HDF5.")],
     effect: Annotated[
         list[str] | None,
@@ -42,6 +41,20 @@ def simulate(
     periods: Annotated[
         int, typer.Option("--periods", min=1, help="Periods of a motion in each take.")
     ] = 1,
+    entry: Annotated[
+        bool,
+        typer.Option(
+            "--entry", help="Enter each motion from rest at a posture, and go back to it."
+        ),
+    ] = False,
+    posture: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="JOINT=VALUE,…",
+            help="The posture of --entry [rad, m]; joints not named are at robot.posture.",
+        ),
+    ] = None,
     rate: Annotated[float, typer.Option("--rate", help="Samples per second [Hz].")] = 500.0,
     torque_noise: Annotated[
         float, typer.Option("--torque-noise", help="As a share of the joint's torque RMS.")
@@ -74,17 +87,22 @@ def simulate(
 
     The robot has a tracking controller, encoders, torque noise, inertias that differ from the URDF,
     the effects that the config declares, in plausible sizes, and those given with --effect. What
-    was put in is stored in the file's attribute `truth`.
+    was put in is stored in the file's attribute `truth`. With --entry the robot starts and ends at
+    rest, and entry and return keep all constraints of the config.
 
     Example:  excite simulate configs/ur10.yaml ur10.h5 -o data.h5 --effect
     'load_dependent_friction@elbow_joint=0.06' --effect 'payload@all=1.5;runs:motion_2'
     """
-    from excite_cli.cli.setup import single_threaded
+    from excite_cli.cli.entry_program import playable, posture_from
+    from excite_cli.cli.motions import load_motions
+    from excite_cli.cli.setup import load_problem, single_threaded
     from excite_cli.config.load import load_spec
     from excite_cli.effects.catalogue import declared_effects
+    from excite_cli.errors import ConfigError
     from excite_cli.measurement.hdf5_writer import write_dataset
     from excite_cli.robot.model import build_robot
     from excite_cli.simulation.engine import load_mujoco
+    from excite_cli.simulation.motion import Planned, PlannedMotion, PlannedProgram
     from excite_cli.simulation.planted import parse_planted
     from excite_cli.simulation.settings import SimulationSettings
     from excite_cli.simulation.simulate import run_names
@@ -92,6 +110,8 @@ def simulate(
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     check_outputs({"output": output}, overwrite)
+    if posture is not None and not entry:
+        raise ConfigError("--from says where --entry starts: give both.")
     with single_threaded():
         spec = load_spec(config, overrides)
         settings = SimulationSettings(
@@ -102,12 +122,19 @@ def simulate(
             encoder=encoder,
             inertia_error=inertia_error,
             repeat=repeat,
-            periods=periods,
+            periods=1 if entry else periods,
             torque_limits=torque_limits,
         )
         load_mujoco()
         robot = build_robot(spec.robot, config.resolve().parent)
-        motions = _motions(file, config, robot.joint_names, motion)
+        found = load_motions(terminal, file, robot, spec, motion)
+        motions: list[Planned]
+        if entry:
+            start, problem = posture_from(posture, robot), load_problem(terminal, config, overrides)
+            chains = playable(terminal, problem, found, start, periods)
+            motions = [PlannedProgram(m.name, c) for m, c in zip(found, chains, strict=True)]
+        else:
+            motions = [PlannedMotion(m.name, m.trajectory, m.coefficients) for m in found]
         names = [name for takes in run_names(motions, repeat) for name in takes]
         planted = [p for text in effect or [] for p in parse_planted(text, robot, names)]
         declared = () if no_declared else declared_effects(spec.effects, robot)
@@ -135,41 +162,6 @@ def simulate(
         [_run_table(simulation), _effect_table(records), str(output)],
         {"runs": runs, "effects": records, "output": str(output), "seed": settings.seed},
     )
-
-
-def _motions(
-    file: Path, config: Path, joints: tuple[str, ...], chosen: list[int] | None
-) -> "list[PlannedMotion]":
-    """The motions to play, with the trajectory that the file itself says they have."""
-    from excite_cli.config.load import parse_spec
-    from excite_cli.errors import FileError
-    from excite_cli.simulation.motion import PlannedMotion
-    from excite_cli.store.result_file import read_result
-    from excite_cli.trajectory.catalogue import build_trajectory
-
-    result = read_result(file)
-    if result.joint_names != joints:
-        raise FileError(
-            f"{file} moves other joints than {config}: {', '.join(result.joint_names)}. Take the "
-            "config that the motions were made with."
-        )
-    stored = parse_spec(result.config, f"the config stored in {file}")
-    trajectory = build_trajectory(stored.trajectory)
-    there = {motion.index: motion for motion in result.motions}
-    if not there:
-        raise FileError(f"{file} holds no motion. Make some with `excite optimize`.")
-    for index in chosen or ():
-        if index not in there:
-            raise FileError(
-                f"{file} has no motion {index}; it has {', '.join(map(str, there))} (--motion)."
-            )
-    shape = (trajectory.n_coefficients, len(joints))
-    if any(motion.coefficients.shape != shape for motion in there.values()):
-        raise FileError(f"{file}: coefficients do not have the shape {shape} of its trajectory.")
-    return [
-        PlannedMotion(f"motion_{index}", trajectory, there[index].coefficients)
-        for index in dict.fromkeys(chosen or there)
-    ]
 
 
 def _converts(spec: "Spec") -> bool:

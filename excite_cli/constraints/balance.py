@@ -3,43 +3,82 @@
 A disc is taken as its inscribed regular polygon: linear in the centre of mass, whereas the
 quadratic form has no gradient at the centre. The polygon has 16 sides and gives away 2 % of the
 radius.
+
+With uncertain inertias the margin (offset M − normal·Σ m c) / M is the least over all admitted φ:
+numerator and mass are linear in φ (`robot.least_ratio`).
 """
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.errors import ConfigError
+from excite_cli.constraints.support_polygon import Support, support_polygon
 from excite_cli.robot.center_of_mass import CenterOfMass
+from excite_cli.robot.enclosed_least import least_of
+from excite_cli.robot.enclosed_motion import EnclosedMotion
+from excite_cli.robot.enclosed_rows import combined, mass_rows
+from excite_cli.robot.least_ratio import Ratios, least_ratios, worst_inertias
 from excite_cli.robot.model import Robot
 from excite_cli.robot.states import States
+from excite_cli.robot.uncertainty import InertiaUncertainty
+from excite_cli.robot.whole_robot import drawn_states
 
 DISC_SIDES = 16
+# A robot that may weigh less than this share of its mass has no centre of mass to speak of.
+_LIGHTEST = 0.05
+_MASS = np.array([1.0, 0.0, 0.0])
 
 
 class Balance(Constraint):
-    """normal·c ≤ offset for every edge; `normals` (m, 2), `offsets` (m,) [m]."""
+    """normal·c ≤ offset for every edge; `normals` (m, 2), `offsets` (m,) [m].
+
+    `uncertainty`: admitted inertias of the whole robot; None: those of the URDF.
+    """
 
     name = "balance"
     unit = "m"
 
-    def __init__(self, robot: Robot, normals: Array, offsets: Array, center: Array) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        normals: Array,
+        offsets: Array,
+        center: Array,
+        uncertainty: InertiaUncertainty | None = None,
+    ) -> None:
         self._mass = CenterOfMass(robot)
         self.normals, self.offsets, self.center = normals, offsets, center
-        self.labels = tuple(
-            f"towards {np.degrees(np.arctan2(y, x)) % 360:.0f}°" for x, y in normals
-        )
-        self.scale = offsets - normals @ center
+        support = Support(normals, offsets, center)
+        self.labels, self.scale = support.labels, support.scale
+        self.uncertainty = uncertainty
+        self._last: tuple[States, Array, Ratios] | None = None
+        self._known = uncertainty or InertiaUncertainty.none(robot)
+        if uncertainty is not None:
+            states = drawn_states(robot)
+            rows = self._functionals @ self._mass.rows(states)
+            self._admitted = uncertainty.of_masses().sharpest(rows.reshape(-1, rows.shape[-1]))
 
     @classmethod
-    def disc(cls, robot: Robot, center: Array, radius: float) -> "Balance":
+    def disc(
+        cls,
+        robot: Robot,
+        center: Array,
+        radius: float,
+        uncertainty: InertiaUncertainty | None = None,
+    ) -> "Balance":
         """Disc of `radius` [m] about `center` (2,)."""
         angles = 2 * np.pi * np.arange(DISC_SIDES) / DISC_SIDES
         normals = np.column_stack([np.cos(angles), np.sin(angles)])
-        return cls(robot, normals, normals @ center + radius * np.cos(np.pi / DISC_SIDES), center)
+        offsets = normals @ center + radius * np.cos(np.pi / DISC_SIDES)
+        return cls(robot, normals, offsets, center, uncertainty)
 
     @classmethod
-    def polygon(cls, robot: Robot, vertices: Array, margin: float) -> "Balance":
+    def polygon(
+        cls,
+        robot: Robot,
+        vertices: Array,
+        margin: float,
+        uncertainty: InertiaUncertainty | None = None,
+    ) -> "Balance":
         """Convex hull of `vertices` (k, 2), shrunk by `margin` [m] at every edge.
 
         Raises
@@ -47,26 +86,51 @@ class Balance(Constraint):
         ConfigError
             The vertices lie on a line, or nothing is left inside the margin.
         """
-        try:
-            hull = ConvexHull(vertices)
-        except QhullError as error:
-            raise ConfigError("constraints.balance.vertices: all points lie on a line.") from error
-        edges = np.unique(hull.equations.round(12), axis=0)
-        offsets = -edges[:, 2] - margin
-        center = vertices[hull.vertices].mean(axis=0)
-        if np.any(offsets - edges[:, :2] @ center <= 0):
-            raise ConfigError(
-                f"constraints.balance: a margin of {margin:g} m leaves nothing of the polygon."
-            )
-        return cls(robot, edges[:, :2], offsets, center)
+        support = support_polygon(vertices, margin, "constraints.balance")
+        return cls(robot, support.normals, support.offsets, support.center, uncertainty)
 
     def margins(self, states: States) -> Array:
         """Distance of the centre of mass to each edge, inwards (T, m) [m]."""
-        return self.offsets - self._mass.position(states)[:, :2] @ self.normals.T
+        if self.uncertainty is None:
+            return self.offsets - self._mass.position(states)[:, :2] @ self.normals.T
+        return self._worst(states)[1].values
+
+    def least(self, motion: EnclosedMotion) -> Array:
+        """Lower bounds on (offset M − normal·Σ m c) / M̂ (T, m) [m], M̂ the URDF's mass."""
+        rows = mass_rows(motion)
+        edges = combined(self._functionals, rows)
+        return least_of(edges, self._known) / self._mass.total_mass
 
     def gradients(
         self, states: States, times: Indices, columns: Indices
     ) -> tuple[Array | None, Array | None, Array | None]:
-        """−normalᵀ ∂c/∂q."""
-        jacobian = self._mass.jacobian(states)[times, :2]
-        return -np.einsum("kx,kxn->kn", self.normals[columns], jacobian), None, None
+        """−normalᵀ ∂c/∂q, with the worst inertias of each edge and instant."""
+        if self.uncertainty is None:
+            jacobian = self._mass.jacobian(states)[times, :2]
+            return -np.einsum("kx,kxn->kn", self.normals[columns], jacobian), None, None
+        rows, found = self._worst(states)
+        at = (times, columns)
+        proper = found.proper[at]
+        ratio = np.where(proper, found.values[at], 0.0)[:, None]
+        y = np.einsum("kr,krp->kp", self._functionals[columns] - ratio * _MASS, rows[times])
+        masses = worst_inertias(self._admitted, y, found.pieces[at])
+        change = self._mass.moment_gradients(states, times, self.normals[columns], masses)
+        weight = np.where(proper, masses[:, ::4].sum(axis=1), self._least_mass)
+        return -change / weight[:, None], None, None
+
+    def _worst(self, states: States) -> tuple[Array, Ratios]:
+        """Rows of mass and first moments, and the margins; those last asked for are kept."""
+        if self._last is None or self._last[0] is not states:
+            rows, least = self._mass.rows(states), self._least_mass
+            found = least_ratios(self._admitted, rows, self._functionals, _MASS, least)
+            self._last = states, rows, found
+        return self._last[1:]
+
+    @property
+    def _functionals(self) -> Array:
+        """offset M − normal·Σ m c (m, 3) on M, Σ m x, Σ m y."""
+        return np.column_stack([self.offsets, -self.normals])
+
+    @property
+    def _least_mass(self) -> float:
+        return _LIGHTEST * self._mass.total_mass

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.robot.enclosed_motion import EnclosedMotion
 from excite_cli.robot.states import States
 
 Array = NDArray[np.float64]
@@ -57,11 +58,26 @@ class Constraint(ABC):
         """
         return self.margins(states)
 
+    def least(self, motion: EnclosedMotion) -> Array | None:
+        """Lower bounds (T, m) on the margins that hold throughout each of T intervals of time.
+
+        Far from zero they may be loose, and in another measure than `margins`; the sign counts.
+        None where no such bound is known.
+        """
+        return None
+
     @abstractmethod
     def gradients(
         self, states: States, times: Indices, columns: Indices
     ) -> tuple[Array | None, Array | None, Array | None]:
         """Derivatives (K, n) of K margins with respect to q, v, a; None where identically zero."""
+
+    def why_not(self, states: States) -> str:
+        """Why a real robot cannot stand as at the first of `states`, in words; empty if it can.
+
+        For members whose margin is broken by more than what a nudge should mend.
+        """
+        return ""
 
     def unit_of(self, column: int) -> str:
         """Unit of one column; prismatic joints differ from the others."""

@@ -4,26 +4,43 @@ import numpy as np
 
 from excite_cli.config.constraints_spec import (
     ConstraintsSpec,
+    ContactSpec,
     DiscSpec,
     JointLimitsSpec,
+    KeepOutSpec,
     PolygonSpec,
+    SelfCollisionSpec,
 )
 from excite_cli.constraints.balance import Balance
 from excite_cli.constraints.base import Array, Constraint
+from excite_cli.constraints.contact import Contact, Ground, ZeroMomentPoint
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.constraints.joint_torque import JointTorque
+from excite_cli.constraints.keep_out import build_keep_out
+from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
 from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.constraints.support_polygon import support_polygon
+from excite_cli.constraints.surroundings import Surroundings
 from excite_cli.errors import ConfigError
 from excite_cli.robot.capsules import fit_capsules
 from excite_cli.robot.center_of_mass import CenterOfMass
 from excite_cli.robot.collision_pairs import choose_pairs
 from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Robot
+from excite_cli.robot.obstacle_pairs import choose_obstacle_pairs, ignored_pairs
+from excite_cli.robot.obstacles import build_obstacles
+from excite_cli.robot.pair_tables import mesh_tables
 from excite_cli.robot.states import States
+from excite_cli.robot.uncertainty import InertiaUncertainty
 
 
-def build_constraints(spec: ConstraintsSpec, robot: Robot) -> tuple[Constraint, ...]:
+def build_constraints(
+    spec: ConstraintsSpec, robot: Robot, uncertainty: InertiaUncertainty | None = None
+) -> tuple[Constraint, ...]:
     """All constraints that `spec` asks for, joint bounds first.
+
+    Torque, balance and contact hold for every inertia that `uncertainty` admits; without it, for
+    those of the URDF.
 
     Raises
     ------
@@ -34,16 +51,44 @@ def build_constraints(spec: ConstraintsSpec, robot: Robot) -> tuple[Constraint, 
     if spec.joint_limits is not None:
         found += _joint_bounds(spec.joint_limits, robot)
     if spec.torque is not None:
-        found.append(_torque(spec.torque.scale, robot))
+        found.append(_torque(spec.torque.scale, robot, uncertainty))
     if spec.balance is not None:
-        found.append(_balance(spec.balance, robot))
-    if spec.self_collision is not None:
-        capsules = fit_capsules(robot, spec.self_collision)
-        pairs = choose_pairs(robot, capsules, spec.self_collision)
-        if pairs.checked:
-            margin = spec.self_collision.margin
-            found.append(SelfCollision(robot, capsules, pairs, margin))
+        found.append(_balance(spec.balance, robot, uncertainty))
+    if spec.contact is not None:
+        found += _contact(spec.contact, robot, uncertainty)
+    found += _distances(spec, robot)
+    if spec.keep_out:
+        found += _keep_out(spec.keep_out, robot)
     return tuple(found)
+
+
+def _distances(spec: ConstraintsSpec, robot: Robot) -> list[Constraint]:
+    """Capsules against each other and against what stands around the robot."""
+    found: list[Constraint] = []
+    around, own = spec.surroundings, spec.self_collision
+    if around is None and own is None:
+        return found
+    # A link that is told from its neighbours in one of the two has a capsule of its own in both.
+    apart = {link for link, _ in ignored_pairs(robot, around)} if around is not None else ()
+    capsules = fit_capsules(robot, own or SelfCollisionSpec(), apart)
+    if own is not None:
+        pairs = choose_pairs(robot, capsules, own)
+        if pairs.checked:
+            found.append(SelfCollision(robot, capsules, pairs, own.margin))
+        tables = mesh_tables(robot, capsules, pairs, own.ignore)
+        if tables:
+            found.append(MeshClearance(tables, min(KEPT, own.margin)))
+    if around is not None:
+        obstacles = build_obstacles(around)
+        beside = choose_obstacle_pairs(robot, capsules, obstacles, around)
+        if beside.checked:
+            found.append(Surroundings(robot, capsules, obstacles, beside))
+    return found
+
+
+def _keep_out(spec: dict[str, KeepOutSpec], robot: Robot) -> list[Constraint]:
+    constraint = build_keep_out(spec, robot)
+    return [] if constraint is None else [constraint]
 
 
 def _joint_bounds(spec: JointLimitsSpec, robot: Robot) -> list[Constraint]:
@@ -71,22 +116,45 @@ def _joint_bounds(spec: JointLimitsSpec, robot: Robot) -> list[Constraint]:
     return [bound for bound in found if bound.labels]
 
 
-def _torque(scale: float, robot: Robot) -> Constraint:
+def _torque(scale: float, robot: Robot, uncertainty: InertiaUncertainty | None) -> Constraint:
     if not np.isfinite(robot.limits.effort).any():
         raise ConfigError(
             "constraints.torque: the URDF gives no effort limits; give robot.limits.<joint>.effort."
         )
-    return JointTorque(robot, scale * robot.limits.effort)
+    return JointTorque(robot, scale * robot.limits.effort, uncertainty)
 
 
-def _balance(spec: DiscSpec | PolygonSpec, robot: Robot) -> Constraint:
+def _balance(
+    spec: DiscSpec | PolygonSpec, robot: Robot, uncertainty: InertiaUncertainty | None
+) -> Constraint:
     if isinstance(spec, PolygonSpec):
-        return Balance.polygon(robot, np.array(spec.vertices), spec.margin)
+        return Balance.polygon(robot, np.array(spec.vertices), spec.margin, uncertainty)
     if spec.center == "posture":
         center = posture_center_of_mass(robot)
     else:
         center = np.array(spec.center, dtype=float)
-    return Balance.disc(robot, center, spec.radius)
+    return Balance.disc(robot, center, spec.radius, uncertainty)
+
+
+def _contact(
+    spec: ContactSpec, robot: Robot, uncertainty: InertiaUncertainty | None
+) -> list[Constraint]:
+    ground = Ground.under(robot, uncertainty)
+    if ground.weight <= 0:
+        raise ConfigError(
+            "constraints.contact: gravity does not press this robot on the ground. It needs a mass "
+            "and robot.gravity with a negative z; leave contact out for what is not on the ground."
+        )
+    found: list[Constraint] = []
+    center = None
+    if spec.vertices is not None:
+        support = support_polygon(np.array(spec.vertices), spec.margin, "constraints.contact")
+        found.append(ZeroMomentPoint(ground, support, spec.height))
+        center = support.center
+    if center is None:
+        center = posture_center_of_mass(robot)
+    found.append(Contact(ground, center, spec.friction, spec.torsion, spec.min_load))
+    return found
 
 
 def posture_center_of_mass(robot: Robot) -> Array:

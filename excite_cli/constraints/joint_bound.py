@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.robot.enclosed_motion import EnclosedMotion
 from excite_cli.robot.model import Robot
 from excite_cli.robot.states import States
 
@@ -35,11 +36,6 @@ class JointBound(Constraint):
     def name(self) -> str:  # type: ignore[override]
         """`joint_position`, `joint_velocity` or `joint_acceleration`."""
         return f"joint_{_ORDERS[self.order]}"
-
-    @property
-    def two_sided(self) -> Mask:
-        """Whether the joint of each column (m,) is bounded on both sides."""
-        return np.bincount(self.joints)[self.joints] == 2
 
     @property
     def unit(self) -> str:  # type: ignore[override]
@@ -76,6 +72,12 @@ class JointBound(Constraint):
     def margins(self, states: States) -> Array:
         """Distance to each bound (T, m)."""
         return self.bounds - self.signs * self.values(states)[:, self.joints]
+
+    def least(self, motion: EnclosedMotion) -> Array:
+        """bound − the most that sign·x_joint can be (T, m)."""
+        states = motion.states
+        x = (states.q, states.v, states.a)[self.order]
+        return self.bounds - x[:, self.joints].scaled(self.signs).upper()
 
     def gradients(
         self, states: States, times: Indices, columns: Indices

@@ -1,20 +1,39 @@
-"""Bounds on the joint torques that the URDF's inertias predict."""
+"""Bounds on the joint torques that the URDF's inertias predict, or that any of a set would need.
+
+With uncertain inertias the torque Y_j φ of a joint must stay within its limit for every admitted φ:
+limit + min_φ (∓ Y_j φ) ≥ 0. The derivative of that margin is a derivative of the torque with the
+worst inertias, which differ between instants, joints and sides.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.robot.enclosed_least import least_of
+from excite_cli.robot.enclosed_motion import EnclosedMotion
+from excite_cli.robot.enclosed_rows import torque_rows
 from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Robot
+from excite_cli.robot.regressor import Regressor
+from excite_cli.robot.row_adjoint import RowAdjoint
 from excite_cli.robot.states import States
+from excite_cli.robot.uncertainty import InertiaUncertainty
+from excite_cli.robot.whole_robot import drawn_states
 
 
 class JointTorque(Constraint):
-    """|τ_j| ≤ limit_j; columns: lower then upper side of every bounded joint."""
+    """|τ_j| ≤ limit_j; columns: lower then upper side of every bounded joint.
+
+    `uncertainty`: admitted inertias of the whole robot; None: those of the URDF.
+    """
 
     name = "joint_torque"
     unit = "N·m"
 
-    def __init__(self, robot: Robot, limits: Array) -> None:
+    def __init__(
+        self, robot: Robot, limits: Array, uncertainty: InertiaUncertainty | None = None
+    ) -> None:
         self._dynamics = InverseDynamics(robot)
         bounded = np.flatnonzero(np.isfinite(limits))
         self._joints = np.concatenate([bounded, bounded])
@@ -25,24 +44,55 @@ class JointTorque(Constraint):
         self.labels = tuple(
             f"{robot.joint_names[j]} {side}" for side in ("lower", "upper") for j in bounded
         )
+        self.uncertainty = uncertainty
+        self._admitted = (uncertainty or InertiaUncertainty.none(robot)).of_moving_bodies()
+        if uncertainty is not None:
+            self._regressor = Regressor(replace(robot, rows=robot.moved))
+            drawn = drawn_states(robot)
+            rows = self._regressor.evaluate(drawn.q, drawn.v, drawn.a)[:, bounded]
+            self._admitted = self._admitted.sharpest(rows.reshape(-1, rows.shape[-1]))
+            self._adjoint = RowAdjoint(robot)
 
     def unit_of(self, column: int) -> str:
         """Newtons for a prismatic joint."""
         return "N" if self._sliding[self._joints[column]] else self.unit
 
     def margins(self, states: States) -> Array:
-        """limit − |τ| on either side (T, m) [N·m or N]."""
-        torque = self._dynamics.torques(states.q, states.v, states.a)
-        return self._limits - self._signs * torque[:, self._joints]
+        """limit − |τ| on either side (T, m) [N·m or N], the least over the admitted inertias."""
+        if self.uncertainty is None:
+            torque = self._dynamics.torques(states.q, states.v, states.a)
+            return self._limits - self._signs * torque[:, self._joints]
+        half = len(self._joints) // 2
+        rows = self._regressor.evaluate(states.q, states.v, states.a)[:, self._joints[:half]]
+        lower, upper = self._admitted.least_both(rows)
+        return self._limits + np.hstack([lower, upper])
+
+    def least(self, motion: EnclosedMotion) -> Array:
+        """Lower bounds on what is left on either side (T, m), for every admitted inertia."""
+        half = len(self._joints) // 2
+        rows = torque_rows(motion)[:, self._joints[:half]]
+        below, above = least_of(rows, self._admitted), least_of(-rows, self._admitted)
+        return self._limits + np.hstack([below, above])
 
     def gradients(
         self, states: States, times: Indices, columns: Indices
     ) -> tuple[Array | None, Array | None, Array | None]:
-        """Rows of the inverse-dynamics derivatives."""
+        """Rows of the inverse-dynamics derivatives, with the worst inertias of each."""
+        joints, sign = self._joints[columns], -self._signs[columns][:, None]
+        if self.uncertainty is not None:
+            return self._robust_gradients(states, times, joints, sign)
         instants, inverse = np.unique(times, return_inverse=True)
         parts = self._dynamics.derivatives(
             states.q[instants], states.v[instants], states.a[instants]
         )
-        sign = -self._signs[columns][:, None]
-        by_q, by_v, by_a = (sign * part[inverse, self._joints[columns]] for part in parts)
+        by_q, by_v, by_a = (sign * part[inverse, joints] for part in parts)
         return by_q, by_v, by_a
+
+    def _robust_gradients(
+        self, states: States, times: Indices, joints: Indices, sign: Array
+    ) -> tuple[Array, Array, Array]:
+        q, v, a = states.q, states.v, states.a
+        instants, inverse = np.unique(times, return_inverse=True)
+        rows = self._regressor.evaluate(q[instants], v[instants], a[instants])[inverse, joints]
+        phi = sign * self._admitted.worst(sign * rows)
+        return self._adjoint.torques(q, v, a, times, joints, phi)

@@ -6,6 +6,8 @@ from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.clearance import Clearance
 from excite_cli.robot.collision_pairs import CollisionPairs
+from excite_cli.robot.enclosed_distances import EnclosedCapsules
+from excite_cli.robot.enclosed_motion import EnclosedMotion
 from excite_cli.robot.model import Robot
 from excite_cli.robot.states import States
 
@@ -35,6 +37,12 @@ class SelfCollision(Constraint):
         """As `margins`; pairs plainly farther apart than `reach` get a bound beyond it instead."""
         farthest = self.margin + float(reach.max(initial=0.0))
         return self._clearance.distances(states, exact_below=farthest) - self.margin
+
+    def least(self, motion: EnclosedMotion) -> Array:
+        """Lower bounds on distance less the margin (T, m) [m]."""
+        axes = EnclosedCapsules(self.capsules, motion)
+        first, second = np.array(self.pairs.checked, dtype=np.intp).T
+        return axes.least_distances(first, second, self.margin) - self.margin
 
     def gradients(
         self, states: States, times: Indices, columns: Indices

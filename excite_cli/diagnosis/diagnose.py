@@ -33,6 +33,7 @@ from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
@@ -94,6 +95,7 @@ def diagnose(
     named, rivals = _named(model, traced, parameters, covariance, doubts)
     before, after = _errors(model, traced, parameters, parts, processing)
     base_values, base_std = _base_parameters(model, parameters, covariance)
+    floor = noise_floor(parts.training, processing)
     return Diagnosis(
         config="",
         config_folder="",
@@ -113,7 +115,11 @@ def diagnose(
         before=before,
         after=after,
         rounds=rounds_of(traced, robot.joint_names),
-        findings=(*dataset.findings, *_assumed(traced, parts)),
+        findings=(
+            *dataset.findings,
+            *_assumed(traced, parts),
+            *(floor.noticed(robot.joint_names) if floor else ()),
+        ),
         processing=_choices(processing, traced, training),
         phi=model.full_inertias(parameters),
         base_values=base_values,
@@ -121,6 +127,7 @@ def diagnose(
         information=_information(model, traced, rivals),
         versions={},
         seconds=time.monotonic() - started,
+        noise_floor=floor.named(robot.joint_names) if floor else None,
     )  # fmt: skip
 
 

@@ -27,6 +27,7 @@ from excite_cli.excitation.extension import in_words, why_not_planned
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.robot.uncertainty import FitKnowledge
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,10 @@ def next_experiment(
     }
 
 
-def plan_after(diagnosis: Diagnosis, spec: Spec, folder: Path) -> NextMotion:
-    """The problem of `spec` after what `diagnosis` learned.
+def plan_after(
+    diagnosis: Diagnosis, spec: Spec, folder: Path, fit: FitKnowledge | None = None
+) -> NextMotion:
+    """The problem of `spec` after what `diagnosis` learned; `fit`: of `uncertainty.fit`.
 
     Raises
     ------
@@ -121,6 +124,7 @@ def plan_after(diagnosis: Diagnosis, spec: Spec, folder: Path) -> NextMotion:
             }
         ),
         folder,
+        fit,
     )
     columns = DataColumns(diagnosis, problem)
     said = [

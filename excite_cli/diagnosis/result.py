@@ -99,7 +99,9 @@ class Information:
 class Diagnosis:
     """All that `excite diagnose` learned. `phi`: full standard parameters that fit the data.
 
-    `effects`: all that were added to the declared model.
+    `effects`: all that were added to the declared model. `noise_floor` [N·m] (N): RMS per joint of
+    what changes from period to period in training runs, filtered as for the errors; None if no
+    motion was repeated.
     """
 
     config: str
@@ -123,6 +125,7 @@ class Diagnosis:
     information: Information
     versions: dict[str, str]
     seconds: float = 0.0
+    noise_floor: dict[str, float] | None = None
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:

@@ -5,8 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from excite_cli.constraints.base import Array, Worst
-from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.excitation.certificate import Path, Verdict, certify
 from excite_cli.excitation.problem import Problem
+from excite_cli.robot.states import States
+from excite_cli.trajectory.base import Trajectory
 
 CONTROLLER_RATE = 1000.0
 _CHUNK = 2000
@@ -55,24 +57,38 @@ def worst_margins(
     return found
 
 
-def proved_constraints(problem: Problem, coefficients: Array) -> dict[str, bool]:
-    """Whether each constraint holds at every instant, not only at those sampled.
+def verdicts(problem: Problem, coefficients: Array) -> tuple[Verdict, ...]:
+    """What is known of every constraint of the problem between the instants of any grid."""
+    return certify(path_of(problem, problem.trajectory, coefficients), problem.constraints)
 
-    Joint bounds of a Fourier series: with M samples of one period, max |p| is at most
-    max_i |p(t_i)| / cos(πN/M), p being the deviation from the middle of the bounds; so a joint
-    that is bounded on one side only is never proved.
+
+def path_of(problem: Problem, trajectory: Trajectory, coefficients: Array) -> Path:
+    """A motion of the problem's robot, to be judged; `trajectory` need not be the problem's."""
+
+    def states_at(times: Array) -> States:
+        return States(problem.kinematics, *trajectory.states(times, coefficients))
+
+    return Path(problem.robot, trajectory, coefficients, states_at)
+
+
+def lacking_margins(problem: Problem, coefficients: Array) -> list[Array]:
+    """By how much (m,) the columns of every constraint fall short somewhere; zero where they hold.
+
+    Between all instants where constraints are certified, at controller rate where they are not, or
+    where no bound between instants is known.
     """
-    samples = 64 * max(problem.trajectory.n_coefficients, 1)
-    step = problem.trajectory.duration / samples
-    factor = problem.trajectory.sampling_factor(samples, step)
-    proved = dict.fromkeys((constraint.name for constraint in problem.constraints), False)
-    if factor is None:
-        return proved
-    basis = problem.trajectory.basis(np.arange(samples, dtype=float) * step)
-    states = problem.states(coefficients, basis)
-    for constraint in problem.constraints:
-        if isinstance(constraint, JointBound):
-            lacking = constraint.margins(states) - (1.0 - factor) * constraint.scale
-            both_sides = bool(np.all(constraint.two_sided))
-            proved[constraint.name] = both_sides and bool(np.all(lacking >= 0))
-    return proved
+    if not problem.spec.optimizer.certify:
+        return _lacking_at_rate(problem, coefficients)
+    found = verdicts(problem, coefficients)
+    if all(verdict.bounded for verdict in found):
+        return [verdict.lacking for verdict in found]
+    sampled = _lacking_at_rate(problem, coefficients)
+    return [
+        verdict.lacking if verdict.bounded else lack
+        for verdict, lack in zip(found, sampled, strict=True)
+    ]
+
+
+def _lacking_at_rate(problem: Problem, coefficients: Array) -> list[Array]:
+    smallest = smallest_margins(problem, coefficients, fine_times(problem))
+    return [np.maximum(-margin, 0.0) for margin in smallest]

@@ -7,13 +7,16 @@ import numpy as np
 
 from excite_cli.constraints.base import Array
 from excite_cli.errors import NoAdmissibleMotionError
-from excite_cli.excitation.admissible import fine_times, smallest_margins, worst_margins
+from excite_cli.excitation.admissible import lacking_margins, verdicts, worst_margins
+from excite_cli.excitation.base_motion import base_motion
+from excite_cli.excitation.given_start import start_from
 from excite_cli.excitation.motion import Motion, Outcome, Progress, ProgressCallback
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.start import Start, clear_posture, moved_note, random_start
+from excite_cli.excitation.start import Start, moved_note, random_start
 from excite_cli.excitation.task import MotionTask
+from excite_cli.trajectory.chain import Segment
 
 _GUARD_ROUNDS = 6
 _GUARD_GROWTH = 1.3
@@ -30,8 +33,11 @@ def generate_motion(
     index: int,
     seed: int,
     report: ProgressCallback,
+    given: Segment | None = None,
 ) -> Motion:
     """Motion `index` on top of `stack`, the best of `optimizer.restarts` starts.
+
+    The first start is made of the motion `given`, if there is one.
 
     Raises
     ------
@@ -40,8 +46,9 @@ def generate_motion(
     """
     began = time.perf_counter()
     task = MotionTask(problem, stack)
-    start = clear_posture(task, seed)
-    outcome = _best_of_starts(task, solver, start, (seed, index), report)
+    start = base_motion(task, seed)
+    first, told = (None, "") if given is None else start_from(task, start, given)
+    outcome = _best_of_starts(task, solver, start, (seed, index), report, first)
     coefficients = task.coefficients(outcome.x)
     value = task.objective.value(coefficients, problem.criterion)
     stacked = task.objective.stacked_condition_number(coefficients)
@@ -64,8 +71,15 @@ def generate_motion(
         iterations=outcome.iterations,
         evaluations=outcome.evaluations,
         margins=worst_margins(problem, coefficients),
-        note=moved_note(task, start),
+        certified=_certified(problem, coefficients),
+        note="; ".join(filter(None, [moved_note(task, start), told])),
     )
+
+
+def _certified(problem: Problem, coefficients: Array) -> dict[str, bool]:
+    if not problem.spec.optimizer.certify:
+        return {}
+    return {verdict.name: verdict.proved for verdict in verdicts(problem, coefficients)}
 
 
 def _best_of_starts(
@@ -74,6 +88,7 @@ def _best_of_starts(
     start: Start,
     seed: tuple[int, int],
     report: ProgressCallback,
+    first: Array | None = None,
 ) -> Outcome:
     """The outcome with the lowest criterion, with iterations and evaluations of all starts.
 
@@ -87,7 +102,9 @@ def _best_of_starts(
         run = MotionTask(problem, task.stack)
         told = _labelled(report, restart, spec.restarts)
         try:
-            outcome = solver.solve(run, random_start(run, start, (*seed, restart)), effort, told)
+            x = first if first is not None and restart == 0 else None
+            x = random_start(run, start, (*seed, restart)) if x is None else x
+            outcome = solver.solve(run, x, effort, told)
             outcome = kept_between_instants(run, solver, start, outcome, effort, told)
         except NoAdmissibleMotionError as error:
             failure = error
@@ -121,17 +138,16 @@ def kept_between_instants(
     effort: Effort,
     report: ProgressCallback,
 ) -> Outcome:
-    """The outcome, mended until no constraint is broken at controller rate.
+    """The outcome, mended until every constraint is proved between the instants.
 
-    Where the finer grid shows a negative margin, the guard of that column is raised by it, and the
-    solver goes on from the nearest point towards standing still that has the new guards.
+    Where a margin is negative (without certificates: at controller rate) the guard of that column
+    is raised by it, and the solver goes on from the nearest point towards the base motion that has
+    the new guards.
     """
     problem = task.problem
-    times = fine_times(problem)
     began = time.perf_counter()
     for round_ in range(_GUARD_ROUNDS + 1):
-        margins = smallest_margins(problem, task.coefficients(outcome.x), times)
-        lacking = [np.maximum(-margin, 0.0) for margin in margins]
+        lacking = lacking_margins(problem, task.coefficients(outcome.x))
         if not any(lack.any() for lack in lacking):
             return outcome
         if round_ == _GUARD_ROUNDS:
@@ -162,15 +178,14 @@ def kept_between_instants(
 
 
 def _drawn_inside(task: MotionTask, x: Array, start: Start) -> Array:
-    """The point nearest to x on the way to standing still whose residuals are all positive."""
-    standing = task.variables(task.problem.still(start.posture))
+    """The point nearest to x on the way to the base motion whose residuals are all positive."""
     for share in np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 60)]):
-        candidate = x + share * (standing - x)
+        candidate = x + share * (start.base - x)
         if all(value.min() > 0 for value in task.values(task.states(candidate))):
             return candidate
     raise NoAdmissibleMotionError(
-        "The posture no longer has room once the motion is kept clear between instants. Take a "
-        "smaller sampling.constraints.step."
+        "Nothing about the start has room any more once the motion is kept clear between instants. "
+        "Take a smaller sampling.constraints.step."
     )
 
 

@@ -57,7 +57,7 @@ def check_gradient(
     objective, criterion = task.objective, problem.criterion
     x = random_direction(task, np.random.default_rng(seed))
     standing = task.variables(problem.still(problem.robot.posture))
-    alpha = problem.trajectory.free_directions @ ((standing + 0.7 * x).reshape(task.n, task.k).T)
+    alpha = task.coefficients(standing + 0.7 * x)
 
     def cost(coefficients: Array) -> float:
         return objective.value(coefficients, criterion)

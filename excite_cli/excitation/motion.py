@@ -1,7 +1,7 @@
 """Records that travel from the optimiser to the file and the terminal."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from excite_cli.constraints.base import Array, Worst
@@ -44,7 +44,7 @@ class Motion:
 
     `condition_number` is that of the motion alone, `stacked_condition_number` that of the motion
     with all earlier data; `improved` tells whether the stack became better by it; `note` says what
-    else one should know.
+    else one should know; `certified` which constraints are proved at every instant.
     """
 
     index: int
@@ -58,3 +58,4 @@ class Motion:
     evaluations: int
     margins: dict[str, Worst]
     note: str = ""
+    certified: dict[str, bool] = field(default_factory=dict)

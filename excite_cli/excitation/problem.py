@@ -12,6 +12,7 @@ from excite_cli.criteria.base import Criterion
 from excite_cli.criteria.catalogue import build_criterion
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ConfigError
+from excite_cli.excitation.boundary import Boundary, build_boundary
 from excite_cli.excitation.discrimination import Discrimination, Separation
 from excite_cli.excitation.extension import Extension, extend
 from excite_cli.excitation.objective import Objective
@@ -22,6 +23,7 @@ from excite_cli.robot.base_parameters import BaseParameters, find_base_parameter
 from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.robot.states import States
+from excite_cli.robot.uncertainty import FitKnowledge, InertiaUncertainty, inertia_uncertainty
 from excite_cli.trajectory.base import Basis, Trajectory
 from excite_cli.trajectory.catalogue import build_trajectory
 
@@ -38,6 +40,7 @@ class Problem:
     robot: Robot
     base: BaseParameters
     trajectory: Trajectory
+    boundary: Boundary
     criterion: Criterion
     weighting: Weighting
     constraints: tuple[Constraint, ...]
@@ -83,8 +86,12 @@ class Problem:
         return self.trajectory.constant(q)
 
 
-def build_problem(spec: Spec, relative_to: Path | None = None) -> Problem:
+def build_problem(
+    spec: Spec, relative_to: Path | None = None, fit: FitKnowledge | None = None
+) -> Problem:
     """Resolve `spec`; paths in it start from `relative_to`.
+
+    `fit`: what the file named by `uncertainty.fit` knows.
 
     The regressor is extended by the effects that `spec.effects` lists. The friction of the URDF's
     <dynamics> belongs to the declared model of identification, but not to the regressor of a
@@ -123,15 +130,28 @@ def build_problem(spec: Spec, relative_to: Path | None = None) -> Problem:
         robot=robot,
         base=base,
         trajectory=trajectory,
+        boundary=build_boundary(spec.trajectory, robot, trajectory),
         criterion=build_criterion(spec.criterion),
         weighting=weighting,
-        constraints=build_constraints(spec.constraints, robot),
+        constraints=build_constraints(
+            spec.constraints, robot, _uncertainty(spec, robot, base, fit)
+        ),
         cost_basis=trajectory.basis(cost),
         constraint_basis=trajectory.basis(grid),
         kinematics=BatchKinematics(robot),
         extension=extension,
     )
     return on_fine_grid(problem) if extension.fine else problem
+
+
+def _uncertainty(
+    spec: Spec, robot: Robot, base: BaseParameters, fit: FitKnowledge | None
+) -> InertiaUncertainty | None:
+    if spec.uncertainty is None:
+        return None
+    if spec.uncertainty.fit is not None and fit is None:
+        raise ConfigError(f"uncertainty.fit: {spec.uncertainty.fit} was not read for this command.")
+    return inertia_uncertainty(spec.uncertainty, robot, base, fit)
 
 
 def on_fine_grid(problem: Problem) -> Problem:

@@ -15,9 +15,10 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import condition_number, singular_values
 from excite_cli.errors import NoAdmissibleMotionError
+from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.start import Start, clear_posture, random_direction
+from excite_cli.excitation.start import Start, random_direction
 from excite_cli.excitation.task import MotionTask
 
 _LARGEST, _GROWTH, _STEPS = 1.5, 0.75, 14
@@ -65,7 +66,7 @@ def random_baseline(
     """
     began = time.perf_counter()
     task = MotionTask(problem, stack)
-    start = clear_posture(task, seed)
+    start = base_motion(task, seed)
     rng = np.random.default_rng((seed, 16))
     found: list[Array] = []
     grams: list[Array] = []
@@ -94,16 +95,7 @@ def random_baseline(
 
 def _candidate(task: MotionTask, start: Start, rng: np.random.Generator) -> Array | None:
     """A random motion, scaled to the largest amplitude that is admissible."""
-    posture = start.posture
-    limits = task.problem.robot.limits
-    lower, upper = (
-        np.maximum(limits.lower, posture - np.pi),
-        np.minimum(limits.upper, posture + np.pi),
-    )
-    centre = posture + rng.uniform(0.0, 0.5) * (rng.uniform(lower, upper) - posture)
-    standing = task.variables(task.problem.still(centre))
-    if not _admissible(task, standing):
-        standing = task.variables(task.problem.still(posture))
+    standing = start.base if task.problem.boundary.given else _drawn_posture(task, start, rng)
     direction = random_direction(task, rng, slow=rng.uniform())
     amplitude = _LARGEST
     for _ in range(_STEPS):
@@ -119,6 +111,18 @@ def _candidate(task: MotionTask, start: Start, rng: np.random.Generator) -> Arra
             (middle, high) if _admissible(task, standing + middle * direction) else (low, middle)
         )
     return standing + low * direction
+
+
+def _drawn_posture(task: MotionTask, start: Start, rng: np.random.Generator) -> Array:
+    """Standing at a random admissible posture, or at that of the start."""
+    posture, limits = start.posture, task.problem.robot.limits
+    lower, upper = (
+        np.maximum(limits.lower, posture - np.pi),
+        np.minimum(limits.upper, posture + np.pi),
+    )
+    centre = posture + rng.uniform(0.0, 0.5) * (rng.uniform(lower, upper) - posture)
+    standing = task.variables(task.problem.still(centre))
+    return standing if _admissible(task, standing) else start.base
 
 
 def _admissible(task: MotionTask, x: Array) -> bool:

@@ -6,7 +6,9 @@ from pathlib import Path
 
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
+from excite_cli.constraints.mesh_clearance import MeshClearance
 from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.constraints.surroundings import Surroundings
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import ProgressCallback
 from excite_cli.excitation.problem import Problem
@@ -14,6 +16,7 @@ from excite_cli.excitation.result import Result, matches
 from excite_cli.excitation.sequence import Step, generate_sequence
 from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.stack import Stack
+from excite_cli.trajectory.chain import Segment
 
 
 def new_result(
@@ -101,8 +104,11 @@ def continue_run(
     report: Callable[[int], ProgressCallback],
     on_motion: Callable[[Step, Result], None],
     model: Problem | None = None,
+    starts: Sequence[Segment] = (),
 ) -> Result:
     """Generate the motions that are still missing, calling `on_motion` after each.
+
+    The search of motion k starts from the k-th of `starts`, as far as there are any.
 
     Where `problem` separates effects, `model` is the problem that the result is kept for: the same
     without the rivals. Stack and condition numbers are then its own.
@@ -110,7 +116,7 @@ def continue_run(
     solver = build_solver(problem.spec.optimizer)
     remaining = range(len(result.motions) + 1, problem.spec.sequence.motions + 1)
     for step in generate_sequence(
-        problem, solver, _running(problem, result), remaining, problem.spec.seed, report
+        problem, solver, _running(problem, result), remaining, problem.spec.seed, report, starts
     ):
         stored = step if model is None else _judged(step, model, result.stack)
         result = result.with_step(stored)
@@ -153,10 +159,14 @@ def _differing(first: Spec, second: Spec) -> list[str]:
 
 
 def _pairs(problem: Problem) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Pairs that are kept apart, and those that are not with the reasons."""
+    checked: list[str] = []
+    dropped: list[str] = []
     for constraint in problem.constraints:
-        if isinstance(constraint, SelfCollision):
-            dropped = tuple(
+        if isinstance(constraint, SelfCollision | Surroundings | MeshClearance):
+            checked += constraint.labels
+        if isinstance(constraint, SelfCollision | Surroundings):
+            dropped += [
                 f"{pair.first} – {pair.second}: {pair.reason}" for pair in constraint.pairs.dropped
-            )
-            return constraint.labels, dropped
-    return (), ()
+            ]
+    return tuple(checked), tuple(dropped)

@@ -1,6 +1,6 @@
 """Motions one after the other, each with all earlier ones stacked as C_0 (Eq. 41, section IV.B)."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from excite_cli.excitation.generate import generate_motion
@@ -8,6 +8,7 @@ from excite_cli.excitation.motion import Motion, ProgressCallback
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.solvers.base import Solver
 from excite_cli.excitation.stack import Stack
+from excite_cli.trajectory.chain import Segment
 
 
 @dataclass(frozen=True)
@@ -25,14 +26,17 @@ def generate_sequence(
     indices: range,
     seed: int,
     report: Callable[[int], ProgressCallback],
+    starts: Sequence[Segment] = (),
 ) -> Iterator[Step]:
     """Yield motions `indices` (counted from 1), starting on top of `stack`.
 
     Each motion depends on the stack, the seed and its index only, so a sequence that is resumed
     from a stored stack goes on to the same numbers. `report(index)` gives the progress callback.
+    Motion k starts its search from the k-th of `starts`, as far as there are any.
     """
     objective = problem.objective()
     for index in indices:
-        motion = generate_motion(problem, solver, stack, index, seed, report(index))
+        given = starts[index - 1] if index <= len(starts) else None
+        motion = generate_motion(problem, solver, stack, index, seed, report(index), given)
         stack = stack.with_rows(objective.block(motion.coefficients))
         yield Step(motion, stack)

@@ -18,6 +18,8 @@ from excite_cli.robot.states import States
 
 # Residuals a start must have: inside, so that a barrier is finite, yet little is given away.
 _CLEAR_POSTURE, _CLEAR_MOTION = 0.03, 0.02
+# What a motion must keep of the room that its base has, where that is less.
+_SHARE_OF_ROOM = 2 / 3
 _SHRINK, _SMALLEST = 0.7, 1e-4
 _TRIES = 40
 # Columns whose residual is beyond this do not bind a posture.
@@ -27,10 +29,16 @@ _TOLD = 8
 
 @dataclass(frozen=True)
 class Start:
-    """A posture (n,) with room around it, and whether it is that of the config."""
+    """A motion with room around it, as free variables `base` (size,).
 
+    It begins at `posture` (n,): standing there, or on the way to where the motion is to end.
+    `as_configured`: the posture is the one that the config gives. `note`: what else to know.
+    """
+
+    base: Array
     posture: Array
     as_configured: bool
+    note: str = ""
 
 
 def random_start(task: MotionTask, start: Start, seed: tuple[int, ...]) -> Array:
@@ -42,18 +50,20 @@ def random_start(task: MotionTask, start: Start, seed: tuple[int, ...]) -> Array
         Not even a tiny motion about the posture is admissible.
     """
     rng = np.random.default_rng(seed)
-    standing = task.variables(task.problem.still(start.posture))
     direction = random_direction(task, rng)
+    room = min((float(value.min()) for value in task.values(task.states(start.base))), default=1.0)
+    clear = min(_CLEAR_MOTION, _SHARE_OF_ROOM * room)
     amplitude = 1.0
     while amplitude > _SMALLEST:
-        x = standing + amplitude * direction
+        x = start.base + amplitude * direction
         values = task.values(task.states(x))
-        if all(value.min() > _CLEAR_MOTION for value in values):
+        if all(value.min() > clear for value in values):
             return x
         amplitude *= _SHRINK
-    label = _blocking(task, task.values(task.states(standing + amplitude * direction)))
+    label = blocking(task, task.values(task.states(start.base + amplitude * direction)))
+    about = "base motion between the given postures" if task.problem.boundary.given else "posture"
     raise NoAdmissibleMotionError(
-        f"No admissible motion: even a tiny one about the posture breaks {label}. Loosen that "
+        f"No admissible motion: even a tiny one about the {about} breaks {label}. Loosen that "
         "constraint or give another robot.posture."
     )
 
@@ -85,11 +95,13 @@ def clear_posture(task: MotionTask, seed: int) -> Start:
     Raises
     ------
     NoAdmissibleMotionError
-        None was found; the message names the constraint that stands in the way.
+        No real robot can stand as configured, or none was found; the message names the constraint
+        that stands in the way.
     """
     configured = task.problem.robot.posture
+    refuse_impossible(task, configured, "robot.posture")
     if _standing(task, configured).min() > _CLEAR_POSTURE:
-        return Start(configured, True)
+        return _standing_at(task, configured, True)
     rng = np.random.default_rng((seed, 7))
     best, best_clearance = configured, -np.inf
     for attempt in range(_TRIES):
@@ -98,22 +110,42 @@ def clear_posture(task: MotionTask, seed: int) -> Start:
         found = _pushed_clear(task, guess)
         clearance = float(_standing(task, found).min())
         if clearance > _CLEAR_POSTURE:
-            return Start(found, False)
+            return _standing_at(task, found, False)
         if clearance > best_clearance:
             best, best_clearance = found, clearance
     values = task.values(_still(task, best))
     raise NoAdmissibleMotionError(
         f"No admissible motion: no posture found that is clear of all constraints "
-        f"({_TRIES} tried from robot.posture). In the way: {_blocking(task, values)}. At the best "
+        f"({_TRIES} tried from robot.posture). In the way: {blocking(task, values)}. At the best "
         f"of them: {_all_broken(task, best)}. Give a clear robot.posture or loosen the constraint "
-        "(pairs of links that always touch: constraints.self_collision.ignore)."
+        "(pairs that always touch: constraints.self_collision.ignore, "
+        "constraints.surroundings.ignore)."
     )
 
 
+def refuse_impossible(task: MotionTask, posture: Array, where: str) -> None:
+    """Raise if no real robot can stand at `posture` (n,), which the config gives as `where`.
+
+    Raises
+    ------
+    NoAdmissibleMotionError
+        It stands inside something; the message says what, where and how deep.
+    """
+    for constraint in task.problem.constraints:
+        reason = constraint.why_not(_still(task, posture))
+        if reason:
+            raise NoAdmissibleMotionError(f"No admissible motion: at {where}, {reason}.")
+
+
+def _standing_at(task: MotionTask, posture: Array, as_configured: bool) -> Start:
+    base = task.variables(task.problem.still(posture))
+    return Start(base, posture, as_configured)
+
+
 def moved_note(task: MotionTask, start: Start) -> str:
-    """What was changed of the configured posture and why; empty if nothing was."""
+    """What was changed of the configured posture and why, or the note of the start."""
     if start.as_configured:
-        return ""
+        return start.note
     configured = task.problem.robot.posture
     changed = ", ".join(
         f"{name}: {value:.3f}"
@@ -122,7 +154,7 @@ def moved_note(task: MotionTask, start: Start) -> str:
         )
         if abs(value - before) > 1e-3
     )
-    broken = _blocking(task, task.values(_still(task, configured)))
+    broken = blocking(task, task.values(_still(task, configured)))
     return f"robot.posture is too near a bound of {broken}; moved about {{{changed}}} instead"
 
 
@@ -178,7 +210,7 @@ def _pushed_clear(task: MotionTask, guess: Array) -> Array:
     return np.asarray(result.x[:-1]) if np.all(np.isfinite(result.x)) else guess
 
 
-def _blocking(task: MotionTask, values: list[Array]) -> str:
+def blocking(task: MotionTask, values: list[Array]) -> str:
     """The constraint and column with the smallest residual, in words."""
     smallest, words = np.inf, "nothing"
     for constraint, value in zip(task.problem.constraints, values, strict=True):

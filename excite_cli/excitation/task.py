@@ -1,7 +1,8 @@
 """One motion to be found, as a nonlinear program in free variables.
 
-x (n·K',) holds, joint after joint, the coordinates of the coefficients in the trajectory's free
-directions N: α = N Xᵀ with X = x as (n, K'). Equalities (start and end at rest) are gone with N.
+x (n·K',) holds, joint after joint, the coordinates of the coefficients in the free directions N of
+the problem's boundary: α = α_0 + N Xᵀ with X = x as (n, K'). Equalities (start and end at rest, and
+where) are gone with α_0 and N; without given postures α_0 is zero.
 """
 
 from functools import cached_property
@@ -31,8 +32,9 @@ class MotionTask:
         self.problem = problem
         self.stack = stack or Stack.empty(problem.columns)
         self.objective = problem.objective(self.stack)
-        self.free = problem.trajectory.free_directions
-        self.guards = guards or first_guards(problem)
+        self.free = problem.boundary.free
+        self.offset = problem.boundary.offset
+        self.guards = _within_ends(problem, guards or first_guards(problem))
         self.residuals = Residuals(
             problem.constraints, problem.constraint_basis, self.free, self.guards
         )
@@ -51,11 +53,15 @@ class MotionTask:
 
     def coefficients(self, x: Array) -> Array:
         """α (K, n) of the free variables."""
-        return self.free @ x.reshape(self.n, self.k).T
+        return self.offset + self.change(x)
+
+    def change(self, direction: Array) -> Array:
+        """By how much α (K, n) changes when the free variables change by `direction`."""
+        return self.free @ direction.reshape(self.n, self.k).T
 
     def variables(self, coefficients: Array) -> Array:
-        """Free variables of α (its part within the free directions)."""
-        return (np.linalg.pinv(self.free) @ coefficients).T.ravel()
+        """Free variables of the nearest α of the task."""
+        return self.flat(np.linalg.pinv(self.free) @ (coefficients - self.offset))
 
     def flat(self, reduced: Array) -> Array:
         """(K', n) as the ordering of x."""
@@ -131,3 +137,19 @@ def first_guards(problem: Problem) -> list[Array]:
         else:
             guards.append(_FIRST_GUARD * constraint.scale)
     return guards
+
+
+def _within_ends(problem: Problem, guards: list[Array]) -> list[Array]:
+    """Guards (m,) that ask at most half of the margin that standing at a given end has.
+
+    A given posture is never moved, and at rest nothing happens between instants.
+    """
+    ends = problem.boundary.postures
+    if not len(ends):
+        return guards
+    still = States(problem.kinematics, ends, np.zeros_like(ends), np.zeros_like(ends))
+    margins = [constraint.margins(still).min(axis=0) for constraint in problem.constraints]
+    return [
+        np.minimum(guard, 0.5 * np.maximum(margin, 0.0))
+        for guard, margin in zip(guards, margins, strict=True)
+    ]

@@ -51,6 +51,8 @@ def mjcf(robot: Robot, model: IdentifiedModel) -> Exported:
         placed.append(body)
     ElementTree.indent(root)
     notes = ["shapes, actuators and sensors are not in it"]
+    if robot.payload is not None:
+        notes.append(f"the payload ({robot.payload.in_words}) is part of its body")
     if left:
         words = in_words(left, robot.joint_names)
         notes.append(f"MJCF cannot hold: {words}. The file of parameters does")

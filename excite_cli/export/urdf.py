@@ -4,7 +4,8 @@ Identified are the bodies between moved joints: a link with all that is fixed to
 locked joints. What changed of such a body is put on the link that its joint carries, in whose frame
 the ten parameters are given, so that they simply add. If that link alone cannot take it (its mass
 would be negative, or no mass distribution would have it), the whole body goes to it and the links
-lumped with it lose their inertias.
+lumped with it lose their inertias. The payload of the config is no part of the robot: it is taken
+off.
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -24,7 +25,7 @@ from excite_cli.export.exported import (
 )
 from excite_cli.identification.pseudo_inertia import smallest_eigenvalues
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
+from excite_cli.robot.regressor import payload_parameters, standard_parameters
 
 _INERTIA = (
     ("ixx", 0, 0),
@@ -52,18 +53,22 @@ def updated_urdf(robot: Robot, model: IdentifiedModel) -> Exported:
     notes = []
     for body, carried in enumerate(_carriers(robot, root)):
         ten = slice(10 * body, 10 * body + 10)
-        old, new = standard_parameters(robot)[ten], np.asarray(model.phi[ten])
+        payload = payload_parameters(robot)[ten]
+        old, new = standard_parameters(robot)[ten] - payload, np.asarray(model.phi[ten]) - payload
         if np.abs(new - old).max() <= _UNCHANGED * max(np.abs(old).max(), 1e-300):
             continue
         if new[0] <= 0:
             raise RobotError(
-                f"The body of link '{carried}' was identified with a mass of {new[0]:.3g} kg, "
-                "which no URDF can hold. Identify with identification.consistent: true."
+                f"The body of link '{carried}' was identified with a mass of {new[0]:.3g} kg"
+                f"{' without its payload' if payload.any() else ''}, which no URDF can hold. "
+                "Identify with identification.consistent: true."
             )
         note = _put(links, carried, _lumped(robot, root, carried), old, new)
         if note:
             notes.append(note)
     notes += _friction(robot, root, model)
+    if robot.payload is not None:
+        notes.append(f"the payload ({robot.payload.in_words}) is not in it: keep robot.payload")
     ElementTree.indent(root)
     body_text = ElementTree.tostring(root, encoding="unicode")
     return Exported(f'<?xml version="1.0"?>\n{body_text}\n', tuple(notes))

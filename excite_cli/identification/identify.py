@@ -26,6 +26,7 @@ from excite_cli.identification.hausman import (
     instrument_dataset,
     not_testable,
 )
+from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import prepare
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import Regression, build_regression
@@ -41,7 +42,11 @@ _SURELY = 3.0
 
 @dataclass(frozen=True)
 class Identification:
-    """The fit, its errors on the sealed part and on the training part, and what was noticed."""
+    """The fit, its errors on the sealed part and on the training part, and what was noticed.
+
+    `noise_floor` [N·m] (N): RMS per joint of what changes from period to period in training runs;
+    None if no motion was repeated.
+    """
 
     fit: Fit
     sealed_run: str
@@ -50,6 +55,7 @@ class Identification:
     hausman: Hausman
     processing: Processing
     findings: tuple[Finding, ...]
+    noise_floor: dict[str, float] | None = None
 
 
 def identify(
@@ -84,6 +90,7 @@ def identify(
         training, held_out = rebuilt(training, found.phi), rebuilt(held_out, found.phi)
     tell("closed-loop bias")
     hausman = _hausman(training, dataset, parts, processing, found, (sealed, spec.diagnosis.block))
+    floor = noise_floor(parts.training, processing)
     return Identification(
         fit=found,
         sealed_run=parts.sealed_name,
@@ -91,7 +98,12 @@ def identify(
         training_error=errors_of(found, training),
         hausman=hausman,
         processing=processing,
-        findings=(*dataset.findings, *_noticed(found, hausman)),
+        findings=(
+            *dataset.findings,
+            *_noticed(found, hausman),
+            *(floor.noticed(robot.joint_names) if floor else ()),
+        ),
+        noise_floor=floor.named(robot.joint_names) if floor else None,
     )
 
 

@@ -39,6 +39,14 @@ class _Layout:
     first_row: int  # number of lines before the first row
 
 
+def header_of(path: Path) -> tuple[str, ...]:
+    """Names of the columns; nothing where the file is no table (reading it says why)."""
+    try:
+        return tuple(_layout(path).header)
+    except (FileError, ValueError, csv.Error, OSError, EOFError, zlib.error):
+        return ()
+
+
 def read_table(path: Path) -> Table:
     """Read a `.csv` or `.csv.gz`; comma, semicolon, tab or white space between columns.
 

@@ -37,7 +37,12 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 0.6, 0.1, 0.95, 0.45
 _WORDS = {
     "joint_torque": ("Joint torque left", "share of limit [–]"),
     "balance": ("Centre of mass to the edge of its region", "distance [m]"),
+    "zmp": ("Zero-moment point to the edge of the support", "distance [m]"),
+    "contact": ("What is left of friction, torsion and load", "margin [N, N·m]"),
     "self_collision": ("Nearest pair of links, less the margin", "distance [m]"),
+    "mesh_clearance": ("Nearest pair of meshes, less the margin", "distance [m]"),
+    "surroundings": ("Nearest link and thing around, less the margin", "distance [m]"),
+    "keep_out": ("Outside the regions of joint space", "distance [rad]"),
 }
 
 

@@ -5,6 +5,8 @@ where that wastes little room (the many small parts of a gripper); a link that o
 badly is cut across a main axis. Everything is in the frame of the joint that carries the link.
 """
 
+from collections.abc import Collection
+
 import numpy as np
 import pinocchio as pin
 
@@ -19,11 +21,13 @@ from excite_cli.robot.model import Robot
 __all__ = ["Capsule", "fit_capsules", "link_joints"]
 
 
-def fit_capsules(robot: Robot, spec: SelfCollisionSpec) -> tuple[Capsule, ...]:
+def fit_capsules(
+    robot: Robot, spec: SelfCollisionSpec, apart: Collection[str] = ()
+) -> tuple[Capsule, ...]:
     """Capsules of all links with collision geometry, ordered by joint; `spec` may replace some.
 
     Links named in `spec` share their capsule with no other, so that what is said of one link is
-    not said of its neighbour.
+    not said of its neighbour. So do those in `apart`. The robot's payload comes with them.
 
     Raises
     ------
@@ -38,22 +42,24 @@ def fit_capsules(robot: Robot, spec: SelfCollisionSpec) -> tuple[Capsule, ...]:
         _check_link(link, joints, f"constraints.self_collision.capsules.{link}")
     for pair in spec.ignore:
         for link in pair:
-            _check_link(link, joints, "constraints.self_collision.ignore")
+            _check_link(link, link_names(robot), "constraints.self_collision.ignore")
     by_hand = [
         Capsule(
             link, joints[link], np.array(one.start), np.array(one.end), one.radius, (link,), True
         )
         for link, one in given.items()
     ]
-    apart = {link for pair in spec.ignore for link in pair} | set(given)
-    fitted = [c for c in _fitted(robot, apart) if c.links[0] not in given]
+    alone = {link for pair in spec.ignore for link in pair} | set(given) | set(apart)
+    fitted = [c for c in _fitted(robot, alone & set(joints)) if c.links[0] not in given]
     if not fitted and not by_hand:
         raise RobotError(
-            f"{robot.description.path.name} has no collision geometry, so self-collision cannot be "
+            f"{robot.description.path.name} has no collision geometry, so distances cannot be "
             "checked. Give capsules by link under constraints.self_collision.capsules, use a URDF "
-            "with <collision> elements, or drop constraints.self_collision."
+            "with <collision> elements, or drop constraints.self_collision and "
+            "constraints.surroundings."
         )
-    return tuple(sorted([*fitted, *by_hand], key=lambda capsule: capsule.joint))
+    carried = [] if robot.payload is None else [robot.payload.capsule]
+    return tuple(sorted([*fitted, *by_hand, *carried], key=lambda capsule: capsule.joint))
 
 
 def link_joints(robot: Robot) -> dict[str, int]:
@@ -65,7 +71,15 @@ def link_joints(robot: Robot) -> dict[str, int]:
     }
 
 
-def _check_link(link: str, known: dict[str, int], where: str) -> None:
+def link_names(robot: Robot) -> list[str]:
+    """All that can be told apart by name: the links of the URDF, and the payload if there is one.
+
+    The payload goes by the name of its capsule.
+    """
+    return [*link_joints(robot), *([] if robot.payload is None else robot.payload.capsule.links)]
+
+
+def _check_link(link: str, known: Collection[str], where: str) -> None:
     if link not in known:
         raise ConfigError(
             f"{where}: the robot has no link '{link}'.{nearest(link, known)} "

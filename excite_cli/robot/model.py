@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from excite_cli.config.robot_spec import JointLimits, RobotSpec
 from excite_cli.errors import ConfigError, RobotError, nearest
 from excite_cli.robot.description import UNBOUNDED, RobotDescription, load_description
+from excite_cli.robot.payload import Payload, add_payload, payload_on
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,8 @@ class Robot:
     """A rigid-body model with `n` moved joints.
 
     `rows` are the rows of the inverse dynamics that are measured; `moved` the velocity indices of
-    the moved joints; `reference` the configuration (nq,) at which everything else stands.
+    the moved joints; `reference` the configuration (nq,) at which everything else stands. The
+    inertias of `model` include that of the `payload`; `description` knows nothing of it.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Robot:
     limits: Limits
     base_orientation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     locked: dict[str, float] = field(default_factory=dict)
+    payload: Payload | None = None
 
     @property
     def n(self) -> int:
@@ -110,7 +113,10 @@ class Robot:
         return q, v, a
 
     def fingerprint(self) -> str:
-        """Hash of what decides the regressor: URDF, moved joints, posture, base and rows."""
+        """Hash of what decides the regressor: URDF, moved joints, posture, base and rows.
+
+        A payload is not part of it: it adds constants to φ and changes no column of Y.
+        """
         text = "|".join(
             [
                 self.description.sha256,
@@ -137,6 +143,8 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
     """
     description = load_description(spec.urdf, spec.package_dirs, relative_to)
     full = _parse(description, spec)
+    if spec.payload is not None:
+        add_payload(full, payload_on(full, spec.payload))
     names = [str(name) for name in full.names[1:] if str(name) != "root_joint"]
     _check_types(full, names, description)
     chosen = _chosen(spec, names, description.mimicking)
@@ -179,6 +187,7 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
         limits=Limits(*columns),
         base_orientation=spec.base_orientation,
         locked={name: posture[name] for name in names if name not in chosen},
+        payload=None if spec.payload is None else payload_on(model, spec.payload),
     )
 
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Robot
 from excite_cli.robot.segments import Nearest, nearest_points, normals
 from excite_cli.robot.states import States
+from excite_cli.robot.world_segments import CapsuleAxes, WorldSegments
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -36,21 +36,17 @@ class PairDistances:
         self, robot: Robot, capsules: Sequence[Capsule], pairs: Sequence[tuple[int, int]]
     ) -> None:
         self._robot = robot
-        self._kinematics = BatchKinematics(robot)
         checked = np.array(pairs, dtype=np.intp).reshape(-1, 2)
         used, place = np.unique(checked, return_inverse=True)
         self._first, self._second = place.reshape(-1, 2).T
         kept = [capsules[index] for index in used]
-        self._joints = np.array([capsule.joint for capsule in kept], dtype=np.intp)
-        self._start = np.array([capsule.start for capsule in kept]).reshape(-1, 3)
-        self._along = np.array([c.end - c.start for c in kept]).reshape(-1, 3)
+        self._axes = CapsuleAxes(robot, kept)
         radius = np.array([capsule.radius for capsule in kept])
         self._radii = radius[self._first] + radius[self._second]
-        ball = radius + 0.5 * np.linalg.norm(self._along, axis=1)
+        ball = radius + 0.5 * np.linalg.norm(self._axes.along, axis=1)
         self._balls = ball[self._first] + ball[self._second]
-        carried = carried_bodies(robot)[self._joints]  # (C, n)
+        carried = carried_bodies(robot)[self._axes.joints]  # (C, n)
         self._sign = carried[self._second] - carried[self._first]
-        self._last: tuple[Array, _World] | None = None
 
     @property
     def n_pairs(self) -> int:
@@ -63,7 +59,7 @@ class PairDistances:
         Where a ball around each segment already shows the distance to be at least `exact_below`,
         that bound is returned instead, which saves most of the work for robots of many links.
         """
-        world = self._world(q)
+        world = self._axes.in_world(q)
         if np.isfinite(exact_below):
             bounds = self._bounds(world)
             cols, rows = np.nonzero(bounds < exact_below)
@@ -86,7 +82,7 @@ class PairDistances:
         result -= self._radii[:, None]
         return result.T
 
-    def _bounds(self, world: "_World") -> Array:
+    def _bounds(self, world: WorldSegments) -> Array:
         """Lower bounds (P, T) of the distances, from balls around the segments."""
         middle = world.start + 0.5 * world.along
         apart = _length(middle[:, self._first] - middle[:, self._second])
@@ -94,78 +90,27 @@ class PairDistances:
 
     def distances_at(self, q: Array, rows: Indices, cols: Indices) -> Array:
         """Signed distances (K,) [m] at instant rows[k] of pair cols[k] only."""
-        world = self._world(q)
+        world = self._axes.in_world(q)
         return _length(self._nearest_at(world, rows, cols)[0].gap) - self._radii[cols]
 
     def gradients(self, q: Array | States, rows: Indices, cols: Indices) -> Array:
         """Derivatives (K, n) of the distance at instant rows[k] of pair cols[k] by q."""
-        world = self._world(q)
+        world = self._axes.in_world(q)
         nearest, start, along, along_second = self._nearest_at(world, rows, cols)
         normal = normals(nearest, along, along_second).T
         point = (start + nearest.share_first * along + 0.5 * nearest.gap).T
         wrench = np.hstack([normal, np.cross(point, normal)])
-        twists = world.axes(self._kinematics)[rows][:, self._robot.moved]  # (K, n, 6)
+        twists = world.columns()[rows][:, self._robot.moved]  # (K, n, 6)
         return self._sign[cols] * (twists @ wrench[..., None])[..., 0]
 
     def _nearest_at(
-        self, world: "_World", rows: Indices, cols: Indices
+        self, world: WorldSegments, rows: Indices, cols: Indices
     ) -> tuple[Nearest, Array, Array, Array]:
         first, second = self._first[cols], self._second[cols]
         start, along = world.start[:, first, rows], world.along[:, first, rows]
         along_second = world.along[:, second, rows]
         nearest = nearest_points(start, along, world.start[:, second, rows], along_second)
         return nearest, start, along, along_second
-
-    def _world(self, q: Array | States) -> "_World":
-        if isinstance(q, States):
-            if self._last is None or self._last[0] is not q.q:
-                world = _World(*q.placements, self._joints, self._start, self._along)
-                world.share_axes(q)
-                self._last = (q.q, world)
-            return self._last[1]
-        q = np.asarray(q, dtype=float).reshape(-1, self._robot.n)
-        if self._last is not None and np.array_equal(self._last[0], q):
-            return self._last[1]
-        rotations, translations = self._kinematics.placements(q)
-        world = _World(rotations, translations, self._joints, self._start, self._along)
-        self._last = (q.copy(), world)
-        return world
-
-
-class _World:
-    """Segments of all capsules in the world, (3, C, T), and the placements they came from."""
-
-    def __init__(
-        self, rotations: Array, translations: Array, joints: Indices, start: Array, along: Array
-    ) -> None:
-        self._placements = (rotations, translations)
-        self._axes: Array | None = None
-        self._states: States | None = None
-        count = len(rotations)
-        self.start = np.empty((3, len(joints), count))
-        self.along = np.empty((3, len(joints), count))
-        still = joints == 0
-        self.start[:, still] = start[still].T[:, :, None]
-        self.along[:, still] = along[still].T[:, :, None]
-        moving = ~still
-        turn = rotations.swapaxes(0, 1)[joints[moving] - 1]  # (C, T, 3, 3)
-        shift = translations.swapaxes(0, 1)[joints[moving] - 1]
-        local = np.stack([start[moving], along[moving]], axis=-1)[:, None]
-        both = turn @ local  # (C, T, 3, 2)
-        self.start[:, moving] = np.moveaxis(both[..., 0] + shift, -1, 0)
-        self.along[:, moving] = np.moveaxis(both[..., 1], -1, 0)
-
-    def share_axes(self, states: States) -> None:
-        """Take the Jacobian columns from `states`, which computes them once for all."""
-        self._states = states
-
-    def axes(self, kinematics: BatchKinematics) -> Array:
-        """Jacobian columns (T, nv, 6) in the world."""
-        if self._states is not None:
-            return self._states.columns
-        if self._axes is None:
-            self._axes = kinematics.axes(*self._placements)
-        return self._axes
 
 
 def _length(gap: Array) -> Array:

@@ -43,10 +43,18 @@ class Regressor:
 
 
 def standard_parameters(robot: Robot) -> Array:
-    """φ (10·n_bodies,) of the URDF's inertias."""
+    """φ (10·n_bodies,) of the URDF's inertias and the payload's."""
     return np.concatenate(
         [robot.model.inertias[body].toDynamicParameters() for body in range(1, robot.model.njoints)]
     )
+
+
+def payload_parameters(robot: Robot) -> Array:
+    """The part of φ (10·n_bodies,) that is the payload's; zero without one."""
+    phi = np.zeros((robot.n_bodies + 1, PARAMETERS_PER_BODY))
+    if robot.payload is not None:
+        phi[robot.payload.capsule.joint] = robot.payload.phi
+    return phi[1:].ravel()
 
 
 def standard_parameter_names(robot: Robot) -> tuple[str, ...]:

@@ -70,7 +70,7 @@ def cross(a: Array, b: Array) -> Array:
     return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
 
 
-def _motion_cross(a: Array, b: Array) -> Array:
+def motion_cross(a: Array, b: Array) -> Array:
     """Spatial a × b of motions [linear; angular]."""
     linear = cross(a[..., 3:], b[..., :3]) + cross(a[..., :3], b[..., 3:])
     return np.concatenate([linear, cross(a[..., 3:], b[..., 3:])], axis=-1)
@@ -141,7 +141,7 @@ class SpatialAdjoint:
         by_velocity, by_acceleration = subtree @ by_velocity, subtree @ by_acceleration
         column, rate = motion.columns[:, moved], motion.column_rates[:, moved]
         body = self._dof_body[moved]
-        second_rate = _motion_cross(motion.acceleration[:, body], column) + _motion_cross(
+        second_rate = motion_cross(motion.acceleration[:, body], column) + motion_cross(
             motion.velocity[:, body], rate
         )
         carried = self._carried_forces(motion, velocity, acceleration, by_body)
@@ -157,7 +157,7 @@ class SpatialAdjoint:
         moving = self._carried[:, robot.moved]
         speeds = columns[:, robot.moved] * v[..., None]
         velocity = moving @ speeds
-        rates = _motion_cross(velocity[:, self._dof_body], columns)
+        rates = motion_cross(velocity[:, self._dof_body], columns)
         accelerations = columns[:, robot.moved] * a[..., None]
         accelerations += rates[:, robot.moved] * v[..., None]
         acceleration = moving @ accelerations + self._gravity
@@ -181,7 +181,7 @@ class SpatialAdjoint:
     ) -> Array:
         """Σ_{i < l} S_i ×* Σ_{j ≥ l} f_j(Z_ij) for the moved joints l: (T, n, 6)."""
         robot = self.robot
-        forces = _body_regressors(velocity, acceleration) @ by_body.transpose(0, 1, 3, 2)
+        forces = body_regressors(velocity, acceleration) @ by_body.transpose(0, 1, 3, 2)
         linear = motion.rotations @ forces[:, :, :3]
         angular = motion.rotations @ forces[:, :, 3:]
         moments = cross(motion.translations[:, :, None, :], linear.swapaxes(2, 3))
@@ -217,7 +217,7 @@ def _force_to_world(motion: BodyMotion, force: Array) -> Array:
     return np.concatenate([linear, angular + cross(motion.translations, linear)], axis=-1)
 
 
-def _body_regressors(velocity: Array, acceleration: Array) -> Array:
+def body_regressors(velocity: Array, acceleration: Array) -> Array:
     """Y_j (T, B, 6, 10) from local velocity and [point acceleration; angular acceleration]."""
     spin, point, turn = velocity[..., 3:], acceleration[..., :3], acceleration[..., 3:]
     y = np.zeros((*spin.shape[:2], 6, 10))

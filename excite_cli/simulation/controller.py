@@ -18,7 +18,7 @@ from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.rigid_body import RigidBody
 from excite_cli.simulation.build import Build, mass_matrices, sudden_inertias
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.motion import Planned
 from excite_cli.simulation.mujoco_model import Plant
 
 _MASS_EVERY = 10  # control steps
@@ -53,7 +53,7 @@ class Gains:
     every: int
 
 
-def reference_of(robot: Robot, motion: PlannedMotion, t: Array) -> Reference:
+def reference_of(robot: Robot, motion: Planned, t: Array) -> Reference:
     """Reference and feed-forward at the instants `t` (N,)."""
     q, v, a = motion.states(t)
     return Reference(t, q, v, a, InverseDynamics(robot).torques(q, v, a))

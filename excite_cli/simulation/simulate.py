@@ -21,7 +21,7 @@ from excite_cli.simulation.controller import (
 from excite_cli.simulation.declared import sized
 from excite_cli.simulation.engine import silent_engine
 from excite_cli.simulation.mechanisms import assemble
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.motion import Planned
 from excite_cli.simulation.planted import Planted
 from excite_cli.simulation.play import Played, play
 from excite_cli.simulation.record import record
@@ -55,7 +55,7 @@ class Simulation:
     tracking: dict[str, Array]
 
 
-def run_names(motions: Sequence[PlannedMotion], repeat: int) -> tuple[tuple[str, ...], ...]:
+def run_names(motions: Sequence[Planned], repeat: int) -> tuple[tuple[str, ...], ...]:
     """Names of the takes of each motion."""
     if repeat == 1:
         return tuple((motion.name,) for motion in motions)
@@ -64,7 +64,7 @@ def run_names(motions: Sequence[PlannedMotion], repeat: int) -> tuple[tuple[str,
 
 def simulate(
     robot: Robot,
-    motions: Sequence[PlannedMotion],
+    motions: Sequence[Planned],
     settings: SimulationSettings = SimulationSettings(),
     effects: Sequence[Planted] = (),
     declared: Sequence[Effect] = (),
@@ -100,7 +100,7 @@ def simulate(
 def _takes(
     robot: Robot,
     phi: Array,
-    motion: PlannedMotion,
+    motion: Planned,
     names: Sequence[str],
     settings: SimulationSettings,
     planted: Sequence[Planted],
@@ -109,7 +109,7 @@ def _takes(
 
     Takes with the same effects differ in what is recorded, not in what happens.
     """
-    duration = settings.periods * motion.trajectory.duration
+    duration = settings.periods * motion.duration
     end = duration + 2.0 / settings.rate
     t = control_instants(-settings.lead_in, end, settings.control_rate)
     reference = reference_of(robot, motion, t)
@@ -125,7 +125,7 @@ def _takes(
             followed = compensated(build, reference, settings.compensation)
             played[active] = play(build, plant, followed, gains)
         # Noise of its own for every run and motion, in this file and in others of the same robot.
-        numbers = [settings.seed, 2, _number(name.encode()), _number(motion.coefficients.tobytes())]
+        numbers = [settings.seed, 2, _number(name.encode()), _number(motion.number)]
         rng = np.random.default_rng(numbers)
         run = record(build, played[active], duration, settings, rng)
         run = replace(run, extra={"q_ref": motion.states(run.t)[0]})

@@ -49,6 +49,8 @@ _RECORDS: dict[str, Any] = {
     "processing": dict[str, Any],
     "versions": dict[str, str],
 }
+# Records that files of earlier versions lack; they are then None.
+_LATER: dict[str, Any] = {"noise_floor": dict[str, float] | None}
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
     "rivals": tuple[EffectRecord, ...],
@@ -94,7 +96,7 @@ def _write(path: Path, diagnosis: Diagnosis) -> None:
                 **{name: getattr(diagnosis, name) for name in _ATTRIBUTES},
             }
         )
-        for name in _RECORDS:
+        for name in (*_RECORDS, *_LATER):
             file[f"records/{name}"] = _text(getattr(diagnosis, name))
         for name in _ARRAYS:
             file[name] = np.asarray(getattr(diagnosis, name), dtype=float)
@@ -110,6 +112,9 @@ def _read(file: Any) -> Diagnosis:
     fields: dict[str, Any] = {name: str(attributes[name]) for name in _ATTRIBUTES}
     fields.update({name: np.asarray(file[name], dtype=float) for name in _ARRAYS})
     fields.update({name: _record(file, f"records/{name}", _RECORDS[name]) for name in _RECORDS})
+    for name, kind in _LATER.items():
+        stored = f"records/{name}" in file
+        fields[name] = _record(file, f"records/{name}", kind) if stored else None
     group = file["information"]
     information = Information(
         factor=_finite(group["factor"]),

@@ -42,6 +42,7 @@ class StoredFit:
     training_error: Errors
     findings: tuple[Finding, ...]
     sources: tuple[str, ...]
+    noise_floor: dict[str, float] | None = None
 
 
 def write_fit(
@@ -73,6 +74,7 @@ def write_fit(
         "error": json.dumps(found.error.as_data()),
         "training_error": json.dumps(found.training_error.as_data()),
         "processing": json.dumps(found.processing.as_data()),
+        "noise_floor": json.dumps(found.noise_floor),
         "closed_loop_bias": found.hausman.sentence(),
         "findings": json.dumps([asdict(finding) for finding in found.findings]),
         "units": "rad, s, N·m, kg, m",
@@ -132,6 +134,17 @@ def read_fit(path: Path) -> StoredFit:
         return _read(file)
 
 
+def is_fit(path: Path) -> bool:
+    """Whether `path` is a file that `write_fit` wrote."""
+    if not (path.is_file() and h5py.is_hdf5(path)):
+        return False
+    try:
+        with h5py.File(path, "r") as file:
+            return str(file.attrs.get("kind", "")) == KIND
+    except OSError:  # damaged: whoever reads it says so
+        return False
+
+
 def _read(file: Any) -> StoredFit:
     attributes = file.attrs
     return StoredFit(
@@ -147,7 +160,13 @@ def _read(file: Any) -> StoredFit:
             for item in json.loads(attributes["findings"])
         ),
         sources=tuple(str(name) for name in attributes["sources"]),
+        noise_floor=_floor(attributes.get("noise_floor", "null")),
     )
+
+
+def _floor(text: str) -> dict[str, float] | None:
+    data = json.loads(text)
+    return None if data is None else {str(name): float(value) for name, value in data.items()}
 
 
 def _errors(text: str) -> Errors:

@@ -23,6 +23,8 @@ from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 
+Matrix = NDArray[np.float64]
+
 SCHEMA = 1
 OWN = OwnFile(
     "a result",
@@ -107,6 +109,7 @@ def _write_motion(group: Any, motion: Motion, problem: Problem) -> None:
             "seconds": motion.seconds,
             "iterations": motion.iterations,
             "evaluations": motion.evaluations,
+            "certified": json.dumps(motion.certified),
             "margins": json.dumps(
                 {
                     name: asdict(worst) for name, worst in motion.margins.items()
@@ -126,6 +129,26 @@ def read_result(path: Path) -> Result:
     """
     with opened(path, OWN) as file:
         return _read(file, path)
+
+
+def read_samples(path: Path) -> dict[int, tuple[Matrix, Matrix, Matrix, Matrix]]:
+    """t (T,), q, v, a (T, n) of every motion as they stand in the file.
+
+    Raises
+    ------
+    FileError
+        As `read_result`.
+    """
+    with opened(path, OWN) as file:
+        return {
+            int(index): (
+                np.asarray(group["t"], dtype=float),
+                _finite_matrix(group["q"]),
+                _finite_matrix(group["v"]),
+                _finite_matrix(group["a"]),
+            )
+            for index, group in file["motions"].items()
+        }
 
 
 def is_result(path: Path) -> bool:
@@ -213,4 +236,5 @@ def _read_motion(group: Any, index: int) -> Motion:
         iterations=int(attributes["iterations"]),
         evaluations=int(attributes["evaluations"]),
         margins={name: Worst(**worst) for name, worst in margins.items()},
+        certified=json.loads(attributes.get("certified", "{}")),
     )

@@ -52,9 +52,42 @@ class Trajectory(ABC):
     def basis(self, times: Array) -> Basis:
         """Evaluate the basis at `times` (T,) [s]."""
 
+    def states(self, times: Array, coefficients: Array) -> tuple[Array, Array, Array]:
+        """q, v, a (T, n) at `times` (T,) [s]; families of many coefficients need no basis here."""
+        return self.basis(times).states(coefficients)
+
+    def slowed(self, factor: float) -> "Trajectory":
+        """The same path at `factor` of its pace: q(factor·t), with the same coefficients."""
+        from excite_cli.trajectory.slowed import Slowed  # it is a trajectory itself
+
+        return Slowed(self, factor)
+
     @abstractmethod
     def constant(self, q: Array) -> Array:
         """Coefficients (K, n) of standing still at `q` (n,)."""
+
+    @property
+    @abstractmethod
+    def smooth_orders(self) -> int:
+        """Time derivatives that describe a piece: the degree of a polynomial, else a few."""
+
+    @property
+    def breaks(self) -> Array:
+        """Instants (P + 1,) [s] between which the motion is one smooth piece."""
+        return np.array([0.0, self.duration])
+
+    @abstractmethod
+    def derivative(self, times: Array, order: int) -> Array:
+        """Time derivative (T, K) of the given order of the basis at `times`."""
+
+    def derivatives(self, times: Array, coefficients: Array) -> Array:
+        """q and its time derivatives up to `smooth_orders` at `times` (D + 1, T, n)."""
+        orders = range(self.smooth_orders + 1)
+        return np.array([self.derivative(times, order) @ coefficients for order in orders])
+
+    def beyond(self, coefficients: Array) -> Array:
+        """Bound (n,) on the first derivative that `derivatives` leaves out, at every instant."""
+        return np.zeros(coefficients.shape[1])
 
     @abstractmethod
     def sampling_factor(self, samples: int, step: float) -> float | None:

@@ -1,6 +1,6 @@
 """Clamped B-splines with uniform inner knots: q(t) = Σ_i c_i N_i(t), c_i the control points."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,18 +24,37 @@ class BSplineTrajectory(Trajectory):
         return self.control_points
 
     @cached_property
-    def _splines(self) -> tuple[BSpline, BSpline, BSpline]:
+    def _splines(self) -> tuple[BSpline, ...]:
+        """The basis splines and all their derivatives."""
         inner = np.linspace(0.0, self.duration, self.control_points - self.degree + 1)
         knots = np.concatenate([np.zeros(self.degree), inner, np.full(self.degree, self.duration)])
         spline = BSpline(knots, np.eye(self.control_points), self.degree)
-        return spline, spline.derivative(1), spline.derivative(2)
+        return (spline, *(spline.derivative(order) for order in range(1, self.degree + 1)))
+
+    @property
+    def smooth_orders(self) -> int:
+        """The degree: pieces between knots are polynomials."""
+        return self.degree
+
+    @property
+    def breaks(self) -> Array:
+        """The knots."""
+        return np.linspace(0.0, self.duration, self.control_points - self.degree + 1)
+
+    def derivative(self, times: Array, order: int) -> Array:
+        """Basis splines differentiated; instants beyond the end are evaluated at the end."""
+        return np.asarray(self._splines[order](np.clip(times, 0.0, self.duration)))
 
     def basis(self, times: Array) -> Basis:
         """Basis splines; instants beyond the end are evaluated at the end."""
         times = np.asarray(times, dtype=float)
         inside = np.clip(times, 0.0, self.duration)
-        position, velocity, acceleration = (spline(inside) for spline in self._splines)
+        position, velocity, acceleration = (spline(inside) for spline in self._splines[:3])
         return Basis(times, position, velocity, acceleration)
+
+    def slowed(self, factor: float) -> "BSplineTrajectory":
+        """A longer duration."""
+        return replace(self, duration=self.duration / factor)
 
     def constant(self, q: Array) -> Array:
         """All control points equal (the splines sum to one)."""

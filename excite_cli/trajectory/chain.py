@@ -41,5 +41,5 @@ class Chain:
         for index in np.unique(at).tolist():
             segment, inside = self.segments[index], at == index
             local = times[inside] - self.starts[index]
-            found[:, inside] = segment.trajectory.basis(local).states(segment.coefficients)
+            found[:, inside] = segment.trajectory.states(local, segment.coefficients)
         return found[0], found[1], found[2]

@@ -1,6 +1,6 @@
 """Fourier series (Eq. 50): q(t) = Σ_k a_k sin kωt + b_k cos kωt + q_0, period 2π/ω."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,29 @@ class FourierTrajectory(Trajectory):
             velocity=np.hstack([cosine * rates, -sine * rates, zero]),
             acceleration=np.hstack([-sine * rates**2, -cosine * rates**2, zero]),
         )
+
+    @property
+    def smooth_orders(self) -> int:
+        """Five: what is beyond is negligible over a few milliseconds, and bounded."""
+        return 5
+
+    def derivative(self, times: Array, order: int) -> Array:
+        """(kω)^order sin(kωt + order π/2), and the same of the cosine."""
+        rates = self.base_frequency * np.arange(1, self.harmonics + 1)
+        angle = np.outer(times, rates) + order * np.pi / 2
+        last = np.full((len(times), 1), float(order == 0))
+        return np.hstack([np.sin(angle) * rates**order, np.cos(angle) * rates**order, last])
+
+    def beyond(self, coefficients: Array) -> Array:
+        """Σ_k (kω)⁶ √(a_k² + b_k²)."""
+        order = self.smooth_orders + 1
+        rates = self.base_frequency * np.arange(1, self.harmonics + 1)
+        sines, cosines = coefficients[: self.harmonics], coefficients[self.harmonics : -1]
+        return np.asarray(rates**order @ np.hypot(sines, cosines))
+
+    def slowed(self, factor: float) -> "FourierTrajectory":
+        """A lower base frequency."""
+        return replace(self, base_frequency=self.base_frequency * factor)
 
     def constant(self, q: Array) -> Array:
         """Only q_0 differs from zero."""

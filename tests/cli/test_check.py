@@ -36,17 +36,19 @@ def test_stored_motions_keep_every_limit(checked: Any) -> None:
         assert set(motion["margins"]) == set(motion["certified"])
         assert {"joint_position", "joint_torque", "self_collision"} <= set(motion["margins"])
         assert all(margin >= 0 for margin in motion["margins"].values())
-        assert motion["certified"]["joint_position"] is True
-        assert motion["certified"]["self_collision"] is False
+        assert all(motion["certified"].values())
+        assert {verdict["state"] for verdict in motion["verdicts"].values()} == {"proved"}
+        assert motion["samples_differ"]["share"] < 1e-9
+        assert motion["meshes"]["pairs"] > 0
 
 
 def test_margins_are_those_stored(checked: Any, two_motions: Run) -> None:
     """The optimiser's own judgement, repeated from the file alone."""
     stored = json.loads(two_motions.process.stdout)["motions"]
     for told, motion in zip(checked["motions"], stored, strict=True):
-        assert set(told["margins"]) == set(motion["margins"])
-        for name, margin in told["margins"].items():
-            assert margin == pytest.approx(motion["margins"][name]["margin"], abs=1e-9)
+        assert set(told["margins"]) - {"mesh_collision"} == set(motion["margins"])
+        for name, stored_margin in motion["margins"].items():
+            assert told["margins"][name] == pytest.approx(stored_margin["margin"], abs=1e-9)
 
 
 def test_a_position_limit_broken_by_hand_is_found(excite: Program, two_motions: Run) -> None:
@@ -72,6 +74,110 @@ def test_a_position_limit_broken_by_hand_is_found(excite: Program, two_motions: 
     q = np.sin(angles) @ c[:harmonics] + np.cos(angles) @ c[harmonics:-1] + c[-1]
     assert second["margins"]["joint_position"] == pytest.approx(2.6 - q.max(), abs=1e-3)
     assert second["margins"]["joint_velocity"] >= 0
+
+
+def test_two_milliseconds_between_samples_are_found(excite: Program, two_motions: Run) -> None:
+    """The elbow swings a little more about its mean, until its speed is too high for 2 ms."""
+    rates = 2 * np.pi / 6.0 * np.arange(1, 5)
+    fine = np.arange(0.0, 6.0, 1e-4)
+    angles = np.outer(fine, rates)
+
+    def speed(c: np.ndarray) -> np.ndarray:
+        return (np.cos(angles) * rates) @ c[:4] - (np.sin(angles) * rates) @ c[4:8]
+
+    def swing(coefficients: np.ndarray) -> None:
+        elbow = coefficients[:8, 2].copy()
+        low, high = 0.5, 4.0
+        for _ in range(60):
+            share = (low + high) / 2
+            lasting = (np.abs(speed(share * elbow)) > 3.0).sum() * 1e-4
+            low, high = (share, high) if lasting < 0.002 else (low, share)
+        coefficients[:8, 2] = share * elbow
+        assert 0.001 < (np.abs(speed(share * elbow)) > 3.0).sum() * 1e-4 < 0.003
+
+    path = altered(two_motions, excite.folder, swing)
+    run = excite("check", SMOKE, path, "--rate", "20", "--no-meshes", "--json")
+    assert run.returncode == 1
+    second = json.loads(run.stdout)["motions"][1]
+    assert second["verdicts"]["joint_velocity"]["state"] == "broken"
+    assert second["certified"]["joint_velocity"] is False
+    assert -0.1 < second["margins"]["joint_velocity"] < 0
+    assert second["worst"]["joint_velocity"]["where"].startswith("elbow")
+
+
+def test_samples_that_someone_changed_are_found(excite: Program, two_motions: Run) -> None:
+    path = excite.folder / "samples.h5"
+    path.write_bytes(two_motions.path.read_bytes())
+    with h5py.File(path, "a") as file:
+        file["motions/1/q"][7, 1] += 1e-3
+        when = file["motions/1/t"][7]
+    run = excite("check", SMOKE, path, "--no-meshes", "--json")
+    assert run.returncode == 1
+    first, second = json.loads(run.stdout)["motions"]
+    assert first["violations"] == 1
+    assert first["samples_differ"]["time"] == pytest.approx(when)
+    assert second["violations"] == 0
+    told = excite("check", SMOKE, path, "--no-meshes")
+    assert "differ from its coefficients" in told.stdout
+
+
+def test_meshes_that_touch_are_found(excite: Program, two_motions: Run) -> None:
+    """The forearm is folded back into the upper arm, while capsules are not asked."""
+
+    def fold(coefficients: np.ndarray) -> None:
+        coefficients[:-1] *= 0.02
+        coefficients[-1, 1:3] = [0.0, 2.5]
+        coefficients[-1, 4] = 0.12
+
+    path = altered(two_motions, excite.folder, fold)
+    run = excite("check", SMOKE, path, "--json")
+    assert run.returncode == 1
+    second = json.loads(run.stdout)["motions"][1]
+    assert second["verdicts"]["mesh_collision"]["state"] == "broken"
+    touching = [pair for pair in second["meshes"]["near"] if pair["touching"]]
+    assert touching
+    assert second["margins"]["mesh_collision"] <= 0
+
+
+def test_random_instants_are_counted(excite: Program, two_motions: Run) -> None:
+    answer = excite.answer(
+        "check", SMOKE, two_motions.path, "--rate", "1", "--random", "3000", "--no-meshes"
+    )
+    alone = excite.answer("check", SMOKE, two_motions.path, "--rate", "1", "--no-meshes")
+    assert answer["random"] == 3000
+    for one, other in zip(answer["motions"], alone["motions"], strict=True):
+        assert one["worst"]["joint_velocity"]["share"] < other["worst"]["joint_velocity"]["share"]
+        assert one["violations"] == 0
+
+
+def test_a_motion_in_a_controllers_format_is_judged(excite: Program, two_motions: Run) -> None:
+    export = excite("export", two_motions.path, "-f", "csv", "--motion", "1", "-o", "m.csv")
+    assert export.returncode == 0, export.stderr
+    answer = excite.answer("check", SMOKE, "m.csv", "--no-meshes")
+    (motion,) = answer["motions"]
+    assert motion["violations"] == 0
+    assert all(motion["certified"].values())
+    lines = (excite.folder / "m.csv").read_text().splitlines()
+    cells = lines[3000].split(",")
+    cells[3] = repr(float(cells[3]) + 0.2)  # one sample of the elbow jumps
+    lines[3000] = ",".join(cells)
+    (excite.folder / "jump.csv").write_text("\n".join(lines))
+    run = excite("check", SMOKE, "jump.csv", "--no-meshes", "--json")
+    assert run.returncode == 1
+    (motion,) = json.loads(run.stdout)["motions"]
+    assert motion["verdicts"]["joint_acceleration"]["state"] == "broken"
+
+
+def test_a_slowed_motion_has_room(excite: Program, two_motions: Run) -> None:
+    answer = excite.answer("check", SMOKE, two_motions.path, "--slow", "0.3", "--no-meshes")
+    for motion in answer["motions"]:
+        assert motion["violations"] == 0
+        worst = motion["worst"]["joint_velocity"]
+        assert worst["share"] >= 0.7 - 1e-9
+    assert "of its pace" in excite("check", SMOKE, two_motions.path, "--slow", "0.3").stderr
+    bad = excite("check", SMOKE, two_motions.path, "--slow", "1.5")
+    assert bad.returncode == 2
+    assert "--slow 1.5" in bad.stderr
 
 
 def test_more_instants_find_no_larger_margin(

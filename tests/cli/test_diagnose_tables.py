@@ -34,12 +34,33 @@ def test_an_approximation_is_no_name_for_scripts(doubted: Diagnosis) -> None:
 
 
 def test_an_approximation_has_a_table_of_its_own(doubted: Diagnosis) -> None:
-    robot = build_robot(smoke_spec().robot, CONFIG.parent)
-    console = Console(width=200, record=True, file=StringIO())
-    for part in tables_of(doubted, robot, NEXT, verbose=False):
-        console.print(part)
-    text = console.export_text()
+    text = printed(doubted)
     assert "Approximations: they lower the error, but something else is there" in text
     assert REASON in text
     assert "What the declared model lacks" not in text
     assert "0 effects, 1 approximation" in text
+
+
+def printed(found: Diagnosis) -> str:
+    robot = build_robot(smoke_spec().robot, CONFIG.parent)
+    console = Console(width=200, record=True, file=StringIO())
+    for part in tables_of(found, robot, NEXT, verbose=False):
+        console.print(part)
+    return console.export_text()
+
+
+def test_the_noise_floor_stands_beside_the_errors(doubted: Diagnosis) -> None:
+    """All joints are left with 1 N·m; repeated periods show 0.8 N·m, at the elbow 0.25 N·m."""
+    floor = {name: 0.25 if name == "elbow" else 0.8 for name in doubted.joint_names[:-1]}
+    found = replace(doubted, noise_floor=floor)
+    text = printed(found)
+    assert "noise floor" in text
+    assert "1.2 times the noise that repeated periods show (elbow 4.0 times)" in text
+    unknown = next(line for line in text.splitlines() if f" {doubted.joint_names[-1]} " in line)
+    assert " - " in unknown
+    assert answer_of(found, NEXT)["noise_floor"] == floor
+
+
+def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -> None:
+    assert "noise" not in printed(doubted)
+    assert answer_of(doubted, NEXT)["noise_floor"] is None

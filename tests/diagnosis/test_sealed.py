@@ -167,6 +167,7 @@ def test_sealed_blocks_of_a_single_run_are_used_for_the_errors_only(
     changed = replace(dataset, runs=(disturbed(run, sealed),))
     one, other = (diagnose(robot, base, data, spec) for data in (whole, changed))
     assert one.effects
+    assert one.noise_floor  # two periods, seen past the sealed blocks
     assert set(differences(one, other)) == FREE
     assert other.after.mean_relative > 1.5 * one.after.mean_relative
 

@@ -6,7 +6,7 @@ import pytest
 
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError, RobotError
-from excite_cli.excitation.admissible import proved_constraints
+from excite_cli.excitation.admissible import verdicts
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.run import continue_run, new_result
 
@@ -99,10 +99,15 @@ def test_a_trajectory_too_poor_to_show_everything(tmp_path: Path) -> None:
         _solve(poor)
 
 
-def test_a_bound_on_one_side_is_never_called_proved(tmp_path: Path) -> None:
-    """Samples bound a series between two limits; from one side they prove nothing."""
+def test_a_bound_on_one_side_is_proved_too(tmp_path: Path) -> None:
+    """Standing at the posture keeps it; standing beyond it does not."""
     limit = 'lower="0.1" upper="1e10" velocity="2" effort="9"'
     problem = _problem(tmp_path, [_turns("0 1 0", limit), _turns("1 0 0")])
-    proved = proved_constraints(problem, problem.still(problem.robot.posture))
-    assert not proved["joint_position"]
-    assert proved["joint_velocity"]
+    posture = problem.robot.posture
+    assert all(verdict.proved for verdict in verdicts(problem, problem.still(posture)))
+    bound = next(index for index, lower in enumerate(problem.robot.limits.lower) if lower == 0.1)
+    posture = posture.copy()
+    posture[bound] = 0.09
+    states = {verdict.name: verdict.state for verdict in verdicts(problem, problem.still(posture))}
+    assert states["joint_position"] == "broken"
+    assert states["joint_velocity"] == "proved"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.load import load_spec
-from excite_cli.excitation.admissible import proved_constraints, worst_margins
+from excite_cli.excitation.admissible import verdicts, worst_margins
 from excite_cli.excitation.gradient_check import check_gradient
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.random_baseline import RandomBaseline, random_baseline
@@ -61,10 +61,10 @@ def test_every_motion_is_admissible_on_a_grid_of_its_own(problem: Problem, resul
     for motion in result.motions:
         margins = worst_margins(problem, motion.coefficients, 1731.0)
         assert all(worst.violations == 0 for worst in margins.values())
-        proved = proved_constraints(problem, motion.coefficients)
-        joints = [name for name in proved if name.startswith("joint_")]
-        assert joints
-        assert all(proved[name] for name in joints)
+        found = verdicts(problem, motion.coefficients)
+        assert len(found) == len(problem.constraints)
+        assert all(verdict.proved for verdict in found)
+        assert motion.certified == {verdict.name: True for verdict in found}
 
 
 def test_a_later_motion_knows_the_earlier_ones(problem: Problem, result: Result) -> None:

@@ -1,6 +1,6 @@
 """Diagnoses go to a file and come back whole; other files are refused with one message."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import h5py
@@ -49,6 +49,17 @@ def test_everything_comes_back(diagnosis: Diagnosis, path: Path) -> None:
     found = read_diagnosis(path)
     for field in fields(Diagnosis):
         assert same(getattr(diagnosis, field.name), getattr(found, field.name)), field.name
+
+
+def test_the_noise_floor_comes_back_and_older_files_have_none(
+    diagnosis: Diagnosis, path: Path, tmp_path: Path
+) -> None:
+    floor = dict.fromkeys(diagnosis.joint_names, 0.25)
+    write_diagnosis(tmp_path / "floor.h5", replace(diagnosis, noise_floor=floor))
+    assert read_diagnosis(tmp_path / "floor.h5").noise_floor == floor
+    with h5py.File(path, "a") as file:
+        del file["records/noise_floor"]
+    assert read_diagnosis(path).noise_floor is None
 
 
 def test_files_are_told_apart(stored: Stored, path: Path, tmp_path: Path) -> None:

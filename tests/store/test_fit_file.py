@@ -1,4 +1,4 @@
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import h5py
@@ -50,6 +50,17 @@ def test_what_is_written_is_read(found: Identification, tmp_path: Path) -> None:
         "/somewhere",
     )
     assert (stored.fingerprint, stored.sources) == ("abc", ("a.h5",))
+
+
+def test_the_noise_floor_comes_back_and_older_files_have_none(
+    found: Identification, tmp_path: Path
+) -> None:
+    path = tmp_path / "fit.h5"
+    write_fit(path, replace(found, noise_floor={"joint_1": 0.25}), PROBLEM, "/somewhere", "abc")
+    assert read_fit(path).noise_floor == {"joint_1": 0.25}
+    with h5py.File(path, "a") as file:
+        del file.attrs["noise_floor"]
+    assert read_fit(path).noise_floor is None
 
 
 def test_foreign_and_damaged_files_give_one_message(found: Identification, tmp_path: Path) -> None:

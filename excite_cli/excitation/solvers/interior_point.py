@@ -176,7 +176,7 @@ class _Run:
     def longest_step(self, point: _Point, direction: Array) -> float:
         """Share of the step that keeps every joint bound, at most 1."""
         task, step = self.task, 1.0
-        change = task.problem.constraint_basis.states(task.coefficients(direction))
+        change = task.problem.constraint_basis.states(task.change(direction))
         for constraint, value in zip(task.problem.constraints, point.values, strict=True):
             if not isinstance(constraint, JointBound):
                 continue

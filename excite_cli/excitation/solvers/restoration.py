@@ -36,6 +36,35 @@ def least_distance(rows: Array, bounds: Array) -> Array | None:
     return np.asarray(-residual[:-1] / residual[-1])
 
 
+def corrected(task: MotionTask, x: Array, aim: float = _AIM, enough: float = 0.0) -> Array | None:
+    """x with the least corrections, in the metric of the task, that mend its linearised residuals.
+
+    `aim` is the residual wanted of the rows that are mended. None where some stay below `enough`;
+    rows that no change of x can mend (given ends) need only be positive.
+    """
+    factor = np.linalg.cholesky(
+        task.metric + 1e-9 * np.trace(task.metric) / task.size * np.eye(task.size)
+    )
+    near_below = max(_NEAR, 2.0 * aim)
+    given = np.isclose(np.abs(task.residuals.grid.orders[0]).max(axis=1), 0.0, atol=1e-9)
+    chosen: list[Mask] | None = None
+    for _ in range(_RESTORATIONS):
+        states = task.states(x)
+        values = task.values(states)
+        if lowest(values) > 0 and lowest([value[~given] for value in values]) > enough:
+            return x
+        near = [(value < near_below) & dips(value) & ~given[:, None] for value in values]
+        chosen = [a | b for a, b in zip(chosen or near, near, strict=True)]
+        rows = Linearised(task, states, values, chosen).dense(chosen)
+        scaled = solve_triangular(factor, rows.T, lower=True).T
+        correction = least_distance(scaled, aim - gathered(values, chosen))
+        if correction is None:
+            return None
+        x = x + solve_triangular(factor, correction, lower=True, trans="T")
+        aim *= 1.5
+    return None
+
+
 class BestAdmissible:
     """The best strictly admissible point seen, by the criterion asked for."""
 
@@ -57,7 +86,7 @@ class BestAdmissible:
 
     def offer_restored(self, x: Array) -> None:
         """Offer the admissible point that least-length corrections or a retreat make of x."""
-        candidate = self._corrected(x)
+        candidate = corrected(self.task, x)
         if candidate is None:
             candidate = self._retreated(x)
         self.task.evaluations += 1
@@ -65,28 +94,6 @@ class BestAdmissible:
         block = objective.block(self.task.coefficients(candidate))
         values = self.task.values(self.task.states(candidate))
         self.offer(candidate, values, objective.spectrum(block))
-
-    def _corrected(self, x: Array) -> Array | None:
-        """Least corrections, in the metric of the task, to the linearised residuals."""
-        task, aim = self.task, _AIM
-        eye = np.eye(task.size)
-        factor = np.linalg.cholesky(task.metric + 1e-9 * np.trace(task.metric) / task.size * eye)
-        chosen: list[Mask] | None = None
-        for _ in range(_RESTORATIONS):
-            states = task.states(x)
-            values = task.values(states)
-            if lowest(values) > 0:
-                return x
-            near = [(value < _NEAR) & dips(value) for value in values]
-            chosen = [a | b for a, b in zip(chosen or near, near, strict=True)]
-            rows = Linearised(task, states, values, chosen).dense(chosen)
-            scaled = solve_triangular(factor, rows.T, lower=True).T
-            correction = least_distance(scaled, aim - gathered(values, chosen))
-            if correction is None:
-                return None
-            x = x + solve_triangular(factor, correction, lower=True, trans="T")
-            aim *= 1.5
-        return None
 
     def _retreated(self, x: Array) -> Array:
         """A point on the way from the kept point to x, as far along as bisection proves."""

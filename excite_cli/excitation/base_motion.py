@@ -1,0 +1,173 @@
+"""The motion about which a start is drawn: standing at a clear posture, or going from end to end.
+
+Where postures are given they stay as they are. The straight motion between them is taken if it is
+admissible, then the nearest admissible one to first order. Otherwise a way round is searched, run
+through with the same profile of time, and projected onto the family of trajectories:
+
+    min over x  Σ_t |q_x(t) − way(s(t))|² + λ Σ_t |a_x(t)|² T⁴
+
+for a falling weight λ of smoothness.
+"""
+
+import numpy as np
+
+from excite_cli.constraints.base import Array
+from excite_cli.errors import NoAdmissibleMotionError
+from excite_cli.excitation.boundary import straight_motion
+from excite_cli.excitation.path_search import at_length, find_way, lengths, standing_margins
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.solvers.linearised import lowest
+from excite_cli.excitation.solvers.restoration import corrected
+from excite_cli.excitation.start import Start, blocking, clear_posture
+from excite_cli.excitation.task import MotionTask
+
+_SMOOTHNESS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 0.0)
+_WAYS = 3
+_INSTANTS_PER_FUNCTION = 12
+# Residual that corrections aim at, so that random motions have room, first much, then little.
+_AIMS = (0.05, 0.01, 1e-3)
+_SHARE_OF_AIM = 0.6
+_MENDED = 2
+_INSTANTS = 400
+
+
+def base_motion(task: MotionTask, seed: int) -> Start:
+    """A motion with room around it that starts and ends where the config wants it to.
+
+    Raises
+    ------
+    NoAdmissibleMotionError
+        A given posture breaks a constraint, or no admissible way between the postures was found.
+    """
+    boundary = task.problem.boundary
+    if not boundary.given:
+        return clear_posture(task, seed)
+    start = boundary.start if boundary.start is not None else boundary.end
+    end = boundary.end if boundary.end is not None else boundary.start
+    assert start is not None
+    assert end is not None
+    require_clear(task.problem, start, "trajectory.start")
+    require_clear(task.problem, end, "trajectory.end")
+    straight = np.zeros(task.size)
+    if _room(task, straight) > 0:
+        return Start(straight, start, True)
+    broken = _broken_in_motion(task, straight)
+    block = straight_block(task.problem, start, end)
+    if block is None:
+        found = _mended(task, straight)
+        if found is not None:
+            return Start(found, start, True)
+        raise NoAdmissibleMotionError(
+            f"No admissible motion from trajectory.start to trajectory.end: {broken} does not "
+            f"allow it within {task.problem.trajectory.duration:g} s, although every posture on "
+            "the straight way is clear. Take a longer trajectory.duration."
+        )
+    found = _way_round(task, start, end, seed, block)
+    note = (
+        f"the straight way from start to end is blocked ({block}); the search began on a way round"
+    )
+    return Start(found, start, True, note)
+
+
+def require_clear(problem: Problem, posture: Array, name: str) -> None:
+    """Raise NoAdmissibleMotionError if standing at the `posture` (n,) breaks a constraint."""
+    found = []
+    margins = standing_margins(problem, posture[None])
+    for constraint, margin in zip(problem.constraints, margins, strict=True):
+        for column in np.flatnonzero(margin[0] <= 0).tolist():
+            share = float(margin[0, column] / constraint.scale[column])
+            amount = f"{-margin[0, column]:.3g} {constraint.unit_of(column)}"
+            words = f"{constraint.name} ({constraint.labels[column]}) by {amount}"
+            found.append((share, words))
+    if not found:
+        return
+    found.sort()
+    more = f" and {len(found) - 3} more" if len(found) > 3 else ""
+    raise NoAdmissibleMotionError(
+        f"{name}: standing there breaks {'; '.join(words for _, words in found[:3])}{more}. A "
+        "posture that is given is not moved: give one that keeps all constraints, or loosen them."
+    )
+
+
+def straight_block(problem: Problem, start: Array, end: Array) -> str | None:
+    """What first stands in the straight way, and where; None if all postures on it are clear."""
+    shares = np.linspace(0.0, 1.0, _INSTANTS + 1)
+    postures = start + shares[:, None] * (end - start)
+    first, words = _INSTANTS + 1, ""
+    margins = standing_margins(problem, postures)
+    for constraint, margin in zip(problem.constraints, margins, strict=True):
+        broken = np.flatnonzero((margin < 0).any(axis=1))
+        if len(broken) and broken[0] < first:
+            first = int(broken[0])
+            inside = margin[broken] / constraint.scale
+            column = int(np.argmin(inside[0]))
+            last = shares[broken[-1]]
+            words = (
+                f"{constraint.name}, {constraint.labels[column]}, from {100 * shares[first]:.0f} % "
+                f"to {100 * last:.0f} % of the way"
+            )
+    return words or None
+
+
+def _way_round(task: MotionTask, start: Array, end: Array, seed: int, block: str) -> Array:
+    """Free variables of an admissible motion that follows a way round what is in between."""
+    for attempt in range(_WAYS):
+        search = find_way(task.problem, start, end, seed + 1000 * attempt)
+        if search.way is None:
+            words = disconnected(block, search.reached)
+            raise NoAdmissibleMotionError(f"trajectory.start, end: {words}")
+        tried = [_projected(task, search.way, weight) for weight in _SMOOTHNESS]
+        tried.sort(key=lambda x: -_room(task, x))
+        if _room(task, tried[0]) > _AIMS[0]:
+            return tried[0]
+        mended = [x for x in (_mended(task, x) for x in tried[:_MENDED]) if x is not None]
+        if mended:
+            return max(mended, key=lambda x: _room(task, x))
+    broken = _broken_in_motion(task, tried[0])
+    raise NoAdmissibleMotionError(
+        f"No admissible motion from trajectory.start to trajectory.end: the straight way is "
+        f"blocked ({block}). There is a way round, but no motion of this "
+        f"trajectory follows it closely enough; {broken} is in the way. Take a longer "
+        "trajectory.duration, or more control_points."
+    )
+
+
+def disconnected(block: str, reached: str) -> str:
+    """The message that no way was found between two postures."""
+    return (
+        "no admissible way from the start to the end was found. The straight way is blocked "
+        f"({block}), and a search for a way round did not get through: {reached}. The postures may "
+        "be disconnected. Give other postures, or loosen that constraint."
+    )
+
+
+def _projected(task: MotionTask, way: Array, weight: float) -> Array:
+    """Free variables of the motion nearest to running through `way` (m, n)."""
+    trajectory = task.problem.trajectory
+    count = _INSTANTS_PER_FUNCTION * trajectory.n_coefficients
+    basis = trajectory.basis(np.linspace(0.0, trajectory.duration, count))
+    along = lengths(task.problem, way)
+    share = basis.position @ straight_motion(trajectory, np.zeros(1), np.ones(1))
+    wanted = at_length(way, along, np.clip(share[:, 0], 0.0, 1.0) * along[-1])
+    bend = np.sqrt(weight) * trajectory.duration**2 * basis.acceleration
+    rows = np.vstack([basis.position, bend])
+    target = np.vstack([wanted, np.zeros_like(wanted)]) - rows @ task.offset
+    found = np.linalg.lstsq(rows @ task.free, target, rcond=None)[0]
+    return task.flat(np.asarray(found))
+
+
+def _room(task: MotionTask, x: Array) -> float:
+    return lowest(task.values(task.states(x)))
+
+
+def _mended(task: MotionTask, x: Array) -> Array | None:
+    """The nearest motion to first order with the most room that can be had; None if with none."""
+    for aim in _AIMS:
+        found = corrected(task, x, aim, enough=_SHARE_OF_AIM * aim)
+        if found is not None:
+            return found
+    return x if _room(task, x) > 0 else None
+
+
+def _broken_in_motion(task: MotionTask, x: Array) -> str:
+    return blocking(task, task.values(task.states(x)))

@@ -1,0 +1,200 @@
+"""The noise floor of the torque: what changes from one period of a repeated motion to the next.
+
+A model of the motion gives the same torque whenever the motion repeats. With y_k(φ) the filtered
+torque at phase φ of period k of C, the deviation from the mean over the periods has the variance
+of what does not repeat,
+
+    σ² = Σ (y_k − ȳ)² / Σ (1 − 1/C),
+
+noise of the torque, but also drift within a run, and the torque of what the controller did
+differently. Effects that repeat, declared or not, leave it as it is.
+
+Torque passes the averages that errors pass. The period is no whole number of samples: averages
+around instants between samples are interpolated from those around the four next samples; what that
+does to the gain of white noise, g = Σ w² relative to an average around a sample, is divided out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from excite_cli.identification.averages import apply, average_rows, reach
+from excite_cli.identification.exact_period import exact_period
+from excite_cli.identification.processing import Processing
+from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+
+_FEWEST = 8  # phases at which a joint must have been seen twice
+# Misalignment of this share of the floor must be told.
+_UNEVEN = 0.5
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """`rms` (n,) [N·m] (N) of what changes from period to period; NaN where too little is known.
+
+    `misalignment` (n,) [N·m]: what of it may be due to periods that begin too early or too late,
+    |dτ/dt| δt, with δt from the positions.
+    """
+
+    rms: Array
+    misalignment: Array
+
+    def named(self, joint_names: Sequence[str]) -> dict[str, float]:
+        """`rms` by joint, where it is known."""
+        pairs = zip(joint_names, self.rms, strict=True)
+        return {name: float(value) for name, value in pairs if np.isfinite(value)}
+
+    def noticed(self, joint_names: Sequence[str]) -> tuple[Finding, ...]:
+        """A note if periods that begin unevenly in time may make up much of the floor."""
+        shares = np.nan_to_num(self.misalignment / np.where(self.rms > 0, self.rms, np.inf))
+        uneven = tuple(
+            name for name, share in zip(joint_names, shares, strict=True) if share > _UNEVEN
+        )
+        if not uneven:
+            return ()
+        text = (
+            f"the noise floor of {', '.join(uneven)} may be too high: repeated periods begin early "
+            f"or late, which makes up to {min(shares.max(), 1.0):.0%} of it. Repeat the motion "
+            "without a break, on one clock."
+        )
+        return (Finding("uneven_periods", "note", text, joints=uneven),)
+
+
+@dataclass(frozen=True)
+class _Whole:
+    """A run put together from its parts: q, tau (T, n); `known` (T,), `valid` (T, n)."""
+
+    q: Array
+    tau: Array
+    known: Mask
+    valid: Mask
+    step: float
+
+
+def noise_floor(parts: Sequence[Run], processing: Processing) -> NoiseFloor | None:
+    """Floor of the torque, filtered as `processing` says, over all runs with repeated periods.
+
+    parts: runs that begin at time zero, and parts of runs, each after the one that it continues.
+
+    Squares are added over the runs. None if no run holds two whole periods.
+    """
+    sums = np.zeros((4, parts[0].tau.shape[1]))
+    for run in _put_together(parts):
+        period = exact_period(run.q, run.known)
+        if period is not None:
+            sums += _sums(run, period, processing)
+    squares, freedom, shifted, phases = sums
+    enough = phases >= _FEWEST
+    if not enough.any():
+        return None
+    rms, misalignment = (
+        np.sqrt(np.where(enough, total / np.where(enough, freedom, 1.0), np.nan))
+        for total in (squares, shifted)
+    )
+    return NoiseFloor(rms, misalignment)
+
+
+def _put_together(parts: Sequence[Run]) -> list[_Whole]:
+    """Runs with gaps where their sealed blocks are."""
+    groups: list[list[Run]] = []
+    for part in parts:
+        if part.t[0] > 0.0 and groups:
+            groups[-1].append(part)
+        else:
+            groups.append([part])
+    return [_whole(group) for group in groups]
+
+
+def _whole(group: Sequence[Run]) -> _Whole:
+    step, start = group[0].step, group[0].t[0]
+    firsts = [round(float(part.t[0] - start) / step) for part in group]
+    size = firsts[-1] + len(group[-1].t)
+    shape = (size, group[0].tau.shape[1])
+    q, tau, valid = np.zeros(shape), np.zeros(shape), np.zeros(shape, bool)
+    known = np.zeros(size, bool)
+    for first, part in zip(firsts, group, strict=True):
+        at = slice(first, first + len(part.t))
+        q[at], known[at] = part.q, True
+        valid[at] = part.usable() & np.isfinite(part.tau)
+        tau[at] = np.where(valid[at], part.tau, 0.0)
+    return _Whole(q, tau, known, valid, step)
+
+
+def _sums(run: _Whole, period: float, processing: Processing) -> Array:
+    """Σ (y_k − ȳ)², Σ g (1 − 1/C), Σ of squared misalignment, and phases seen twice: (4, n)."""
+    size, cutoff = len(run.q), processing.parallel_cutoff
+    stride = max(1, round(1.0 / (run.step * processing.rate)))
+    margin = reach(run.step, cutoff) + 2
+    count = int(max(size - 2 * margin, 0) / period) + 1
+    phases = np.arange(0.0, period, stride)
+    if count < 2 or len(phases) < _FEWEST:
+        return np.zeros((4, run.q.shape[1]))
+    instants = margin + phases + period * np.arange(count)[:, None]
+    inside = instants < size - margin
+    rows = _averages_around(instants.ravel(), size, run.step, cutoff)
+    nominal = average_rows(size, np.array([margin]), run.step, cutoff)
+    gain = _squared(rows).reshape(*inside.shape, 1) / _squared(nominal)
+
+    def seen(known: Mask) -> Mask:
+        touched = np.asarray((rows != 0).astype(float) @ (~known).astype(float))
+        return inside[:, :, None] & (touched.reshape(*inside.shape, -1) == 0)
+
+    torque, good = apply(rows, run.tau).reshape(*inside.shape, -1), seen(run.valid)
+    times = good.sum(axis=0)
+    twice = times > 1
+    good &= twice
+    mean = _mean(torque, good)
+    squares = np.square(np.where(good, torque - mean, 0.0)).sum(axis=(0, 1))
+    freedom = (good * gain * (1.0 - 1.0 / np.maximum(times, 1))).sum(axis=(0, 1))
+    position = apply(rows, run.q).reshape(*inside.shape, -1)
+    late = _late(position, seen(run.known[:, None]), stride)
+    slope = np.nan_to_num(np.gradient(mean, stride, axis=0))
+    steep = np.square(slope).sum(axis=0) / np.maximum(twice.sum(axis=0), 1)
+    return np.stack([squares, freedom, freedom * late**2 * steep, twice.sum(axis=0)])
+
+
+def _squared(rows: csr_matrix) -> Array:
+    """Σ w² of every row: the gain of white noise."""
+    return np.asarray(rows.multiply(rows).sum(axis=1))
+
+
+def _averages_around(
+    instants: Array, samples: int, step: float, cutoff: float | None
+) -> csr_matrix:
+    """Averages (M, samples) around `instants` (M,), in samples, by cubic polynomials."""
+    base = np.floor(instants).astype(int)
+    u = (instants - base)[:, None]
+    weights = np.concatenate(
+        [
+            -u * (u - 1) * (u - 2) / 6,
+            (u + 1) * (u - 1) * (u - 2) / 2,
+            -(u + 1) * u * (u - 2) / 2,
+            (u + 1) * u * (u - 1) / 6,
+        ],
+        axis=1,
+    )
+    around = average_rows(samples, (base[:, None] + np.arange(-1, 3)).ravel(), step, cutoff)
+    count = len(instants)
+    places = (np.repeat(np.arange(count), 4), np.arange(4 * count))
+    return csr_matrix(csr_matrix((weights.ravel(), places), (count, 4 * count)) @ around)
+
+
+def _mean(x: Array, good: Mask) -> Array:
+    """Over the periods (K, M, n) -> (M, n); NaN where there is none."""
+    times = good.sum(axis=0)
+    total = np.where(good, x, 0.0).sum(axis=0)
+    return np.where(times > 0, total / np.maximum(times, 1), np.nan)
+
+
+def _late(position: Array, good: Mask, stride: int) -> float:
+    """RMS time in samples by which periods (K, M, n) run ahead of their mean or behind it."""
+    good = good & (good.sum(axis=0) > 1)
+    mean = _mean(position, good)
+    speed = np.nan_to_num(np.gradient(mean, stride, axis=0)) * good
+    ahead = (np.nan_to_num(position - mean) * speed).sum(axis=(1, 2))
+    energy = np.square(speed).sum(axis=(1, 2))
+    shifts = ahead[energy > 0] / energy[energy > 0]
+    count = len(shifts)
+    return float(np.sqrt(np.square(shifts).sum() / (count - 1))) if count > 1 else 0.0

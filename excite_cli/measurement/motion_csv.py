@@ -1,0 +1,65 @@
+"""Motions as CSV: `t, q_<joint>, …[, dq_<joint>, …[, ddq_<joint>, …]]`, a row per instant."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from excite_cli.errors import FileError
+from excite_cli.measurement.csv_reader import CsvReader
+from excite_cli.measurement.csv_table import header_of, read_table
+from excite_cli.measurement.dataset import Array
+from excite_cli.measurement.motion_reader import MotionReader
+from excite_cli.measurement.timed_motion import TimedMotion
+
+CHANNELS = ("q", "dq", "ddq")
+_COLUMN = re.compile(r"(ddq|dq|q)(?:_?\[?(?P<number>\d+)\]?|_(?P<name>.+))$")
+
+
+class MotionCsv(MotionReader):
+    """Text tables."""
+
+    title = "CSV"
+    suffixes = CsvReader.suffixes
+
+    def recognises(self, path: Path, torque: str = "tau") -> bool:
+        """Tables without torques; those with torques are measured data."""
+        return super().recognises(path) and not any(
+            column.startswith(torque) for column in header_of(path)
+        )
+
+    def read(self, path: Path) -> TimedMotion:
+        """Columns are matched by name; what is none of t, q, dq and ddq is passed over."""
+        columns = read_table(path).columns
+        found: dict[str, dict[str, Array]] = {channel: {} for channel in CHANNELS}
+        numbered = True
+        for column, values in columns.items():
+            if match := _COLUMN.match(column):
+                number, name = match["number"], match["name"]
+                numbered = numbered and number is not None
+                found[match[1]][number or name] = values
+        if "t" not in columns or not found["q"]:
+            raise FileError(
+                f"{path} has no column '{'q_<joint>' if 't' in columns else 't'}'; its columns: "
+                f"{', '.join(list(columns)[:30])}. A motion has t, q_<joint>, … and, where they "
+                "are known, dq_<joint>, … and ddq_<joint>, …, in s and rad."
+            )
+        joints = tuple(found["q"])
+        matrices = [_matrix(path, channel, found[channel], joints) for channel in CHANNELS]
+        q, v, a = matrices
+        assert q is not None
+        return TimedMotion(path.name.split(".")[0], joints, columns["t"], q, v, a, numbered)
+
+
+def _matrix(
+    path: Path, channel: str, columns: dict[str, Array], joints: tuple[str, ...]
+) -> Array | None:
+    if not columns:
+        return None
+    missing = [joint for joint in joints if joint not in columns]
+    if missing:
+        raise FileError(
+            f"{path} has {channel} of {', '.join(columns)}, but not of {', '.join(missing)}. Give "
+            f"{channel} of every joint or of none."
+        )
+    return np.column_stack([columns[joint] for joint in joints])

@@ -1,0 +1,55 @@
+"""Readers of motion files, and the one way from such a file to a `TimedMotion`."""
+
+from pathlib import Path
+
+from excite_cli.errors import FileError
+from excite_cli.measurement.motion_bag import MotionBag
+from excite_cli.measurement.motion_csv import MotionCsv
+from excite_cli.measurement.motion_moveit import MotionMoveit
+from excite_cli.measurement.motion_npz import MotionNpz
+from excite_cli.measurement.motion_reader import MotionReader
+from excite_cli.measurement.motion_ros2 import MotionRos2
+from excite_cli.measurement.timed_motion import TimedMotion, arranged, checked
+
+MOTION_READERS: tuple[MotionReader, ...] = (
+    MotionCsv(),
+    MotionNpz(),
+    MotionRos2(),
+    MotionMoveit(),
+    MotionBag(),
+)
+
+
+def motion_reader_for(path: Path, torque: str = "tau") -> MotionReader | None:
+    """The reader of a motion file; None for what is none, as measured data with columns `torque`.
+
+    Raises
+    ------
+    FileError
+        There is no such file.
+    """
+    if not path.exists():
+        raise FileError(f"There is no file {path}.")
+    return next((reader for reader in MOTION_READERS if reader.recognises(path, torque)), None)
+
+
+def read_motion(path: Path, joints: tuple[str, ...]) -> tuple[TimedMotion, str]:
+    """The motion of a file with columns in the order of `joints`, and a note (or nothing).
+
+    Raises
+    ------
+    FileError
+        The file is missing, damaged, of no known format, or moves other joints.
+    MissingExtraError
+        A bag, and the library for bags is not installed.
+    """
+    return arranged(path, read_own_motion(path), joints)
+
+
+def read_own_motion(path: Path) -> TimedMotion:
+    """The motion of a file with the columns that it has; errors as `read_motion`."""
+    reader = motion_reader_for(path)
+    if reader is None:
+        known = "; ".join(f"{each.title}: {', '.join(each.suffixes)}" for each in MOTION_READERS)
+        raise FileError(f"{path} is of no format that holds motions. Read are {known}.")
+    return checked(path, reader.read(path))

@@ -1,0 +1,107 @@
+"""A motion as files hold it: positions, speeds and accelerations of named joints at instants.
+
+Units: s, rad, rad/s, rad/s² (m for prismatic joints). What comes from a file is checked before it
+is used: increasing instants, finite numbers, and columns matched to joints by name.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from excite_cli.errors import FileError, nearest
+from excite_cli.measurement.dataset import Array
+
+_CHANNELS = {"q": "position", "v": "speed", "a": "acceleration"}
+_LISTED = 12
+
+
+@dataclass(frozen=True)
+class TimedMotion:
+    """t (T,) and q, v, a (T, n), columns in the order of `joint_names`; v or a may be unknown.
+
+    `numbered`: the file has numbers in place of the joints' names.
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    t: Array
+    q: Array
+    v: Array | None = None
+    a: Array | None = None
+    numbered: bool = False
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.t[-1] - self.t[0])
+
+
+def checked(path: Path, motion: TimedMotion) -> TimedMotion:
+    """`motion` as it is, once it is sure that it can be played.
+
+    Raises
+    ------
+    FileError
+        Fewer than two instants, instants that do not increase, or a value that is no number.
+    """
+    names, t = motion.joint_names, motion.t
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise FileError(f"{path} has joint '{twice[0]}' twice. Give every joint once.")
+    if len(t) < 2 or not names:
+        raise FileError(
+            f"{path} has {len(t)} instants of {len(names)} joints; a motion needs at least two "
+            "instants of one joint."
+        )
+    if not np.isfinite(t).all():
+        row = int(np.argmin(np.isfinite(t)))
+        raise FileError(f"{path}: instant {row + 1} of {len(t)} is not a number.")
+    if not (np.diff(t) > 0).all():
+        row = int(np.argmax(np.diff(t) <= 0))
+        raise FileError(
+            f"{path}: time does not increase: {t[row + 1]:.9g} s comes after {t[row]:.9g} s "
+            f"(instants {row + 1} and {row + 2}). Sort the instants, and give each once."
+        )
+    for channel, words in _CHANNELS.items():
+        values = getattr(motion, channel)
+        if values is not None and not np.isfinite(values).all():
+            row, joint = np.argwhere(~np.isfinite(values))[0].tolist()
+            raise FileError(
+                f"{path}: the {words} of '{names[joint]}' at {t[row]:.6g} s (instant {row + 1}) "
+                "is missing or not a number."
+            )
+    return motion
+
+
+def arranged(path: Path, motion: TimedMotion, joints: tuple[str, ...]) -> tuple[TimedMotion, str]:
+    """`motion` with the columns of `joints`, in their order, and what should be said about it.
+
+    Raises
+    ------
+    FileError
+        A joint has no column.
+    """
+    names = motion.joint_names
+    note = ""
+    if motion.numbered and len(names) == len(joints):
+        pairs = zip(sorted(names, key=int), joints, strict=True)
+        led = dict(pairs)
+        names = tuple(led[name] for name in names)
+        order = ", ".join(f"{number} is {joint}" for number, joint in led.items())
+        note = f"columns carry numbers, not names; taken in the robot's order: {order}"
+    missing = [joint for joint in joints if joint not in names]
+    if missing:
+        there = ", ".join(names[:_LISTED]) + (", …" if len(names) > _LISTED else "")
+        rest = f" (nor {', '.join(missing[1:])})" if len(missing) > 1 else ""
+        raise FileError(
+            f"{path} does not move joint '{missing[0]}'{rest}.{nearest(missing[0], names)} It "
+            f"moves: {there}. Rename its columns, or leave the joint out of robot.joints."
+        )
+    others = [name for name in names if name not in joints]
+    if others:
+        note = f"joints that the robot does not move are left out: {', '.join(others[:_LISTED])}"
+    columns = [names.index(joint) for joint in joints]
+    v, a = (None if x is None else x[:, columns] for x in (motion.v, motion.a))
+    q = motion.q[:, columns]
+    return replace(motion, joint_names=joints, q=q, v=v, a=a, numbered=False), note

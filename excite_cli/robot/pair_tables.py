@@ -1,0 +1,261 @@
+"""Distances of meshes that always lie near each other, tabled over the two joints between them.
+
+The capsules of links a joint or two apart may overlap whatever the posture (a wrist's sensor and
+the forearm), so capsules cannot keep their meshes apart. But their distance depends on those
+joints only: it is computed once over a grid of both and interpolated by a cubic spline, which has
+a gradient everywhere and costs next to nothing. Where meshes touch, coal gives no depth; there the
+table goes on with minus a slope times the way in joint space to the nearest posture that is clear,
+so that the gradient leads out. Distances are cut off at `FAR`.
+"""
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RectBivariateSpline
+from scipy.ndimage import distance_transform_edt
+
+from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.capsule_cache import capsule_key
+from excite_cli.robot.collision_pairs import CollisionPairs
+from excite_cli.robot.hull_bounds import hull_bounds
+from excite_cli.robot.link_meshes import LinkMesh, Poses, link_meshes
+from excite_cli.robot.link_shapes import collision_model
+from excite_cli.robot.mesh_pairs import PairMeshes, movable_pairs
+from excite_cli.robot.model import Robot
+from excite_cli.robot.pair_distances import carried_bodies
+from excite_cli.robot.table_cache import store_arrays, stored_arrays
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+FAR = 0.02  # [m]
+_STEP, _MOST = 0.03, 97  # [rad or m] between nodes; nodes of one joint
+_BEYOND = 2  # nodes beyond the limits, where an optimiser may stray
+_LEAST_SLOPE = 0.02  # [m/rad]
+_TRIALS = 400
+_VERSION = 1  # raise when the tables change
+_COARSE = 4  # nodes from one to the next of a first look,
+_DOUBT = 0.012  # [m] and what a distance may fall by between them
+
+
+@dataclass(frozen=True, eq=False)
+class PairTable:
+    """Distance [m] of the meshes of two links over two moved joints.
+
+    joints: the two moved joints; grids: positions of each; values: distances at all of them;
+    error: the most by which the table was found to exceed the true distance at trial postures
+    [m]; touching: share of the grid in contact.
+    """
+
+    first: str
+    second: str
+    joints: tuple[int, int]
+    grids: tuple[Array, Array]
+    values: Array
+    error: float
+    touching: float
+
+    @cached_property
+    def _spline(self) -> RectBivariateSpline:
+        return RectBivariateSpline(*self.grids, self.values, kx=3, ky=3)
+
+    def distances(self, q: Array) -> Array:
+        """Distances (T,) [m], cut off at `FAR`, at q (T, n)."""
+        return np.asarray(self._spline.ev(*self._at(q)))
+
+    def slopes(self, q: Array) -> Array:
+        """Derivatives (T, 2) by the two joints."""
+        at = self._at(q)
+        return np.stack([self._spline.ev(*at, dx=1), self._spline.ev(*at, dy=1)], axis=1)
+
+    def holds(self, at: Array) -> NDArray[np.bool_]:
+        """Whether positions (T, 2) of the two joints are within the table (T,)."""
+        low, high = (np.array([grid[end] for grid in self.grids]) for end in (0, -1))
+        return np.asarray(((at >= low) & (at <= high)).all(axis=1))
+
+    @cached_property
+    def bends(self) -> tuple[float, float, float]:
+        """Bounds on |second derivatives|: by one joint, by both, by the other.
+
+        A spline is nowhere beyond its coefficients.
+        """
+        found = [self._spline.partial_derivative(*by) for by in ((2, 0), (1, 1), (0, 2))]
+        one, both, other = (float(np.abs(spline.tck[2]).max()) for spline in found)
+        return one, both, other
+
+    def _at(self, q: Array) -> tuple[Array, Array]:
+        one, two = (
+            np.clip(q[:, joint], grid[0], grid[-1])
+            for joint, grid in zip(self.joints, self.grids, strict=True)
+        )
+        return one, two
+
+
+def mesh_tables(
+    robot: Robot,
+    capsules: tuple[Capsule, ...],
+    pairs: CollisionPairs,
+    ignore: tuple[tuple[str, str], ...] = (),
+    kept: float = 0.002,
+) -> tuple[PairTable, ...]:
+    """Tables of all pairs of links that no checked capsules keep apart and that can come near.
+
+    Near is nearer than `kept` [m]. Left out are links more than two joints apart, links whose
+    capsule is given by hand, and pairs that are nearer than `kept` at the posture already (their
+    meshes cannot be told apart from contact there).
+    """
+    key = _key(robot, capsules, pairs, ignore, kept)
+    stored = stored_arrays(key)
+    if stored is not None:
+        return tuple(_restored(stored))
+    meshes = link_meshes(robot)
+    guarded = _guarded(capsules, pairs)
+    by_hand = {link for capsule in capsules if capsule.by_hand for link in capsule.links}
+    carried = carried_bodies(robot)
+    found = []
+    for i, j in movable_pairs(robot, meshes, ignore):
+        both = (meshes[i], meshes[j])
+        names = {both[0].link, both[1].link}
+        joints = np.flatnonzero(carried[both[0].joint] != carried[both[1].joint])
+        if len(joints) > 2 or frozenset(names) in guarded or names & by_hand:
+            continue
+        table = _table(robot, both, joints, kept)
+        if table is not None:
+            found.append(table)
+    store_arrays(key, _as_arrays(found))
+    return tuple(found)
+
+
+def _key(
+    robot: Robot,
+    capsules: tuple[Capsule, ...],
+    pairs: CollisionPairs,
+    ignore: tuple[tuple[str, str], ...],
+    kept: float,
+) -> str:
+    """Hash of all that decides the tables."""
+    geometry = capsule_key(robot, collision_model(robot), ())
+    given = [(capsule.name, capsule.links, capsule.by_hand) for capsule in capsules]
+    digest = hashlib.sha256(
+        f"{_VERSION}|{geometry}|{robot.fingerprint()}|{given}|{pairs}|{ignore}|{kept}".encode()
+    )
+    for part in (robot.posture, *robot.limits.ranges()):
+        digest.update(part.tobytes())
+    return digest.hexdigest()
+
+
+def _as_arrays(tables: list[PairTable]) -> dict[str, Array]:
+    found: dict[str, Array] = {"names": np.array([f"{t.first}|{t.second}" for t in tables])}
+    for k, table in enumerate(tables):
+        found[f"values_{k}"] = table.values
+        found[f"one_{k}"], found[f"two_{k}"] = table.grids
+        found[f"facts_{k}"] = np.array([*table.joints, table.error, table.touching])
+    return found
+
+
+def _restored(arrays: dict[str, Array]) -> Iterator[PairTable]:
+    for k, names in enumerate(arrays["names"].tolist()):
+        first, second = str(names).split("|")
+        one, two, error, touching = arrays[f"facts_{k}"].tolist()
+        grids = (arrays[f"one_{k}"], arrays[f"two_{k}"])
+        values = arrays[f"values_{k}"]
+        yield PairTable(first, second, (int(one), int(two)), grids, values, error, touching)
+
+
+def _guarded(capsules: tuple[Capsule, ...], pairs: CollisionPairs) -> set[frozenset[str]]:
+    """Pairs of links with all capsules of both checked against each other."""
+    of: dict[str, set[int]] = {}
+    for index, capsule in enumerate(capsules):
+        for link in capsule.links:
+            of.setdefault(link, set()).add(index)
+    checked = {frozenset(pair) for pair in pairs.checked}
+    never = {frozenset((d.first, d.second)) for d in pairs.dropped if "never near" in d.reason}
+    names = {index: capsule.name for index, capsule in enumerate(capsules)}
+    return {
+        frozenset((one, two))
+        for one in of
+        for two in of
+        if one < two
+        and all(
+            frozenset((a, b)) in checked or frozenset((names[a], names[b])) in never
+            for a in of[one]
+            for b in of[two]
+        )
+    }
+
+
+def _table(
+    robot: Robot, both: tuple[LinkMesh, LinkMesh], joints: Indices, kept: float
+) -> PairTable | None:
+    """The table of one pair, or None where nothing is to be guarded."""
+    meshes = PairMeshes(*both)
+    if _distances(robot, both, meshes, robot.posture[None])[0] <= kept:
+        return None
+    lower, upper = robot.limits.ranges()
+    alone = len(joints) == 1
+    if alone:  # the other axis of the table is any other joint, which changes nothing
+        joints = np.append(joints, [k for k in range(robot.n) if k != joints[0]][:1])
+    grids = [_grid(float(lower[k]), float(upper[k])) for k in joints]
+    if alone:
+        grids[1] = np.linspace(float(lower[joints[1]]), float(upper[joints[1]]), 4)
+    first_look = (grids[0][::_COARSE], grids[1][:1] if alone else grids[1][::_COARSE])
+    seen = _distances(robot, both, meshes, _nodes(robot, joints, *first_look), kept + _DOUBT)
+    if seen.min() >= kept + _DOUBT:
+        return None
+    across = grids[1][:1] if alone else grids[1]
+    values = _distances(robot, both, meshes, _nodes(robot, joints, grids[0], across))
+    if values.min() > kept:
+        return None
+    values = np.broadcast_to(values.reshape(len(grids[0]), -1), (len(grids[0]), len(grids[1])))
+    steps = [float(grid[1] - grid[0]) for grid in grids]
+    slope = max(_LEAST_SLOPE, float(np.quantile(np.abs(np.gradient(values, *steps)), 0.95)))
+    inside = values <= 0.0
+    depth = distance_transform_edt(inside, sampling=steps)
+    table = PairTable(
+        both[0].link,
+        both[1].link,
+        (int(joints[0]), int(joints[1])),
+        (grids[0], grids[1]),
+        np.where(inside, -slope * depth, values),
+        error=0.0,
+        touching=float(inside.mean()),
+    )
+    q = np.tile(robot.posture, (_TRIALS, 1))
+    trials = np.random.default_rng(0).uniform(size=(_TRIALS, 2))
+    q[:, joints] = lower[joints] + trials * (upper - lower)[joints]
+    true = _distances(robot, both, meshes, q)
+    doubtful = (true > 0.0) & (true < FAR / 2)
+    error = float(np.max((table.distances(q) - true)[doubtful], initial=0.0))
+    return replace(table, error=error)
+
+
+def _grid(low: float, high: float) -> Array:
+    count = int(np.clip(np.ceil((high - low) / _STEP) + 1, 8, _MOST))
+    step = (high - low) / (count - 1)
+    return np.asarray(low + step * np.arange(-_BEYOND, count + _BEYOND), dtype=float)
+
+
+def _nodes(robot: Robot, joints: Indices, one: Array, two: Array) -> Array:
+    q = np.tile(robot.posture, (len(one) * len(two), 1))
+    q[:, joints[0]], q[:, joints[1]] = np.repeat(one, len(two)), np.tile(two, len(one))
+    return q
+
+
+def _distances(
+    robot: Robot,
+    both: tuple[LinkMesh, LinkMesh],
+    meshes: PairMeshes,
+    q: Array,
+    far: float = FAR,
+) -> Array:
+    """Distances (T,) [m], cut off at `far`."""
+    poses = Poses.of(robot, q)
+    values = np.full(len(poses), far)
+    bounds = hull_bounds(poses, both, np.arange(len(poses)), values)
+    for t in np.flatnonzero(bounds <= far).tolist():
+        values[t] = meshes.distance(poses, t, below=far)
+    return values

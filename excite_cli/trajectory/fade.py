@@ -1,0 +1,104 @@
+"""A periodic motion that swells from rest at a posture, or dies away to it.
+
+    q(t) = q_s + w(t) (q_m(t) − q_s)
+
+over whole periods of q_m, with w a polynomial of degree five from 0 to 1 (or back) that has no
+velocity and no acceleration at its ends: at one end the robot rests at q_s, at the other it is in
+the state of the motion.
+"""
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from excite_cli.trajectory.base import Array, Basis, Trajectory
+from excite_cli.trajectory.fourier import FourierTrajectory
+
+_WEIGHT = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+_DEGREE = 5
+
+
+@dataclass(frozen=True)
+class Fade(Trajectory):
+    """Swells over `periods` of `motion`; dies away if `out`.
+
+    Coefficient rows: those of the motion, then the posture q_s.
+    """
+
+    motion: FourierTrajectory
+    periods: int
+    out: bool = False
+    at_rest: bool = False
+
+    @property
+    def duration(self) -> float:  # type: ignore[override]
+        """That of all periods [s]."""
+        return self.periods * self.motion.duration
+
+    @property
+    def n_coefficients(self) -> int:
+        """Those of the motion and one."""
+        return self.motion.n_coefficients + 1
+
+    @property
+    def smooth_orders(self) -> int:
+        """As the motion; what is beyond is bounded."""
+        return self.motion.smooth_orders
+
+    def _weight(self, times: Array, order: int) -> Array:
+        """Derivative (T, 1) of w [1/s^order]."""
+        share = np.clip(np.asarray(times, dtype=float) / self.duration, 0.0, 1.0)
+        sign = 1.0
+        if self.out:
+            share, sign = 1.0 - share, (-1.0) ** order
+        value = _WEIGHT.deriv(order)(share) if order else _WEIGHT(share)
+        return np.asarray(sign * value / self.duration**order)[:, None]
+
+    def derivative(self, times: Array, order: int) -> Array:
+        """Leibniz' rule."""
+        times = np.asarray(times, dtype=float)
+        of_motion = sum(
+            comb(order, j) * self._weight(times, j) * self.motion.derivative(times, order - j)
+            for j in range(min(order, _DEGREE) + 1)
+        )
+        of_posture = float(order == 0) - self._weight(times, order)
+        return np.hstack([of_motion, of_posture])
+
+    def basis(self, times: Array) -> Basis:
+        """The motion's basis times w, then 1 − w."""
+        times = np.asarray(times, dtype=float)
+        return Basis(times, *(self.derivative(times, order) for order in range(3)))
+
+    def beyond(self, coefficients: Array) -> Array:
+        """Leibniz' rule with the largest value of each factor."""
+        order = self.smooth_orders + 1
+        largest = np.zeros(coefficients.shape[1])
+        for j in range(min(order - 1, _DEGREE) + 1):
+            weight = _largest_weight(j) / self.duration**j
+            largest += comb(order, j) * weight * self._largest_motion(coefficients[:-1], order - j)
+        return largest
+
+    def _largest_motion(self, coefficients: Array, order: int) -> Array:
+        """Σ_k (kω)^order √(a_k² + b_k²), a bound (n,) on that derivative of the motion."""
+        harmonics = self.motion.harmonics
+        rates = self.motion.base_frequency * np.arange(1, harmonics + 1)
+        sines, cosines = coefficients[:harmonics], coefficients[harmonics:-1]
+        return np.asarray(rates**order @ np.hypot(sines, cosines))
+
+    def constant(self, q: Array) -> Array:
+        """The motion standing at the posture itself."""
+        return np.vstack([self.motion.constant(q), q])
+
+    def sampling_factor(self, samples: int, step: float) -> float | None:
+        """Samples prove nothing between them."""
+        return None
+
+
+def _largest_weight(order: int) -> float:
+    """Largest magnitude of a derivative of w over its share of time, 0 to 1."""
+    polynomial = _WEIGHT.deriv(order) if order else _WEIGHT
+    turns = polynomial.deriv().roots() if polynomial.degree() > 1 else np.zeros(0)
+    inside = turns[np.isreal(turns)].real
+    at = np.concatenate([[0.0, 1.0], inside[(inside > 0.0) & (inside < 1.0)]])
+    return float(np.abs(polynomial(at)).max())

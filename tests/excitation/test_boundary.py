@@ -1,0 +1,186 @@
+"""Given postures at start and end: exact, for both families, and kept by the optimiser."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from excite_cli.config.load import load_spec
+from excite_cli.errors import ConfigError, NoAdmissibleMotionError
+from excite_cli.excitation.admissible import smallest_margins
+from excite_cli.excitation.base_motion import base_motion
+from excite_cli.excitation.boundary import boundary_between, posture_of, straight_motion
+from excite_cli.excitation.differences import central_differences, relative_error
+from excite_cli.excitation.generate import generate_motion
+from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.random_baseline import random_baseline
+from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.start import random_direction, random_start
+from excite_cli.excitation.task import MotionTask
+from excite_cli.trajectory.base import Array, Trajectory
+from excite_cli.trajectory.bspline import BSplineTrajectory
+from excite_cli.trajectory.fourier import FourierTrajectory
+from tests.robot.random_robots import random_robot
+
+CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
+SPLINE = (
+    "trajectory={family: bspline, duration: 6, control_points: 14, start: posture, "
+    "end: {shoulder_pitch: -0.5, elbow: 1.5}}"
+)
+SERIES = (
+    "trajectory={family: fourier, harmonics: 4, base_frequency: 1.0471975511965976, "
+    "at_rest: true, start: {elbow: 0.5}}"
+)
+
+
+def _problem(*settings: str) -> Problem:
+    brief = ["sampling={}", "optimizer.max_iterations=20"]
+    return build_problem(load_spec(CONFIG, [*brief, *settings]), CONFIG.parent)
+
+
+def _ends(trajectory: Trajectory, coefficients: Array) -> tuple[Array, Array, Array]:
+    return trajectory.states(np.array([0.0, trajectory.duration]), coefficients)
+
+
+@settings(max_examples=30, derandomize=True, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    points=st.integers(10, 40),
+    degree=st.integers(3, 7),
+    which=st.sampled_from(["both", "start", "end"]),
+)
+def test_any_spline_of_the_set_starts_and_ends_there_at_rest(
+    seed: int, points: int, degree: int, which: str
+) -> None:
+    robot = random_robot(seed % 7, joints=4)
+    rng = np.random.default_rng(seed)
+    start, end = rng.uniform(robot.limits.lower, robot.limits.upper, (2, robot.n))
+    trajectory = BSplineTrajectory(rng.uniform(2, 20), max(points, degree + 5), degree)
+    given_ends = (None if which == "end" else start, None if which == "start" else end)
+    boundary = boundary_between(trajectory, *given_ends, robot.n)
+    beta = rng.normal(size=(boundary.free.shape[1], robot.n))
+    q, v, a = _ends(trajectory, boundary.offset + boundary.free @ beta)
+    assert which == "end" or np.abs(q[0] - start).max() < 1e-9
+    assert which == "start" or np.abs(q[1] - end).max() < 1e-9
+    assert max(np.abs(v).max(), np.abs(a).max()) < 1e-9
+    assert np.allclose(boundary.free.T @ boundary.free, np.eye(len(beta)))
+
+
+@settings(max_examples=20, derandomize=True, deadline=None)
+@given(seed=st.integers(0, 10_000), harmonics=st.integers(3, 12))
+def test_any_series_of_the_set_starts_and_ends_there_at_rest(seed: int, harmonics: int) -> None:
+    robot = random_robot(seed % 7, joints=4)
+    rng = np.random.default_rng(seed)
+    start = rng.uniform(robot.limits.lower, robot.limits.upper)
+    trajectory = FourierTrajectory(harmonics, rng.uniform(0.3, 2.0), at_rest=True)
+    boundary = boundary_between(trajectory, start, start, robot.n)
+    beta = rng.normal(size=(boundary.free.shape[1], robot.n))
+    q, v, a = _ends(trajectory, boundary.offset + boundary.free @ beta)
+    assert np.abs(q - start).max() < 1e-9
+    assert max(np.abs(v).max(), np.abs(a).max()) < 1e-9
+    assert boundary.free.shape[1] == 2 * harmonics + 1 - 3
+
+
+def test_the_straight_motion_is_straight_and_accelerates_least() -> None:
+    trajectory = BSplineTrajectory(5.0, 15)
+    start, end = np.array([0.2, -1.0]), np.array([1.0, 1.5])
+    boundary = boundary_between(trajectory, start, end, 2)
+    basis = trajectory.basis(np.linspace(0, 5.0, 400))
+    q, _, least = basis.states(straight_motion(trajectory, start, end))
+    share = (q - start) / (end - start)
+    assert np.allclose(share[:, 0], share[:, 1])
+    assert np.all(np.diff(share[:, 0]) > -1e-9)
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        other = boundary.offset + boundary.free @ (
+            0.05 * rng.normal(size=(boundary.free.shape[1], 2))
+        )
+        assert np.sum(basis.states(other)[2] ** 2) > np.sum(least**2)
+
+
+@pytest.mark.parametrize("family", [SPLINE, SERIES])
+def test_the_gradient_of_the_cost_with_an_offset(family: str) -> None:
+    task = MotionTask(_problem(family))
+    x = 0.5 * random_direction(task, np.random.default_rng(3))
+    criterion = task.problem.criterion
+
+    def cost(at: Array) -> float:
+        return task.objective.value(task.coefficients(at), criterion)
+
+    _, gradient, _ = task.cost(x, criterion)
+    assert relative_error(gradient, central_differences(cost, x)) < 1e-6
+    assert np.allclose(task.variables(task.coefficients(x)), x)
+
+
+@pytest.mark.parametrize("family", [SPLINE, SERIES])
+def test_an_optimised_motion_keeps_its_ends_and_all_constraints(family: str) -> None:
+    problem = _problem(family)
+    task = MotionTask(problem)
+    begin = random_start(task, base_motion(task, 1), (1, 1, 0))
+    solver = build_solver(problem.spec.optimizer)
+    motion = generate_motion(problem, solver, Stack.empty(problem.columns), 1, 1, lambda _: None)
+    q, v, a = _ends(problem.trajectory, motion.coefficients)
+    ends = problem.boundary.postures
+    assert np.abs(q - ends).max() < 1e-9
+    assert max(np.abs(v).max(), np.abs(a).max()) < 1e-9
+    times = np.linspace(0.0, problem.trajectory.duration, 6001)
+    assert all(m.min() >= 0 for m in smallest_margins(problem, motion.coefficients, times))
+    before = task.objective.own_condition_number(task.coefficients(begin))
+    assert motion.condition_number < 0.5 * before
+
+
+def test_random_motions_keep_the_ends_too() -> None:
+    problem = _problem(SPLINE)
+    found = random_baseline(problem, 1, 1, 5, 0.0, lambda drawn, best: None)
+    q, _, _ = _ends(problem.trajectory, found.motions[0].coefficients)
+    assert np.abs(q - problem.boundary.postures).max() < 1e-9
+
+
+def test_a_posture_near_a_bound_is_not_moved() -> None:
+    """A margin far below what a start without given ends asks for."""
+    problem = _problem(SERIES.replace("elbow: 0.5", "elbow: 2.595, shoulder_pitch: -0.4"),
+                       "constraints.self_collision=null")  # fmt: skip
+    start = base_motion(MotionTask(problem), 1)
+    assert start.posture[2] == 2.595
+    solver = build_solver(problem.spec.optimizer)
+    motion = generate_motion(problem, solver, Stack.empty(problem.columns), 1, 1, lambda _: None)
+    q, _, _ = _ends(problem.trajectory, motion.coefficients)
+    assert np.abs(q[:, 2] - 2.595).max() < 1e-9
+    assert motion.margins["joint_position"].violations == 0
+
+
+def test_a_given_posture_that_is_not_clear_is_named() -> None:
+    problem = _problem(SERIES.replace("elbow: 0.5", "shoulder_pitch: 2.1, elbow: 2.5"))
+    with pytest.raises(NoAdmissibleMotionError, match="self_collision") as error:
+        base_motion(MotionTask(problem), 1)
+    assert "trajectory.start" in str(error.value)
+    assert " m" in str(error.value)
+
+
+def test_a_way_too_long_for_the_time_is_said_to_be() -> None:
+    spline = SPLINE.replace("duration: 6", "duration: 0.6")
+    with pytest.raises(NoAdmissibleMotionError, match=r"within 0\.6 s.*longer trajectory"):
+        base_motion(MotionTask(_problem(spline)), 1)
+
+
+@pytest.mark.parametrize(
+    ("start", "message"),
+    [
+        ("{elbov: 0.5}", "Did you mean 'elbow'"),
+        ("{elbow: 9}", r"trajectory.start.elbow: 9 is outside its limits \[-2.6, 2.6\]"),
+    ],
+)
+def test_postures_that_cannot_be(start: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        _problem(SERIES.replace("{elbow: 0.5}", start))
+
+
+def test_joints_not_named_are_at_the_posture() -> None:
+    robot = _problem().robot
+    assert np.array_equal(posture_of(robot, "posture", "here"), robot.posture)
+    found = posture_of(robot, {"elbow": -1.0}, "here")
+    assert found[2] == -1.0
+    assert np.array_equal(np.delete(found, 2), np.delete(robot.posture, 2))

@@ -1,0 +1,75 @@
+"""A slowed motion keeps its share of the limits at every instant, and is no slower than that."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from excite_cli.config.load import load_spec
+from excite_cli.constraints.catalogue import build_constraints
+from excite_cli.errors import ConfigError
+from excite_cli.excitation.time_scaling import PaceLimits, slowing
+from excite_cli.robot.model import build_robot
+from excite_cli.trajectory.base import Trajectory
+from excite_cli.trajectory.bspline import BSplineTrajectory
+from excite_cli.trajectory.fourier import FourierTrajectory
+from excite_cli.trajectory.sampled import SampledTrajectory
+
+CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
+FAMILIES: list[Trajectory] = [
+    FourierTrajectory(5, 0.8),
+    BSplineTrajectory(6.0, 12),
+    SampledTrajectory(np.array([0.0, 0.4, 1.0, 1.3, 2.2])),
+]
+
+
+@given(seed=st.integers(0, 10**6), share=st.floats(0.05, 1.0), which=st.integers(0, 2))
+@settings(max_examples=25, deadline=None)
+def test_the_share_is_kept_and_reached(seed: int, share: float, which: int) -> None:
+    rng = np.random.default_rng(seed)
+    family = FAMILIES[which]
+    alpha = rng.normal(size=(family.n_coefficients, 3))
+    limits = PaceLimits(rng.uniform(0.3, 5.0, 3), rng.uniform(0.3, 20.0, 3))
+    pace = slowing(limits, family, alpha, share)
+    slow = family.slowed(pace)
+    _, v, a = slow.states(np.linspace(0.0, slow.duration, 20_001), alpha)
+    used = max(
+        (np.abs(v).max(axis=0) / limits.velocity).max(),
+        (np.abs(a).max(axis=0) / limits.acceleration).max(),
+    )
+    assert 0 < pace <= 1
+    assert used <= share * (1 + 1e-9)
+    if pace < 1:
+        assert used > 0.999 * share
+
+
+def test_a_motion_that_is_slow_enough_is_not_sped_up() -> None:
+    family = FourierTrajectory(2, 0.1)
+    limits = PaceLimits(np.full(1, 100.0), np.full(1, np.inf))
+    assert slowing(limits, family, np.ones((5, 1)), 1.0) == 1.0
+    assert slowing(limits, family, np.zeros((5, 1)), 0.5) == 1.0
+
+
+def test_limits_are_those_of_the_constraints() -> None:
+    spec = load_spec(CONFIG, ["constraints.joint_limits={acceleration: 7, velocity: 0.9}"])
+    robot = build_robot(spec.robot, CONFIG.parent)
+    only = spec.constraints.model_copy(update={"self_collision": None, "torque": None})
+    limits = PaceLimits.of(build_constraints(only, robot), robot.n)
+    assert limits.velocity == pytest.approx(np.minimum(robot.limits.velocity, 0.9))
+    assert limits.acceleration == pytest.approx(np.full(robot.n, 7.0))
+    assert np.isinf(PaceLimits.of((), 2).velocity).all()
+
+
+@pytest.mark.parametrize("share", [0.0, -1.0, 1.01, float("nan")])
+def test_shares_that_cannot_be(share: float) -> None:
+    limits = PaceLimits(np.ones(1), np.ones(1))
+    with pytest.raises(ConfigError, match="share of the limits above 0, at most 1"):
+        slowing(limits, FourierTrajectory(2, 1.0), np.ones((5, 1)), share)
+
+
+def test_without_limits_there_is_nothing_to_keep() -> None:
+    limits = PaceLimits(np.full(1, np.inf), np.full(1, np.inf))
+    with pytest.raises(ConfigError, match="no limits of speed or acceleration"):
+        slowing(limits, FourierTrajectory(2, 1.0), np.ones((5, 1)), 0.5)
