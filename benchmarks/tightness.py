@@ -26,7 +26,7 @@ from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.identification.identify import identify
 from excite_cli.robot.model import Array
 from excite_cli.robot.regressor import Regressor
-from excite_cli.robot.uncertainty import InertiaUncertainty, inertia_uncertainty
+from excite_cli.robot.uncertainty import FitKnowledge, InertiaUncertainty, inertia_uncertainty
 from excite_cli.robot.whole_robot import GroundWrench, whole_parameters
 from excite_cli.simulation.motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
@@ -47,10 +47,12 @@ def corner(y: Array, center: Array, reach: Array) -> float:
     return float(y @ phi)
 
 
-def cone(y: Array, center: Array, reach: Array, mapping: Array, fit: object) -> float:
+def cone(y: Array, center: Array, reach: Array, mapping: Array, fit: FitKnowledge) -> float:
     """The largest y·φ over box and ellipsoid."""
     used = np.flatnonzero(reach > 0)
-    size, values, covariance = len(used), fit.values, fit.covariance  # type: ignore[attr-defined]
+    shown = np.isfinite(np.diag(fit.covariance))  # the rest is left to the box
+    size, values, mapping = len(used), fit.values[shown], mapping[shown]
+    covariance = fit.covariance[np.ix_(shown, shown)]
     whiten = np.linalg.inv(np.linalg.cholesky(covariance))
     rows = np.vstack(
         [np.eye(size), -np.eye(size), np.zeros((1, size)), -whiten @ (mapping * reach)[:, used]]
@@ -61,7 +63,10 @@ def cone(y: Array, center: Array, reach: Array, mapping: Array, fit: object) -> 
     quiet.verbose = False
     zero, goal = csc_matrix((size, size)), -(y * reach)[used]
     solver = clarabel.DefaultSolver(zero, goal, csc_matrix(rows), right, cones, quiet)
-    return float(y @ center - solver.solve().obj_val)
+    found = solver.solve()
+    if "Solved" not in str(found.status):
+        print(f"  (the cone program ended with {found.status})")
+    return float(y @ center - found.obj_val)
 
 
 def told(words: str, admitted: InertiaUncertainty, y: Array, worst: list[float]) -> None:

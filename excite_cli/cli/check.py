@@ -173,10 +173,8 @@ def _table(found: "list[tuple[str, Inspection, tuple[float, float]]]", title: st
     for name, inspection, _ in found:
         margins = inspection.margins
         for key, (state, _) in inspection.states.items():
-            worst = margins.get(key)
-            row = ["> 0.02", "m", "all pairs", ""]
-            if worst is not None:
-                row = [f"{worst.margin:.5f}", worst.unit, worst.label, f"{worst.time:.4f}"]
+            worst = margins[key]
+            row = [f"{worst.margin:.5f}", worst.unit, worst.label, f"{worst.time:.4f}"]
             table.add_row(name, key, *row, "BROKEN" if state == "broken" else state)
     return table
 

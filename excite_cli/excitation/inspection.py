@@ -62,9 +62,8 @@ class Inspection:
             if verdict.state == "broken" and not worst.violations:
                 worst = Worst(verdict.margin, worst.unit, verdict.label, verdict.time, 1)
             found[verdict.name] = worst
-        meshes = self.meshes.worst() if self.meshes is not None else None
-        if meshes is not None:
-            found[MESHES] = meshes
+        if self.meshes is not None:
+            found[MESHES] = self.meshes.worst()
         return found
 
     @property

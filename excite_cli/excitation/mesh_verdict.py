@@ -37,11 +37,11 @@ class MeshVerdict:
         """Whether no judged pair touches at any instant."""
         return self.state == "proved"
 
-    def worst(self) -> Worst | None:
-        """The nearest judged pair, if any came near."""
+    def worst(self) -> Worst:
+        """The nearest judged pair; a bound for all where none came near."""
         judged = [gap for gap in self.gaps.near if not gap.standing]
         if not judged:
-            return None
+            return Worst(self.gaps.beyond, "m", "all pairs farther", float(self.times[0]), 0)
         nearest = judged[0]
         broken = sum(gap.touching for gap in judged)
         distance = -1e-9 if nearest.touching and nearest.distance >= 0 else nearest.distance

@@ -16,7 +16,8 @@ For the box alone this is exact. The derivative of a piece with respect to y is 
 Eᵀ E y / ‖E y‖: the worst inertias (for a piece with both terms, as good as such for derivatives).
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +26,25 @@ from excite_cli.config.uncertainty_spec import BodyUncertaintySpec, UncertaintyS
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.robot.base_parameters import BaseParameters
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.whole_robot import body_names, whole_parameters
+from excite_cli.robot.regressor import Regressor
+from excite_cli.robot.whole_robot import (
+    GroundWrench,
+    body_names,
+    drawn_states,
+    whole_parameters,
+)
 
 # Weights λ of the ellipsoid against the box.
 _SPLITS = (1e-3, 0.1, 3.0)
+# States from which typical functionals are taken, rounds of reweighting, and its least residual.
+_DRAWN, _REWEIGHTED, _DEAREST = 12, 12, 1e-3
 # Mean share of the width of an interval that may be lost by leaving pieces out.
 _LOST = 0.03
 # Shares of the largest eigenvalue below which a direction counts as none.
 _NOTHING = 1e-13
+# Weights of the ellipsoid against the box when both are to be met, and how far inside (squared).
+_AGREEMENT = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-6)
+_WELL_INSIDE = 0.5
 
 
 @dataclass(frozen=True)
@@ -195,20 +207,58 @@ def inertia_uncertainty(
     wide = mapping @ spread
     eigenvalues, vectors = np.linalg.eigh(narrow)
     root = np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T
-    for split in _SPLITS:
-        gain = _solved(wide + split * narrow, spread.T)
+    gains = [_solved(wide + split * narrow, spread.T) for split in _SPLITS]
+    gains += [_fitted_gain(y, gains[0], mapping, reach, narrow) for y in _typical(robot)]
+    for gain in gains:
         left = np.eye(len(phi)) - mapping.T @ gain
         pieces.append(Piece(phi + gain.T @ gap, reach[:, None] * left, root @ gain))
     return InertiaUncertainty(tuple(pieces))
 
 
+def _typical(robot: Robot) -> Iterator[Array]:
+    """Functionals (K, P) as constraints ask them: loads on the ground, wrenches, torques."""
+    states = drawn_states(robot, _DRAWN, 0)
+    wrench = GroundWrench(robot).regressor(states)
+    yield wrench[:, 2]
+    yield wrench.reshape(-1, wrench.shape[-1])
+    torque = Regressor(replace(robot, rows=robot.moved)).evaluate(states.q, states.v, states.a)
+    yield np.pad(torque.reshape(-1, torque.shape[-1]), ((0, 0), (10, 0)))
+
+
+def _fitted_gain(y: Array, gain: Array, mapping: Array, reach: Array, narrow: Array) -> Array:
+    """G (k, P) whose split suits functionals like y (K, P), by reweighted least squares.
+
+    With weights w = ρ/|y₁| and v = 1/‖κ P^½ y₂‖ (means over the functionals), the least of
+    Σ w y₁² + v ‖κ P^½ y₂‖² is nearer to that of ρ·|y₁| + κ ‖P^½ y₂‖.
+    """
+    y = y / np.maximum(np.abs(y) @ reach, _NOTHING)[:, None]
+    for _ in range(_REWEIGHTED):
+        known = y @ gain.T
+        left = np.abs(y - known @ mapping).mean(axis=0)
+        length = np.sqrt(np.maximum(np.einsum("kr,rs,ks->k", known, narrow, known), 0.0)).mean()
+        # A parameter that is hardly left over must not become infinitely dear.
+        weights = reach / np.maximum(left, _DEAREST * float(np.abs(y).mean()) + _NOTHING)
+        weighed = weights[:, None] * mapping.T
+        matrix = mapping @ weighed + narrow / max(float(length), _NOTHING)
+        gain = _solved(matrix, weighed.T)
+    return gain
+
+
 def _widened(reach: Array, mapping: Array, narrow: Array, gap: Array) -> Array:
-    """ρ (P,), larger where what best agrees with box and fit lies outside the box."""
+    """ρ (P,), larger where what agrees with box and fit lies outside the box.
+
+    The least change of φ (in units of ρ) that brings the base parameters into the ellipsoid must be
+    admitted, or no inertia would be, and bounds over an empty set say nothing.
+    """
     spread = np.square(reach)[:, None] * mapping.T
-    gain = _solved(mapping @ spread + narrow, spread.T).T
-    moved = np.abs(gain @ gap)
+    for share in _AGREEMENT:
+        gain = _solved(mapping @ spread + share * narrow, spread.T).T
+        moved = gain @ gap
+        left = gap - mapping @ moved
+        if float(left @ _solved(narrow, left)) <= _WELL_INSIDE:
+            break
     unsure = np.sqrt(np.maximum(np.einsum("pk,kl,pl->p", gain, narrow, gain), 0.0))
-    return np.where(moved > reach, moved + unsure, reach)
+    return np.where(np.abs(moved) > reach, np.abs(moved) + unsure, reach)
 
 
 def box(spec: UncertaintySpec, robot: Robot) -> Array:

@@ -122,12 +122,11 @@ def test_samples_that_someone_changed_are_found(excite: Program, two_motions: Ru
 
 
 def test_meshes_that_touch_are_found(excite: Program, two_motions: Run) -> None:
-    """The forearm is folded back into the upper arm, while capsules are not asked."""
+    """The arm is folded back until its tool is in the base."""
 
     def fold(coefficients: np.ndarray) -> None:
         coefficients[:-1] *= 0.02
-        coefficients[-1, 1:3] = [0.0, 2.5]
-        coefficients[-1, 4] = 0.12
+        coefficients[-1] = [0.87, -1.65, -2.39, -1.81, 0.07]
 
     path = altered(two_motions, excite.folder, fold)
     run = excite("check", SMOKE, path, "--json")

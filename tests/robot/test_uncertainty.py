@@ -193,6 +193,28 @@ def test_a_fit_outside_the_box_widens_it() -> None:
     assert np.all(-above - below < 0.2 * np.abs(y @ truth) + 1e-2)
 
 
+@pytest.mark.parametrize("precision", [0.003, 0.1])
+@pytest.mark.parametrize("off", [1.15, 1.6, 3.0])
+def test_a_fit_that_contradicts_the_box_leaves_something_admitted(
+    precision: float, off: float
+) -> None:
+    """Otherwise bounds would be bounds over an empty set: the least above the largest."""
+    robot = random_robot(8, joints=4)
+    base = find_base_parameters(robot)
+    fit = knowledge(robot, base, 8, precision)
+    values = base.mapping @ (off * whole_parameters(robot)[10:])
+    admitted = inertia_uncertainty(SPEC, robot, base, replace(fit, values=values))
+    states = drawn_states(robot, 10)
+    y = np.pad(Regressor(robot).evaluate(states.q, states.v, states.a), ((0, 0), (0, 0), (10, 0)))
+    below, above = admitted.least_both(y.reshape(-1, y.shape[-1]))
+    assert np.all(below <= -above)
+    mapping = np.hstack([np.zeros((base.rank, 10)), base.mapping])
+    phi, reach = whole_parameters(robot), admitted.pieces[0].corners
+    row = y.reshape(-1, y.shape[-1])[0]
+    exact = exact_least(row, phi, reach, mapping, replace(fit, values=values), SPEC.sigmas)
+    assert np.isfinite(exact)
+
+
 def test_bodies_are_named_by_joint_link_or_base() -> None:
     robot = random_robot(7, joints=3)
     exact = BodyUncertaintySpec(mass=0.0, center_of_mass=0.0, inertia=0.0)
