@@ -3,23 +3,19 @@
 One motion is sought with the limits for the URDF's inertias, one with limits for every inertia
 within the stated bounds. Both are replayed on robots drawn within these bounds: physically
 consistent ones, and corners of the box (any corner, and those that the two motions mind most).
-Counted is how many robots break a limit. Then the room that a fit gives back: the condition number
-of a motion that is robust in the box, and of one within three standard deviations of a fit.
+Counted is how many robots break a limit. (`benchmarks.opening` shows the room that fits give back.)
 
 Run: python -m benchmarks.robust_replay [--sets 200] [--iterations 150] [ur10] [talos_arms]
 """
 
 import argparse
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.problems import CONFIGS
 from benchmarks.whole_plant import WholePlant
-from excite_cli.cli.setup import fit_knowledge
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.constraints.balance import Balance
@@ -27,15 +23,10 @@ from excite_cli.constraints.contact import Contact, ZeroMomentPoint
 from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.run import continue_run, new_result
-from excite_cli.identification.identify import identify
 from excite_cli.robot.model import Array
 from excite_cli.robot.states import States
 from excite_cli.robot.uncertainty import box
 from excite_cli.robot.whole_robot import whole_parameters
-from excite_cli.simulation.motion import PlannedMotion
-from excite_cli.simulation.settings import SimulationSettings
-from excite_cli.simulation.simulate import simulate
-from excite_cli.store.fit_file import write_fit
 
 RATE = 500.0
 # A replay counts as broken beyond this share of the limit; margins end at zero, not above it.
@@ -176,20 +167,6 @@ def _left(constraint: object, torque: Array, wrench: Array, center: Array) -> Ar
     return wrench @ constraint.functionals.T - constraint.least_values
 
 
-def after_fit(name: str, robust: Problem, coefficients: Array, iterations: int) -> float:
-    """Condition number of a motion that is robust to what a fit leaves open."""
-    motion = PlannedMotion("motion_1", robust.trajectory, coefficients)
-    settings = SimulationSettings(inertia_error=0.05)
-    dataset = simulate(robust.robot, [motion], settings, ()).dataset
-    found = identify(robust.robot, robust.base, dataset, robust.spec)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "fit.h5"
-        write_fit(path, found, "", "", robust.robot.fingerprint())
-        spec = spec_of(name, iterations, True, f"uncertainty.fit={path}")
-        knowledge = fit_knowledge(spec, Path(folder))
-        return motion_of(build_problem(spec, CONFIGS, knowledge))[1]
-
-
 def run(name: str, sets: int, iterations: int) -> None:
     plain = build_problem(spec_of(name, iterations, False), CONFIGS)
     robust = build_problem(spec_of(name, iterations, True), CONFIGS)
@@ -214,10 +191,9 @@ def run(name: str, sets: int, iterations: int) -> None:
                 f"{least[0]:8.4f} → {least[1]:8.4f}",
                 flush=True,
             )
-    fitted = after_fit(name, robust, moved["robust"][0], iterations)
     print(
         f"  condition number: plain {moved['plain'][1]:.2f}, robust in the box "
-        f"{moved['robust'][1]:.2f}, robust after a fit {fitted:.2f}"
+        f"{moved['robust'][1]:.2f}"
     )
 
 
