@@ -45,6 +45,13 @@ SETTINGS = {
         "center_of_mass: 0.003, inertia: 0.05}}}",
     ),
 }
+# Balance alone, in the paper's disc: the motion then uses all of it.
+SETTINGS["talos_balance"] = (
+    "constraints.self_collision=null",
+    "uncertainty={mass: 0.05, center_of_mass: 0.003, inertia: 0.1, bodies: {base: {mass: 0.02, "
+    "center_of_mass: 0.001, inertia: 0.05}}}",
+)
+FILES = {"talos_balance": "talos_arms"}
 LIMITS = (JointTorque, Balance, ZeroMomentPoint, Contact)
 
 
@@ -61,7 +68,8 @@ class Replay:
 def spec_of(name: str, iterations: int, robust: bool, *overrides: str) -> Spec:
     settings = [s for s in SETTINGS[name] if robust or not s.startswith("uncertainty")]
     common = ["sequence.motions=1", f"optimizer.max_iterations={iterations}"]
-    return load_spec(CONFIGS / f"{name}.yaml", [*settings, *common, *overrides])
+    file = CONFIGS / f"{FILES.get(name, name)}.yaml"
+    return load_spec(file, [*settings, *common, *overrides])
 
 
 def motion_of(problem: Problem) -> tuple[Array, float]:

@@ -34,6 +34,9 @@ def tell_problem(terminal: Terminal, problem: Problem) -> None:
             _tell_self_collision(terminal, constraint, _tabled(problem))
         elif isinstance(constraint, Surroundings):
             _tell_surroundings(terminal, constraint)
+    around = problem.spec.constraints.surroundings
+    if around is not None and not any(isinstance(c, Surroundings) for c in problem.constraints):
+        terminal.say("surroundings: no link can come near any of them, so nothing is checked")
     if robot.payload is not None:
         terminal.say(f"payload: {robot.payload.in_words}, part of the predicted torque")
     for name, words in zip(_symbols(problem), problem.base.in_words(), strict=True):

@@ -55,7 +55,12 @@ class Balance(Constraint):
         if uncertainty is not None:
             states = drawn_states(robot)
             rows = self._functionals @ self._mass.rows(states)
-            self._admitted = uncertainty.of_masses().sharpest(rows.reshape(-1, rows.shape[-1]))
+            of_masses = rows.reshape(-1, rows.shape[-1])
+            full = np.zeros((len(of_masses), len(of_masses[0]) // 4 * 10))
+            full[:, np.arange(full.shape[1]) % 10 < 4] = of_masses
+            # One choice for margins and proof, lest they contradict each other.
+            self._known = uncertainty.sharpest(full)
+            self._admitted = self._known.of_masses()
 
     @classmethod
     def disc(

@@ -17,6 +17,8 @@ from excite_cli.robot.states import States
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+_ROUNDING = 1e-12
+
 
 @dataclass(frozen=True)
 class Worst:
@@ -50,6 +52,11 @@ class Constraint(ABC):
     @abstractmethod
     def margins(self, states: States) -> Array:
         """Margins (T, m) in `unit`."""
+
+    @property
+    def rounding(self) -> Array:
+        """What standing exactly at a bound may lack (m,): rounding, a share of the scale."""
+        return np.asarray(_ROUNDING * self.scale)
 
     def margins_within(self, states: States, reach: Array) -> Array:
         """Margins (T, m) that are exact up to `reach` (m,) and at least `reach` beyond it.
@@ -87,7 +94,7 @@ class Constraint(ABC):
         """The margin that is smallest as a share of its column's scale, and how many are broken."""
         t, column = divmod(int(np.argmin(margins / self.scale)), margins.shape[1])
         margin = float(margins[t, column])
-        broken = int(np.count_nonzero(margins < 0))
+        broken = int(np.count_nonzero(margins < -self.rounding))
         share = margin / float(self.scale[column])
         unit, label = self.unit_of(column), self.labels[column]
         return Worst(margin, unit, label, float(times[t]), broken, share)

@@ -68,11 +68,13 @@ def _distances(spec: ConstraintsSpec, robot: Robot) -> list[Constraint]:
     around, own = spec.surroundings, spec.self_collision
     if around is None and own is None:
         return found
+    # What no position within the limits brings near is left out only if the limits are kept.
+    bounded = spec.joint_limits is not None and spec.joint_limits.position
     # A link that is told from its neighbours in one of the two has a capsule of its own in both.
     apart = {link for link, _ in ignored_pairs(robot, around)} if around is not None else ()
     capsules = fit_capsules(robot, own or SelfCollisionSpec(), apart)
     if own is not None:
-        pairs = choose_pairs(robot, capsules, own)
+        pairs = choose_pairs(robot, capsules, own, bounded=bounded)
         if pairs.checked:
             found.append(SelfCollision(robot, capsules, pairs, own.margin))
         tables = mesh_tables(robot, capsules, pairs, own.ignore)
@@ -80,7 +82,7 @@ def _distances(spec: ConstraintsSpec, robot: Robot) -> list[Constraint]:
             found.append(MeshClearance(tables, min(KEPT, own.margin)))
     if around is not None:
         obstacles = build_obstacles(around)
-        beside = choose_obstacle_pairs(robot, capsules, obstacles, around)
+        beside = choose_obstacle_pairs(robot, capsules, obstacles, around, bounded)
         if beside.checked:
             found.append(Surroundings(robot, capsules, obstacles, beside))
     return found

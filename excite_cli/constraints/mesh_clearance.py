@@ -44,7 +44,8 @@ class MeshClearance(Constraint):
             r, s = reach.T
             bend = 0.5 * (one * r * r + 2 * both * r * s + other * s * s)
             least = table.distances(q.center) + change - bend
-            inside = table.holds(q.center[:, at] - reach) & table.holds(q.center[:, at] + reach)
+            middle = table.positions(q.center)
+            inside = table.holds(middle - reach) & table.holds(middle + reach)
             found.append(np.where(inside, least, -np.inf))
         return np.stack(found, axis=1) - self._kept
 

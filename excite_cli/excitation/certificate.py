@@ -84,7 +84,7 @@ def certify(path: Path, constraints: Sequence[Constraint]) -> tuple[Verdict, ...
             if least is None:
                 known[index] = False
                 continue
-            doubtful = _doubtful(least)
+            doubtful = _doubtful(least, constraint)
             if doubtful.any():
                 open_[index].append(some.only(doubtful))
     return tuple(
@@ -93,9 +93,9 @@ def certify(path: Path, constraints: Sequence[Constraint]) -> tuple[Verdict, ...
     )
 
 
-def _doubtful(least: Array) -> NDArray[np.bool_]:
+def _doubtful(least: Array, constraint: Constraint) -> NDArray[np.bool_]:
     """Which intervals are not proved; what is not a number proves nothing."""
-    return np.asarray(~(least >= 0.0).all(axis=1))
+    return np.asarray(~(least >= -constraint.rounding).all(axis=1))
 
 
 def _unknown(constraint: Constraint) -> Verdict:
@@ -114,7 +114,7 @@ def _settled(path: Path, constraint: Constraint, open_: list[Intervals]) -> Verd
             break
         margins = constraint.margins(path.states_at(pending.middles))
         seen.look(margins, pending.middles)
-        np.maximum(lacking, -margins.min(axis=0), out=lacking)
+        np.maximum(lacking, -margins.min(axis=0) - constraint.rounding, out=lacking)
         if len(pending) > _MOST_OPEN or (seen.broken and len(pending) * 2 > _MOST_OPEN // 8):
             break
         pending, columns = _still_open(path, constraint, pending.halved())
@@ -123,6 +123,8 @@ def _settled(path: Path, constraint: Constraint, open_: list[Intervals]) -> Verd
     if seen.broken:
         reason = "a margin is negative"
         return seen.verdict("broken", lacking, reason)
+    if len(pending) > _MOST_OPEN:
+        return seen.verdict("sampled", lacking, "too many intervals would have to be looked at")
     if len(pending):
         thin = "the margin is too thin to be told from zero"
         return seen.verdict("sampled", lacking, thin)
@@ -139,8 +141,8 @@ def _still_open(
         some = intervals.only(slice(begin, begin + _CHUNK))
         least = constraint.least(path.enclosed(some))
         assert least is not None, "a bound that was known once is known always"
-        keep.append(some.only(_doubtful(least)))
-        columns |= ~(least >= 0.0).all(axis=0)
+        keep.append(some.only(_doubtful(least, constraint)))
+        columns |= ~(least >= -constraint.rounding).all(axis=0)
     return _joined(keep), columns
 
 
@@ -154,7 +156,7 @@ class _Seen:
 
     def look(self, margins: Array, times: Array) -> None:
         worst = self._constraint.worst(margins, times)
-        self.broken |= bool((margins < 0).any())
+        self.broken |= bool((margins < -self._constraint.rounding).any())
         if worst.share < self._share:
             self._share, self._margin = worst.share, worst.margin
             self._label, self._time = worst.label, worst.time

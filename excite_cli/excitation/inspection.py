@@ -6,7 +6,7 @@ from the collision meshes by Pinocchio and coal.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.robot.mesh_check import MeshCheck
 
 MESHES = "mesh_collision"
+_OF_PAIRS = ("self_collision", "mesh_clearance", "surroundings")
 _CHUNK = 2000
 
 
@@ -84,25 +85,39 @@ class Inspection:
 
 
 def mesh_check_of(problem: Problem) -> MeshCheck | None:
-    """Meshes to be looked at; None where the problem does not ask for self-collision."""
+    """Meshes to be looked at; None without self-collision in the problem, or without meshes."""
     spec = problem.spec.constraints.self_collision
     if spec is None:
         return None
     by_hand = () if spec.capsules == "auto" else tuple(spec.capsules)
-    return MeshCheck(problem.robot, spec.ignore, by_hand)
+    check = MeshCheck(problem.robot, spec.ignore, by_hand)
+    return check if check.pairs else None
 
 
 def inspect(problem: Problem, path: Path, meshes: MeshCheck | None, look: Look) -> Inspection:
     """Margins, verdicts and meshes of one motion of the problem's robot."""
     regular, times = instants_of(path, look)
     worst = _worst(problem, path, times)
-    verdicts = certify(path, problem.constraints)
+    verdicts = _within_limits(certify(path, problem.constraints))
     if meshes is None:
         return Inspection(worst, verdicts, None)
     found = mesh_verdict(path, meshes, regular)
     if found.state == "sampled" and look.random:  # proof would have said more than any instants
         found = mesh_verdict(path, meshes, times)
     return Inspection(worst, verdicts, found)
+
+
+def _within_limits(verdicts: tuple[Verdict, ...]) -> tuple[Verdict, ...]:
+    """Distances are not proved where positions leave the limits that pairs were chosen within."""
+    if all(verdict.proved for verdict in verdicts if verdict.name == "joint_position"):
+        return verdicts
+    reason = "its pairs are those that can come near within the position limits"
+    return tuple(
+        replace(verdict, state="sampled", reason=reason)
+        if verdict.proved and verdict.name in _OF_PAIRS
+        else verdict
+        for verdict in verdicts
+    )
 
 
 def instants_of(path: Path, look: Look) -> tuple[Array, Array]:

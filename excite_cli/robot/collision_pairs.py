@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 _ALWAYS = 0.99  # share of the sample in contact
 _CONTACT_SAMPLES = 200
 ALWAYS = "always in contact"
+NEVER = "never near"
 UNGUARDED = "unguarded: capsules always overlap"
 _CONTACT = 0.01  # [m] a wider margin does not make a contact; it may make the problem infeasible
 _ALLOWANCE = 0.05  # [m] beyond the margin that the nearest posture found must keep
@@ -60,6 +61,7 @@ def choose_pairs(
     spec: SelfCollisionSpec,
     samples: int = 2000,
     seed: int = 0,
+    bounded: bool = True,
 ) -> CollisionPairs:
     """Pairs that can be apart and can come near, in order of the capsules.
 
@@ -67,7 +69,8 @@ def choose_pairs(
     nearer than the margin in at least 99 % of `samples` random postures within the limits, and
     never nearer than the margin and 5 cm in the sample or at the end of a descent from it. So are
     capsules that touch although the meshes, at most three joints apart, never come as near as the
-    margin.
+    margin. What never comes near within the limits is kept unless positions are `bounded` by a
+    constraint.
     """
     dropped: dict[tuple[int, int], str] = {}
     possible: list[tuple[int, int]] = []
@@ -84,7 +87,7 @@ def choose_pairs(
             _by_sampling(robot, capsules, possible, spec.margin, samples, seed),
             strict=True,
         ):
-            if reason:
+            if reason and (bounded or NEVER not in reason):
                 dropped[pair] = reason
     return CollisionPairs(
         checked=tuple(pair for pair in possible if pair not in dropped),
@@ -151,7 +154,7 @@ def _by_sampling(
         nearest[clear] = _descend(robot, measure, q[starts], clear, target)
     reasons = [""] * len(pairs)
     for k in np.flatnonzero(nearest > margin + _ALLOWANCE).tolist():
-        reasons[k] = f"never near (at least {nearest[k]:.2f} m found)"
+        reasons[k] = f"{NEVER} (at least {nearest[k]:.2f} m found)"
     start = measure.distances(robot.posture[None])[0]
     doubtful = ~always & (nearest <= margin + _ALLOWANCE)
     doubtful &= (touching > _DOUBTFUL) | (start < 2 * margin)
@@ -193,7 +196,7 @@ def _by_meshes(
             starts = np.vstack([robot.posture, q[np.argsort(distances[:, k])[:_MESH_SAMPLES]]])
             known[links] = meshes.least_distance(*links, starts, moved, stop=margin)
         if known[links] > margin:
-            yield k, f"meshes never near (at least {known[links]:.3f} m found)"
+            yield k, f"meshes {NEVER} (at least {known[links]:.3f} m found)"
 
 
 def _contacts(

@@ -21,6 +21,8 @@ _CROSSED = 1e-9  # [m] hulls nearer than this have no direction between them
 
 def ball_bounds(poses: Poses, meshes: tuple[LinkMesh, ...], pairs: Indices) -> Array:
     """Lower bounds (P, T) [m] of the distance of pairs (P, 2) of links, from balls around them."""
+    if not len(pairs):
+        return np.zeros((0, len(poses)))
     centers = np.stack([poses.points(mesh.joint, mesh.center) for mesh in meshes])
     radii = np.array([mesh.radius for mesh in meshes])
     between = centers[pairs[:, 0]] - centers[pairs[:, 1]]

@@ -76,8 +76,11 @@ def choose_obstacle_pairs(
     capsules: tuple[Capsule, ...],
     obstacles: tuple[Obstacle, ...],
     spec: SurroundingsSpec,
+    bounded: bool = True,
 ) -> ObstaclePairs:
     """The pairs of `robot`, in order of the capsules.
+
+    Only where positions are `bounded` by a constraint is anything out of reach.
 
     Raises
     ------
@@ -96,7 +99,7 @@ def choose_obstacle_pairs(
             least = reach.least_distance(capsule, obstacle)
             if any((link, obstacle.name) in ignored for link in capsule.links):
                 dropped[i, j] = "ignored in the config"
-            elif least > spec.margin:
+            elif bounded and least > spec.margin:
                 dropped[i, j] = "out of reach"
             else:
                 possible.append((i, j))

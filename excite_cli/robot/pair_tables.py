@@ -37,7 +37,7 @@ _STEP, _MOST = 0.03, 97  # [rad or m] between nodes; nodes of one joint
 _BEYOND = 2  # nodes beyond the limits, where an optimiser may stray
 _LEAST_SLOPE = 0.02  # [m/rad]
 _TRIALS = 400
-_VERSION = 1  # raise when the tables change
+_VERSION = 2  # raise when the tables change
 _COARSE = 4  # nodes from one to the next of a first look,
 _DOUBT = 0.012  # [m] and what a distance may fall by between them
 
@@ -48,7 +48,7 @@ class PairTable:
 
     joints: the two moved joints; grids: positions of each; values: distances at all of them;
     error: the most by which the table was found to exceed the true distance at trial postures
-    [m]; touching: share of the grid in contact.
+    [m]; touching: share of the grid in contact; turning: which of the two joints turn without end.
     """
 
     first: str
@@ -58,6 +58,7 @@ class PairTable:
     values: Array
     error: float
     touching: float
+    turning: tuple[bool, bool] = (False, False)
 
     @cached_property
     def _spline(self) -> RectBivariateSpline:
@@ -75,7 +76,16 @@ class PairTable:
     def holds(self, at: Array) -> NDArray[np.bool_]:
         """Whether positions (T, 2) of the two joints are within the table (T,)."""
         low, high = (np.array([grid[end] for grid in self.grids]) for end in (0, -1))
-        return np.asarray(((at >= low) & (at <= high)).all(axis=1))
+        inside = (at >= low) & (at <= high)
+        if not np.ptp(self.values, axis=1).any():  # the second joint changes nothing
+            inside[:, 1] = True
+        return np.asarray(inside.all(axis=1))
+
+    def positions(self, q: Array) -> Array:
+        """Positions (T, 2) of the two joints, within one turn where they turn without end."""
+        at = q[:, list(self.joints)]
+        wrapped = np.mod(at + np.pi, 2 * np.pi) - np.pi
+        return np.where(self.turning, wrapped, at)
 
     @cached_property
     def bends(self) -> tuple[float, float, float]:
@@ -89,8 +99,8 @@ class PairTable:
 
     def _at(self, q: Array) -> tuple[Array, Array]:
         one, two = (
-            np.clip(q[:, joint], grid[0], grid[-1])
-            for joint, grid in zip(self.joints, self.grids, strict=True)
+            np.clip(at, grid[0], grid[-1])
+            for at, grid in zip(self.positions(q).T, self.grids, strict=True)
         )
         return one, two
 
@@ -153,17 +163,28 @@ def _as_arrays(tables: list[PairTable]) -> dict[str, Array]:
     for k, table in enumerate(tables):
         found[f"values_{k}"] = table.values
         found[f"one_{k}"], found[f"two_{k}"] = table.grids
-        found[f"facts_{k}"] = np.array([*table.joints, table.error, table.touching])
+        found[f"facts_{k}"] = np.array(
+            [*table.joints, table.error, table.touching, *table.turning], dtype=float
+        )
     return found
 
 
 def _restored(arrays: dict[str, Array]) -> Iterator[PairTable]:
     for k, names in enumerate(arrays["names"].tolist()):
         first, second = str(names).split("|")
-        one, two, error, touching = arrays[f"facts_{k}"].tolist()
+        one, two, error, touching, *turning = arrays[f"facts_{k}"].tolist()
         grids = (arrays[f"one_{k}"], arrays[f"two_{k}"])
         values = arrays[f"values_{k}"]
-        yield PairTable(first, second, (int(one), int(two)), grids, values, error, touching)
+        yield PairTable(
+            first,
+            second,
+            (int(one), int(two)),
+            grids,
+            values,
+            error,
+            touching,
+            (bool(turning[0]), bool(turning[1])),
+        )
 
 
 def _guarded(capsules: tuple[Capsule, ...], pairs: CollisionPairs) -> set[frozenset[str]]:
@@ -197,6 +218,8 @@ def _table(
         return None
     lower, upper = robot.limits.ranges()
     alone = len(joints) == 1
+    if alone and robot.n == 1:
+        return None  # a table wants two axes; such a pair is left to the check of the meshes
     if alone:  # the other axis of the table is any other joint, which changes nothing
         joints = np.append(joints, [k for k in range(robot.n) if k != joints[0]][:1])
     grids = [_grid(float(lower[k]), float(upper[k])) for k in joints]
@@ -223,14 +246,35 @@ def _table(
         np.where(inside, -slope * depth, values),
         error=0.0,
         touching=float(inside.mean()),
+        turning=(_turns(robot, int(joints[0])), _turns(robot, int(joints[1]))),
     )
-    q = np.tile(robot.posture, (_TRIALS, 1))
-    trials = np.random.default_rng(0).uniform(size=(_TRIALS, 2))
-    q[:, joints] = lower[joints] + trials * (upper - lower)[joints]
+    trials = _trials(table, lower[joints], upper[joints])
+    q = np.tile(robot.posture, (len(trials), 1))
+    q[:, joints] = trials
     true = _distances(robot, both, meshes, q)
-    doubtful = (true > 0.0) & (true < FAR / 2)
-    error = float(np.max((table.distances(q) - true)[doubtful], initial=0.0))
-    return replace(table, error=error)
+    doubtful = true < FAR / 2
+    over = table.distances(q) - np.maximum(true, 0.0)
+    return replace(table, error=float(np.max(over[doubtful], initial=0.0)))
+
+
+def _turns(robot: Robot, joint: int) -> bool:
+    """Whether a moved joint turns without end."""
+    limits = robot.limits
+    return not (robot.sliding[joint] or np.isfinite(limits.lower[joint]))
+
+
+def _trials(table: PairTable, low: Array, high: Array) -> Array:
+    """Positions (K, 2) between nodes: anywhere, and in cells where meshes come near or touch."""
+    rng = np.random.default_rng(0)
+    anywhere = low + rng.uniform(size=(_TRIALS, 2)) * (high - low)
+    v = table.values
+    corners = np.stack([v[:-1, :-1], v[1:, :-1], v[:-1, 1:], v[1:, 1:]])
+    near = np.argwhere((corners.min(axis=0) < FAR / 4) & (corners.max(axis=0) > 0.0))
+    chosen = near[rng.permutation(len(near))[:_TRIALS]]
+    steps = np.array([grid[1] - grid[0] for grid in table.grids])
+    first = np.array([grid[0] for grid in table.grids])
+    middles = first + (chosen + 0.5) * steps
+    return np.clip(np.vstack([anywhere, middles]), low, high)
 
 
 def _grid(low: float, high: float) -> Array:

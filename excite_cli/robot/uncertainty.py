@@ -249,6 +249,11 @@ def _widened(reach: Array, mapping: Array, narrow: Array, gap: Array) -> Array:
 
     The least change of φ (in units of ρ) that brings the base parameters into the ellipsoid must be
     admitted, or no inertia would be, and bounds over an empty set say nothing.
+
+    Raises
+    ------
+    ConfigError
+        Bounds of zero keep any such change out.
     """
     spread = np.square(reach)[:, None] * mapping.T
     for share in _AGREEMENT:
@@ -257,6 +262,14 @@ def _widened(reach: Array, mapping: Array, narrow: Array, gap: Array) -> Array:
         left = gap - mapping @ moved
         if float(left @ _solved(narrow, left)) <= _WELL_INSIDE:
             break
+    exact = _solved(mapping @ spread, spread.T).T
+    rest = gap - mapping @ (exact @ gap)
+    if float(rest @ _solved(narrow, rest)) > _WELL_INSIDE:
+        raise ConfigError(
+            "uncertainty.fit: no inertias within the bounds agree with the fit, since some bounds "
+            "are zero (shares of zero, or a link without inertia in the URDF). Give wider ones "
+            "under uncertainty, or under uncertainty.bodies for single bodies."
+        )
     unsure = np.sqrt(np.maximum(np.einsum("pk,kl,pl->p", gain, narrow, gain), 0.0))
     return np.where(np.abs(moved) > reach, np.abs(moved) + unsure, reach)
 

@@ -215,6 +215,18 @@ def test_a_fit_that_contradicts_the_box_leaves_something_admitted(
     assert np.isfinite(exact)
 
 
+def test_a_fit_that_bounds_of_zero_cannot_follow_is_refused() -> None:
+    """Nothing would be admitted, and bounds over nothing would prove anything."""
+    robot = random_robot(9, joints=3)
+    base = find_base_parameters(robot)
+    fit = knowledge(robot, base, 9, 0.01)
+    heavier = replace(fit, values=base.mapping @ (1.5 * whole_parameters(robot)[10:]))
+    stiff = UncertaintySpec(mass=0.0, center_of_mass=0.0, inertia=0.0)
+    with pytest.raises(ConfigError, match="some bounds are zero"):
+        inertia_uncertainty(stiff, robot, base, heavier)
+    assert len(inertia_uncertainty(SPEC, robot, base, heavier).pieces) > 1
+
+
 def test_bodies_are_named_by_joint_link_or_base() -> None:
     robot = random_robot(7, joints=3)
     exact = BodyUncertaintySpec(mass=0.0, center_of_mass=0.0, inertia=0.0)
