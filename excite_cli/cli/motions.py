@@ -30,8 +30,6 @@ def load_motions(
     FileError
         The file cannot be read, moves other joints, or lacks a chosen motion.
     """
-    from excite_cli.store.diagnosis_file import is_diagnosis
-    from excite_cli.store.fit_file import is_fit
     from excite_cli.store.result_file import is_result, read_result
     from excite_cli.trajectory.chain import Segment
     from excite_cli.trajectory.sampled import through_samples
@@ -44,6 +42,9 @@ def load_motions(
                 "the config that the motions were made with."
             )
         return motions_of_result(path, result, chosen)
+    from excite_cli.store.diagnosis_file import is_diagnosis  # slow to import
+    from excite_cli.store.fit_file import is_fit
+
     if is_fit(path) or is_diagnosis(path):
         read_result(path)  # tells that these are no motions
     if chosen and chosen != [1]:

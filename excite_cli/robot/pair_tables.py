@@ -12,11 +12,10 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
-from scipy.ndimage import distance_transform_edt
 
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.capsule_cache import capsule_key
@@ -61,7 +60,9 @@ class PairTable:
     turning: tuple[bool, bool] = (False, False)
 
     @cached_property
-    def _spline(self) -> RectBivariateSpline:
+    def _spline(self) -> Any:
+        from scipy.interpolate import RectBivariateSpline  # few robots need a table
+
         return RectBivariateSpline(*self.grids, self.values, kx=3, ky=3)
 
     def distances(self, q: Array) -> Array:
@@ -213,6 +214,8 @@ def _table(
     robot: Robot, both: tuple[LinkMesh, LinkMesh], joints: Indices, kept: float
 ) -> PairTable | None:
     """The table of one pair, or None where nothing is to be guarded."""
+    from scipy.ndimage import distance_transform_edt  # tables are stored
+
     meshes = PairMeshes(*both)
     if _distances(robot, both, meshes, robot.posture[None])[0] <= kept:
         return None
