@@ -54,10 +54,13 @@ def check(
     """
     from excite_cli.cli.motions import load_motions
     from excite_cli.cli.setup import load_problem, single_threaded
+    from excite_cli.errors import FileError
     from excite_cli.excitation.admissible import path_of
     from excite_cli.excitation.inspection import Look, inspect, mesh_check_of
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    if not file.exists():
+        raise FileError(f"There is no file {file}.")
     with single_threaded():
         problem = load_problem(terminal, config, overrides)
         segments = load_motions(terminal, file, problem.robot, problem.spec)
@@ -78,7 +81,12 @@ def check(
     table = _table(found, f"Margins at {rate:g} Hz" + (f" and {random} instants" if random else ""))
     notes = [note for name, inspection, off in found for note in _notes(name, inspection, off)]
     summary = f"{broken} violations" if broken else "No violation."
-    terminal.answer([table, *notes, summary], {"motions": data, "rate": rate, "random": random})
+    caption = "A margin is what is left beyond what the config asks to keep."
+    terminal.answer(
+        [table, caption, *notes, summary],
+        {"file": str(file), "ok": not broken, "motions": data, "rate": rate, "random": random,
+         "slow": slow},
+    )  # fmt: skip
     if broken:
         raise typer.Exit(1)
 

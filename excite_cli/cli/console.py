@@ -45,12 +45,12 @@ class Terminal:
     def say(self, text: str) -> None:
         """A message for people, unless quiet."""
         if not self.quiet:
-            self.err.print(text, markup=False)
+            self.err.print(text)
 
     def detail(self, text: str) -> None:
         """A message for those who asked for more."""
         if self.verbose:
-            self.err.print(text, markup=False)
+            self.err.print(text)
 
     def answer(self, table: Table | str | Sequence[Table | str], data: dict[str, Any]) -> None:
         """The answer: JSON, or tables and sentences."""
@@ -60,7 +60,7 @@ class Terminal:
         if self.quiet:
             return
         for part in [table] if isinstance(table, Table | str) else table:
-            self.out.print(part, markup=not isinstance(part, str))
+            self.out.print(part)
 
     @contextmanager
     def live(self, title: str, total: int | None = None) -> Iterator[Callable[[str, int], None]]:
@@ -83,8 +83,12 @@ class Terminal:
 
 
 def _console(file: TextIO) -> Console:
-    """Coloured and as wide as the terminal; plain and wide enough for our tables elsewhere."""
-    return Console(file=file, highlight=False, width=None if file.isatty() else PLAIN_WIDTH)
+    """Coloured and as wide as the terminal; plain and wide enough for our tables elsewhere.
+
+    Brackets are what they are, units in headers among them, and no markup.
+    """
+    width = None if file.isatty() else PLAIN_WIDTH
+    return Console(file=file, highlight=False, markup=False, width=width)
 
 
 def _sparse(title: str) -> Callable[[str, int], None]:

@@ -22,14 +22,17 @@ def posture_from(text: str | None, robot: "Robot") -> "Array":
     from excite_cli.excitation.boundary import posture_of
 
     given: dict[str, float] = {}
-    for part in filter(None, (piece.strip() for piece in (text or "").split(","))):
+    for part in () if text is None else (piece.strip() for piece in text.split(",")):
         name, equals, value = part.partition("=")
         try:
-            given[name.strip()] = float(value)
+            number = float(value)
         except ValueError:
             equals = ""
         if not equals:
             raise ConfigError(f"--from: '{part}' is not joint=value [rad or m].")
+        if name.strip() in given:
+            raise ConfigError(f"--from: {name.strip()} is given twice.")
+        given[name.strip()] = number
     return posture_of(robot, given, "--from")
 
 

@@ -125,8 +125,8 @@ def export(
         )
     if slow is not None:
         terminal.say(
-            "a slowed motion needs other torques: judge it with `excite check --slow` before it is "
-            "played"
+            "a slowed motion needs other torques: judge what was written, `excite check CONFIG "
+            f"{paths[0]}`, before it is played"
         )
     lines = [
         f"{path}: {each.name}, {record['instants']} instants, {record['duration']:.6g} s"

@@ -10,8 +10,11 @@ if TYPE_CHECKING:
     from excite_cli.config.spec import Spec
     from excite_cli.excitation.result import Result
     from excite_cli.identification.prepare import PreparedRun
-    from excite_cli.robot.model import Robot
+    from excite_cli.robot.model import Array, Robot
     from excite_cli.trajectory.chain import Segment
+
+# Share of the position limits from which positions are taken for another unit.
+_FAR_BEYOND = 4.0
 
 
 def load_motions(
@@ -45,16 +48,32 @@ def load_motions(
     from excite_cli.store.diagnosis_file import is_diagnosis  # slow to import
     from excite_cli.store.fit_file import is_fit
 
-    if is_fit(path) or is_diagnosis(path):
+    if path.is_file() and (is_fit(path) or is_diagnosis(path)):
         read_result(path)  # tells that these are no motions
     if chosen and chosen != [1]:
         raise FileError(f"--motion {chosen[0]}: {path} is no result file; it holds one motion.")
     if is_motion(path, spec):
-        return [_motion(terminal, path, robot.joint_names)]
+        return [_motion(terminal, path, robot)]
     return [
         Segment(run.name, *through_samples(run.t, run.q, run.v, run.a))
         for run in _measured(terminal, path, robot, spec)
     ]
+
+
+def _refuse_degrees(path: Path, q: "Array", robot: "Robot") -> None:
+    """Positions (T, n) far beyond what the robot can reach are in another unit."""
+    import numpy as np
+
+    limits = robot.limits
+    reach = np.maximum(np.abs(limits.lower), np.abs(limits.upper))
+    share = np.abs(q).max(axis=0) / np.where(np.isfinite(reach) & (reach > 0), reach, np.inf)
+    worst = int(np.argmax(share))
+    if share[worst] > _FAR_BEYOND:
+        raise FileError(
+            f"{path}: '{robot.joint_names[worst]}' reaches {np.abs(q[:, worst]).max():.3g}, its "
+            f"limits are {limits.lower[worst]:.3g} and {limits.upper[worst]:.3g}. Are these "
+            "degrees, or millimetres? Positions are in rad (m for prismatic joints)."
+        )
 
 
 def motions_of_result(
@@ -104,12 +123,13 @@ def is_motion(path: Path, spec: "Spec | None" = None) -> bool:
     return motion_reader_for(path, torque or "tau") is not None
 
 
-def _motion(terminal: Terminal, path: Path, joints: tuple[str, ...]) -> "Segment":
+def _motion(terminal: Terminal, path: Path, robot: "Robot") -> "Segment":
     from excite_cli.measurement.motions import read_motion
     from excite_cli.trajectory.chain import Segment
     from excite_cli.trajectory.sampled import through_samples
 
-    motion, note = read_motion(path, joints)
+    motion, note = read_motion(path, robot.joint_names)
+    _refuse_degrees(path, motion.q, robot)
     if note:
         terminal.say(f"{path}: {note}")
     missing = "speeds and accelerations" if motion.v is None else "accelerations"

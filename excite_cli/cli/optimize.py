@@ -127,6 +127,10 @@ def optimize(
                 note = "" if motion.improved else "; it brings no improvement"
                 note += "; raise optimizer.max_seconds" if motion.status == "time limit" else ""
                 note += f"; {motion.note}" if motion.note else ""
+                if motion.certified:
+                    loose = [name for name, proved in motion.certified.items() if not proved]
+                    told = "all constraints proved at every instant"
+                    note += f"; not proved: {', '.join(loose)}" if loose else f"; {told}"
                 terminal.say(
                     f"motion {motion.index}: condition number {motion.condition_number:.2f}, "
                     f"stacked {motion.stacked_condition_number:.2f} "

@@ -11,6 +11,9 @@ from excite_cli.config.load import load_spec, parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
 
+# Share of a joint's torque on sealed data from which a fit is doubted.
+_MUCH_LEFT = 0.1
+
 if TYPE_CHECKING:
     from excite_cli.config.spec import Spec
     from excite_cli.diagnosis.next_motion import NextMotion
@@ -36,7 +39,24 @@ def load_problem(
     folder = config.resolve().parent
     problem = build_problem(spec, folder, fit_knowledge(spec, folder))
     tell_problem(terminal, problem)
+    if spec.uncertainty is not None and spec.uncertainty.fit is not None:
+        _tell_fit(terminal, folder / spec.uncertainty.fit)
     return problem
+
+
+def _tell_fit(terminal: Terminal, path: Path) -> None:
+    """Warn where a fit leaves much unexplained: its deviations say nothing of that."""
+    from excite_cli.store.fit_file import read_fit
+
+    errors = read_fit(path).error.relative_moving
+    much = {joint: error for joint, error in errors.items() if error > _MUCH_LEFT}
+    if much:
+        worst = max(much, key=lambda joint: much[joint])
+        terminal.say(
+            f"warning: {path} leaves {100 * much[worst]:.0f} % of the torque of {worst} "
+            f"unexplained ({len(much)} joints above {100 * _MUCH_LEFT:.0f} %). Its standard "
+            "deviations do not cover an effect that the model lacks: run `excite diagnose` first."
+        )
 
 
 def fit_knowledge(spec: "Spec", folder: Path) -> "FitKnowledge | None":

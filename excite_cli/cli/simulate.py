@@ -93,12 +93,15 @@ def simulate(
     Example:  excite simulate configs/ur10.yaml ur10.h5 -o data.h5 --effect
     'load_dependent_friction@elbow_joint=0.06' --effect 'payload@all=1.5;runs:motion_2'
     """
+    from dataclasses import replace
+
     from excite_cli.cli.entry_program import playable, posture_from
     from excite_cli.cli.motions import load_motions
     from excite_cli.cli.setup import load_problem, single_threaded
     from excite_cli.config.load import load_spec
     from excite_cli.effects.catalogue import declared_effects
     from excite_cli.errors import ConfigError
+    from excite_cli.export.timed import repeated
     from excite_cli.measurement.hdf5_writer import write_dataset
     from excite_cli.robot.model import build_robot
     from excite_cli.simulation.engine import load_mujoco
@@ -135,6 +138,10 @@ def simulate(
             motions = [PlannedProgram(m.name, c) for m, c in zip(found, chains, strict=True)]
         else:
             motions = [PlannedMotion(m.name, m.trajectory, m.coefficients) for m in found]
+            if periods > 1 and not all(motion.periodic for motion in motions):
+                chains = [repeated(m, periods, robot.joint_names) for m in found]
+                motions = [PlannedProgram(m.name, c) for m, c in zip(found, chains, strict=True)]
+                settings = replace(settings, periods=1)
         names = [name for takes in run_names(motions, repeat) for name in takes]
         planted = [p for text in effect or [] for p in parse_planted(text, robot, names)]
         declared = () if no_declared else declared_effects(spec.effects, robot)
@@ -159,7 +166,7 @@ def simulate(
         for run in simulation.dataset.runs
     ]
     terminal.answer(
-        [_run_table(simulation), _effect_table(records), str(output)],
+        [_run_table(simulation), *([_effect_table(records)] if records else []), str(output)],
         {"runs": runs, "effects": records, "output": str(output), "seed": settings.seed},
     )
 

@@ -104,6 +104,7 @@ def motion_data(motion: Motion) -> dict[str, Any]:
         "seconds": motion.seconds,
         "iterations": motion.iterations,
         "evaluations": motion.evaluations,
+        "certified": motion.certified,
         "margins": {name: worst_data(worst) for name, worst in motion.margins.items()},
     }
 

@@ -50,8 +50,8 @@ def _tell_uncertainty(terminal: Terminal, problem: Problem) -> None:
     held = [c.name for c in problem.constraints if getattr(c, "uncertainty", None) is not None]
     if not held:
         terminal.say(
-            "uncertainty: nothing to apply it to; it concerns constraints.torque, balance and "
-            "contact"
+            "warning: uncertainty bounds nothing: it concerns constraints.torque, balance and "
+            "contact, and none of them is asked for"
         )
         return
     known = f", and within {spec.sigmas:g} standard deviations of {spec.fit}" if spec.fit else ""

@@ -59,7 +59,10 @@ def load_spec(path: Path, overrides: list[str] | None = None) -> Spec:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path} cannot be read as text: {error}") from error
+        raise ConfigError(
+            f"{path} cannot be read as text, so it is no config ({error}). The config comes first: "
+            "excite COMMAND CONFIG FILE."
+        ) from error
     return parse_spec(text, str(path), overrides)
 
 

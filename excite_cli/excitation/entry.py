@@ -64,7 +64,7 @@ def program(
     ConfigError
         Several periods of a motion that does not end as it begins.
     """
-    require_clear(problem, posture, "the robot's posture at the start")
+    require_clear(problem, posture, "the posture of the entry (--from, else robot.posture)")
     if periods > 1:
         _require_closed(motion)
     judge = judge or judge_of(problem)

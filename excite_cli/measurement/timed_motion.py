@@ -14,6 +14,8 @@ from excite_cli.measurement.dataset import Array
 
 _CHANNELS = {"q": "position", "v": "speed", "a": "acceleration"}
 _LISTED = 12
+# Share by which changes and rates may differ, and the change below which nothing is compared.
+_DISAGREE, _STILL = 0.3, 1e-3
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,36 @@ def checked(path: Path, motion: TimedMotion) -> TimedMotion:
                 f"{path}: the {words} of '{names[joint]}' at {t[row]:.6g} s (instant {row + 1}) "
                 "is missing or not a number."
             )
+    _check_agreement(path, motion, "position", motion.q, motion.v)
+    if motion.v is not None:
+        _check_agreement(path, motion, "speed", motion.v, motion.a)
     return motion
+
+
+def _check_agreement(
+    path: Path, motion: TimedMotion, words: str, x: Array, rate: Array | None
+) -> None:
+    """Refuse rates (T, n) that are not those of x (T, n): wrong units of time, or another signal.
+
+    Between samples x changes by about the mean of both rates times the step; what differs, summed
+    over the motion, is compared with the change itself.
+    """
+    if rate is None:
+        return
+    step = np.diff(motion.t)[:, None]
+    change = np.diff(x, axis=0)
+    off = np.abs(change - step * (rate[1:] + rate[:-1]) / 2).sum(axis=0)
+    size = np.maximum(np.abs(change), step * np.abs(rate[1:] + rate[:-1]) / 2).sum(axis=0)
+    share = off / np.where(size > 0, size, 1.0)
+    share[size < _STILL] = 0.0
+    worst = int(np.argmax(share))
+    if share[worst] > _DISAGREE:
+        what = {"position": "speeds", "speed": "accelerations"}[words]
+        raise FileError(
+            f"{path}: the {what} of '{motion.joint_names[worst]}' are not those of its {words}s "
+            f"(they differ by {100 * share[worst]:.0f} %). Give time in s, angles in rad and "
+            f"speeds in rad/s, or leave the {what} out."
+        )
 
 
 def arranged(path: Path, motion: TimedMotion, joints: tuple[str, ...]) -> tuple[TimedMotion, str]:

@@ -55,6 +55,12 @@ def _check(attributes: Any, path: Path, own: OwnFile) -> None:
     ours = attributes.get("program") == PROGRAM
     if own.marker is not None:
         ours = ours and attributes.get(own.marker[0]) == own.marker[1]
+    else:
+        ours = ours and "kind" not in attributes
+    if not ours and attributes.get("program") == PROGRAM and "kind" in attributes:
+        raise FileError(f"{path} holds a {attributes['kind']}, not {own.what}. {own.written_by}")
+    if not ours and "simulated" in attributes:
+        raise FileError(f"{path} holds measured data, not {own.what}. {own.written_by}")
     if not ours:
         raise FileError(f"{path} is HDF5, but not {own.what} of this program. {own.written_by}")
     if int(attributes["schema"]) > own.schema:

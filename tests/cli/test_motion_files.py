@@ -1,0 +1,104 @@
+"""Files given where motions are wanted: units that cannot be right, and files of another kind."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cli.conftest import Run
+from tests.cli.program import SMOKE, Program
+
+JOINTS = ("shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide")
+
+
+def written(
+    folder: Path, name: str, pace: float = 1.0, turn: float = 1.0, speed: float = 1.0
+) -> str:
+    """A slow swing of all joints; `pace` scales time, `turn` positions, `speed` the speeds."""
+    t = np.linspace(0, 4, 401)
+    middle = np.array([0.0, 0.6, 0.8, 0.0, 0.05])
+    size = np.array([0.5, 0.3, 0.3, 0.5, 0.02])
+    q = middle + size * (1 - np.cos(np.pi * t[:, None] / 2)) / 2
+    v = size * np.pi / 4 * np.sin(np.pi * t[:, None] / 2)
+    head = ["t", *(f"q_{joint}" for joint in JOINTS), *(f"dq_{joint}" for joint in JOINTS)]
+    rows = np.column_stack([t * pace, q * turn, v * turn * speed])
+    np.savetxt(folder / name, rows, delimiter=",", header=",".join(head), comments="")
+    return name
+
+
+def test_a_good_file_is_judged(excite: Program) -> None:
+    answer = excite.answer("check", SMOKE, written(excite.folder, "m.csv"), "--no-meshes")
+    assert answer["ok"] is True
+    assert answer["motions"][0]["violations"] == 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"pace": 1000.0}, "Give time in s"),
+        ({"speed": 2.0}, "the speeds of"),
+        ({"turn": 57.3}, "Are these degrees"),
+    ],
+    ids=["milliseconds", "speeds", "degrees"],
+)
+@pytest.mark.parametrize("command", ["check", "prior"])
+def test_units_that_cannot_be_right(
+    excite: Program, changes: dict[str, float], words: str, command: str
+) -> None:
+    name = written(excite.folder, "m.csv", **changes)
+    if command == "check":
+        run = excite("check", SMOKE, name, "--no-meshes")
+    else:
+        run = excite("optimize", SMOKE, "--prior", name, "-o", "out.h5")
+    assert run.returncode == 2, run.stderr
+    assert words in run.stderr
+    assert not (excite.folder / "out.h5").exists()
+
+
+def test_files_of_another_kind_are_named(excite: Program, two_motions: Run) -> None:
+    made = excite("simulate", SMOKE, two_motions.path, "--motion", "1", "-o", "data.h5")
+    assert made.returncode == 0, made.stderr
+    assert "duration [s]" in made.stdout  # units of headers are no markup
+    assert "tracking RMS [mrad]" in made.stdout
+    assert "Effects" not in made.stdout  # there are none
+    fitted = excite("identify", SMOKE, "data.h5", "-o", "fit.h5")
+    assert fitted.returncode == 0, fitted.stderr
+    for arguments in (
+        ("check", SMOKE, "fit.h5"),
+        ("report", "fit.h5", "-o", "figures"),
+        ("optimize", SMOKE, "--start", "fit.h5", "-o", "out.h5"),
+    ):
+        run = excite(*arguments)
+        assert run.returncode == 2
+        assert "holds a fit, not a result" in run.stderr
+    run = excite("report", "data.h5", "-o", "figures")
+    assert run.returncode == 2
+    assert "holds measured data" in run.stderr
+    swapped = excite("check", two_motions.path, SMOKE)
+    assert swapped.returncode == 2
+    assert "The config comes first" in swapped.stderr
+
+
+def test_what_closes_can_be_repeated(excite: Program) -> None:
+    config = excite.folder / "closed.yaml"
+    config.write_text(
+        f"robot: {{urdf: {SMOKE.parents[1] / 'data' / 'smoke_arm.urdf'}, "
+        "posture: {shoulder_pitch: 0.6, elbow: 0.8, slide: 0.05}}\n"
+        "trajectory: {family: bspline, duration: 3, control_points: 12, start: posture, "
+        "end: posture}\nconstraints: {joint_limits: {acceleration: 10.0}}\n"
+        "optimizer: {max_iterations: 3}\n"
+    )
+    run = excite("optimize", config, "-o", "closed.h5")
+    assert "all constraints proved at every instant" in run.stderr
+    answer = excite.answer("simulate", config, "closed.h5", "-o", "data.h5", "--periods", "3")
+    assert answer["runs"][0]["duration"] == pytest.approx(9.0, abs=0.01)
+
+
+def test_from_wants_each_joint_once(excite: Program, two_motions: Run) -> None:
+    for given in ("elbow=1,elbow=2", ""):
+        run = excite(
+            "export", two_motions.path, "-f", "csv", "--entry", "--from", given, "-o", "x.csv"
+        )
+        assert run.returncode == 2
+        assert "--from" in run.stderr
+        assert not (excite.folder / "x.csv").exists()
