@@ -14,8 +14,9 @@ from excite_cli.measurement.dataset import Array
 
 _CHANNELS = {"q": "position", "v": "speed", "a": "acceleration"}
 _LISTED = 12
-# Share by which changes and rates may differ, and the change below which nothing is compared.
-_DISAGREE, _STILL = 0.3, 1e-3
+# Share by which changes and rates may differ; the change below which nothing is compared, and the
+# number of instants.
+_DISAGREE, _STILL, _SAMPLED = 0.3, 1e-3, 50
 
 
 @dataclass(frozen=True)
@@ -85,16 +86,17 @@ def _check_agreement(
     """Refuse rates (T, n) that are not those of x (T, n): wrong units of time, or another signal.
 
     Between samples x changes by about the mean of both rates times the step; what differs, summed
-    over the motion, is compared with the change itself.
+    over the motion, is compared with the change itself. A few way points, or stops at each of them
+    (rates of zero), say nothing about what is between.
     """
-    if rate is None:
+    if rate is None or len(motion.t) < _SAMPLED:
         return
     step = np.diff(motion.t)[:, None]
     change = np.diff(x, axis=0)
     off = np.abs(change - step * (rate[1:] + rate[:-1]) / 2).sum(axis=0)
     size = np.maximum(np.abs(change), step * np.abs(rate[1:] + rate[:-1]) / 2).sum(axis=0)
     share = off / np.where(size > 0, size, 1.0)
-    share[size < _STILL] = 0.0
+    share[(size < _STILL) | ~rate.any(axis=0)] = 0.0
     worst = int(np.argmax(share))
     if share[worst] > _DISAGREE:
         what = {"position": "speeds", "speed": "accelerations"}[words]

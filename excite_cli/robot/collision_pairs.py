@@ -7,7 +7,6 @@ Neighbours but one (the base and the upper arm of an industrial robot) pass each
 capsules can tell: where their capsules touch, the meshes themselves decide whether they ever meet.
 """
 
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.mesh_distances import MeshDistances
+from excite_cli.robot.mesh_pairs import joined_links
 from excite_cli.robot.model import Robot
 from excite_cli.robot.pair_distances import PairDistances, carried_bodies
 
@@ -107,7 +107,7 @@ class _Known:
 
     def __init__(self, robot: Robot, spec: SelfCollisionSpec) -> None:
         self._carried = carried_bodies(robot)
-        self._neighbours = _neighbours(robot)
+        self._neighbours = joined_links(robot)
         self._ignored = {frozenset(pair) for pair in spec.ignore}
 
     def reason(self, first: Capsule, second: Capsule) -> str:
@@ -120,16 +120,6 @@ class _Known:
         if between == 1 and links & self._neighbours:
             return "adjacent"
         return ""
-
-
-def _neighbours(robot: Robot) -> set[frozenset[str]]:
-    """Pairs of links that a joint of the URDF joins directly."""
-    pairs = set()
-    for joint in ElementTree.fromstring(robot.description.xml).findall("joint"):
-        parent, child = joint.find("parent"), joint.find("child")
-        if parent is not None and child is not None:
-            pairs.add(frozenset((parent.get("link", ""), child.get("link", ""))))
-    return pairs
 
 
 def _by_sampling(

@@ -106,7 +106,7 @@ def test_slowed_and_repeated(here: Here, two_motions: Run) -> None:
     assert max(speed, acceleration) == pytest.approx(0.25, rel=1e-3)
     status, _, err = here(*arguments, "--overwrite", "--slow", "0.25")
     assert status == 0
-    assert "`excite check --slow`" in err
+    assert "`excite check CONFIG a.npz`" in err
 
 
 def test_entered_from_rest(here: Here, two_motions: Run) -> None:

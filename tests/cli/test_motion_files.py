@@ -41,15 +41,9 @@ def test_a_good_file_is_judged(excite: Program) -> None:
     ],
     ids=["milliseconds", "speeds", "degrees"],
 )
-@pytest.mark.parametrize("command", ["check", "prior"])
-def test_units_that_cannot_be_right(
-    excite: Program, changes: dict[str, float], words: str, command: str
-) -> None:
+def test_units_that_cannot_be_right(excite: Program, changes: dict[str, float], words: str) -> None:
     name = written(excite.folder, "m.csv", **changes)
-    if command == "check":
-        run = excite("check", SMOKE, name, "--no-meshes")
-    else:
-        run = excite("optimize", SMOKE, "--prior", name, "-o", "out.h5")
+    run = excite("optimize", SMOKE, "--prior", name, "-o", "out.h5")
     assert run.returncode == 2, run.stderr
     assert words in run.stderr
     assert not (excite.folder / "out.h5").exists()
@@ -63,11 +57,7 @@ def test_files_of_another_kind_are_named(excite: Program, two_motions: Run) -> N
     assert "Effects" not in made.stdout  # there are none
     fitted = excite("identify", SMOKE, "data.h5", "-o", "fit.h5")
     assert fitted.returncode == 0, fitted.stderr
-    for arguments in (
-        ("check", SMOKE, "fit.h5"),
-        ("report", "fit.h5", "-o", "figures"),
-        ("optimize", SMOKE, "--start", "fit.h5", "-o", "out.h5"),
-    ):
+    for arguments in (("check", SMOKE, "fit.h5"), ("report", "fit.h5", "-o", "figures")):
         run = excite(*arguments)
         assert run.returncode == 2
         assert "holds a fit, not a result" in run.stderr

@@ -144,7 +144,7 @@ def test_a_posture_in_collision_is_named() -> None:
     problem = _problem()
     still = Segment("m", problem.trajectory, problem.trajectory.constant(problem.robot.posture))
     folded = problem.robot.posture + np.array([0.0, 1.5, 1.7, 0.0, 0.0])
-    with pytest.raises(NoAdmissibleMotionError, match=r"robot's posture.*self_collision"):
+    with pytest.raises(NoAdmissibleMotionError, match=r"posture of the entry.*self_collision"):
         program(problem, still, folded)
 
 

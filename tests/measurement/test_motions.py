@@ -154,3 +154,13 @@ def test_an_npz_that_claims_more_than_it_holds(tmp_path: Path) -> None:
             new.writestr(name, header.getvalue() if name == "q.npy" else old.read(name))
     with pytest.raises(FileError, match="claims 10,000,000,000,000 values"):
         read_motion(big, ("a",))
+
+
+def test_way_points_with_stops_are_no_contradiction(tmp_path: Path) -> None:
+    """Speeds of zero at every way point: a program that stops there."""
+    rows = "\n".join(f"{k},{k % 2},0" for k in range(80))
+    motion, _ = read_motion(_file(tmp_path, "m.csv", f"t,q_a,dq_a\n{rows}\n"), ("a",))
+    assert motion.v is not None
+    rows = "\n".join(f"{k},{k % 2},{3 * (k % 2)}" for k in range(80))
+    with pytest.raises(FileError, match="the speeds of 'a' are not those of its positions"):
+        read_motion(_file(tmp_path, "n.csv", f"t,q_a,dq_a\n{rows}\n"), ("a",))

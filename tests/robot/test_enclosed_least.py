@@ -45,7 +45,7 @@ def test_bound_is_tight_for_short_intervals(seed: int) -> None:
         at = np.min([known.least(y.at(s)) for s in np.linspace(-1, 1, 41)], axis=0)
         off.append(float(np.max(at - least_of(y, known))))
     assert off[0] < 0.05
-    assert off[1] < 0.5 * off[0] + 1e-6
+    assert off[1] < 0.5 * off[0] + 2e-4
 
 
 def test_combinations_of_rows() -> None:
