@@ -9,13 +9,12 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.hull_bounds import ball_bounds, hull_bounds
 from excite_cli.robot.link_meshes import Poses, link_meshes
-from excite_cli.robot.mesh_certificate import certify_meshes
 from excite_cli.robot.mesh_check import MeshCheck
-from excite_cli.robot.mesh_cover import uncovered_links
 from excite_cli.robot.mesh_distances import MeshDistances
 from excite_cli.robot.mesh_pairs import ALWAYS, AT_POSTURE, BY_HAND
 from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.robot.relative_reach import RelativeReach
+from tests.robot.mesh_cover import uncovered_links
 
 from .fitted_robots import capsules_of, robot_of
 
@@ -123,55 +122,6 @@ def seen(poses: Poses, one: object, two: object) -> Array:
     turn = poses.rotations[:, one.joint]  # type: ignore[attr-defined]
     away = corners - poses.translations[:, one.joint][:, None]  # type: ignore[attr-defined]
     return np.asarray(np.einsum("txy,tcx->tcy", turn, away))
-
-
-class Dip:
-    """A motion that stands still but for a dip of some ms towards another posture."""
-
-    def __init__(self, rest: Array, there: Array, depth: float, at: float, width: float) -> None:
-        self.rest, self.way = rest, depth * (there - rest)
-        self.at, self.width = at, width
-
-    def positions(self, times: Array) -> Array:
-        share = np.maximum(1.0 - np.abs(times - self.at) / self.width, 0.0)
-        return np.asarray(self.rest + share[:, None] * self.way)
-
-    def change(self, times: Array, half: float) -> Array:
-        reached = np.abs(times - self.at) < self.width + half
-        rate = np.abs(self.way) / self.width
-        return np.asarray(np.minimum(reached[:, None] * rate * half, np.abs(self.way)))
-
-
-def first_contact(check: MeshCheck, rest: Array, there: Array) -> float:
-    """Share of the way from rest at which meshes first touch."""
-    shares = np.linspace(0, 1, 400)
-    q = rest + shares[:, None] * (there - rest)
-    return next(s for s, at in zip(shares, q, strict=True) if check.least(at[None]).broken)
-
-
-def test_contact_of_two_milliseconds_between_samples_is_found() -> None:
-    robot = arm()
-    check = MeshCheck(robot)
-    rest = robot.posture
-    folded = rest.copy()
-    folded[robot.joint_names.index("shoulder_pitch")] = 2.1
-    folded[robot.joint_names.index("elbow")] = 2.5
-    contact = first_contact(check, rest, folded)
-    # Contact lasts while the share of the dip exceeds that of the contact: 2 ms in all.
-    depth, width = contact * 1.1, 0.011
-    dip = Dip(rest, folded, depth, at=1.005, width=width)
-    assert 2 * width * (1 - contact / depth) == pytest.approx(0.002, rel=0.05)
-    sampled = np.arange(0, 2.0, 0.01)
-    seen_at = sampled[np.abs(sampled - 1.005) > 0.0011]
-    assert not check.least(dip.positions(seen_at)).broken
-    found = certify_meshes(check, dip.positions, dip.change, 2.0)
-    assert not found.proved
-    assert found.broken
-    assert found.gaps[0].time == pytest.approx(1.005, abs=0.002)
-    clear = Dip(rest, folded, 0.95 * contact, at=1.005, width=width)
-    certificate = certify_meshes(check, clear.positions, clear.change, 2.0)
-    assert certificate.proved
-    assert certificate.intervals < 10_000
 
 
 def test_what_is_proved_holds() -> None:
