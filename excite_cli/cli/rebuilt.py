@@ -1,0 +1,48 @@
+"""The problem of a result file, from the config that the file holds."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from excite_cli.excitation.problem import Problem
+    from excite_cli.excitation.result import Result
+
+
+def rebuilt_problem(file: Path, result: "Result", config: Path | None) -> "Problem":
+    """The problem that `file` was made for; `config` says where relative paths start.
+
+    Raises
+    ------
+    FileError
+        The file holds no motion, its URDF is not found, or the robot is not the one it had.
+    """
+    from excite_cli.cli.setup import fit_knowledge
+    from excite_cli.config.load import load_spec, parse_spec
+    from excite_cli.errors import FileError
+    from excite_cli.excitation.problem import build_problem
+    from excite_cli.excitation.result import matches
+    from excite_cli.robot.description import EXAMPLE_PREFIX
+
+    if not result.motions:
+        raise FileError(f"{file} holds no motion yet. Go on with `excite optimize --resume`.")
+    spec = parse_spec(result.config, f"the config stored in {file}")
+    folder = config.resolve().parent if config is not None else Path(result.config_folder)
+    if config is not None:
+        given = load_spec(config).robot
+        found = {"urdf": given.urdf, "package_dirs": given.package_dirs}
+        spec = spec.model_copy(update={"robot": spec.robot.model_copy(update=found)})
+    urdf = spec.robot.urdf
+    if not urdf.startswith(EXAMPLE_PREFIX) and not (folder / urdf).is_file():
+        raise FileError(
+            f"{file} was made with the URDF {urdf}, and there is none at "
+            f"{(folder / urdf).resolve()}. Relative paths start from the config: give the YAML "
+            "file it was made with, --config CONFIG.yaml."
+        )
+    problem = build_problem(spec, folder, fit_knowledge(spec, folder))
+    reason = matches(problem, result)
+    if reason:
+        raise FileError(
+            f"{file} does not fit the robot that was found ({urdf}): {reason}. Give the YAML file "
+            "it was made with, --config CONFIG.yaml, and the URDF as it was."
+        )
+    return problem

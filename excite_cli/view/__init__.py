@@ -1,0 +1,1 @@
+"""Robots and motions in three dimensions."""

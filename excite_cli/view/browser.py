@@ -1,0 +1,235 @@
+"""Motions played in the browser: a small server on this machine, with controls and a readout.
+
+One loop does everything that is shown, so that nothing is changed from two sides at once: it reads
+the controls, moves the robot on, and writes the readout a few times a second.
+"""
+
+import contextlib
+import errno
+import importlib
+import io
+import socket
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from excite_cli.errors import ConfigError, MissingExtraError
+from excite_cli.excitation.problem import Problem
+from excite_cli.trajectory.chain import Segment
+from excite_cli.view.camera import fitted_camera
+from excite_cli.view.instants import Instants, instants_of
+from excite_cli.view.readout import joints_html, margins_html, nearest_html
+from excite_cli.view.scene import build_scene
+from excite_cli.view.stage import Stage
+
+_RATE = 50.0  # instants per second of motion
+_FRAME = 1 / 30  # [s]
+_READOUT = 0.2  # [s] between two readouts while playing
+_SEEN = 40  # instants that tell how far a motion reaches
+_TRIED = 50  # ports
+_PACES = ("0.1", "0.25", "0.5", "1", "2", "4")  # shares of the motion's own pace
+
+
+@dataclass(frozen=True)
+class Serving:
+    """Where to serve, and what to show at first.
+
+    mass None: the centre of mass where a constraint asks for balance.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8080
+    azimuth: float = 35.0
+    elevation: float = 18.0
+    capsules: bool = True
+    distance: bool = True
+    mass: bool | None = None
+
+
+def play_in_browser(
+    problem: Problem,
+    segments: Sequence[Segment],
+    serving: Serving,
+    ready: Callable[[str, int], None],
+    going: Callable[[], bool] = lambda: True,
+    say: Callable[[str], None] = lambda text: None,
+) -> None:
+    """Serve the motions of `problem` until interrupted, or as long as `going`.
+
+    `ready` hears the address and the port as soon as the page can be opened; the port is another
+    one than asked for if that is taken. `say` hears what cannot be shown as the URDF says it.
+
+    Raises
+    ------
+    MissingExtraError
+        viser is not installed.
+    ConfigError
+        The host or the port cannot be used.
+    """
+    viser = _viser()
+    times = np.linspace(0.0, 1.0, _SEEN)
+    paths = [
+        s.trajectory.states(times * s.trajectory.duration, s.coefficients)[0] for s in segments
+    ]
+    scene = build_scene(problem, paths)
+    if scene.note:
+        say(scene.note)
+    server = _server(viser, serving, problem.robot.name)
+    try:
+        camera = fitted_camera(scene.outline, (4, 3), serving.azimuth, serving.elevation, fill=0.75)
+        server.initial_camera.position = tuple(camera.eye)
+        server.initial_camera.look_at = tuple(scene.center)
+        server.initial_camera.fov = float(2 * np.arctan(3 / 2 / camera.focal))
+        player = _Player(server, Stage(server, scene), problem, segments, serving)
+        player.update(time.monotonic())
+        host = "localhost" if serving.host in ("127.0.0.1", "0.0.0.0", "::") else serving.host
+        ready(f"http://{host}:{server.get_port()}", server.get_port())
+        while going():
+            began = time.monotonic()
+            player.update(began)
+            time.sleep(max(0.001, _FRAME - (time.monotonic() - began)))
+    finally:
+        _stop(server)
+
+
+class _Player:
+    """The controls, and what follows from them."""
+
+    def __init__(
+        self,
+        server: Any,
+        stage: Stage,
+        problem: Problem,
+        segments: Sequence[Segment],
+        serving: Serving,
+    ) -> None:
+        self._server, self._stage, self._problem = server, stage, problem
+        self._segments = {segment.name: segment for segment in segments}
+        self._known: dict[str, Instants] = {}
+        self._playing = True
+        self._time, self._before = 0.0, time.monotonic()
+        self._shown: tuple[str, int] | None = None
+        self._told = -np.inf
+        gui = server.gui
+        names = tuple(self._segments)
+        duration = self._segments[names[0]].trajectory.duration
+        self._motion = gui.add_dropdown("motion", names, initial_value=names[0])
+        self._slider = gui.add_slider("time [s]", 0.0, duration, 1 / _RATE, 0.0)
+        self._set = 0.0  # what this program put into the slider: anything else is the user's
+        self._button = gui.add_button("pause")
+        self._button.on_click(lambda _: self._toggle())
+        self._pace = gui.add_dropdown("speed", _PACES, initial_value="1")
+        self._toggles = []
+        for label, node, shown in (
+            ("capsules", stage.capsules, serving.capsules),
+            ("nearest distance", stage.distance, serving.distance),
+            (
+                "centre of mass",
+                stage.mass,
+                stage.balanced if serving.mass is None else serving.mass,
+            ),
+        ):
+            self._toggles.append((gui.add_checkbox(label, shown), node))
+        self._nearest = gui.add_html("")
+        with gui.add_folder("smallest margins now"):
+            self._margins = gui.add_html("")
+        with gui.add_folder("joint positions within limits", expand_by_default=problem.robot.n < 9):
+            self._joints = gui.add_html("")
+
+    def _toggle(self) -> None:
+        self._playing = not self._playing
+        self._button.label = "pause" if self._playing else "play"
+
+    def update(self, now: float) -> None:
+        """Read the controls and show what they ask for."""
+        name = str(self._motion.value)
+        segment = self._segments[name]
+        duration = segment.trajectory.duration
+        if self._slider.max != duration:
+            self._slider.max, self._time = duration, 0.0
+        if abs(float(self._slider.value) - self._set) > 0.5 / _RATE:
+            self._time = float(self._slider.value)
+        elif self._playing:
+            pace = float(self._pace.value)
+            self._time = (self._time + pace * (now - self._before)) % duration
+        self._before = now
+        instants = self._instants(name)
+        instant = instants.index_at(self._time)
+        for box, node in self._toggles:
+            if node.visible != box.value:
+                node.visible = box.value
+        if self._shown == (name, instant):
+            return
+        self._shown = name, instant
+        with self._server.atomic():
+            self._stage.show(instants, instant)
+        if not self._playing or now - self._told > _READOUT:
+            self._told = now
+            self._set = round(self._time * _RATE) / _RATE
+            self._slider.value = self._set
+            self._nearest.content = nearest_html(instants, instant)
+            self._margins.content = margins_html(instants, instant)
+            self._joints.content = joints_html(self._problem, instants, instant)
+
+    def _instants(self, name: str) -> Instants:
+        if name not in self._known:
+            segment = self._segments[name]
+            duration = segment.trajectory.duration
+            times = np.linspace(0.0, duration, int(np.ceil(duration * _RATE)) + 1)
+            self._known[name] = instants_of(self._problem, segment, times)
+        return self._known[name]
+
+
+def _viser() -> Any:
+    try:
+        return importlib.import_module("viser")
+    except ImportError as error:
+        raise MissingExtraError(
+            "Playing motions in the browser needs viser, which is not installed. Run: "
+            "pip install 'excite-cli[view]' (or take --png or --gif)."
+        ) from error
+
+
+def _server(viser: Any, serving: Serving, title: str) -> Any:
+    """A server that says nothing of its own and is shared with nobody outside."""
+    port = _free_port(serving.host, serving.port)
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(serving.host, port, label=title, verbose=False)
+    server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+    server.request_share_url = lambda *_, **__: None
+    return server
+
+
+def _stop(server: Any) -> None:
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def _free_port(host: str, port: int) -> int:
+    """The port, or the next free one.
+
+    Raises
+    ------
+    ConfigError
+        This machine has no such address, or none of the next ports is free.
+    """
+    reason = "no port there is free"
+    for candidate in range(port, min(port + _TRIED, 65536)):
+        try:
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
+            with socket.socket(family, socket.SOCK_STREAM) as probe:
+                # As the server itself does: a port that was closed a moment ago is free.
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                probe.bind((host, candidate))
+            return candidate
+        except OSError as error:
+            reason = error.strerror or str(error)
+            if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+                break
+    raise ConfigError(
+        f"Nothing can be served at {host}, port {port}: {reason}. Give another --port, or as "
+        "--host an address of this machine (127.0.0.1: for it only; 0.0.0.0: for its network)."
+    )

@@ -1,0 +1,202 @@
+"""What stands still while a motion is shown: the robot's bodies, its capsules, what is around it.
+
+A `Scene` knows no time: `Instants` says where its bodies are at each instant.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.constraints.balance import Balance
+from excite_cli.constraints.contact import ZeroMomentPoint
+from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.constraints.surroundings import Surroundings
+from excite_cli.excitation.problem import Problem
+from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.link_meshes import Poses
+from excite_cli.robot.model import Array
+from excite_cli.robot.obstacles import FLOOR, Box, Obstacle, Plane
+from excite_cli.view.geometry import Body, Colour, robot_bodies
+from excite_cli.view.surface import Surface, box_triangles, capsule_triangles, smooth_surface
+
+PAYLOAD_COLOUR: Colour = (0.85, 0.55, 0.16)
+_NEAR_BASE = 0.02  # [m] by which a robot may be seen below the foot of its base
+_FEW = 24  # instants that tell how far a motion reaches
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """A convex part of the ground: corners (k, 2) in order [m] at `height` [m]."""
+
+    corners: Array
+    height: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything of a problem that can be shown, at rest.
+
+    capsules: those that constraints look at, with a surface for each, in the frames of their
+    joints. boxes: solid things in the world, by name; walls: half-spaces other than the floor.
+    region: what the centre of mass or the zero-moment point is kept in. contacts: (k, 3) points
+    [m]. ground: height [m] at which the ground is drawn. low, high: (3,) corners of what the
+    motions reach [m]; outline: (K, 3) outermost points of it [m]. note: what is
+    not shown as one might expect.
+    """
+
+    name: str
+    bodies: tuple[Body, ...]
+    capsules: tuple[Capsule, ...]
+    capsule_surfaces: tuple[Surface, ...]
+    boxes: tuple[tuple[str, Surface], ...]
+    walls: tuple[Plane, ...]
+    region: Region | None
+    contacts: Array
+    ground: float
+    low: Array
+    high: Array
+    outline: Array
+    note: str = ""
+
+    @property
+    def center(self) -> Array:
+        """(3,) [m]."""
+        return np.asarray((self.low + self.high) / 2)
+
+    @property
+    def size(self) -> float:
+        """Length [m] of the diagonal of what the motions reach."""
+        return float(np.linalg.norm(self.high - self.low))
+
+
+def build_scene(problem: Problem, paths: list[Array], cell: float = 0.0) -> Scene:
+    """The scene of `problem`, as large as the positions (T, n) in `paths` ask for.
+
+    cell: detail of meshes below this size [m] is dropped.
+    """
+    robot = problem.robot
+    bodies, note = robot_bodies(robot, cell)
+    if robot.payload is not None:
+        carried = robot.payload.capsule
+        surface = smooth_surface(capsule_triangles(carried.start, carried.end, carried.radius))
+        bodies = (*bodies, Body(carried.name, carried.joint, surface, PAYLOAD_COLOUR))
+    capsules, obstacles = _capsules(problem), _obstacles(problem)
+    outline, foot = _reach(problem, bodies, paths)
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    floor = next((o.offset for o in obstacles if isinstance(o, Plane) and o.name == FLOOR), None)
+    height = next((c.height for c in problem.constraints if isinstance(c, ZeroMomentPoint)), None)
+    ground = _ground(floor, height, foot, float(low[2]))
+    boxes = tuple((o.name, _box_surface(o)) for o in obstacles if isinstance(o, Box))
+    outline = np.vstack([outline, *(_corners(surface.points) for _, surface in boxes)])
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    region, contacts = _region(problem, ground)
+    return Scene(
+        name=robot.name,
+        bodies=bodies,
+        capsules=capsules,
+        capsule_surfaces=tuple(
+            smooth_surface(capsule_triangles(c.start, c.end, c.radius)) for c in capsules
+        ),
+        boxes=boxes,
+        walls=tuple(o for o in obstacles if isinstance(o, Plane) and o.name != FLOOR),
+        region=region,
+        contacts=contacts,
+        ground=ground,
+        low=np.array([low[0], low[1], min(float(low[2]), ground)]),
+        high=high,
+        outline=outline,
+        note=note,
+    )
+
+
+def _capsules(problem: Problem) -> tuple[Capsule, ...]:
+    """Those of self-collision and surroundings, which are the same where both are asked for."""
+    for constraint in problem.constraints:
+        if isinstance(constraint, SelfCollision | Surroundings):
+            return constraint.capsules
+    return ()
+
+
+def _obstacles(problem: Problem) -> tuple[Obstacle, ...]:
+    for constraint in problem.constraints:
+        if isinstance(constraint, Surroundings):
+            return constraint.obstacles
+    return ()
+
+
+def _box_surface(box: Box) -> Surface:
+    return smooth_surface(box_triangles(box.half)).moved(box.rotation, box.position)
+
+
+def _reach(problem: Problem, bodies: tuple[Body, ...], paths: list[Array]) -> tuple[Array, float]:
+    """Outermost points (K, 3) of all bodies along the paths, and the height of the base's foot."""
+    found = []
+    for q in paths:
+        some = np.unique(np.linspace(0, len(q) - 1, min(_FEW, len(q))).astype(int))
+        found.append(outermost(bodies, Poses.of(problem.robot, q[some])))
+    points = np.vstack(found)
+    if not len(points):
+        points = np.array([[-1.0] * 3, [1.0] * 3])
+    still = [body.surface.points[:, 2] for body in bodies if body.joint == 0]
+    return points, min((float(z.min()) for z in still if len(z)), default=float("inf"))
+
+
+def outermost(bodies: tuple[Body, ...], poses: Poses) -> Array:
+    """Points (K, 3) of the bodies [m] that reach farthest at the given poses."""
+    if not len(poses):
+        return np.zeros((0, 3))
+    found = [np.zeros((0, 3))]
+    for body in bodies:
+        if len(body.surface.points):
+            points = poses.points(body.joint, _corners(body.surface.points))
+            found.append(points.reshape(-1, 3) if body.joint else points[0])
+    return np.vstack(found)
+
+
+def _corners(points: Array) -> Array:
+    """The points (k, 3) that are outermost in many directions."""
+    angles = np.linspace(0, np.pi, 7)[:, None], np.linspace(0, 2 * np.pi, 13)[None, :-1]
+    z, x, y = (
+        np.cos(angles[0]) + 0 * angles[1],
+        np.sin(angles[0]) * np.cos(angles[1]),
+        np.sin(angles[0]) * np.sin(angles[1]),
+    )
+    directions = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+    return np.asarray(points[np.unique((points @ directions.T).argmax(axis=0))])
+
+
+def _ground(floor: float | None, height: float | None, foot: float, lowest: float) -> float:
+    """The floor or the contact's height if there is one, else the foot of the base.
+
+    A robot that reaches below its own foot stands on something: then the lowest point it reaches.
+    """
+    if floor is not None:
+        return floor
+    if height is not None:
+        return height
+    return foot if np.isfinite(foot) and lowest >= foot - _NEAR_BASE else lowest
+
+
+def _region(problem: Problem, ground: float) -> tuple[Region | None, Array]:
+    region, contacts = None, np.zeros((0, 3))
+    for constraint in problem.constraints:
+        if isinstance(constraint, ZeroMomentPoint):
+            support = constraint.support
+            corners = _polygon(support.normals, support.offsets)
+            region = Region(corners, constraint.height)
+            given = problem.spec.constraints.contact
+            if given is not None:
+                points = np.array(given.vertices, dtype=float)
+                contacts = np.column_stack([points, np.full(len(points), constraint.height)])
+        elif isinstance(constraint, Balance) and region is None:
+            region = Region(_polygon(constraint.normals, constraint.offsets), ground)
+    return region, contacts
+
+
+def _polygon(normals: Array, offsets: Array) -> Array:
+    """Corners (m, 2) of the region normal·x ≤ offset, in order."""
+    order = np.argsort(np.arctan2(normals[:, 1], normals[:, 0]))
+    normals, offsets = normals[order], offsets[order]
+    pairs = np.stack([normals, np.roll(normals, -1, axis=0)], axis=1)
+    sides = np.stack([offsets, np.roll(offsets, -1)], axis=1)[..., None]
+    return np.asarray(np.linalg.solve(pairs, sides)[..., 0])

@@ -1,0 +1,247 @@
+"""A scene at an instant as a picture: shaded bodies on a grid, with what is translucent over them.
+
+One ray for each pixel finds where edges are; there more rays smooth them. Everything is computed
+on the processor (see `tracing`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.robot.link_meshes import Poses
+from excite_cli.robot.model import Array
+from excite_cli.view.camera import Camera
+from excite_cli.view.geometry import Colour
+from excite_cli.view.ground import PAPER, Ground, Shade
+from excite_cli.view.lighting import Lights
+from excite_cli.view.scene import Scene
+from excite_cli.view.surface import Surface
+from excite_cli.view.tracing import Hits, Tracer
+from excite_cli.view.translucent import GHOST, Pane, region_pane, wall_panes
+
+BOX_COLOUR: Colour = (0.86, 0.80, 0.70)
+_FOLD = 0.88  # cosine of normals of neighbouring pixels below which there is an edge
+_STEPS = 8192  # of light that colours tell apart
+_STEP = 0.03  # share of the distance by which neighbouring pixels differ at an edge
+# Places within a pixel [1/16], one in each row and column of a grid.
+_PLACES = {
+    4: np.array([[2, 6], [6, 14], [10, 2], [14, 10]]),
+    8: np.array([[3, 11], [7, 5], [11, 15], [15, 9], [1, 1], [5, 13], [9, 7], [13, 3]]),
+}
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Rays for each pixel on an edge (4 or 8), towards the lamp and the sky; patches of shade."""
+
+    edge_rays: int = 8
+    lamp_rays: int = 10
+    sky_rays: int = 28
+    patches: int = 200
+
+
+FINE, QUICK = Quality(), Quality(4, 4, 8, 110)
+
+
+class Studio:
+    """Renders `scene` for one camera; what stands still is prepared once.
+
+    `panes` are shown besides those of the scene (walls, the balance region).
+    """
+
+    def __init__(
+        self, scene: Scene, camera: Camera, azimuth: float, quality: Quality = FINE
+    ) -> None:
+        self._scene, self._camera, self._quality = scene, camera, quality
+        self._lights = Lights.beside(azimuth, quality.lamp_rays, quality.sky_rays)
+        self._ground = Ground(scene)
+        self._moving = [body for body in scene.bodies if body.joint != 0]
+        still = [body for body in scene.bodies if body.joint == 0]
+        self._still = Tracer([*(b.surface for b in still), *(box for _, box in scene.boxes)])
+        colours = [*(b.colour for b in still), *(BOX_COLOUR for _ in scene.boxes)]
+        self._first_moving = len(colours)
+        colours += [body.colour for body in self._moving]
+        self._albedo = _linear(np.array(colours, dtype=float).reshape(-1, 3))
+        self._panes = wall_panes(scene)
+        if scene.region is not None:
+            self._panes.append(region_pane(scene.region))
+        self._lift = 1e-4 * scene.size
+
+    def picture(
+        self,
+        poses: Poses,
+        instant: int,
+        capsules: Sequence[tuple[int, Colour]] = (),
+        ghosts: Poses | None = None,
+    ) -> NDArray[np.uint8]:
+        """The scene at an instant of `poses`, (height, width, 3).
+
+        capsules: indices and colours of those to be shown; ghosts: where else the robot is shown,
+        faintly.
+        """
+        moving = Tracer(self._placed(poses, instant), self._first_moving)
+        panes = [*self._panes]
+        if capsules:
+            panes.append(self._capsule_pane(poses, instant, capsules))
+        if ghosts is not None and len(ghosts):
+            bodies = [one for t in range(len(ghosts)) for one in self._placed(ghosts, t)]
+            panes.append(Pane(Tracer(bodies), np.array([GHOST] * len(bodies)), 0.16, 0.5))
+        width, height = self._camera.width, self._camera.height
+        view = _Instant(moving, panes, self._shade(moving))
+        colour, keys = self._seen(view, self._whole)
+        at = np.flatnonzero(_edges(keys, height, width))
+        y, x = np.divmod(at, width)
+        places = _PLACES[self._quality.edge_rays] / 16
+        total = np.zeros((len(at), 3))
+        for across, down in places:
+            total += self._seen(view, self._sight(x + across, y + down))[0]
+        colour[at] = total / len(places)
+        return _bytes(colour).reshape(height, width, 3)
+
+    def _shade(self, moving: Tracer) -> Shade:
+        blockers = (self._still, moving)
+        patches = self._quality.patches
+        return self._ground.shade(
+            patches, lambda points, up: self._lights.on(points, up, blockers, self._lift)
+        )
+
+    @cached_property
+    def _whole(self) -> "_Sight":
+        """Through the middle of every pixel."""
+        width, height = self._camera.width, self._camera.height
+        y, x = np.divmod(np.arange(width * height), width)
+        return self._sight(x + 0.5, y + 0.5)
+
+    def _sight(self, x: Array, y: Array) -> "_Sight":
+        directions = self._camera.rays(x, y)
+        origins = np.broadcast_to(self._camera.eye, directions.shape)
+        still = self._still.first_hits(origins, directions)
+        below = self._ground.distances(origins, directions)
+        on_ground = np.flatnonzero(below < still.distance)
+        way = below[on_ground]
+        places = origins[on_ground] + way[:, None] * directions[on_ground]
+        paint = np.tile(_linear(np.array(PAPER)), (len(x), 1))
+        paint[on_ground] = _linear(
+            self._ground.colours(places, way / self._camera.focal, directions[on_ground])
+        )
+        return _Sight(directions, still, below, paint)
+
+    def _placed(self, poses: Poses, instant: int) -> list[Surface]:
+        return [
+            body.surface.moved(
+                poses.rotations[instant, body.joint], poses.translations[instant, body.joint]
+            )
+            for body in self._moving
+        ]
+
+    def _capsule_pane(
+        self, poses: Poses, instant: int, capsules: Sequence[tuple[int, Colour]]
+    ) -> Pane:
+        surfaces = []
+        for index, _ in capsules:
+            joint = self._scene.capsules[index].joint
+            surface = self._scene.capsule_surfaces[index]
+            place = poses.rotations[instant, joint], poses.translations[instant, joint]
+            surfaces.append(surface.moved(*place))
+        return Pane(Tracer(surfaces), np.array([colour for _, colour in capsules]), 0.07, 0.5)
+
+    def _seen(self, view: "_Instant", sight: "_Sight") -> tuple[Array, Array]:
+        """Linear colours (K, 3), and what tells edges (K, 6)."""
+        eye, directions = self._camera.eye, sight.directions
+        origins = np.broadcast_to(eye, directions.shape)
+        hits = _nearer(sight.still, view.moving.first_hits(origins, directions))
+        below = sight.below
+        colour = sight.paint.copy()
+        on_ground = np.flatnonzero(below < hits.distance)
+        places = eye + below[on_ground, None] * directions[on_ground]
+        colour[on_ground] *= view.shade.at(places)[:, None]
+        met = np.flatnonzero(hits.distance < below)
+        places = eye + hits.distance[met, None] * directions[met]
+        blockers = (self._still, view.moving)
+        light = self._lights.on(places, hits.normal[met], blockers, self._lift)
+        shine = self._lights.gloss(hits.normal[met], directions[met])
+        colour[met] = (self._albedo[hits.part[met]] + shine[:, None]) * light[:, None]
+        seen = np.minimum(hits.distance, below)
+        layers = np.zeros(len(seen))
+        for pane in view.panes:
+            found = pane.tracer.first_hits(origins, directions)
+            front = np.flatnonzero(found.distance < seen * 1.001)
+            alpha = pane.cover(found.normal[front], directions[front])[:, None]
+            tint = _linear(pane.colours[found.part[front]])
+            colour[front] = (1 - alpha) * colour[front] + alpha * tint
+            layers[front] = layers[front] * 64 + found.part[front] + 1
+        solid = hits.distance < below
+        keys = np.empty((len(seen), 6))
+        keys[:, 0] = np.where(solid, hits.part, np.where(np.isfinite(below), -2, -1))
+        keys[:, 1], keys[:, 2] = layers, np.where(solid, seen, 0.0)
+        keys[:, 3:] = np.where(solid[:, None], hits.normal, [0.0, 0.0, 1.0])
+        return colour, keys
+
+
+@dataclass(frozen=True, eq=False)
+class _Sight:
+    """What K rays of the camera meet that never moves: bodies, the ground and its paint (K, 3)."""
+
+    directions: Array
+    still: Hits
+    below: Array
+    paint: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Instant:
+    """What is there at one instant only."""
+
+    moving: Tracer
+    panes: Sequence[Pane]
+    shade: Shade
+
+
+def _nearer(first: Hits, second: Hits) -> Hits:
+    closer = second.distance < first.distance
+    return Hits(
+        np.where(closer, second.distance, first.distance),
+        np.where(closer, second.part, first.part),
+        np.where(closer[:, None], second.normal, first.normal),
+    )
+
+
+def _edges(keys: Array, height: int, width: int) -> NDArray[np.bool_]:
+    """Pixels (height·width,) that differ from one beside them."""
+    part, layer, depth = (keys[:, k].reshape(height, width) for k in range(3))
+    normal = keys[:, 3:].reshape(height, width, 3)
+    found = np.zeros((height, width), dtype=bool)
+    for one, other in (
+        ((slice(None), slice(1, None)), (slice(None), slice(None, -1))),
+        ((slice(1, None), slice(None)), (slice(None, -1), slice(None))),
+    ):
+        differ = (part[one] != part[other]) | (layer[one] != layer[other])
+        differ |= np.einsum("yxk,yxk->yx", normal[one], normal[other]) < _FOLD
+        differ |= np.abs(depth[one] - depth[other]) > _STEP * depth[one]
+        found[one] |= differ
+        found[other] |= differ
+    return found.ravel()
+
+
+def _linear(colour: Array) -> Array:
+    """From sRGB to light, both from 0 to 1."""
+    return np.asarray(
+        np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+    )
+
+
+def _curve() -> NDArray[np.uint8]:
+    light = np.linspace(0.0, 1.0, _STEPS + 1)
+    colour = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return np.round(255 * colour).astype(np.uint8)
+
+
+_SRGB = _curve()
+
+
+def _bytes(light: Array) -> NDArray[np.uint8]:
+    """From light to sRGB."""
+    return _SRGB[(np.clip(light, 0.0, 1.0) * _STEPS + 0.5).astype(np.int32)]

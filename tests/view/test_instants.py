@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+
+from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.constraints.surroundings import Surroundings
+from excite_cli.excitation.problem import Problem
+from excite_cli.robot.center_of_mass import CenterOfMass
+from excite_cli.robot.clearance_coal import CoalClearance
+from excite_cli.robot.model import Array
+from excite_cli.robot.states import States
+from excite_cli.trajectory.chain import Segment
+from excite_cli.view.instants import Instants, closest_time, instants_of
+
+TIMES = np.linspace(0.0, 6.0, 41)
+
+
+@pytest.fixture(scope="module")
+def instants(problem: Problem, segment: Segment) -> Instants:
+    return instants_of(problem, segment, TIMES)
+
+
+@pytest.fixture(scope="module")
+def states(problem: Problem, segment: Segment) -> States:
+    return States(problem.kinematics, *segment.trajectory.states(TIMES, segment.coefficients))
+
+
+def _distances(problem: Problem, states: States) -> Array:
+    """Of all pairs of capsules by coal, and of all capsules and things, (T, P)."""
+    found = []
+    for constraint in problem.constraints:
+        if isinstance(constraint, SelfCollision):
+            coal = CoalClearance(problem.robot, constraint.capsules, constraint.pairs)
+            found.append(coal.distances(states.q))
+        elif isinstance(constraint, Surroundings):
+            found.append(constraint.margins(states) + constraint.pairs.kept)
+    return np.hstack(found)
+
+
+def test_the_nearest_pair_is_the_nearest(
+    problem: Problem, instants: Instants, states: States
+) -> None:
+    nearest = instants.nearest
+    assert nearest is not None
+    least = _distances(problem, states).min(axis=1)
+    np.testing.assert_allclose(nearest.distances, least, atol=1e-6)
+    assert len(set(nearest.labels)) > 2  # pairs of both kinds were nearest
+    assert {len(capsules) for capsules in nearest.capsules} == {1, 2}
+
+
+def test_the_line_is_as_long_as_the_distance_and_ends_on_the_capsules(
+    problem: Problem, instants: Instants
+) -> None:
+    nearest = instants.nearest
+    assert nearest is not None
+    lengths = np.linalg.norm(nearest.ends[:, 1] - nearest.ends[:, 0], axis=1)
+    np.testing.assert_allclose(lengths, np.abs(nearest.distances), atol=1e-9)
+    capsules = next(c.capsules for c in problem.constraints if isinstance(c, SelfCollision))
+    for t in range(len(TIMES)):
+        for index, end in zip(nearest.capsules[t], nearest.ends[t], strict=False):
+            capsule = capsules[index]
+            axis = instants.poses.points(capsule.joint, np.stack([capsule.start, capsule.end]))[t]
+            along = axis[1] - axis[0]
+            share = np.clip((end - axis[0]) @ along / max(along @ along, 1e-12), 0, 1)
+            away = np.linalg.norm(end - axis[0] - share * along)
+            assert away == pytest.approx(capsule.radius, abs=1e-9)
+
+
+def test_margins_are_the_smallest_of_each_constraint(
+    problem: Problem, instants: Instants, states: States
+) -> None:
+    assert [track.name for track in instants.margins] == [c.name for c in problem.constraints]
+    for track, constraint in zip(instants.margins, problem.constraints, strict=True):
+        margins = constraint.margins(states)
+        shares = margins / constraint.scale
+        np.testing.assert_allclose(track.shares, shares.min(axis=1))
+        column = constraint.labels.index(track.labels[7])
+        assert track.values[7] == margins[7, column]
+        assert track.units[7] == constraint.unit_of(column)
+
+
+def test_centre_of_mass(problem: Problem, instants: Instants, states: States) -> None:
+    np.testing.assert_allclose(instants.mass, CenterOfMass(problem.robot).position(states))
+    assert instants.zmp is None
+
+
+def test_closest_time(problem: Problem, segment: Segment, instants: Instants) -> None:
+    assert instants.nearest is not None
+    at = closest_time(problem, segment)
+    there = instants_of(problem, segment, np.array([at])).nearest
+    assert there is not None
+    assert there.distances[0] <= instants.nearest.distances.min() + 0.03
+
+
+def test_index_at(instants: Instants) -> None:
+    assert instants.index_at(0.29) == 2
+    assert instants.index_at(99.0) == 40

@@ -1,0 +1,88 @@
+import io
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from excite_cli.excitation.problem import Problem
+from excite_cli.trajectory.chain import Segment
+from excite_cli.view import pictures
+from excite_cli.view.pictures import View, motion_gif, still_png
+from excite_cli.view.studio import QUICK
+
+pytest.importorskip("embreex")
+Image = pytest.importorskip("PIL.Image")
+
+SMALL = View(size=(96, 72), caption=False, capsules=False, distance=False, mass=False)
+
+
+def _pixels(content: bytes) -> np.ndarray:
+    image = Image.open(io.BytesIO(content))
+    assert image.format == "PNG"
+    return np.asarray(image.convert("RGB")).astype(float)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _quickly() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pictures, "FINE", QUICK)
+        yield
+
+
+@pytest.fixture(scope="module")
+def plain(problem: Problem, segment: Segment) -> bytes:
+    return still_png(problem, segment, SMALL, time=1.0)
+
+
+def test_the_robot_is_in_the_picture(plain: bytes) -> None:
+    pixels = _pixels(plain)
+    assert pixels.shape == (72, 96, 3)
+    np.testing.assert_array_equal(pixels[0, 0], 255)  # paper
+    dark = (pixels.max(axis=2) < 150).mean()
+    assert 0.01 < dark < 0.5
+    seen = np.argwhere(pixels.min(axis=2) < 200)
+    assert np.ptp(seen[:, 0]) > 36  # it fills the picture
+
+
+def test_equal_motions_give_equal_pictures(
+    problem: Problem, segment: Segment, plain: bytes
+) -> None:
+    assert still_png(problem, segment, SMALL, time=1.0) == plain
+
+
+@pytest.mark.parametrize("what", ["capsules", "distance", "mass", "caption", "ghosts"])
+def test_what_can_be_shown_beside_it(
+    problem: Problem, segment: Segment, plain: bytes, what: str
+) -> None:
+    look = replace(SMALL, **{what: 3 if what == "ghosts" else True})
+    change = np.abs(_pixels(still_png(problem, segment, look, time=1.0)) - _pixels(plain))
+    assert (change.max(axis=2) > 8).mean() > 0.002
+
+
+def test_other_instants_and_sides_look_different(
+    problem: Problem, segment: Segment, plain: bytes
+) -> None:
+    later = _pixels(still_png(problem, segment, SMALL, time=2.5))
+    behind = _pixels(still_png(problem, segment, replace(SMALL, azimuth=170.0), time=1.0))
+    for other in (later, behind):
+        assert (np.abs(other - _pixels(plain)).max(axis=2) > 30).mean() > 0.02
+
+
+def test_a_gif_of_the_whole_motion(problem: Problem, segment: Segment) -> None:
+    told: list[int] = []
+    content = motion_gif(
+        problem, segment, replace(SMALL, size=(64, 48)), 10, 0.6, lambda _, done: told.append(done)
+    )
+    image = Image.open(io.BytesIO(content))
+    assert image.format == "GIF"
+    assert image.n_frames == 6
+    assert image.info["duration"] == 100
+    assert image.info["loop"] == 0
+    assert told == list(range(6))
+    frames = []
+    for frame in range(6):
+        image.seek(frame)
+        frames.append(np.asarray(image.convert("RGB")).astype(float))
+    assert all(np.abs(a - b).max() > 60 for a, b in pairwise(frames))

@@ -1,0 +1,117 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.config.load import load_spec
+from excite_cli.excitation.problem import Problem
+from excite_cli.robot.model import Robot, build_robot
+from excite_cli.trajectory.chain import Segment
+from excite_cli.view.geometry import robot_bodies
+from excite_cli.view.scene import Scene, build_scene
+from excite_cli.view.surface import box_triangles
+from excite_cli.view.translucent import wall_surface
+
+HEAD = '<robot name="r"><link name="a">{}</link><link name="b">{}</link>'
+TAIL = """<joint name="j" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 0.5"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+INERTIAL = (
+    '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    "</inertial>"
+)
+SPHERE = '<geometry><sphere radius="0.1"/></geometry>'
+BOX = '<geometry><box size="0.2 0.2 0.2"/></geometry>'
+RED = '<material name="red"><color rgba="0.9 0.1 0.2 1"/></material>'
+
+
+@pytest.fixture(scope="module")
+def scene(problem: Problem, segment: Segment) -> Scene:
+    times = np.linspace(0.0, 6.0, 20)
+    return build_scene(problem, [segment.trajectory.states(times, segment.coefficients)[0]])
+
+
+def _robot(folder: Path, first: str, second: str) -> Robot:
+    path = folder / "robot.urdf"
+    path.write_text(HEAD.format(INERTIAL + first, INERTIAL + second) + TAIL)
+    config = folder / "robot.yaml"
+    config.write_text("robot: {urdf: robot.urdf}\n")
+    return build_robot(load_spec(config).robot, folder)
+
+
+def test_everything_of_the_problem_is_there(problem: Problem, scene: Scene) -> None:
+    assert [name for name, _ in scene.boxes] == ["shelf"]
+    assert [wall.name for wall in scene.walls] == ["left"]
+    assert scene.ground == -0.6
+    assert "payload" in [body.name for body in scene.bodies]
+    assert "payload" in [capsule.name for capsule in scene.capsules]
+    assert len(scene.capsule_surfaces) == len(scene.capsules)
+    assert scene.region is not None
+    middle = scene.region.corners.mean(axis=0)
+    inner = np.linalg.norm(scene.region.corners - middle, axis=1)
+    np.testing.assert_allclose(inner, 0.2, rtol=1e-6)
+
+
+def test_the_walls_stand_on_the_ground_in_their_plane(scene: Scene) -> None:
+    surface = wall_surface(scene.walls[0], scene)
+    np.testing.assert_allclose(surface.points[:, 1], 1.2)
+    assert surface.points[:, 2].min() == pytest.approx(scene.ground)
+    a, b, c = surface.points[surface.faces[0]]
+    assert np.cross(b - a, c - a) @ scene.walls[0].normal > 0
+
+
+def test_visual_shapes_with_their_colours(tmp_path: Path) -> None:
+    visual = f"<visual>{SPHERE}{RED}</visual>"
+    robot = _robot(tmp_path, visual, f"<collision>{BOX}</collision>")
+    bodies, note = robot_bodies(robot)
+    assert note == ""
+    assert [(body.joint, body.colour) for body in bodies] == [(0, pytest.approx((0.9, 0.1, 0.2)))]
+
+
+def test_collision_shapes_where_nothing_is_visual(tmp_path: Path) -> None:
+    bodies, _ = robot_bodies(_robot(tmp_path, "", f"<collision>{BOX}</collision>"))
+    assert [body.joint for body in bodies] == [1]
+    np.testing.assert_allclose(np.abs(bodies[0].surface.points), 0.1)
+
+
+def test_missing_visual_meshes_are_told(tmp_path: Path) -> None:
+    lost = '<visual><geometry><mesh filename="lost.stl"/></geometry></visual>'
+    bodies, note = robot_bodies(_robot(tmp_path, lost, f"<collision>{BOX}</collision>"))
+    assert len(bodies) == 1
+    assert "lost.stl" in note
+    assert "collision shapes are shown" in note
+
+
+def test_sticks_where_there_is_nothing(tmp_path: Path) -> None:
+    bodies, note = robot_bodies(_robot(tmp_path, "", ""))
+    assert "sticks" in note
+    assert bodies[0].joint == 0
+    assert bodies[0].surface.points[:, 2].max() == pytest.approx(0.52, abs=0.002)
+
+
+def test_mirrored_meshes_face_outwards(tmp_path: Path) -> None:
+    box = box_triangles(np.array([0.1, 0.2, 0.3]))
+    lines = [f"v {x} {y + 0.5} {z}" for x, y, z in box.points]
+    lines += [f"f {a} {b} {c}" for a, b, c in box.faces + 1]
+    (tmp_path / "box.obj").write_text("\n".join(lines) + "\n")
+    mesh = '<visual><geometry><mesh filename="box.obj" scale="1 {} 1"/></geometry></visual>'
+    bodies, note = robot_bodies(_robot(tmp_path, mesh.format(1), mesh.format(-1)))
+    assert note == ""
+    for body, side in zip(bodies, (1, -1), strict=True):
+        points, faces = body.surface.points, body.surface.faces
+        assert points[:, 1].mean() == pytest.approx(0.5 * side)
+        a, b, c = (points[faces[:, k]] for k in range(3))
+        assert np.einsum("kx,kx->k", a, np.cross(b, c)).sum() / 6 == pytest.approx(0.048)
+
+
+def test_the_ground_is_the_foot_of_the_base_or_what_is_reached(
+    problem: Problem, segment: Segment
+) -> None:
+    bare = replace(problem, constraints=())
+    up = np.zeros((1, problem.robot.n))
+    foot = build_scene(bare, [up]).ground
+    down = up.copy()
+    down[0, problem.robot.joint_names.index("shoulder_pitch")] = 2.0
+    reached = build_scene(bare, [up, down])
+    assert reached.ground <= foot
+    assert reached.ground == pytest.approx(min(foot, reached.outline[:, 2].min()))

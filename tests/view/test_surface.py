@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from excite_cli.view.surface import (
+    Triangles,
+    ball_profile,
+    box_triangles,
+    capsule_triangles,
+    cylinder_triangles,
+    hull_triangles,
+    round_triangles,
+    smooth_surface,
+    turn_to,
+)
+
+
+def _volume(triangles: Triangles) -> float:
+    a, b, c = (triangles.points[triangles.faces[:, k]] for k in range(3))
+    return float(np.einsum("kx,kx->k", a, np.cross(b, c)).sum() / 6)
+
+
+@pytest.mark.parametrize(
+    ("triangles", "volume"),
+    [
+        (box_triangles(np.array([0.1, 0.2, 0.3])), 0.048),
+        (cylinder_triangles(0.1, 0.5), np.pi * 0.01),
+        (cylinder_triangles(0.1, 0.5, 0.0), np.pi * 0.01 / 3),
+        (round_triangles(ball_profile(0.2, 0.0)), 4 / 3 * np.pi * 0.008),
+        (
+            capsule_triangles(np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.4, 3.3]), 0.1),
+            np.pi * 0.01 * 0.5 + 4 / 3 * np.pi * 0.001,
+        ),
+    ],
+)
+def test_shapes_have_their_volume_and_face_outwards(triangles: Triangles, volume: float) -> None:
+    assert _volume(triangles) == pytest.approx(volume, rel=0.02)
+    assert _volume(hull_triangles(triangles.points)) == pytest.approx(volume, rel=0.02)
+
+
+def test_a_box_keeps_its_edges_sharp() -> None:
+    surface = smooth_surface(box_triangles(np.ones(3)))
+    assert len(surface.points) == 24  # each corner once for each of its sides
+    np.testing.assert_allclose(np.sort(np.abs(surface.normals), axis=1), [[0, 0, 1]] * 24)
+    assert (np.einsum("kx,kx->k", surface.points, surface.normals) > 0).all()
+
+
+def test_a_ball_is_smooth() -> None:
+    surface = smooth_surface(round_triangles(ball_profile(2.0, 0.0)))
+    radial = np.einsum("kx,kx->k", surface.points / 2.0, surface.normals)
+    assert radial.min() > 0.995
+    rim_points = 48 * 15 + 2
+    assert len(surface.points) == rim_points
+
+
+def test_small_detail_is_dropped() -> None:
+    fine = round_triangles(ball_profile(1.0, 0.0))
+    coarse = smooth_surface(fine, cell=0.3)
+    assert len(coarse.faces) < len(fine.faces) / 3
+    assert np.linalg.norm(coarse.points, axis=1).min() > 0.85
+
+
+def test_triangles_without_area_are_dropped() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]])
+    surface = smooth_surface(Triangles(points, np.array([[0, 1, 2], [0, 1, 3]])))
+    assert len(surface.faces) == 1
+    np.testing.assert_allclose(surface.normals, [[0, 0, 1]] * 3)
+    assert len(smooth_surface(Triangles(points, np.array([[0, 1, 3]]))).faces) == 0
+    assert len(hull_triangles(points).faces) == 0
+
+
+@pytest.mark.parametrize("direction", [[0, 0, 1], [0, 0, -2], [1, 2, 3], [0, 0, 0]])
+def test_turn_to(direction: list[float]) -> None:
+    turn = turn_to(np.array(direction, dtype=float))
+    np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    length = np.linalg.norm(direction)
+    if length:
+        np.testing.assert_allclose(turn[:, 2], np.array(direction) / length)
