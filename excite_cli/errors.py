@@ -7,6 +7,8 @@ that is not an `ExciteError` is a bug of ours (exit status 70).
 import difflib
 from collections.abc import Iterable
 
+_ENOUGH_TO_GUESS = 3  # letters
+
 
 class ExciteError(Exception):
     """Base of all errors raised on purpose; `exit_status` is what the command line returns."""
@@ -37,6 +39,12 @@ class NoAdmissibleMotionError(ExciteError):
 
 
 def nearest(word: str, allowed: Iterable[str], cutoff: float = 0.6) -> str:
-    """Return ` Did you mean 'x'?` for the allowed word nearest to `word`, or an empty string."""
-    match = difflib.get_close_matches(word, list(allowed), n=1, cutoff=cutoff)
+    """Return ` Did you mean 'x'?` for the allowed word nearest to `word`, or an empty string.
+
+    A word that is the beginning of an allowed one is near, however much longer that is.
+    """
+    options = list(allowed)
+    match = difflib.get_close_matches(word, options, n=1, cutoff=cutoff)
+    if not match and len(word) >= _ENOUGH_TO_GUESS:
+        match = [each for each in options if each.lower().startswith(word.lower())]
     return f" Did you mean '{match[0]}'?" if match else ""

@@ -1,0 +1,1 @@
+"""The program `excite`: one file for each command, tables, progress, exit statuses."""

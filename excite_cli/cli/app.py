@@ -1,8 +1,8 @@
 """The program `excite`: its commands, and the way out."""
 
-import inspect
 import sys
 from collections.abc import Callable
+from typing import Any
 
 import typer
 
@@ -12,32 +12,30 @@ from excite_cli.cli.compare_random import compare_random
 from excite_cli.cli.console import INTERRUPTED, run_guarded
 from excite_cli.cli.diagnose import diagnose
 from excite_cli.cli.export import export
+from excite_cli.cli.help_page import HelpfulCommand, HelpfulGroup, split_docstring
 from excite_cli.cli.identify import identify
+from excite_cli.cli.init import init
 from excite_cli.cli.optimize import optimize
 from excite_cli.cli.report import report
 from excite_cli.cli.robots import robots
 from excite_cli.cli.schema import schema
 from excite_cli.cli.simulate import simulate
+from excite_cli.cli.usage_errors import USAGE_ERROR, in_our_words
 from excite_cli.cli.verify_gradient import verify_gradient
-from excite_cli.errors import ConfigError, nearest
+from excite_cli.cli.view import view
 
 app = typer.Typer(
     name="excite",
+    cls=HelpfulGroup,
     help="Plan robot motions that make inertial parameters visible, and trace what a robot's model "
-    "lacks from what was measured.",
-    epilog="Example:  excite optimize configs/ur10.yaml -o ur10.h5",
+    "lacks from what was measured. `excite COMMAND --help` has examples of each command.",
+    epilog="excite init --robot ur10 -o ur10.yaml\nexcite optimize ur10.yaml -o ur10.h5",
     no_args_is_help=True,
     add_completion=True,
+    rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-
-
-def _unwrapped(docstring: str) -> str:
-    """Paragraphs on one line each: the terminal wraps them to its own width."""
-    paragraphs = inspect.cleandoc(docstring).split("\n\n")
-    return "\n\n".join(" ".join(paragraph.split("\n")) for paragraph in paragraphs)
-
 
 _COMMANDS: dict[str, Callable[..., None]] = {
     "optimize": optimize,
@@ -49,11 +47,29 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "diagnose": diagnose,
     "export": export,
     "report": report,
+    "view": view,
     "robots": robots,
+    "init": init,
     "schema": schema,
 }
-for _name, _command in _COMMANDS.items():
-    app.command(_name, help=_unwrapped(_command.__doc__ or ""))(_command)
+_GROUPS = {
+    "Begin": ("robots", "init", "schema"),
+    "Plan motions": ("optimize", "check", "compare-random", "verify-gradient"),
+    "Look at them, hand them on": ("report", "view", "export"),
+    "From measured data": ("simulate", "identify", "diagnose"),
+}
+_ORDER = [name for names in _GROUPS.values() for name in names]
+_ORDER += [name for name in _COMMANDS if name not in _ORDER]
+for _name in _ORDER:
+    if _name in _COMMANDS:
+        _words, _examples = split_docstring(_COMMANDS[_name].__doc__ or "")
+        app.command(
+            _name,
+            cls=HelpfulCommand,
+            help=_words,
+            epilog=_examples,
+            rich_help_panel=next((g for g, names in _GROUPS.items() if _name in names), None),
+        )(_COMMANDS[_name])
 
 
 def _version(value: bool) -> None:
@@ -71,38 +87,20 @@ def _options(
     """Plan exciting robot motions; trace what the model lacks from measured data."""
 
 
-# Typer brings its own copy of click in some versions: take the base from one of its errors.
-_USAGE_ERROR: type[Exception] = next(
-    c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"
-)
-
-
-def _mistyped(error: Exception, words: list[str]) -> ConfigError | None:
-    """A helpful error when the first word is no command, else None."""
-    word = next((word for word in words if not word.startswith("-")), None)
-    if word is None or word in _COMMANDS or "ommand" not in str(error):
-        return None
-    return ConfigError(
-        f"there is no command '{word}'.{nearest(word, _COMMANDS)} Commands: {', '.join(_COMMANDS)}."
-    )
-
-
 def main() -> None:
     """Entry point of the console script."""
-    command = typer.main.get_command(app)
+    command: Any = typer.main.get_command(app)
 
     def act() -> None:
         try:
-            status = command.main(standalone_mode=False)
+            status = command.main(prog_name="excite", standalone_mode=False)
         except typer.Abort as error:
             raise KeyboardInterrupt from error
-        except _USAGE_ERROR as error:
-            better = _mistyped(error, sys.argv[1:])
-            if better is not None:
-                raise better from error
-            show = getattr(error, "show", None)
-            if show is not None:
-                show()
+        except USAGE_ERROR as error:
+            told = in_our_words(error, sys.argv[1:], command.commands)
+            if told is not None:
+                raise told from error
+            typer.echo(str(error), err=True)  # no words at all: the page of help
             raise SystemExit(2) from error
         if status == INTERRUPTED:  # typer turns Ctrl-C into this status
             raise KeyboardInterrupt

@@ -50,7 +50,9 @@ def check(
     violation seen, with the reason why it is not proved) or `BROKEN`. Exit status 1: something is
     broken.
 
-    Example:  excite check configs/talos_arms.yaml talos_arms.h5 --random 100000
+    Examples:
+      excite check ur10.yaml ur10.h5
+      excite check ur10.yaml ur10.h5 --random 10000 --json
     """
     from excite_cli.cli.motions import load_motions
     from excite_cli.cli.setup import load_problem, single_threaded
@@ -78,12 +80,12 @@ def check(
                 found.append((segment.name, inspection, off))
                 data.append(_data(index, segment.name, inspection, off))
     broken = sum(motion["violations"] for motion in data)
-    table = _table(found, f"Margins at {rate:g} Hz" + (f" and {random} instants" if random else ""))
+    title = f"margins at {rate:g} Hz" + (f" and {random} random instants" if random else "")
     notes = [note for name, inspection, off in found for note in _notes(name, inspection, off)]
     summary = f"{broken} violations" if broken else "No violation."
     caption = "A margin is what is left beyond what the config asks to keep."
     terminal.answer(
-        [table, caption, *notes, summary],
+        [*_tables(found, title), caption, *notes, summary],
         {"file": str(file), "ok": not broken, "motions": data, "rate": rate, "random": random,
          "slow": slow},
     )  # fmt: skip
@@ -171,20 +173,22 @@ def _data(
     return data
 
 
-def _table(found: "list[tuple[str, Inspection, tuple[float, float]]]", title: str) -> Any:
-    from rich.table import Table
+def _tables(found: "list[tuple[str, Inspection, tuple[float, float]]]", title: str) -> list[Any]:
+    """One table for each motion."""
+    from excite_cli.cli.layout import table as new_table
 
-    table = Table(title=title, title_justify="left")
-    for name in ("motion", "constraint", "worst margin", "unit", "where", "time [s]", "verdict"):
-        right = name in ("worst margin", "time [s]")
-        table.add_column(name, justify="right" if right else "left")
+    names = ("constraint", "margin", "unit", "where", "time [s]", "verdict")
+    tables = []
     for name, inspection, _ in found:
-        margins = inspection.margins
+        table = new_table(
+            f"{name}: worst {title}", names, ("constraint", "unit", "verdict"), ("where",)
+        )
         for key, (state, _) in inspection.states.items():
-            worst = margins[key]
+            worst = inspection.margins[key]
             row = [f"{worst.margin:.5f}", worst.unit, worst.label, f"{worst.time:.4f}"]
-            table.add_row(name, key, *row, "BROKEN" if state == "broken" else state)
-    return table
+            table.add_row(key, *row, "BROKEN" if state == "broken" else state)
+        tables.append(table)
+    return tables
 
 
 def _notes(name: str, inspection: "Inspection", off: tuple[float, float]) -> list[str]:

@@ -7,6 +7,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.help_page import OUTPUT
 
 
 def compare_random(
@@ -15,7 +16,10 @@ def compare_random(
         int, typer.Option("--candidates", min=1, help="Least number of random motions.")
     ] = 300,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Write both to this result file.")
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="Write both to this result file.", rich_help_panel=OUTPUT
+        ),
     ] = None,
     optimized: Annotated[
         Path | None,
@@ -38,12 +42,15 @@ def compare_random(
     The problem is optimised first (or taken from --optimized); then at least --candidates random
     motions are drawn, and more until as much time has passed as the optimiser took.
 
-    Example:  excite compare-random configs/talos_arms.yaml --candidates 300
+    Examples:
+      excite compare-random ur10.yaml --candidates 100
+      excite compare-random ur10.yaml --optimized ur10.h5 -o compared.h5
     """
     from dataclasses import replace
 
     from rich.table import Table
 
+    from excite_cli.cli.best_so_far import Best
     from excite_cli.cli.setup import load_problem, output_path, single_threaded
     from excite_cli.cli.tables import comparison_table, motion_data
     from excite_cli.config.load import parse_spec
@@ -77,11 +84,14 @@ def compare_random(
                 )
         else:
             with terminal.live("optimising", problem.spec.optimizer.max_iterations) as show:
+                total = problem.spec.sequence.motions
 
                 def report(index: int) -> ProgressCallback:
+                    best = Best()
+
                     def tell(progress: Progress) -> None:
                         show(
-                            f"motion {index}  iteration {progress.iteration}  {progress.figure}",
+                            f"motion {index} of {total}: {best.words(progress)}",
                             progress.iteration,
                         )
 
@@ -101,7 +111,7 @@ def compare_random(
                 problem.spec.seed,
                 candidates,
                 seconds,
-                lambda drawn, best: show(f"{drawn} drawn, best {best:.1f}", drawn),
+                lambda drawn, best: show(f"{drawn} of {candidates} drawn, best {best:.1f}", drawn),
                 result.prior_stack,
             )
     result = replace(

@@ -3,24 +3,38 @@
 stdout is the answer (a table, or JSON with `--json`), stderr is progress and messages.
 """
 
+import errno
 import json
 import math
 import os
+import platform
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TextIO
 
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
+from rich.progress import (
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Column, Table
+from rich.text import Text
 
+from excite_cli import __version__
 from excite_cli.errors import ExciteError
 
 BUG, INTERRUPTED = 70, 130
-PLAIN_WIDTH = 140
+# Off a terminal rows stay whole, so that they can be searched and cut.
+_WHOLE_ROWS = 10_000
 
 
 @dataclass(frozen=True)
@@ -57,38 +71,89 @@ class Terminal:
         if self.as_json:
             print(json.dumps(_finite(data), ensure_ascii=False))
             return
-        if self.quiet:
-            return
-        for part in [table] if isinstance(table, Table | str) else table:
-            self.out.print(part)
+        parts = [table] if isinstance(table, Table | str) else list(table)
+        with (out := self.out).capture() as printed:
+            for before, part in zip([None, *parts], parts, strict=False):
+                if before is not None and not (isinstance(before, str) and isinstance(part, str)):
+                    out.print()
+                _print(out, part)
+        print("\n".join(line.rstrip() for line in printed.get().splitlines()))
 
     @contextmanager
     def live(self, title: str, total: int | None = None) -> Iterator[Callable[[str, int], None]]:
-        """A progress line; call the yielded function with a text and the count done."""
+        """A progress line; call the yielded function with a text and the count done.
+
+        On a terminal only; elsewhere a line every few seconds with `--verbose`, else nothing.
+        """
         if self.quiet or not self.progress:
             yield lambda text, done: None
             return
-        if not sys.stderr.isatty():
-            yield _sparse(title)
+        if not _is_terminal(sys.stderr):
+            yield _sparse(title) if self.verbose else lambda text, done: None
             return
-        columns = (
-            SpinnerColumn(),
-            TextColumn("{task.description}"),
-            TextColumn("{task.fields[text]}"),
-            TimeElapsedColumn(),
-        )
+        columns: list[ProgressColumn] = [SpinnerColumn()]
+        columns += [TextColumn("{task.description}")] if title else []
+        columns += [TextColumn("{task.fields[text]}", table_column=Column(no_wrap=True))]
+        columns += [_Remaining() if total else TimeElapsedColumn()]
         with Progress(*columns, console=self.err, transient=True) as bar:
             task = bar.add_task(title, total=total, text="")
-            yield lambda text, done: bar.update(task, completed=done, text=text)
+            started = 0
+
+            def show(text: str, done: int) -> None:
+                nonlocal started
+                if done < started:  # the next motion counts from zero again
+                    bar.reset(task)
+                started = done
+                bar.update(task, completed=done, text=text)
+
+            yield show
+
+
+class _Remaining(TimeRemainingColumn):
+    """The time that all steps need; the time that has passed until that is known."""
+
+    def render(self, task: Task) -> Text:
+        """`≤ 0:00:12`, or `0:00:03`."""
+        if task.time_remaining is None:
+            return TimeElapsedColumn().render(task)
+        return Text.assemble("≤ ", super().render(task))
+
+
+def _print(out: Console, part: Table | str) -> None:
+    """A sentence, or a table whose title may be wider than its columns."""
+    if isinstance(part, Table):
+        title, part.title = part.title, None
+        if title:
+            out.print(title, style="bold", soft_wrap=out.width >= _WHOLE_ROWS)
+        out.print(part)
+        part.title = title
+    else:
+        out.print(part, soft_wrap=out.width >= _WHOLE_ROWS)
+
+
+def _is_terminal(file: TextIO) -> bool:
+    return file.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def _console(file: TextIO) -> Console:
-    """Coloured and as wide as the terminal; plain and wide enough for our tables elsewhere.
+    """As wide as the terminal, or as COLUMNS says; elsewhere plain, with rows in one line each.
 
-    Brackets are what they are, units in headers among them, and no markup.
+    Brackets are what they are, units in headers among them, and no markup. With NO_COLOR there is
+    neither colour nor bold.
     """
-    width = None if file.isatty() else PLAIN_WIDTH
-    return Console(file=file, highlight=False, markup=False, width=width)
+    columns = os.environ.get("COLUMNS", "")
+    width = int(columns) if columns.isdecimal() and int(columns) else None
+    if width is None and not file.isatty():
+        width = _WHOLE_ROWS
+    plain = bool(os.environ.get("NO_COLOR")) or not _is_terminal(file)
+    return Console(
+        file=file,
+        highlight=False,
+        markup=False,
+        emoji=False,
+        width=width,
+        color_system=None if plain else "auto",
+    )
 
 
 def _sparse(title: str) -> Callable[[str, int], None]:
@@ -101,7 +166,7 @@ def _sparse(title: str) -> Callable[[str, int], None]:
         nonlocal last
         if time.monotonic() - last >= 5.0:
             last = time.monotonic()
-            print(f"{title}  {text}", file=sys.stderr, flush=True)
+            print(f"{title}  {text}".strip(), file=sys.stderr, flush=True)
 
     return tell
 
@@ -122,24 +187,60 @@ def run_guarded(action: Callable[[], None]) -> int:
     try:
         action()
     except ExciteError as error:
-        print(f"excite: {error}", file=sys.stderr)
+        _tell(f"error: {error}")
         return error.exit_status
     except KeyboardInterrupt:
-        print("excite: interrupted; every finished motion is in the file.", file=sys.stderr)
+        _tell("interrupted; every finished motion is in the file.")
         return INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except MemoryError:
-        print("excite: out of memory; take fewer samples, harmonics or joints.", file=sys.stderr)
+        _tell("error: out of memory; take fewer samples, harmonics or joints.")
+        return 2
+    except OSError as error:
+        if error.filename is None or error.errno not in _NOT_OUR_FAULT:
+            return _bug(error)
+        _tell(f"error: {error.filename}: {_NOT_OUR_FAULT[error.errno]}")
         return 2
     except Exception as error:
-        if {"--verbose", "-v"} & set(sys.argv):
-            traceback.print_exc()
-        print(
-            f"excite: internal error ({type(error).__name__}: {error}). This is a bug of the "
-            "program. Run again with --verbose and report what it prints.",
-            file=sys.stderr,
-        )
-        return BUG
+        return _bug(error)
     return 0
+
+
+# What a file system may refuse, and what helps.
+_NOT_OUR_FAULT = {
+    errno.EACCES: "no permission. Change it with chmod, or give another place.",
+    errno.EPERM: "no permission. Change it with chmod, or give another place.",
+    errno.EROFS: "this file system is read-only. Give another place.",
+    errno.ENOSPC: "no space is left on the disk.",
+    errno.ENOTDIR: "a part of this path is a file, not a folder. Give another place.",
+    errno.ENAMETOOLONG: "this name is too long. Give a shorter one.",
+}
+
+
+def _bug(error: Exception) -> int:
+    """One message on what to report; the traceback with --verbose."""
+    if {"--verbose", "-v"} & set(sys.argv):
+        traceback.print_exc()
+        ask = "Please report it: the command, and all that is printed above."
+    else:
+        ask = "Please run the command again with --verbose, and report it with what that prints."
+    last = traceback.extract_tb(error.__traceback__)[-1:]
+    place = "".join(f" at {Path(frame.filename).name}:{frame.lineno}" for frame in last)
+    _tell(
+        f"error: a bug of excite, not of your input ({type(error).__name__}{place}: {error}).\n"
+        f"{ask}\n"
+        f"excite {__version__}, Python {platform.python_version()}, {platform.platform()}"
+    )
+    return BUG
+
+
+def _tell(message: str) -> None:
+    """On stderr; the first word red on a terminal."""
+    head, colon, rest = message.partition(":")
+    if colon and head == "error":
+        text = Text.assemble((f"{head}:", "bold red"), rest)
+    else:
+        text = Text(message)
+    _console(sys.stderr).print(text, soft_wrap=True)

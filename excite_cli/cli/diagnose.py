@@ -7,6 +7,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.help_page import OUTPUT
 from excite_cli.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
@@ -18,12 +19,20 @@ def diagnose(
     config: options.Config,
     data: options.Data,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File for the diagnosis (HDF5).")
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="File for the diagnosis (HDF5).", rich_help_panel=OUTPUT
+        ),
     ] = None,
     sealed: options.Sealed = None,
     apply: Annotated[
         Path | None,
-        typer.Option("--apply", metavar="NEW.yaml", help="Write the config with what was found."),
+        typer.Option(
+            "--apply",
+            metavar="NEW.yaml",
+            help="Write the config with what was found.",
+            rich_help_panel=OUTPUT,
+        ),
     ] = None,
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,
@@ -39,7 +48,8 @@ def diagnose(
     is used once, for the error before and after. A single run is cut into blocks, every third
     sealed.
 
-    Example:  excite diagnose configs/ur10.yaml measured.h5 -o diagnosis.h5 --apply better.yaml
+    Examples:
+      excite diagnose ur10.yaml measured.h5 -o diagnosis.h5 --apply better.yaml
     """
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     check_outputs({"output": output, "apply": apply}, overwrite)
@@ -81,31 +91,10 @@ def diagnose(
 
 def _apply(spec: "Spec", folder: Path, found: "Diagnosis", path: Path) -> None:
     """Write the config with declared and found effects, atomically."""
-    import os
-
     from excite_cli.atomic import write_atomically
-    from excite_cli.config.write import yaml_text
-    from excite_cli.diagnosis.candidates import effect_of
-    from excite_cli.export.parameters import effect_specs
+    from excite_cli.export.found_config import found_config
 
-    tree = spec.model_dump(mode="json", exclude_unset=True)
-    urdf = spec.robot.urdf
-    if ":" not in urdf and not Path(urdf).is_absolute():
-        tree["robot"]["urdf"] = os.path.relpath(folder / urdf, path.resolve().parent)
-    if spec.robot.package_dirs:
-        tree["robot"]["package_dirs"] = [
-            os.path.relpath(folder / each, path.resolve().parent)
-            for each in spec.robot.package_dirs
-        ]
-    records = [*found.declared, *(named.effect for named in found.effects)]
-    effects = [effect_of(record, found.joint_names) for record in records]
-    tree["effects"] = effect_specs(effects, found.joint_names)
-    comment = (
-        f"{len(found.effects)} effects found by `excite diagnose`, added to the declared model.\n"
-        f"Mean relative error on {found.sealed_run}: {found.before.mean_relative_moving:.2%} "
-        f"before, {found.after.mean_relative_moving:.2%} after (moving samples)."
-    )
-    text = yaml_text(tree, comment)
+    text = found_config(spec, folder, found, path)
 
     def write(temporary: Path) -> None:
         temporary.write_text(text, encoding="utf-8")

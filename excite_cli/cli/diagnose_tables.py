@@ -5,50 +5,48 @@ from typing import Any
 
 from rich.table import Table
 
-from excite_cli.cli.noise_floor_words import above_the_floor, floor_cells, floor_columns
+from excite_cli.cli.layout import table as new_table
+from excite_cli.cli.noise_floor_words import floor_cells, floor_columns
 from excite_cli.diagnosis.result import Diagnosis, EffectRecord, NamedEffect, Round
-from excite_cli.effects.base import Value
-from excite_cli.effects.catalogue import catalogue
+from excite_cli.diagnosis.words import (
+    SMALL_SHARE,
+    counted,
+    is_small,
+    p_in_words,
+    place_in_words,
+    value_in_words,
+)
+from excite_cli.identification.fit_words import above_the_floor
 from excite_cli.robot.model import Robot
-
-_SHOWN_ROUNDS = 6
 
 
 def tables_of(
     found: Diagnosis, robot: Robot, experiment: dict[str, Any], verbose: bool
 ) -> list[Table | str]:
-    """Rounds, verdicts, what is absorbed or unexplained, before and after, what to do next."""
-    parts: list[Table | str] = [_data_in_words(found)]
-    rounds = found.rounds if verbose else found.rounds[:_SHOWN_ROUNDS]
-    parts += [_round_table(found, each) for each in rounds]
-    if len(rounds) < len(found.rounds):
-        parts.append(
-            f"… {len(found.rounds) - len(rounds)} more rounds (--verbose shows them); the last "
-            "one finds nothing more."
-        )
+    """What is missing, absorbed or unexplained, before and after, what to do next.
+
+    With `verbose` also how the data were processed, every round's suspects, and small effects.
+    """
+    parts: list[Table | str] = []
+    if verbose:
+        parts.append(_data_in_words(found))
+        parts += [_round_table(found, each) for each in found.rounds]
     if found.named:
-        parts.append(_effect_table(found))
+        parts += _effects(found, verbose)
     if found.approximations:
         parts.append(_approximation_table(found))
     if not found.effects:
         parts.append("Nothing is missing: no effect of the catalogue passes.")
     parts += _absorbed(found) + _unexplained(found)
-    parts.append(_error_table(found, robot))
-    parts += above_the_floor(found.after, found.noise_floor)
+    parts.append(_error_table(found, robot, verbose))
+    above = above_the_floor(found.after, found.noise_floor)
+    parts += [above] if above else []
     parts.append(_verdict(found))
+    if not verbose:
+        rounds = counted(len(found.rounds), "round")
+        parts.append(f"({rounds} of tests; --verbose shows the suspects of each, and why not.)")
     parts.append(_next(experiment))
     return parts
-
-
-def _place(record: EffectRecord, everything: int) -> str:
-    whole = len(record.joints) == everything > 2
-    where = "all joints" if whole else ", ".join(record.joints)
-    return f"{where} ({', '.join(record.runs)})" if record.runs else where
-
-
-def _title(kind: str) -> str:
-    known = catalogue().get(kind)
-    return known.title if known else kind
 
 
 def _data_in_words(found: Diagnosis) -> str:
@@ -65,19 +63,16 @@ def _data_in_words(found: Diagnosis) -> str:
 
 def _round_table(found: Diagnosis, each: Round) -> Table:
     worst = max(each.residual, key=lambda joint: each.residual[joint])
-    table = Table(
-        title=f"Round {each.index}: residual up to {each.residual[worst]:.3g} ({worst}); "
-        f"{each.verdict}",
-        title_justify="left",
+    table = new_table(
+        f"Round {each.index}: residual up to {each.residual[worst]:.3g} ({worst}); {each.verdict}",
+        ("suspect", "where", "p", "share", "gain", "verdict"),
+        words=("suspect", "where", "verdict"),
     )
-    for name in ("suspect", "where", "p", "of the residual", "gain left out", "verdict"):
-        right = name in ("p", "of the residual", "gain left out")
-        table.add_column(name, justify="right" if right else "left")
     for suspect in each.suspects:
         table.add_row(
-            _title(suspect.effect.kind),
-            _place(suspect.effect, len(found.joint_names)),
-            _p(suspect.p_value),
+            suspect.effect.kind,
+            place_in_words(suspect.effect, len(found.joint_names)),
+            p_in_words(suspect.p_value),
             f"{suspect.share_of_residual:.1%}",
             f"{suspect.gain:.1%}",
             suspect.verdict,
@@ -86,66 +81,79 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
     return table
 
 
-def _p(p: float) -> str:
-    return "< 1e-16" if p < 1e-16 else f"{p:.1e}" if p < 1e-3 else f"{p:.2g}"
-
-
-def _effect_table(found: Diagnosis) -> Table:
-    table = Table(title="What the declared model lacks", title_justify="left")
-    for name in ("effect", "where", "size", "p", "share", "cannot be told from"):
-        table.add_column(name, justify="right" if name in ("p", "share") else "left")
-    for named in found.named:
+def _effects(found: Diagnosis, verbose: bool) -> list[Table | str]:
+    """The named effects, small ones in one line, and what each cannot be told from."""
+    everything = len(found.joint_names)
+    ranked = sorted(found.named, key=lambda each: -each.share_of_residual)
+    small = [each for each in ranked if is_small(each)]
+    if verbose or len(small) < 2:  # a line about one is no shorter than the one
+        small = []
+    shown = ranked[: len(ranked) - len(small)]
+    names = ("effect", "where", "size", *(["p"] if verbose else []), "share")
+    table = new_table(
+        "What the declared model lacks (share: of the residual)",
+        names,
+        left=("effect",),
+        words=("where", "size"),
+    )
+    for named in shown:
         table.add_row(
-            _title(named.effect.kind),
-            _place(named.effect, len(found.joint_names)),
-            "\n".join(_value(name, value) for name, value in named.parameters.items()),
-            _p(named.p_value),
+            named.effect.kind,
+            place_in_words(named.effect, everything),
+            "\n".join(value_in_words(name, value) for name, value in named.parameters.items()),
+            *([p_in_words(named.p_value)] if verbose else []),
             f"{named.share_of_residual:.2%}",
-            "\n".join(
-                f"{_title(alias.kind)} on {_place(alias, len(found.joint_names))}"
-                for alias in named.aliases
-            )
-            or "-",
         )
-    return table
+    parts: list[Table | str] = [table]
+    if small:
+        listed = ", ".join(
+            f"{s.effect.kind} on {place_in_words(s.effect, everything)}" for s in small
+        )
+        parts.append(
+            f"and {len(small)} small ones (each below {SMALL_SHARE:.1%}): {listed} (--verbose: sizes)"
+        )
+    for named in found.named:
+        if named.aliases:
+            others = [
+                f"{alias.kind} on {place_in_words(alias, everything)}" for alias in named.aliases
+            ]
+            parts.append(
+                f"{named.effect.kind} on {place_in_words(named.effect, everything)} cannot be told from: "
+                f"{', '.join(others)}"
+            )
+    return parts
 
 
 def _approximation_table(found: Diagnosis) -> Table:
-    table = Table(
-        title="Approximations: they lower the error, but something else is there",
-        title_justify="left",
+    table = new_table(
+        "Approximations: they lower the error, but something else is there",
+        ("effect", "where", "size", "share", "stands for"),
+        left=("effect",),
+        words=("where", "size", "stands for"),
     )
-    for name in ("effect", "where", "size", "share", "stands for"):
-        table.add_column(name, justify="right" if name == "share" else "left")
     for each in found.approximations:
         table.add_row(
-            _title(each.effect.kind),
-            _place(each.effect, len(found.joint_names)),
-            "\n".join(_value(name, value) for name, value in each.parameters.items()),
+            each.effect.kind,
+            place_in_words(each.effect, len(found.joint_names)),
+            "\n".join(value_in_words(name, value) for name, value in each.parameters.items()),
             f"{each.share_of_residual:.2%}",
-            each.approximates.replace("[", r"\["),
+            each.approximates,
         )
     return table
-
-
-def _value(name: str, value: Value) -> str:
-    unit = "" if value.unit == "1" else f" {value.unit}"
-    if value.std != value.std:  # chosen from a grid
-        return f"{name} {value.value:.3g}{unit}"
-    return f"{name} {value.value:.4g} ± {2 * value.std:.2g}{unit}"
 
 
 def _absorbed(found: Diagnosis) -> list[Table | str]:
     if not found.absorbed:
         return []
-    table = Table(
-        title="Not testable: these would show as other values of parameters", title_justify="left"
+    table = new_table(
+        "Not testable: these would show as other values of parameters",
+        ("effect", "where", "absorbed by"),
+        left=("effect", "where"),
+        words=("absorbed by",),
     )
-    for name in ("effect", "where", "absorbed by"):
-        table.add_column(name)
     for each in found.absorbed:
         where = ", ".join(each.joints) if len(each.joints) < 3 else "all joints"
-        table.add_row(_title(each.kind), where, ", ".join(each.by).replace("[", r"\["))
+        table.add_row(each.kind, where, ", ".join(each.by))
     return [table]
 
 
@@ -158,55 +166,48 @@ def _unexplained(found: Diagnosis) -> list[Table | str]:
     ]
 
 
-def _error_table(found: Diagnosis, robot: Robot) -> Table:
-    table = Table(
-        title=f"Error of the torque on data never used ({found.sealed_run})", title_justify="left"
+def _error_table(found: Diagnosis, robot: Robot, verbose: bool) -> Table:
+    """Errors where the joints move; with `verbose` over all samples, too."""
+    more = ("all, before", "all, after") if verbose else ()
+    names = ("joint", "before", "after", *more, "RMS before", "RMS after", "unit",
+             *floor_columns(found.noise_floor))  # fmt: skip
+    table = new_table(
+        f"Error of the torque on data never used ({found.sealed_run}), where joints move",
+        names,
+        left=("joint", "unit"),
     )
-    names = ("joint", "before", "after", "moving, before", "moving, after", "RMS before",
-             "RMS after", *floor_columns(found.noise_floor), "unit")  # fmt: skip
-    for name in names:
-        table.add_column(name, justify="left" if name in ("joint", "unit") else "right")
-    before, after = found.before, found.after
+    errors = (found.before, found.after)
     for joint, sliding in zip(robot.joint_names, robot.sliding, strict=True):
         table.add_row(
             joint,
-            f"{before.relative[joint]:.2%}",
-            f"{after.relative[joint]:.2%}",
-            f"{before.relative_moving[joint]:.2%}",
-            f"{after.relative_moving[joint]:.2%}",
-            f"{before.rms[joint]:.4g}",
-            f"{after.rms[joint]:.4g}",
-            *floor_cells(found.noise_floor, joint),
+            *(f"{error.relative_moving[joint]:.2%}" for error in errors),
+            *(f"{error.relative[joint]:.2%}" for error in errors if verbose),
+            *(f"{error.rms[joint]:.4g}" for error in errors),
             "N" if sliding else "N·m",
+            *floor_cells(found.noise_floor, joint),
         )
     table.add_section()
     table.add_row(
         "mean",
-        f"{before.mean_relative:.2%}",
-        f"{after.mean_relative:.2%}",
-        f"{before.mean_relative_moving:.2%}",
-        f"{after.mean_relative_moving:.2%}",
-        *[""] * (len(names) - 5),
+        *(f"{error.mean_relative_moving:.2%}" for error in errors),
+        *(f"{error.mean_relative:.2%}" for error in errors if verbose),
+        *[""] * (len(names) - 3 - len(more)),
         style="bold",
-    )  # fmt: skip
+    )
     return table
 
 
 def _verdict(found: Diagnosis) -> str:
     low, high = found.after.interval
     return (
-        f"{_counted(len(found.named), 'effect')}"
-        + (f", {_counted(len(found.approximations), 'approximation')}" * bool(found.approximations))
+        f"{counted(len(found.named), 'effect')}"
+        + (f", {counted(len(found.approximations), 'approximation')}" * bool(found.approximations))
         + "; mean error "
         f"{found.before.mean_relative_moving:.2%} → "
         f"{found.after.mean_relative_moving:.2%} where joints move (over all samples "
         f"{found.after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}). "
         f"{found.seconds:.1f} s."
     )
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _next(experiment: dict[str, Any]) -> str:

@@ -62,8 +62,13 @@ def playable(
 
 def _in_words(chain: "Chain") -> str:
     """How long entry, motion and return take."""
+    return ", ".join(f"{name} {seconds:.3g} s" for name, seconds in durations_of(chain).items())
+
+
+def durations_of(chain: "Chain") -> dict[str, float]:
+    """Seconds of `motion` (all periods), and of `entry` and `return` where there are any."""
     seconds: dict[str, float] = {}
     for segment in chain.segments:
         name = segment.name if segment.name in ("entry", "return") else "motion"
         seconds[name] = seconds.get(name, 0.0) + segment.trajectory.duration
-    return ", ".join(f"{name} {duration:.3g} s" for name, duration in seconds.items())
+    return seconds

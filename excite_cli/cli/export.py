@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from excite_cli.cli import options
+from excite_cli.cli.completion import complete_format
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.help_page import OUTPUT
 from excite_cli.cli.outputs import check_outputs
 from excite_cli.errors import ConfigError, FileError, nearest
 
@@ -28,11 +30,17 @@ def export(
             "-f",
             metavar="FORMAT",
             help="csv, ros2, rosbag2, mcap, moveit, npz of motions; urdf, mjcf, yaml of a fit.",
+            autocompletion=complete_format,
         ),
     ],
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="File, or folder of a bag. Default: named after FILE."),
+        typer.Option(
+            "--output",
+            "-o",
+            help="File, or folder of a bag. Default: named after FILE.",
+            rich_help_panel=OUTPUT,
+        ),
     ] = None,
     motion: Annotated[
         str, typer.Option("--motion", metavar="I|all", help="Which motion of a result file.")
@@ -69,6 +77,7 @@ def export(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
 ) -> None:
     """Write motions in the formats that controllers take, or a fit as a robot model.
 
@@ -77,15 +86,20 @@ def export(
     the last step is between half and one and a half of the others. Several motions go to files with
     their numbers in the name. With --entry the robot starts and ends at rest. Units: s, rad (m).
 
-    Example:  excite export ur10.h5 --format ros2 --motion 1 --rate 500 -o motion.yaml
+    Examples:
+      excite export ur10.h5 --format csv --motion 1 -o motion.csv
+      excite export ur10.h5 --format ros2 --entry --rate 500
+      excite export ur10.h5 --format csv --motion 1 --slow 0.3 -o slow.csv
+      excite export fit.h5 --format mjcf -o identified.xml
     """
+    from excite_cli.cli.entry_program import durations_of
     from excite_cli.cli.exported_chains import Wanted, chains_of
     from excite_cli.cli.setup import single_threaded
     from excite_cli.export.motions import MOTION_EXPORTERS
     from excite_cli.export.timed import timed_motion
     from excite_cli.store.fit_file import is_fit
 
-    terminal = Terminal(as_json, quiet, verbose)
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     formats = [*MOTION_EXPORTERS, *_MODELS]
     if format_ not in formats:
         raise ConfigError(
@@ -120,6 +134,7 @@ def export(
                 "output": str(path),
                 "instants": len(timed.t),
                 "duration": timed.duration,
+                "durations": durations_of(each.chain),
                 "pace": each.pace,
             }
         )

@@ -7,6 +7,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.help_page import OUTPUT
 from excite_cli.cli.outputs import check_outputs
 
 
@@ -14,16 +15,22 @@ def identify(
     config: options.Config,
     data: options.Data,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File for the fit (HDF5).")
+        Path | None,
+        typer.Option("--output", "-o", help="File for the fit (HDF5).", rich_help_panel=OUTPUT),
     ] = None,
     urdf: Annotated[
-        Path | None, typer.Option("--urdf", help="Write the URDF with what was identified.")
+        Path | None,
+        typer.Option(
+            "--urdf", help="Write the URDF with what was identified.", rich_help_panel=OUTPUT
+        ),
     ] = None,
     mjcf: Annotated[
-        Path | None, typer.Option("--mjcf", help="Write a MuJoCo model of it (MJCF).")
+        Path | None,
+        typer.Option("--mjcf", help="Write a MuJoCo model of it (MJCF).", rich_help_panel=OUTPUT),
     ] = None,
     parameters: Annotated[
-        Path | None, typer.Option("--parameters", help="Write all parameters (YAML).")
+        Path | None,
+        typer.Option("--parameters", help="Write all parameters (YAML).", rich_help_panel=OUTPUT),
     ] = None,
     sealed: options.Sealed = None,
     overwrite: options.Overwrite = False,
@@ -38,11 +45,13 @@ def identify(
     Base parameters and those of the declared effects are fitted to all runs but the sealed one, on
     which the errors are measured. A single run is cut into blocks, of which every third is sealed.
 
-    Example:  excite identify configs/ur10.yaml measured.h5 -o fit.h5 --urdf identified.urdf
+    Examples:
+      excite identify ur10.yaml measured.h5 -o fit.h5
+      excite identify ur10.yaml measured.h5 --sealed motion_1 --urdf identified.urdf
     """
     from excite_cli.cli.identify_tables import answer_of, tables_of
     from excite_cli.cli.models import write_models
-    from excite_cli.cli.setup import load_dataset, single_threaded
+    from excite_cli.cli.setup import load_dataset, single_threaded, tell_findings
     from excite_cli.config.load import load_spec, spec_as_yaml
     from excite_cli.diagnosis.plausibility import check_dataset
     from excite_cli.identification.identify import identify as run_identification
@@ -65,16 +74,14 @@ def identify(
                 robot, base, dataset, spec, sealed, lambda text: show(text, 0)
             )
         for reason in found.processing.reasons:
-            terminal.say(reason)
+            terminal.detail(reason)
         notes: list[str] = []
         if output is not None:
             sources = tuple(map(str, data))
             fingerprint = robot.fingerprint()
             write_fit(output, found, spec_as_yaml(spec), str(folder), fingerprint, sources)
         notes += write_models(robot, found.fit, urdf, mjcf, parameters)
-    for finding in found.findings[len(dataset.findings) :]:
-        where = f" ({finding.run})" if finding.run else ""
-        terminal.say(f"{finding.severity}{where}: {finding.text}")
+    tell_findings(terminal, found.findings[len(dataset.findings) :])
     for note in notes:
         terminal.say(f"note: {note}")
     files = {"fit": output, **exports}

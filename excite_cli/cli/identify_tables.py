@@ -4,9 +4,17 @@ from typing import Any
 
 from rich.table import Table
 
-from excite_cli.cli.noise_floor_words import above_the_floor, floor_cells, floor_columns
+from excite_cli.cli.layout import table as new_table
+from excite_cli.cli.noise_floor_words import floor_cells, floor_columns
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
+from excite_cli.identification.fit_words import (
+    above_the_floor,
+    consistency_in_words,
+    fixed_by_data,
+    relative_in_words,
+    short_number,
+)
 from excite_cli.identification.identify import Identification
 from excite_cli.robot.model import Robot
 
@@ -22,59 +30,41 @@ def tables_of(found: Identification, robot: Robot) -> list[Table | str]:
         f"{found.hausman.sentence()[0].upper()}{found.hausman.sentence()[1:]}.",
     ]
     if fit.consistent is not None:
-        sentences.append(_consistency(fit))
+        sentences.append(consistency_in_words(fit))
+    above = above_the_floor(found.error, found.noise_floor)
     return [
         _parameter_table(fit),
         error_table(found.error, found.training_error, robot, found.noise_floor),
-        *above_the_floor(found.error, found.noise_floor),
+        *([above] if above else []),
         *sentences,
     ]
 
 
-def _consistency(fit: Fit) -> str:
-    consistent = fit.consistent
-    assert consistent is not None
-    if not consistent.solved:
-        return f"No physically consistent set of parameters was found: {consistent.status}."
-    return (
-        "A physically consistent set of all standard parameters fits as well but for "
-        f"{max(consistent.cost, 0.0) ** 0.5:.1f} standard deviations."
-    )
-
-
 def _parameter_table(fit: Fit) -> Table:
-    table = Table(title="Parameters", title_justify="left")
-    for name in ("parameter", "value", "std", "relative", "unit", "fixed by the data"):
-        table.add_column(name, justify="right" if name in ("value", "std", "relative") else "left")
+    names = ("parameter", "value", "std", "relative", "unit", "fixed by the data")
+    table = new_table("Parameters", names, left=("parameter", "unit", "fixed by the data"))
     for i, name in enumerate(fit.names):
-        relative = f"{fit.relative_std[i]:.1%}" if fit.relative_std[i] < 10 else "> 1000%"
-        verdict = "yes" if fit.identifiable[i] else "NO"
-        if fit.identifiable[i] and not fit.essential[i]:
-            verdict = "yes, small"
-        row = (_short(fit.values[i], 5), _short(fit.std[i], 3), relative, fit.units[i], verdict)
-        table.add_row(name.replace("[", r"\["), *row)
+        row = (
+            short_number(fit.values[i], 5),
+            short_number(fit.std[i], 3),
+            relative_in_words(fit.relative_std[i]),
+        )
+        table.add_row(name, *row, fit.units[i], fixed_by_data(fit, i))
     return table
-
-
-def _short(value: float, digits: int) -> str:
-    """So many digits, and no exponent for hundreds and thousands."""
-    return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
 
 
 def error_table(
     error: Errors, training: Errors, robot: Robot, floor: dict[str, float] | None = None
 ) -> Table:
     """Errors per joint on the sealed part, and the training part's and the noise floor beside."""
-    table = Table(title="Error of the torque", title_justify="left")
-    names = ("joint", "relative", "moving", "RMS", *floor_columns(floor), "RMS as recorded",
-             "unit", "training")  # fmt: skip
-    for name in names:
-        table.add_column(name, justify="left" if name in ("joint", "unit") else "right")
+    title = "Error of the torque on sealed data (raw: as recorded; training: where it was fitted)"
+    names = ("joint", "moving", "all", "RMS", *floor_columns(floor), "raw RMS", "unit", "training")
+    table = new_table(title, names, left=("joint", "unit"))
     for joint, sliding in zip(robot.joint_names, robot.sliding, strict=True):
         table.add_row(
             joint,
-            f"{error.relative[joint]:.2%}",
             f"{error.relative_moving[joint]:.2%}",
+            f"{error.relative[joint]:.2%}",
             f"{error.rms[joint]:.4g}",
             *floor_cells(floor, joint),
             f"{error.rms_raw[joint]:.4g}",

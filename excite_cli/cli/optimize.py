@@ -50,10 +50,16 @@ def optimize(
     of the measured data. Exit status 1: no admissible motion exists or was found, and the message
     names what stands in the way.
 
-    Example:  excite optimize configs/talos_arms.yaml -o arms.h5 --motions 3
+    Examples:
+      excite optimize ur10.yaml -o ur10.h5
+      excite optimize ur10.yaml -o ur10.h5 --motions 3 --resume
+      excite optimize ur10.yaml -o quick.h5 --set optimizer.max_iterations=20
+      excite optimize ur10.yaml -o more.h5 --prior ur10.h5
+      excite optimize ur10.yaml -o next.h5 --after diagnosis.h5
     """
     from rich.table import Table
 
+    from excite_cli.cli.best_so_far import Best
     from excite_cli.cli.motions import load_motions
     from excite_cli.cli.setup import (
         load_next_motion,
@@ -109,13 +115,15 @@ def optimize(
             load_motions(terminal, start, problem.robot, problem.spec) if start is not None else []
         )
         with terminal.live("", problem.spec.optimizer.max_iterations) as show:
+            most = problem.spec.optimizer.max_iterations
 
             def report(index: int) -> ProgressCallback:
+                best = Best()
+
                 def tell(progress: Progress) -> None:
                     show(
-                        f"motion {index}/{total}  stage {progress.stage}  "
-                        f"it {progress.iteration}  {progress.figure}  "
-                        f"{progress.worst_name} {progress.worst_margin:.3g} {progress.worst_unit}",
+                        f"motion {index} of {total}: {best.words(progress)}, iteration "
+                        f"{progress.iteration} of {most}",
                         progress.iteration,
                     )
 

@@ -5,6 +5,9 @@ from typing import Annotated
 
 import typer
 
+from excite_cli.cli.completion import complete_key
+from excite_cli.cli.help_page import MESSAGES, OUTPUT
+
 Config = Annotated[Path, typer.Argument(help="The problem, a YAML file.", show_default=False)]
 Data = Annotated[
     list[Path], typer.Argument(help="Measured data: HDF5, CSV or bags.", show_default=False)
@@ -23,18 +26,39 @@ MotionFile = Annotated[
 ]
 Output = Annotated[
     Path | None,
-    typer.Option("--output", "-o", help="Result file. Default: <config name>.h5 here."),
+    typer.Option(
+        "--output",
+        "-o",
+        help="Result file. Default: <config name>.h5 here.",
+        rich_help_panel=OUTPUT,
+    ),
 ]
 Set = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Override a value of the config."),
+    typer.Option(
+        "--set",
+        metavar="KEY.PATH=VALUE",
+        help="Override a value of the config (may be repeated).",
+        autocompletion=complete_key,
+    ),
 ]
 Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Override the config's seed.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Only errors.")]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="More detail.")]
-NoProgress = Annotated[bool, typer.Option("--no-progress", help="No progress display.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing file.")]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print the answer as JSON.", rich_help_panel=MESSAGES)
+]
+Quiet = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="Only the answer, and errors.", rich_help_panel=MESSAGES),
+]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="More detail.", rich_help_panel=MESSAGES)
+]
+NoProgress = Annotated[
+    bool, typer.Option("--no-progress", help="No progress line.", rich_help_panel=MESSAGES)
+]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace existing files.", rich_help_panel=OUTPUT)
+]
 Threads = Annotated[
     int, typer.Option("--threads", min=1, help="Threads of the linear algebra library.")
 ]

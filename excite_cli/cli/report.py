@@ -1,177 +1,174 @@
-"""`excite report`: figures of a result file."""
+"""`excite report`: one page about motions, fits and diagnoses; figures of motions as files."""
 
-from collections.abc import Callable, Iterator
-from enum import StrEnum
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.help_page import OUTPUT
+from excite_cli.cli.report_figures import Format, write_figures
 
 if TYPE_CHECKING:
+    from excite_cli.cli.report_files import Told
     from excite_cli.excitation.problem import Problem
     from excite_cli.excitation.result import Result
-
-
-class Format(StrEnum):
-    """What a figure is written as."""
-
-    png = "png"
-    svg = "svg"
-    pdf = "pdf"
+    from excite_cli.report.page import Picture
 
 
 def report(
-    file: options.ResultFile,
+    files: Annotated[
+        list[Path],
+        typer.Argument(help="Results, fits and diagnoses, in any order.", show_default=False),
+    ],
     output: Annotated[
         Path | None,
         typer.Option(
             "--output",
             "-o",
-            help="Folder of the figures, or NAME.pdf for one file. Default: <file name>-report.",
+            help="The page. Default: <first file>-report.html here.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option(
+            "--figures",
+            metavar="DIR",
+            help="Write figures of the motions to this folder, or to NAME.pdf; the page only with "
+            "-o.",
+            rich_help_panel=OUTPUT,
         ),
     ] = None,
     kind: Annotated[
-        Format | None, typer.Option("--format", help="Format in a folder. Default: png.")
+        Format | None,
+        typer.Option(
+            "--format", help="Of --figures in a folder. Default: png.", rich_help_panel=OUTPUT
+        ),
     ] = None,
     config: Annotated[
         Path | None,
         typer.Option("--config", help="The YAML file it was made with, to find a relative URDF."),
     ] = None,
+    picture: Annotated[
+        bool, typer.Option("--picture/--no-picture", help="Show the robot on the page.")
+    ] = True,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Draw a result file: condition numbers, spectrum, and every motion against its limits.
+    """Write a page (HTML, one file, no network) about motions, what was identified and diagnosed.
 
-    Figures go to a folder, or as pages into one PDF. The problem is rebuilt from the config that
-    the file holds; where that names a URDF by a relative path, --config says what it starts from.
+    Condition numbers beside random motions, every joint against its limits, the margins of all
+    constraints, parameters, residuals, found effects, errors before and after; several files of
+    the same kind are compared. The problem is rebuilt from the config that a result holds; where
+    that names a URDF by a relative path, --config says what it starts from.
 
-    Example:  excite report talos_arms.h5 -o figures --format svg
+    Examples:
+      excite report ur10.h5 -o ur10.html
+      excite report ur10.h5 fit.h5 diagnosis.h5 -o loop.html
+      excite report ur10.h5 more.h5 -o compared.html
+      excite report ur10.h5 --figures ur10-figures --format svg
     """
     from excite_cli.atomic import write_atomically
+    from excite_cli.cli.rebuilt import rebuilt_problem
+    from excite_cli.cli.report_files import read_files
     from excite_cli.cli.setup import single_threaded
-    from excite_cli.report.style import matplotlib_part, save_figure, save_pages
-    from excite_cli.store.result_file import read_result
+    from excite_cli.errors import FileError
+    from excite_cli.excitation.result import Result
+    from excite_cli.report.style import matplotlib_part
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     matplotlib_part("")
-    target = output or Path(f"{file.stem}-report")
+    if kind is not None and figures is None:
+        raise FileError("--format is that of figures: give a folder for them with --figures.")
+    page = output or (Path(f"{files[0].stem}-report.html") if figures is None else None)
+    if page is not None:
+        _check_page(page, overwrite)
     with single_threaded():
-        result = read_result(file)
-        problem = _rebuilt(file, result, config)
-        figures = _figures(result, problem)
-        paths = _paths(target, kind, list(figures), overwrite)
-        with terminal.live("drawing", len(figures)) as show:
-
-            def drawn() -> Iterator[Any]:
-                for done, (name, draw) in enumerate(figures.items()):
-                    show(name, done)
-                    yield draw()
-
-            if _is_single(target):
-                write_atomically(target, lambda temporary: save_pages(drawn(), temporary))
-            else:
-                for path, figure in zip(paths, drawn(), strict=True):
-                    kind_of = path.suffix.removeprefix(".")
-                    write_atomically(path, partial(save_figure, figure, kind=kind_of))
-    written = [str(path) for path in paths]
-    terminal.answer(written, {"figures": written})
+        told = read_files(files)
+        problems = {
+            each.path: rebuilt_problem(each.path, each.content, config)
+            for each in told
+            if isinstance(each.content, Result)
+        }
+        written: list[str] = []
+        if figures is not None:
+            written = write_figures(terminal, told, problems, (figures, kind, overwrite))
+        if page is not None:
+            text = _page_text(terminal, told, problems, picture)
+            write_atomically(page, partial(_write_text, text=text))
+    terminal.answer(
+        [*([str(page)] if page is not None else []), *written],
+        {"output": None if page is None else str(page), "figures": written},
+    )
 
 
-def _is_single(target: Path) -> bool:
-    """Whether all figures go into one file."""
-    return target.suffix.lower() == ".pdf" and not target.is_dir()
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
 
 
-def _paths(target: Path, kind: Format | None, names: list[str], overwrite: bool) -> list[Path]:
-    """The files that will be written.
+def _check_page(page: Path, overwrite: bool) -> None:
+    """See that the page can be written.
 
     Raises
     ------
     FileError
-        One exists and nothing says to replace it, or `target` does not suit the format.
+        It exists and nothing says to replace it, or its name is that of another format.
     """
+    from excite_cli.cli.outputs import check_outputs
     from excite_cli.errors import FileError
 
-    if target.suffix.lower() in (".png", ".svg") and not target.is_dir():
-        raise FileError(
-            f"-o {target}: there are {len(names)} figures and {target.suffix} holds one. Give a "
-            f"folder (and --format {target.suffix[1:].lower()}), or a name that ends in .pdf."
-        )
-    if _is_single(target):
-        if kind not in (None, Format.pdf):
-            raise FileError(f"-o {target} asks for a PDF and --format for {kind}. Drop one.")
-        paths = [target]
-    elif target.exists() and not target.is_dir():
-        raise FileError(f"-o {target} is a file. Give a folder, or a name that ends in .pdf.")
-    else:
-        paths = [target / f"{name}.{kind or Format.png}" for name in names]
-    present = [path for path in paths if path.exists()]
-    if present and not overwrite:
-        raise FileError(
-            f"{present[0]} exists already. Give another place with -o, or replace it with "
-            "--overwrite."
-        )
-    return paths
+    if page.suffix.lower() not in (".html", ".htm") and not page.is_dir():
+        hint = " Figures and PDF are written by --figures."
+        raise FileError(f"-o {page}: a report is a page, NAME.html.{hint}")
+    check_outputs({"output": page}, overwrite)
 
 
-def _figures(result: "Result", problem: "Problem") -> dict[str, Callable[[], Any]]:
-    """What draws each figure, by its name, in reading order."""
-    from excite_cli.report.condition_figure import draw_condition_numbers, draw_spectrum
-    from excite_cli.report.motion_figure import draw_margins, draw_motion, watched_constraints
+def _page_text(
+    terminal: Terminal, told: "Sequence[Told]", problems: "Mapping[Path, Problem]", picture: bool
+) -> str:
+    from excite_cli.report.assembly import Source, page_of
+    from excite_cli.report.page import render
 
-    figures: dict[str, Callable[[], Any]] = {
-        "condition_numbers": partial(draw_condition_numbers, result),
-        "spectrum": partial(draw_spectrum, result, problem),
-    }
-    for motion in result.motions:
-        figures[f"motion_{motion.index}"] = partial(draw_motion, motion, problem)
-        if watched_constraints(problem):
-            figures[f"margins_{motion.index}"] = partial(draw_margins, motion, problem)
-    return figures
+    with terminal.live("drawing", len(told)) as show:
+        sources = []
+        for each in told:
+            problem, taken = problems.get(each.path), None
+            if picture and problem is not None:
+                show(f"{each.name}: the robot", 0)
+                taken = _picture(terminal, each, problem)
+            sources.append(Source(each.name, each.path.name, each.content, problem, taken))
+        return render(page_of(sources, show))
 
 
-def _rebuilt(file: Path, result: "Result", config: Path | None) -> "Problem":
-    """The problem that `file` was made for.
+def _picture(terminal: Terminal, each: "Told", problem: "Problem") -> "Picture | None":
+    """The robot where it comes nearest to something in its first motion, if that can be drawn."""
+    from typing import cast
 
-    Raises
-    ------
-    FileError
-        The file holds no motion, its URDF is not found, or the robot is not the one it had.
-    """
-    from excite_cli.cli.setup import fit_knowledge
-    from excite_cli.config.load import load_spec, parse_spec
-    from excite_cli.errors import FileError
-    from excite_cli.excitation.problem import build_problem
-    from excite_cli.excitation.result import matches
-    from excite_cli.robot.description import EXAMPLE_PREFIX
+    from excite_cli.cli.motions import motions_of_result
+    from excite_cli.errors import MissingExtraError
+    from excite_cli.report.page import Picture
 
-    if not result.motions:
-        raise FileError(f"{file} holds no motion yet. Go on with `excite optimize --resume`.")
-    spec = parse_spec(result.config, f"the config stored in {file}")
-    folder = config.resolve().parent if config is not None else Path(result.config_folder)
-    if config is not None:
-        given = load_spec(config).robot
-        found = {"urdf": given.urdf, "package_dirs": given.package_dirs}
-        spec = spec.model_copy(update={"robot": spec.robot.model_copy(update=found)})
-    urdf = spec.robot.urdf
-    if not urdf.startswith(EXAMPLE_PREFIX) and not (folder / urdf).is_file():
-        raise FileError(
-            f"{file} was made with the URDF {urdf}, and there is none at "
-            f"{(folder / urdf).resolve()}. Relative paths start from the config: give the YAML "
-            "file it was made with, --config CONFIG.yaml."
-        )
-    problem = build_problem(spec, folder, fit_knowledge(spec, folder))
-    reason = matches(problem, result)
-    if reason:
-        raise FileError(
-            f"{file} does not fit the robot that was found ({urdf}): {reason}. Give the YAML file "
-            "it was made with, --config CONFIG.yaml, and the URDF as it was."
-        )
-    return problem
+    try:
+        from excite_cli.view.pictures import View, still_png
+
+        result = cast("Result", each.content)
+        segment = motions_of_result(each.path, result, [result.motions[0].index])[0]
+        png = still_png(problem, segment, View(size=(600, 441), ghosts=3, caption=False))
+    except (MissingExtraError, ImportError) as error:
+        terminal.detail(f"no picture of the robot: {error}")
+        return None
+    name = problem.robot.name
+    return Picture(
+        f"{name} in its first motion",
+        png,
+        f"{name} at the instant of its first motion at which it comes nearest to itself or to "
+        "something around it, with three other instants faintly behind.",
+        f"Where it comes nearest to something. `excite view {each.path.name}` plays all motions.",
+    )

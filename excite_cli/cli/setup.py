@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.telling import tell_problem
-from excite_cli.config.load import load_spec, parse_spec
+from excite_cli.config.load import load_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.store.fit_knowledge import fit_knowledge
 
 # Share of a joint's torque on sealed data from which a fit is doubted.
 _MUCH_LEFT = 0.1
@@ -19,9 +20,8 @@ if TYPE_CHECKING:
     from excite_cli.diagnosis.next_motion import NextMotion
     from excite_cli.excitation.result import Result
     from excite_cli.excitation.stack import Stack
-    from excite_cli.measurement.dataset import Dataset
+    from excite_cli.measurement.dataset import Dataset, Finding
     from excite_cli.robot.model import Robot
-    from excite_cli.robot.uncertainty import FitKnowledge
 
 
 def single_threaded(threads: int = 1) -> AbstractContextManager[object]:
@@ -57,42 +57,6 @@ def _tell_fit(terminal: Terminal, path: Path) -> None:
             f"unexplained ({len(much)} joints above {100 * _MUCH_LEFT:.0f} %). Its standard "
             "deviations do not cover an effect that the model lacks: run `excite diagnose` first."
         )
-
-
-def fit_knowledge(spec: "Spec", folder: Path) -> "FitKnowledge | None":
-    """What the fit file of `uncertainty.fit` knows; its path starts from `folder`.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or was made with another payload.
-    """
-    if spec.uncertainty is None or spec.uncertainty.fit is None:
-        return None
-    from excite_cli.robot.uncertainty import FitKnowledge
-    from excite_cli.store.fit_file import read_fit
-
-    path = folder / spec.uncertainty.fit
-    if not path.is_file():
-        raise FileError(
-            f"uncertainty.fit: there is no file {path}. Write one with `excite identify`, or leave "
-            "it out."
-        )
-    stored = read_fit(path)
-    fit = stored.fit
-    carried = parse_spec(stored.config, f"the config stored in {path}").robot.payload
-    if carried != spec.robot.payload:
-        raise FileError(
-            f"uncertainty.fit: {path} was made with another robot.payload, so its inertias are "
-            "others. Identify with the payload of this config, or give the same one."
-        )
-    return FitKnowledge(
-        values=fit.base_values,
-        covariance=fit.covariance[: fit.rank, : fit.rank],
-        names=fit.names[: fit.rank],
-        fingerprint=stored.fingerprint,
-        source=spec.uncertainty.fit,
-    )
 
 
 def load_next_motion(
@@ -166,14 +130,21 @@ def load_dataset(
         (~robot.sliding).astype(float),
     )
     raise_for_errors(data)
-    terminal.say(
-        f"{robot.name}: {robot.n} joints; {len(data.runs)} runs, "
-        f"{sum(run.duration for run in data.runs):.3g} s"
-    )
-    for finding in data.findings:
-        where = f" ({finding.run})" if finding.run else ""
-        terminal.say(f"{finding.severity}{where}: {finding.text}")
+    runs = "1 run" if len(data.runs) == 1 else f"{len(data.runs)} runs"
+    seconds = sum(run.duration for run in data.runs)
+    terminal.say(f"{robot.name}: {robot.n} joints; {runs}, {seconds:.3g} s")
+    tell_findings(terminal, data.findings)
     return data
+
+
+def tell_findings(terminal: Terminal, findings: "Sequence[Finding]") -> None:
+    """What was noticed; the same of several runs is told once."""
+    runs: dict[tuple[str, str], list[str]] = {}
+    for finding in findings:
+        runs.setdefault((finding.severity, finding.text), []).append(finding.run or "")
+    for (severity, text), names in runs.items():
+        listed = ", ".join(name for name in names if name)
+        terminal.say(f"{severity}{f' ({listed})' if listed else ''}: {text}")
 
 
 def output_path(output: Path | None, config: Path, overwrite: bool, resume: bool = False) -> Path:
@@ -185,6 +156,8 @@ def output_path(output: Path | None, config: Path, overwrite: bool, resume: bool
         It exists already and nothing says to replace or resume it.
     """
     path = output or Path(f"{config.stem}.h5")
+    if path.is_file() and config.is_file() and path.samefile(config):
+        load_spec(config)  # tells that this is no config
     if path.is_dir():
         raise FileError(f"{path} is a folder. Give a file name with -o.")
     if path.exists() and not overwrite and not resume:

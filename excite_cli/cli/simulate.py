@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from excite_cli.cli import options
+from excite_cli.cli.completion import complete_effect
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.help_page import OUTPUT
 from excite_cli.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
@@ -17,63 +19,115 @@ if TYPE_CHECKING:
     from excite_cli.simulation.settings import SimulationSettings
     from excite_cli.simulation.simulate import Simulation
 
+_PLAYED, _ROBOT, _MEASURED = "What is played", "The robot", "What is measured"
+
 
 def simulate(
     config: options.Config,
     file: options.MotionFile,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The data file, HDF5.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="The data file, HDF5.", rich_help_panel=OUTPUT)
+    ],
     effect: Annotated[
         list[str] | None,
         typer.Option(
             "--effect",
+            rich_help_panel=_ROBOT,
             metavar="KIND@JOINT=VALUE",
-            help="Put an effect into the robot: kind@joint[,joint…]=value[,name:value…]"
-            "[;runs:name|name]. May be given several times.",
+            help="Put an effect into the robot (may be repeated); in full: "
+            "KIND@JOINT,…=VALUE,NAME:VALUE,…;runs:RUN|RUN.",
+            autocompletion=complete_effect,
         ),
     ] = None,
     motion: Annotated[
         list[int] | None,
-        typer.Option("--motion", min=1, help="Play this motion only; may be given several times."),
+        typer.Option(
+            "--motion",
+            rich_help_panel=_PLAYED,
+            min=1,
+            help="Play this motion only (may be repeated).",
+        ),
     ] = None,
     repeat: Annotated[
-        int, typer.Option("--repeat", min=1, help="Takes of each motion, with fresh noise.")
+        int,
+        typer.Option(
+            "--repeat",
+            rich_help_panel=_PLAYED,
+            min=1,
+            help="Takes of each motion, with fresh noise.",
+        ),
     ] = 1,
     periods: Annotated[
-        int, typer.Option("--periods", min=1, help="Periods of a motion in each take.")
+        int,
+        typer.Option(
+            "--periods", rich_help_panel=_PLAYED, min=1, help="Periods of a motion in each take."
+        ),
     ] = 1,
     entry: Annotated[
         bool,
         typer.Option(
-            "--entry", help="Enter each motion from rest at a posture, and go back to it."
+            "--entry",
+            rich_help_panel=_PLAYED,
+            help="Enter each motion from rest at a posture, and go back to it.",
         ),
     ] = False,
     posture: Annotated[
         str | None,
         typer.Option(
             "--from",
+            rich_help_panel=_PLAYED,
             metavar="JOINT=VALUE,…",
             help="The posture of --entry [rad, m]; joints not named are at robot.posture.",
         ),
     ] = None,
-    rate: Annotated[float, typer.Option("--rate", help="Samples per second [Hz].")] = 500.0,
+    rate: Annotated[
+        float, typer.Option("--rate", rich_help_panel=_MEASURED, help="Samples per second [Hz].")
+    ] = 500.0,
     torque_noise: Annotated[
-        float, typer.Option("--torque-noise", help="As a share of the joint's torque RMS.")
+        float,
+        typer.Option(
+            "--torque-noise",
+            rich_help_panel=_MEASURED,
+            help="As a share of the joint's torque RMS.",
+        ),
     ] = 0.01,
     noise_correlation: Annotated[
-        float, typer.Option("--noise-correlation", help="Of the noise, from sample to sample.")
+        float,
+        typer.Option(
+            "--noise-correlation",
+            rich_help_panel=_MEASURED,
+            help="Of the noise, from sample to sample.",
+        ),
     ] = 0.0,
     encoder: Annotated[
-        float, typer.Option("--encoder", help="Resolution of the encoders, in rad (m).")
+        float,
+        typer.Option(
+            "--encoder", rich_help_panel=_MEASURED, help="Resolution of the encoders, in rad (m)."
+        ),
     ] = 2e-5,
     inertia_error: Annotated[
         float,
-        typer.Option("--inertia-error", help="Of the robot's inertias against the URDF; 0: none."),
+        typer.Option(
+            "--inertia-error",
+            rich_help_panel=_ROBOT,
+            help="Of the robot's inertias against the URDF; 0: none.",
+        ),
     ] = 0.2,
     no_declared: Annotated[
-        bool, typer.Option("--no-declared", help="The robot lacks the config's own effects.")
+        bool,
+        typer.Option(
+            "--no-declared",
+            rich_help_panel=_ROBOT,
+            help="The robot lacks the config's own effects.",
+        ),
     ] = False,
     torque_limits: Annotated[
-        bool, typer.Option("--torque-limits", help="Motors stop at the robot's effort limits.")
+        bool,
+        typer.Option(
+            "--torque-limits",
+            rich_help_panel=_ROBOT,
+            help="Motors stop at the robot's effort limits.",
+        ),
     ] = False,
     seed: options.Seed = None,
     overrides: options.Set = None,
@@ -90,8 +144,12 @@ def simulate(
     was put in is stored in the file's attribute `truth`. With --entry the robot starts and ends at
     rest, and entry and return keep all constraints of the config.
 
-    Example:  excite simulate configs/ur10.yaml ur10.h5 -o data.h5 --effect
-    'load_dependent_friction@elbow_joint=0.06' --effect 'payload@all=1.5;runs:motion_2'
+    Examples:
+      excite simulate ur10.yaml ur10.h5 -o measured.h5 \\
+          --effect load_dependent_friction@elbow_joint=0.06
+      excite simulate ur10.yaml ur10.h5 -o loaded.h5 \\
+          --effect coulomb_friction@elbow_joint,wrist_1_joint=2 \\
+          --effect 'payload@all=1.5;runs:motion_2'
     """
     from dataclasses import replace
 
@@ -206,13 +264,11 @@ def _attributes(
 
 def _run_table(simulation: "Simulation") -> "Table":
     import numpy as np
-    from rich.table import Table
 
-    table = Table(title="Runs", title_justify="left")
-    table.add_column("run")
-    for name in ("samples", "duration [s]", "tracking RMS [mrad]", "worst joint [mrad]"):
-        table.add_column(name, justify="right")
-    table.add_column("joint")
+    from excite_cli.cli.layout import table as new_table
+
+    names = ("run", "samples", "seconds", "tracking [mrad]", "worst", "joint")
+    table = new_table("Runs (tracking: RMS)", names, left=("run", "joint"))
     for run in simulation.dataset.runs:
         error = 1e3 * simulation.tracking[run.name]
         worst = int(np.argmax(error))
@@ -228,11 +284,12 @@ def _run_table(simulation: "Simulation") -> "Table":
 
 
 def _effect_table(records: list[dict[str, object]]) -> "Table":
-    from rich.table import Table
+    from excite_cli.cli.layout import table as new_table
 
-    table = Table(title="Effects in the robot", title_justify="left")
-    for name in ("effect", "joints", "parameters", "runs", "declared"):
-        table.add_column(name)
+    names = ("effect", "joints", "parameters", "runs", "declared")
+    table = new_table(
+        "Effects in the robot", names, ("effect", "declared"), ("joints", "parameters", "runs")
+    )
     for record in records:
         parameters, joints = record["parameters"], record["joints"]
         assert isinstance(parameters, dict)

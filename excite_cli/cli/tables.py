@@ -5,6 +5,7 @@ from typing import Any
 
 from rich.table import Table
 
+from excite_cli.cli.layout import table as new_table
 from excite_cli.constraints.base import Constraint, Worst
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
@@ -13,9 +14,8 @@ from excite_cli.excitation.random_baseline import RandomMotion
 
 def motion_table(motions: Sequence[Motion]) -> Table:
     """Condition numbers of each motion and of the stack (the paper's Table I), status, effort."""
-    table = Table(title="Condition numbers", title_justify="left")
-    for name in ("motion", "own", "stacked", "status", "iterations", "seconds"):
-        table.add_column(name, justify="left" if name == "status" else "right")
+    names = ("motion", "own", "stacked", "status", "iterations", "seconds")
+    table = new_table("Condition numbers", names, left=("status",))
     for motion in motions:
         status = motion.status if motion.improved else f"{motion.status}; no improvement"
         table.add_row(
@@ -31,9 +31,10 @@ def motion_table(motions: Sequence[Motion]) -> Table:
 
 def margin_table(motions: Sequence[Motion], constraints: Sequence[Constraint]) -> Table:
     """The worst margin of every constraint over all motions, at controller rate."""
-    table = Table(title="Worst margins at 1 kHz", title_justify="left")
-    for name in ("constraint", "margin", "unit", "where", "motion", "time [s]"):
-        table.add_column(name, justify="right" if name in ("margin", "time [s]") else "left")
+    names = ("constraint", "margin", "unit", "where", "motion", "time [s]")
+    table = new_table(
+        "Worst margins at 1 kHz", names, left=("constraint", "unit"), words=("where",)
+    )
     for constraint in constraints:
         motion = min(motions, key=lambda m: m.margins[constraint.name].margin)
         worst = motion.margins[constraint.name]
@@ -50,10 +51,8 @@ def margin_table(motions: Sequence[Motion], constraints: Sequence[Constraint]) -
 
 def comparison_table(optimized: Sequence[Motion], random: Sequence[RandomMotion]) -> Table:
     """The paper's Tables I and II side by side."""
-    table = Table(title="Condition numbers, Table I and II", title_justify="left")
-    for name in ("motion", "optimised own", "optimised stacked", "random own", "random stacked"):
-        table.add_column(name, justify="right")
-    table.add_column("stacked, random / optimised", justify="right")
+    names = ("motion", "optimised", "stacked", "random", "random, stacked", "times worse")
+    table = new_table("Condition numbers, optimised and random (the paper's Tables I, II)", names)
     for index in range(max(len(optimized), len(random))):
         first = optimized[index] if index < len(optimized) else None
         second = random[index] if index < len(random) else None
@@ -74,12 +73,9 @@ def _pair(motion: Motion | RandomMotion | None) -> tuple[str, str]:
 
 def outlook_table(outlook: dict[str, Any]) -> Table:
     """What the motions are expected to tell apart."""
-    table = Table(
-        title=f"Expected divergence ½Δ; from {outlook['told_apart_from']:g} on, told apart",
-        title_justify="left",
-    )
-    for name in ("effect", "alias", "so far", "with the motions", "motions like the first needed"):
-        table.add_column(name, justify="left" if name in ("effect", "alias") else "right")
+    title = f"Expected divergence ½Δ; from {outlook['told_apart_from']:g} on, told apart"
+    names = ("effect", "alias", "so far", "then", "motions needed")
+    table = new_table(title, names, words=("effect", "alias"))
     for pair in outlook["pairs"]:
         needed = pair["motions_needed"]
         table.add_row(
@@ -87,7 +83,7 @@ def outlook_table(outlook: dict[str, Any]) -> Table:
             pair["alias"],
             f"{pair['kl_so_far']:.2g}",
             f"{pair['expected_kl']:.3g}",
-            "more than 1000" if needed is None else str(needed),
+            "> 1000" if needed is None else str(needed),
         )
     return table
 

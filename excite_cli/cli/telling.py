@@ -3,6 +3,7 @@
 from collections import Counter
 
 from excite_cli.cli.console import Terminal
+from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.mesh_clearance import MeshClearance
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.constraints.surroundings import Surroundings
@@ -13,21 +14,23 @@ from excite_cli.robot.obstacle_pairs import ObstaclePairs
 
 
 def tell_problem(terminal: Terminal, problem: Problem) -> None:
-    """Say what was understood."""
+    """Say in two lines what was understood, and what a person must know; the rest is detail."""
     robot = problem.robot
-    terminal.say(
-        f"{robot.name}: {robot.n} joints, {problem.base.rank} base parameters, "
-        f"{problem.variables} variables, {len(problem.cost_basis.times)} cost and "
-        f"{len(problem.constraint_basis.times)} constraint samples"
-    )
     criterion, weighting = problem.spec.criterion, problem.weighting
+    extra = len(problem.extension.names)
+    effects = f" and {extra} columns of effects" if extra else ""
     terminal.say(
-        f"criterion: {criterion.kind}, row weights: {weighting.row_name}, column scaling: "
+        f"{robot.name}: {robot.n} joints, {problem.base.rank} base parameters{effects}, "
+        f"{problem.variables} variables; criterion: {criterion.kind}"
+    )
+    names = ", ".join(_counted_name(constraint) for constraint in problem.constraints) or "none"
+    terminal.say(f"constraints: {names}")
+    terminal.detail(
+        f"{len(problem.cost_basis.times)} cost and {len(problem.constraint_basis.times)} "
+        f"constraint samples; row weights: {weighting.row_name}, column scaling: "
         f"{weighting.column_name}"
     )
     _tell_effects(terminal, problem)
-    names = ", ".join(constraint.name for constraint in problem.constraints) or "none"
-    terminal.say(f"constraints: {names}")
     _tell_uncertainty(terminal, problem)
     for constraint in problem.constraints:
         if isinstance(constraint, SelfCollision):
@@ -38,9 +41,18 @@ def tell_problem(terminal: Terminal, problem: Problem) -> None:
     if around is not None and not any(isinstance(c, Surroundings) for c in problem.constraints):
         terminal.say("surroundings: no link can come near any of them, so nothing is checked")
     if robot.payload is not None:
-        terminal.say(f"payload: {robot.payload.in_words}, part of the predicted torque")
+        terminal.detail(f"payload: {robot.payload.in_words}, part of the predicted torque")
     for name, words in zip(_symbols(problem), problem.base.in_words(), strict=True):
         terminal.detail(f"  base parameter {name}: {words}")
+
+
+def _counted_name(constraint: Constraint) -> str:
+    """The name of a constraint, with the pairs that it keeps apart."""
+    if isinstance(constraint, SelfCollision | Surroundings):
+        return f"{constraint.name} ({len(constraint.pairs.checked)} pairs)"
+    if isinstance(constraint, MeshClearance):
+        return f"{constraint.name} ({len(constraint.labels)} pairs)"
+    return constraint.name
 
 
 def _tell_uncertainty(terminal: Terminal, problem: Problem) -> None:
@@ -55,7 +67,7 @@ def _tell_uncertainty(terminal: Terminal, problem: Problem) -> None:
         )
         return
     known = f", and within {spec.sigmas:g} standard deviations of {spec.fit}" if spec.fit else ""
-    terminal.say(
+    terminal.detail(
         f"{', '.join(held)}: for every inertia within {spec.mass:.3g} of the mass, "
         f"{spec.center_of_mass:.3g} m of the centre of mass and {spec.inertia:.3g} of the inertia "
         f"of each body{' (others for some)' if spec.bodies else ''}{known}"
@@ -67,14 +79,16 @@ def _tell_effects(terminal: Terminal, problem: Problem) -> None:
     if extension.names:
         counts = Counter(effect.kind for effect in extension.effects)
         listed = ", ".join(f"{kind} ({count})" for kind, count in counts.items())
-        terminal.say(
+        terminal.detail(
             f"effects in the regressor: {listed}; {len(extension.names)} columns, each scaled to "
             "the size of the median inertial column"
         )
     for reason in extension.left_out:
         terminal.say(f"left out of the regressor: {reason}")
     if extension.fine:
-        terminal.say("the cost is taken on the constraint grid: an effect needs time derivatives")
+        terminal.detail(
+            "cost samples are those of the constraints: an effect needs time derivatives"
+        )
     if spec.effects is None and declared_effects(None, problem.robot):
         terminal.say(
             "the friction of the URDF's <dynamics> is not in the regressor; list it under effects "
@@ -93,12 +107,12 @@ def _tell_self_collision(
     terminal: Terminal, constraint: SelfCollision, tabled: tuple[str, ...]
 ) -> None:
     pairs = constraint.pairs
-    terminal.say(
+    terminal.detail(
         f"self-collision: {len(constraint.capsules)} capsules, {len(pairs.checked)} pairs "
-        f"checked; not checked (--verbose lists all): {_reasons(pairs)}"
+        f"checked; not checked: {_reasons(pairs)}"
     )
     if tabled:
-        terminal.say(
+        terminal.detail(
             "kept apart by their meshes, since their capsules overlap whatever the posture: "
             f"{'; '.join(tabled)}"
         )
@@ -122,9 +136,9 @@ def _tell_self_collision(
 def _tell_surroundings(terminal: Terminal, constraint: Surroundings) -> None:
     pairs = constraint.pairs
     things = ", ".join(obstacle.name for obstacle in constraint.obstacles)
-    terminal.say(
+    terminal.detail(
         f"surroundings: {things}; {len(pairs.checked)} pairs of a capsule and a thing checked; not "
-        f"checked (--verbose lists all): {_reasons(pairs)}"
+        f"checked: {_reasons(pairs)}"
     )
     most = float(pairs.kept.max())
     closer = [

@@ -20,11 +20,12 @@ def verify_gradient(
     differences. Exit status 1: the adjoint and the block form differ by more than 1e-9, or one of
     them from central differences by more than 1e-7 (relative).
 
-    Example:  excite verify-gradient configs/talos_arms.yaml
+    Examples:
+      excite verify-gradient ur10.yaml
     """
     import typer
-    from rich.table import Table
 
+    from excite_cli.cli.layout import table as new_table
     from excite_cli.cli.setup import load_problem, single_threaded
     from excite_cli.excitation.gradient_check import (
         ADJOINT_BLOCK_LIMIT,
@@ -40,9 +41,7 @@ def verify_gradient(
         problem = load_problem(terminal, config, overrides, extra)
         with terminal.live("differences of every variable"):
             found = check_gradient(problem, problem.spec.seed)
-    table = Table(title="Relative error of the gradient", title_justify="left")
-    for name in ("pair", "error", "allowed"):
-        table.add_column(name, justify="left" if name == "pair" else "right")
+    table = new_table("Relative error of the gradient", ("pair", "error", "allowed"), ("pair",))
     errors = found.relative_error
     table.add_row(
         "adjoint – block form", f"{errors['adjoint_vs_block']:.1e}", f"{ADJOINT_BLOCK_LIMIT:.0e}"
@@ -62,9 +61,7 @@ def verify_gradient(
         f"{errors['adjoint_vs_forward']:.1e}",
         f"the paper had {PAPER_FORWARD_ERROR:.1e}",
     )
-    times = Table(title="Time", title_justify="left")
-    for name in ("what", "ms", "forward differences take"):
-        times.add_column(name, justify="left" if name == "what" else "right")
+    times = new_table("Time", ("what", "ms", "forward differences take"), ("what",))
     words = {
         "cost": "cost alone",
         "adjoint": "cost and gradient, adjoint",

@@ -1,0 +1,1 @@
+"""YAML files, checked at the door: one class for each section."""

@@ -18,7 +18,7 @@ from excite_cli.config.section import (
 class JointLimitsSpec(Section):
     """Bounds on joint position, velocity and acceleration."""
 
-    position: StrictBool = True
+    position: StrictBool = Field(True, description="keep the URDF's position limits")
     velocity: StrictBool | Positive = Field(
         True, description="URDF limit, or [rad/s] for every joint"
     )
@@ -36,7 +36,7 @@ class TorqueSpec(Section):
 class DiscSpec(Section):
     """Centre of mass within a disc on the ground plane (Eq. 52)."""
 
-    kind: Literal["disc"] = "disc"
+    kind: Literal["disc"] = Field("disc", description="the paper's form")
     radius: Positive = Field(description="[m]")
     center: Literal["posture"] | tuple[Finite, Finite] = Field(
         "posture", description="world x, y [m]; 'posture': where the posture puts it"
@@ -46,7 +46,7 @@ class DiscSpec(Section):
 class PolygonSpec(Section):
     """Centre of mass within a convex support polygon."""
 
-    kind: Literal["polygon"]
+    kind: Literal["polygon"] = Field(description="for feet of any shape")
     vertices: tuple[tuple[Finite, Finite], ...] = Field(description="world x, y [m], any order")
     margin: NonNegative = Field(0.0, description="[m] kept from every edge")
 
@@ -91,9 +91,9 @@ class ContactSpec(Section):
 class CapsuleSpec(Section):
     """A capsule given by hand, in the frame of its joint (see `excite robots`)."""
 
-    start: Vector3
-    end: Vector3
-    radius: Positive
+    start: Vector3 = Field(description="one end of its axis [m]")
+    end: Vector3 = Field(description="the other end [m]")
+    radius: Positive = Field(description="[m]")
 
 
 class SelfCollisionSpec(Section):
@@ -103,6 +103,11 @@ class SelfCollisionSpec(Section):
         "auto", description="fitted to the URDF, with those named here (by link) replaced"
     )
     margin: NonNegative = Field(0.01, description="distance kept [m]")
+    by_meshes: tuple[tuple[str, str], ...] = Field(
+        (),
+        description="pairs of links, at most two joints apart, that are kept apart by tables of "
+        "their meshes' distances instead of their capsules",
+    )
     ignore: tuple[tuple[str, str], ...] = Field((), description="pairs of links not to check")
 
 

@@ -81,7 +81,7 @@ class MeasurementSpec(Section):
     velocity_sign: dict[str, Literal[-1, 1]] = Field(
         default_factory=dict, description="-1 where recorded speeds count the other way"
     )
-    time: Literal["s", "ms", "us", "ns"] = "s"
+    time: Literal["s", "ms", "us", "ns"] = Field("s", description="unit of the time stamps")
     angle: Literal["rad", "deg"] = Field(
         "rad", description="of positions and speeds; prismatic joints are in m either way"
     )
@@ -103,7 +103,9 @@ class MeasurementSpec(Section):
 class IdentificationSpec(Section):
     """How parameters are found."""
 
-    method: Literal["ols", "wls", "irls"] = "wls"
+    method: Literal["ols", "wls", "irls"] = Field(
+        "wls", description="ordinary, weighted by joint, or robust least squares"
+    )
     inertias: Literal["free", "cad"] = Field(
         "free", description="cad: kept at the URDF's values within `uncertainty`"
     )
@@ -120,8 +122,10 @@ class DiagnosisSpec(Section):
     gain: NonNegative = Field(
         0.01, description="least share by which it lowers the error on runs left out"
     )
-    kinds: Literal["all"] | tuple[EffectKind, ...] = "all"
-    exclude: tuple[EffectKind, ...] = ()
+    kinds: Literal["all"] | tuple[EffectKind, ...] = Field(
+        "all", description="kinds of effects that are looked for"
+    )
+    exclude: tuple[EffectKind, ...] = Field((), description="kinds that are not looked for")
     moving_speed: Positive | None = Field(
         None, description="a joint moves above this speed [rad/s or m/s]; default 0.02"
     )

@@ -6,6 +6,7 @@ of one union that all fail are told as one list of what is allowed.
 """
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from pydantic import ValidationError
@@ -40,15 +41,24 @@ _BOUNDS = {
 Path = tuple[Any, ...]
 
 
-def explain(error: ValidationError, tree: Any, source: str) -> str:
-    """One line for each wrong place: where, what is wrong, what is allowed."""
+def explain(
+    error: ValidationError, tree: Any, source: str, line_of: Callable[[Path], int | None]
+) -> str:
+    """One line for each wrong place: where, what is wrong, what is allowed.
+
+    `line_of` tells the line of the file on which a path stands, None for what is not in it.
+    """
     found: dict[Path, list[Any]] = {}
     for item in error.errors(include_url=False):
         found.setdefault(_path_in_file(item, tree), []).append(item)
     # Where something inside a value is wrong, what the value might have been instead is noise.
     deepest = [path for path in found if not any(_inside(other, path) for other in found)]
-    lines = [f"{source}: {_named(path)}: {_reason(found[path], path, tree)}" for path in deepest]
-    return "\n".join(lines)
+    told = []
+    for path in deepest:
+        line = line_of(path)
+        where = source if line is None else f"{source}, line {line}"
+        told.append(f"{where}: {_named(path)}: {_reason(found[path], path, tree)}")
+    return "\n".join(told)
 
 
 def _path_in_file(item: Any, tree: Any) -> Path:
@@ -64,7 +74,7 @@ def _path_in_file(item: Any, tree: Any) -> Path:
         if known:
             path.append(part)
             node = node[part]
-        elif last and item["type"] == "missing":
+        elif last and item["type"] == "missing" and not isinstance(node, list):
             path.append(part)
     return tuple(path)
 
@@ -84,6 +94,10 @@ def _reason(items: list[Any], path: Path, tree: Any) -> str:
         word = str(path[-1])
         return f"unknown key.{nearest(word, allowed)} Allowed here: {', '.join(allowed)}."
     if "missing" in kinds:
+        given = _at(path, tree)
+        if isinstance(given, list):  # the place of a number in a list is no key
+            count = max(item["loc"][-1] for item in items if item["type"] == "missing") + 1
+            return f"{_count(count)} needed (given: {len(given)})."
         return "this key is required."
     for item in items:
         if item["type"].startswith("union_tag"):
@@ -116,12 +130,30 @@ def _allowed(item: Any) -> str:
     if kind in _BOUNDS:
         name, words = _BOUNDS[kind]
         return words.format(f"{context[name]:.10g}")
+    if kind == "too_long" and isinstance(item.get("input"), list | tuple):
+        most = context.get("max_length")
+        return f"{_count(most)} (given: {len(item['input'])})"
     if kind in ("too_short", "too_long"):
         limit = context.get("min_length", context.get("max_length"))
         return f"{'at least' if kind == 'too_short' else 'at most'} {limit} values"
     if kind in _ALLOWED:
         return _ALLOWED[kind]
     return str(item["msg"])
+
+
+def _count(count: int) -> str:
+    return f"{count} value{'' if count == 1 else 's'}"
+
+
+def _at(path: Path, tree: Any) -> Any:
+    """What the file says at `path`; None where it says nothing."""
+    node = tree
+    for part in path:
+        try:
+            node = node[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return node
 
 
 def _literals(item: Any) -> list[str]:

@@ -5,18 +5,30 @@ foreign file can neither run code nor grow in memory. Errors name the key's path
 and the nearest known key.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import yaml
 from pydantic import ValidationError
 
+from excite_cli.config.explain import Path as Place
 from excite_cli.config.explain import explain
+from excite_cli.config.lines import line_at
 from excite_cli.config.spec import Spec
-from excite_cli.errors import ConfigError
+from excite_cli.errors import ConfigError, nearest
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 30
+# What is given by mistake for a config, by its suffix.
+_KINDS = {
+    ".h5": "an HDF5 file (a result, a fit or measured data)",
+    ".urdf": "a URDF",
+    ".csv": "a table of data",
+    ".db3": "a bag",
+    ".mcap": "a bag",
+    ".npz": "a NumPy file",
+}
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -52,8 +64,19 @@ def load_spec(path: Path, overrides: list[str] | None = None) -> Spec:
     ConfigError
         The file is missing, too large, not YAML, or says something that is not allowed.
     """
+    if path.is_dir():
+        raise ConfigError(
+            f"{path} is a folder, not a config. The config, a YAML file, comes first: "
+            "excite COMMAND CONFIG FILE."
+        )
     if not path.is_file():
-        raise ConfigError(f"There is no config file {path}. `ls configs` shows those shipped.")
+        raise ConfigError(f"There is no config file {path}.{_near(path)}")
+    what = _KINDS.get(path.suffix.lower())
+    if what is not None:
+        raise ConfigError(
+            f"{path} is {what}, not a config. The config, a YAML file, comes first: excite "
+            "COMMAND CONFIG FILE."
+        )
     if path.stat().st_size > MAX_BYTES:
         raise ConfigError(f"{path} is larger than {MAX_BYTES // 1000} kB: not a config.")
     try:
@@ -66,6 +89,13 @@ def load_spec(path: Path, overrides: list[str] | None = None) -> Spec:
     return parse_spec(text, str(path), overrides)
 
 
+def _near(path: Path) -> str:
+    """The config in the same folder whose name is nearest, and how to get one."""
+    folder = path.parent
+    there = [each.name for each in folder.glob("*.y*ml")] if folder.is_dir() else []
+    return nearest(path.name, there) + " `excite init` writes one for a robot of yours."
+
+
 def parse_spec(text: str, source: str = "config", overrides: list[str] | None = None) -> Spec:
     """As `load_spec`, from YAML text; `source` is named in messages."""
     tree = _load(text, source)
@@ -73,10 +103,33 @@ def parse_spec(text: str, source: str = "config", overrides: list[str] | None = 
         raise ConfigError(f"{source}: a problem is a mapping with at least the key 'robot'.")
     for override in overrides or []:
         _apply(tree, override)
+    changed = [override.partition("=")[0].strip() for override in overrides or []]
+
+    def line_of(place: Place) -> int | None:
+        written = ".".join(map(str, place))
+        if any(f"{written}.".startswith(f"{key}.") for key in changed):
+            return None  # it is not the file that says this
+        return line_at(text, place)
+
+    return parsed_spec(tree, source, line_of)
+
+
+def parsed_spec(
+    tree: dict[str, Any],
+    source: str = "config",
+    line_of: Callable[[Place], int | None] = lambda place: None,
+) -> Spec:
+    """The checked problem of plain values; `source` and the lines of places are told in messages.
+
+    Raises
+    ------
+    ConfigError
+        They say something that is not allowed.
+    """
     try:
         return Spec.model_validate(tree)
     except ValidationError as error:
-        raise ConfigError(explain(error, tree, source)) from error
+        raise ConfigError(explain(error, tree, source, line_of)) from error
 
 
 def spec_as_yaml(spec: Spec) -> str:

@@ -49,7 +49,9 @@ class RobotSpec(Section):
         default_factory=dict,
         description="joint values [rad or m] at which unmoved joints are locked and motions start",
     )
-    base: Literal["fixed", "floating"] = "fixed"
+    base: Literal["fixed", "floating"] = Field(
+        "fixed", description="floating: the base stands still and its wrench can be measured"
+    )
     base_orientation: tuple[Finite, Finite, Finite] = Field(
         (0.0, 0.0, 0.0), description="roll, pitch, yaw of the base [rad]"
     )

@@ -33,21 +33,29 @@ CriterionKind = Literal[
 class CriterionSpec(Section):
     """What is minimised, and how rows and columns of the regressor are weighted."""
 
-    kind: CriterionKind = "condition_number"
+    kind: CriterionKind = Field(
+        "condition_number", description="function of the singular values; see docs/criteria.md"
+    )
     smoothing: Power = Field(64.0, description="p of the smooth condition number")
     row_weights: Literal["none", "effort"] | dict[str, Positive] = Field(
         "none", description="1/effort limit, or one weight per joint (1/torque noise)"
     )
-    column_scaling: Literal["none", "unit_norm", "a_priori"] = "none"
+    column_scaling: Literal["none", "unit_norm", "a_priori"] = Field(
+        "none",
+        description="unit_norm: columns of a fixed random stack get length 1; a_priori: columns "
+        "times the URDF's parameters",
+    )
 
 
 class OptimizerSpec(Section):
     """How the motion is sought."""
 
-    method: Literal["interior_point", "sqp", "slsqp"] = "interior_point"
+    method: Literal["interior_point", "sqp", "slsqp"] = Field(
+        "interior_point", description="the way to the best motion; see docs/decisions.md"
+    )
     qp_solver: Literal["daqp", "piqp"] = Field("daqp", description="used by method: sqp")
     max_seconds: Positive = Field(30.0, description="per start of a motion")
-    max_iterations: Integer = Field(400, ge=1, le=100_000)
+    max_iterations: Integer = Field(400, ge=1, le=100_000, description="per start of a motion")
     restarts: Integer = Field(1, ge=1, le=100, description="starts tried per motion, the best kept")
     tolerance: Positive = Field(
         1e-3, description="change of the (logarithmic) criterion over 8 iterations that ends a run"
@@ -60,7 +68,9 @@ class OptimizerSpec(Section):
 class SequenceSpec(Section):
     """Motions generated one after the other."""
 
-    motions: Integer = Field(1, ge=1, le=1000)
+    motions: Integer = Field(
+        1, ge=1, le=1000, description="how many, each on top of all earlier ones"
+    )
 
 
 class Spec(Section):
@@ -80,4 +90,4 @@ class Spec(Section):
     identification: IdentificationSpec = IdentificationSpec()
     diagnosis: DiagnosisSpec = DiagnosisSpec()
     sequence: SequenceSpec = SequenceSpec()
-    seed: Integer = Field(1, ge=0, le=2**32 - 1)
+    seed: Integer = Field(1, ge=0, le=2**32 - 1, description="of all that is random")

@@ -21,7 +21,7 @@ Posture = Literal["posture"] | dict[str, Finite]
 class FourierSpec(Section):
     """Fourier series of Eq. 50."""
 
-    family: Literal["fourier"] = "fourier"
+    family: Literal["fourier"] = Field("fourier", description="periodic")
     harmonics: Integer = Field(5, ge=1, le=100, description="N")
     base_frequency: Frequency = Field(0.785398, description="ω [rad/s]")
     at_rest: StrictBool = Field(False, description="no velocity or acceleration at start and end")
@@ -43,10 +43,10 @@ class FourierSpec(Section):
 class BSplineSpec(Section):
     """Clamped B-spline."""
 
-    family: Literal["bspline"]
+    family: Literal["bspline"] = Field(description="from a start to an end")
     duration: Duration = Field(description="[s]")
-    control_points: Integer = Field(12, ge=4, le=500)
-    degree: Integer = Field(5, ge=3, le=9)
+    control_points: Integer = Field(12, ge=4, le=500, description="per joint")
+    degree: Integer = Field(5, ge=3, le=9, description="of its polynomial pieces")
     at_rest: StrictBool = Field(True, description="no velocity or acceleration at start and end")
     start: Posture | None = Field(
         None,

@@ -1,0 +1,22 @@
+"""The figure of a progress line: where the solver is, and its best within all limits so far."""
+
+from excite_cli.excitation.motion import Progress
+
+_CONDITION = "cond "
+
+
+class Best:
+    """Follows one motion; the best is the lowest condition number at a point that keeps limits."""
+
+    def __init__(self) -> None:
+        self._best = float("inf")
+
+    def words(self, progress: Progress) -> str:
+        """`condition number 5.48 (best 5.31)`; another figure is told as it is."""
+        if not progress.figure.startswith(_CONDITION):
+            return progress.figure
+        value = float(progress.figure.removeprefix(_CONDITION))
+        if progress.worst_margin >= 0.0:
+            self._best = min(self._best, value)
+        best = f" (best {self._best:.2f})" if self._best < float("inf") else ""
+        return f"condition number {value:.2f}{best}"

@@ -1,0 +1,76 @@
+"""Typer's own errors (mistyped commands and options, missing arguments) in our words.
+
+Each becomes one `ConfigError`, so that it looks and ends like every other bad input.
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+import typer
+
+from excite_cli.cli.help_page import usage_of
+from excite_cli.errors import ConfigError, nearest
+
+# Typer brings its own copy of click in some versions: take the base from one of its errors.
+USAGE_ERROR: type[Exception] = next(
+    c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"
+)
+
+
+def in_our_words(error: Exception, words: list[str], commands: Iterable[str]) -> ConfigError | None:
+    """What is wrong, where, and what was meant; None for a page of help that was asked for."""
+    if type(error).__name__ == "NoArgsIsHelpError":
+        return None
+    mistyped = _mistyped_command(error, words, list(commands))
+    if mistyped is not None:
+        return mistyped
+    context: Any = getattr(error, "ctx", None)
+    param: Any = getattr(error, "param", None)
+    reason = str(getattr(error, "message", error)).strip().rstrip(".")
+    path = context.command_path if context is not None else "excite"
+    where = f"{path}: "
+    usage = f" Usage: {usage_of(context.command, context)}" if context is not None else ""
+    more = f" `{path} --help` says more."
+    kind = type(error).__name__
+    if kind == "NoSuchOption" and context is not None:
+        given = str(getattr(error, "option_name", ""))
+        known = [name for each in context.command.get_params(context) for name in _names(each)]
+        return ConfigError(f"{where}there is no option {given}.{nearest(given, known)}{more}")
+    if kind == "MissingParameter":
+        return ConfigError(f"{where}{_called(param)} is missing.{usage}")
+    if kind == "BadParameter":
+        reason = reason[:1].lower() + reason[1:]
+        return ConfigError(f"{where}{_called(param)}: {reason.partition(', unable')[0]}.{more}")
+    if kind == "BadOptionUsage":
+        return ConfigError(
+            f"{where}{getattr(error, 'option_name', 'an option')} needs a value.{more}"
+        )
+    if "unexpected extra argument" in reason:
+        extra = reason.rpartition("(")[2].rstrip(")")
+        return ConfigError(f"{where}unexpected: {extra}.{usage}")
+    return ConfigError(f"{where}{reason[:1].lower()}{reason[1:]}.{more}")
+
+
+def _mistyped_command(
+    error: Exception, words: list[str], commands: list[str]
+) -> ConfigError | None:
+    """A helpful error when the first word is no command, else None."""
+    word = next((word for word in words if not word.startswith("-")), None)
+    if word is None or word in commands or "ommand" not in str(error):
+        return None
+    return ConfigError(
+        f"there is no command '{word}'.{nearest(word, commands)} Commands: {', '.join(commands)}."
+    )
+
+
+def _names(param: Any) -> list[str]:
+    return [name for name in (*param.opts, *param.secondary_opts) if name.startswith("--")]
+
+
+def _called(param: Any) -> str:
+    """What a person calls a parameter: `CONFIG`, `--format`."""
+    if param is None:
+        return "a value"
+    if param.param_type_name == "argument":
+        return str(param.metavar or param.name).upper()
+    return max(param.opts, key=len)

@@ -1,0 +1,124 @@
+"""Tables that can be read and copied, completion, and the message of a bug."""
+
+import json
+import sys
+
+import pytest
+import typer.main
+
+from excite_cli.cli.app import app
+from excite_cli.cli.best_so_far import Best
+from excite_cli.cli.completion import (
+    MODEL_FORMATS,
+    MOTION_FORMATS,
+    complete_effect,
+    complete_format,
+    complete_key,
+    complete_robot,
+)
+from excite_cli.cli.console import BUG, Terminal, run_guarded
+from excite_cli.cli.export import _MODELS
+from excite_cli.cli.layout import table
+from excite_cli.excitation.motion import Progress
+from excite_cli.export.motions import MOTION_EXPORTERS
+from excite_cli.robot.glance import known_robots
+
+NAME = "a_very_long_name_of_a_joint_that_someone_wants_to_copy"
+
+
+def printed(capsys: pytest.CaptureFixture[str], quiet: bool = False, as_json: bool = False) -> str:
+    made = table("Title", ("joint", "figure", "words"), left=("joint",), words=("words",))
+    made.add_row(NAME, "1.5", "so many words that they need more than one line of eighty columns")
+    Terminal(as_json, quiet).answer([made, "a sentence [N·m]"], {"figure": float("inf")})
+    return capsys.readouterr().out
+
+
+def test_off_a_terminal_rows_stay_whole(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    text = printed(capsys)
+    row = next(line for line in text.splitlines() if NAME in line)
+    assert row.endswith("eighty columns")
+    assert "\n\na sentence [N·m]\n" in text
+    assert "\x1b" not in text
+    assert all(line == line.rstrip() for line in text.splitlines())
+
+
+def test_narrow_terminals_fold_words_and_keep_names(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    text = printed(capsys)
+    assert NAME in text
+    assert max(map(len, text.splitlines())) <= 80
+    assert "…" not in text
+
+
+def test_quiet_prints_the_answer_and_json_is_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    assert NAME in printed(capsys, quiet=True)
+    assert json.loads(printed(capsys, quiet=True, as_json=True)) == {"figure": None}
+
+
+def test_every_command_takes_the_flags_of_the_contract() -> None:
+    for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+        known = {option for param in command.params for option in param.opts}
+        missing = {"--json", "--quiet", "--verbose", "--no-progress"} - known
+        assert not missing, f"excite {name} lacks {missing}"
+
+
+def test_a_bug_says_how_to_report_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail() -> None:
+        raise ZeroDivisionError("by nothing")
+
+    monkeypatch.setattr(sys, "argv", ["excite", "optimize"])
+    assert run_guarded(fail) == BUG
+    told = capsys.readouterr().err
+    assert "a bug of excite, not of your input (ZeroDivisionError at test_console.py:" in told
+    assert "--verbose" in told
+    assert "Traceback" not in told
+    monkeypatch.setattr(sys, "argv", ["excite", "optimize", "--verbose"])
+    assert run_guarded(fail) == BUG
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_refusal_of_the_file_system_is_no_bug(capsys: pytest.CaptureFixture[str]) -> None:
+    def refuse() -> None:
+        raise PermissionError(13, "Permission denied", "/there/x.h5")
+
+    assert run_guarded(refuse) == 2
+    assert capsys.readouterr().err.startswith("error: /there/x.h5: no permission.")
+
+
+def test_completion_knows_robots_formats_kinds_and_keys() -> None:
+    assert complete_format("r") == ["ros2", "rosbag2"]
+    assert set(MOTION_FORMATS) == set(MOTION_EXPORTERS)
+    assert set(MODEL_FORMATS) == set(_MODELS)
+    assert "ur10" in complete_robot("ur")
+    assert complete_effect("spr") == ["spring@"]
+    assert complete_key("optimizer.max_it") == ["optimizer.max_iterations="]
+    assert complete_key("optim") == ["optimizer."]
+    assert complete_key("nothing.at.all") == []
+
+
+def test_robots_have_kinds() -> None:
+    kinds = {each.name: each.kind for each in known_robots()}
+    expected = {
+        "ur10": "arm", "talos": "humanoid", "go1": "quadruped", "allegro_left_hand": "hand",
+        "tiago": "mobile, with arms", "bolt": "biped", "baxter": "two arms", "iris": "flying",
+    }  # fmt: skip
+    assert {name: kinds[name] for name in expected} == expected
+
+
+def test_the_best_so_far_keeps_all_limits() -> None:
+    best = Best()
+
+    def words(figure: str, margin: float) -> str:
+        return best.words(Progress(1, figure, "torque", margin, "N·m", 0.1, "search"))
+
+    assert words("cond 9.00", -0.1) == "condition number 9.00"
+    assert words("cond 12.00", 0.1) == "condition number 12.00 (best 12.00)"
+    assert words("cond 5.00", -0.1) == "condition number 5.00 (best 12.00)"
+    assert words("divergence 3", 0.1) == "divergence 3"
