@@ -1,0 +1,1 @@
+"""What is made small: functions of the singular values of the regressor."""

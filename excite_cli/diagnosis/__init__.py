@@ -1,0 +1,1 @@
+"""From what the declared model leaves over to named effects, and to the next motion."""

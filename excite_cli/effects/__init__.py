@@ -1,0 +1,1 @@
+"""What a rigid-body model lacks, by name: one file for each effect."""

@@ -1,0 +1,1 @@
+"""What quantities can be over whole intervals of time: Taylor models."""

@@ -1,0 +1,1 @@
+"""From a problem to motions: objective, start, solvers, certificate, entry."""

@@ -1,0 +1,1 @@
+"""Motions for controllers, identified models for simulators."""

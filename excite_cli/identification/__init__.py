@@ -1,0 +1,1 @@
+"""From measured data to parameters, with what they are worth."""

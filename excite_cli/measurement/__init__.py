@@ -1,0 +1,1 @@
+"""Measured files and motions of others, read and checked."""

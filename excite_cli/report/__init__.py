@@ -1,0 +1,1 @@
+"""Stored results as pages and figures."""

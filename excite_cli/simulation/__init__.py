@@ -1,0 +1,1 @@
+"""Motions played on a MuJoCo robot that differs from its model."""

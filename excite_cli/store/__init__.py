@@ -1,0 +1,1 @@
+"""Records to HDF5 files and back."""

@@ -27,6 +27,12 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
+from excite_cli.store.trace_groups import (
+    read_torque_traces,
+    read_traces,
+    write_torque_traces,
+    write_traces,
+)
 
 SCHEMA = 1
 CONTENT = "diagnosis"
@@ -105,6 +111,9 @@ def _write(path: Path, diagnosis: Diagnosis) -> None:
         file["information/factor"] = np.asarray(information.factor, dtype=float)
         file["information/noise"] = np.asarray(information.noise, dtype=float)
         file["information"].attrs["rank"] = int(information.rank)
+        if diagnosis.traces is not None:
+            write_traces(file.create_group("traces"), diagnosis.traces)
+        write_torque_traces(file.create_group("sealed_traces"), diagnosis.sealed_traces)
 
 
 def _read(file: Any) -> Diagnosis:
@@ -122,6 +131,10 @@ def _read(file: Any) -> Diagnosis:
         noise=_finite(group["noise"]),
         **{name: _record(group, name, kind) for name, kind in _INFORMATION.items()},
     )
+    # Files of earlier versions have no traces.
+    fields["traces"] = read_traces(file["traces"]) if "traces" in file else None
+    if "sealed_traces" in file:
+        fields["sealed_traces"] = read_torque_traces(file["sealed_traces"])
     return Diagnosis(
         fingerprint=str(attributes["robot_hash"]),
         seconds=float(attributes["seconds"]),

@@ -5,7 +5,7 @@ kind, joints, shape and runs, from which the model is built again.
 """
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -19,30 +19,16 @@ from excite_cli.identification.consistent import ConsistentParameters
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.identify import Identification
+from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.measurement.dataset import Finding
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
+from excite_cli.store.trace_groups import read_torque_traces, write_torque_traces
 from excite_cli.store.versions import versions
 
 SCHEMA = 1
 KIND = "fit"
 OWN = OwnFile("a fit", "Such files are written by `excite identify`.", SCHEMA, ("kind", KIND))
 _ARRAYS = ("values", "std", "relative_std", "identifiable", "essential")
-
-
-@dataclass(frozen=True)
-class StoredFit:
-    """What a fit file holds."""
-
-    config: str
-    config_folder: str
-    fingerprint: str
-    fit: Fit
-    sealed_run: str
-    error: Errors
-    training_error: Errors
-    findings: tuple[Finding, ...]
-    sources: tuple[str, ...]
-    noise_floor: dict[str, float] | None = None
 
 
 def write_fit(
@@ -77,14 +63,17 @@ def write_fit(
         "noise_floor": json.dumps(found.noise_floor),
         "closed_loop_bias": found.hausman.sentence(),
         "findings": json.dumps([asdict(finding) for finding in found.findings]),
+        "torque_units": json.dumps(found.torque_units),
         "units": "rad, s, N·m, kg, m",
     }
-    write_atomically(path, lambda temporary: _write(temporary, found.fit, attributes))
+    write_atomically(path, lambda temporary: _write(temporary, found, attributes))
 
 
-def _write(path: Path, fit: Fit, attributes: dict[str, Any]) -> None:
+def _write(path: Path, found: Identification, attributes: dict[str, Any]) -> None:
+    fit = found.fit
     with h5py.File(path, "w") as file:
         file.attrs.update(attributes)
+        write_torque_traces(file.create_group("traces"), found.traces)
         group = file.create_group("parameters")
         for name in _ARRAYS:
             group[name] = getattr(fit, name)
@@ -161,6 +150,11 @@ def _read(file: Any) -> StoredFit:
         ),
         sources=tuple(str(name) for name in attributes["sources"]),
         noise_floor=_floor(attributes.get("noise_floor", "null")),
+        closed_loop_bias=str(attributes.get("closed_loop_bias", "")),
+        processing=json.loads(attributes.get("processing", "{}")),
+        versions=json.loads(attributes.get("versions", "{}")),
+        torque_units=tuple(json.loads(attributes.get("torque_units", "[]"))),
+        traces=read_torque_traces(file["traces"]) if "traces" in file else (),
     )
 
 

@@ -1,0 +1,1 @@
+"""From coefficients to positions, speeds and accelerations."""

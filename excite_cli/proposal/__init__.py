@@ -1,0 +1,1 @@
+"""A first config for a robot that nobody has described yet."""

@@ -1,0 +1,130 @@
+"""Files that pages of documentation work on, made once from the small arm of `data/`."""
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from excite_cli import (
+    Case,
+    Dataset,
+    diagnose,
+    identify,
+    load_case,
+    load_data,
+    load_problem,
+    plan,
+    save_fit,
+    simulate,
+    write_dataset,
+)
+from excite_cli.simulation.settings import SimulationSettings
+
+ROOT = Path(__file__).resolve().parents[2]
+_PLANNING = ["optimizer.max_iterations=8", "sequence.motions=3"]
+
+
+class Samples:
+    """Makes a file when it is first asked for, and copies it from then on."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def put(self, name: str, folder: Path) -> None:
+        """A file or folder (`name/`) of the repository or made here, into `folder`."""
+        name = name.rstrip("/")
+        makers: dict[str, Callable[[Path], None]] = {
+            "arm.urdf": _urdf,
+            "arm.yaml": _config,
+            "arm.h5": self._motions,
+            "measured.h5": self._measured,
+            "measured.csv": self._csv,
+            "deg.csv": self._degrees,
+            "measured_bag": self._bag,
+            "fit.h5": self._fit,
+            "diagnosis.h5": self._diagnosis,
+        }
+        source = self._made(name, makers[name]) if name in makers else ROOT / name
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if source.is_dir():
+            shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy(source, target)
+
+    def _made(self, name: str, make: Callable[[Path], None]) -> Path:
+        path = self._folder / name
+        if not path.exists():
+            make(path)
+        return path
+
+    def _case(self) -> Case:
+        self._made("arm.urdf", _urdf)
+        return load_case(self._made("arm.yaml", _config))
+
+    def _data(self) -> Dataset:
+        return load_data(self._case(), self._made("measured.h5", self._measured))
+
+    def _motions(self, path: Path) -> None:
+        self._case()
+        plan(load_problem(self._folder / "arm.yaml", _PLANNING), output=path)
+
+    def _measured(self, path: Path) -> None:
+        from excite_cli import read_result
+
+        motions = read_result(self._made("arm.h5", self._motions))
+        settings = SimulationSettings(rate=200.0)
+        recording = simulate(self._case(), motions, ["coulomb_friction@elbow=1.5"], settings)
+        write_dataset(path, recording.dataset, {})
+
+    def _csv(self, path: Path) -> None:
+        _write_csv(path, self._data(), 1.0, 1.0)
+
+    def _degrees(self, path: Path) -> None:
+        _write_csv(path, self._data(), 180 / np.pi, 1e3)
+
+    def _bag(self, path: Path) -> None:
+        from rosbags.rosbag2 import Writer
+        from rosbags.typesys import Stores, get_typestore
+
+        store = get_typestore(Stores.ROS2_HUMBLE)
+        kind = "sensor_msgs/msg/JointState"
+        state, header, stamp = (
+            store.types[name]
+            for name in (kind, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+        )
+        data = self._data()
+        run, names = data.runs[0], list(data.joint_names)
+        with Writer(path, version=9) as writer:
+            connection = writer.add_connection("/joint_states", kind, typestore=store)
+            for t, q, tau in zip(run.t, run.q, run.tau, strict=True):
+                at = 1_700_000_000_000_000_000 + round(1e9 * float(t))
+                when = header(stamp=stamp(sec=at // 10**9, nanosec=at % 10**9), frame_id="")
+                message = state(header=when, name=names, position=q, velocity=0 * q, effort=tau)
+                writer.write(connection, at, store.serialize_cdr(message, kind))
+
+    def _fit(self, path: Path) -> None:
+        case = self._case()
+        save_fit(path, case, identify(case, self._data()))
+
+    def _diagnosis(self, path: Path) -> None:
+        diagnose(self._case(), self._data(), output=path)
+
+
+def _urdf(path: Path) -> None:
+    shutil.copy(ROOT / "data" / "smoke_arm.urdf", path)
+
+
+def _config(path: Path) -> None:
+    text = (ROOT / "configs" / "smoke.yaml").read_text(encoding="utf-8")
+    path.write_text(text.replace(f"..{os.sep}data{os.sep}smoke_arm.urdf", "arm.urdf"), "utf-8")
+
+
+def _write_csv(path: Path, data: Dataset, angle: float, time: float) -> None:
+    run, names = data.runs[0], data.joint_names
+    sliding = np.array([name == "slide" for name in names])
+    table = np.column_stack([run.t * time, run.q * np.where(sliding, 1.0, angle), run.tau])
+    header = ["t", *(f"q_{name}" for name in names), *(f"tau_{name}" for name in names)]
+    np.savetxt(path, table, delimiter=",", header=",".join(header), comments="")

@@ -1,0 +1,58 @@
+"""The documentation is built with warnings as errors, and needs nothing from elsewhere."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+# What a page would load by itself; links that a reader may follow are none of it.
+_LOADED = re.compile(r"<(?:script|img|link|iframe|source)\b[^>]*?\b(?:src|href)=[\"']?([^\"'\s>]+)")
+_STYLE = re.compile(r"""(?:url\(|@import\s+)["']?(https?:)?//""")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("mkdocs")
+    target = tmp_path_factory.mktemp("site")
+    run = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-d", str(target)],
+        cwd=ROOT,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=180,
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    return target
+
+
+def test_pages_load_nothing_from_elsewhere(site: Path) -> None:
+    pages = list(site.rglob("*.html"))
+    assert len(pages) > 20
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        outside = [
+            found for found in _LOADED.findall(text) if found.startswith(("http:", "https:", "//"))
+        ]
+        assert not outside, f"{page.name} loads {outside}"
+    for style in site.rglob("*.css"):
+        assert not _STYLE.search(style.read_text(encoding="utf-8")), style.name
+
+
+def test_formulas_are_mathml(site: Path) -> None:
+    text = (site / "criteria.html").read_text(encoding="utf-8")
+    assert text.count("<math") > 15
+    assert 'class="arithmatex"' not in text
+    for page in site.rglob("*.html"):
+        assert "\\frac" not in page.read_text(encoding="utf-8").partition("<footer")[0], page.name
+
+
+def test_public_functions_are_in_the_reference(site: Path) -> None:
+    text = (site / "library.html").read_text(encoding="utf-8")
+    for name in ("load_problem", "plan", "diagnose", "identify", "simulate", "check"):
+        assert f'id="excite_cli.library.{name}"' in text

@@ -1,0 +1,137 @@
+"""`from excite_cli import …`: light to import, complete, typed, and the examples run."""
+
+import ast
+import doctest
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import excite_cli.library
+from excite_cli import (
+    Case,
+    ConfigError,
+    FileError,
+    Problem,
+    load_case,
+    load_data,
+    load_problem,
+    motions_of,
+    plan,
+    propose,
+    read_result,
+)
+
+ROOT = Path(__file__).resolve().parents[1]
+SMOKE = ROOT / "configs" / "smoke.yaml"
+BRIEF = ["optimizer.max_iterations=8", "sequence.motions=1"]
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return load_problem(SMOKE, BRIEF)
+
+
+def test_importing_the_package_imports_no_room() -> None:
+    code = "import sys, excite_cli; print([m for m in sys.modules if m.startswith('excite_cli.')])"
+    heavy = "print([m for m in ('numpy', 'pinocchio', 'h5py') if m in sys.modules])"
+    run = subprocess.run(
+        [sys.executable, "-c", f"{code}; {heavy}"], capture_output=True, text=True, check=True
+    )
+    assert run.stdout.split() == ["[]", "[]"]
+
+
+def test_every_public_name_is_there_and_documented() -> None:
+    for name in excite_cli.__all__:
+        found = getattr(excite_cli, name)
+        assert name == "__version__" or found.__doc__, name
+    assert set(excite_cli.__all__) <= set(dir(excite_cli))
+
+
+def test_types_are_those_of_the_names() -> None:
+    """What mypy and editors see are the names that there are, from the same rooms."""
+    tree = ast.parse((ROOT / "excite_cli" / "__init__.py").read_text(encoding="utf-8"))
+    guarded = next(node for node in tree.body if isinstance(node, ast.If))
+    seen = {}
+    for node in guarded.body:
+        assert isinstance(node, ast.ImportFrom)
+        for alias in node.names:
+            assert alias.asname == alias.name  # else type checkers take it for private
+            seen[alias.name] = node.module
+    assert seen == {name: f"excite_cli.{home}" for name, home in excite_cli._HOME.items()}
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'optimise'"):
+        excite_cli.optimise  # noqa: B018
+
+
+def test_a_plan_is_stored_motion_by_motion(problem: Problem, tmp_path: Path) -> None:
+    path, told = tmp_path / "arm.h5", []
+    result = plan(problem, output=path, progress=lambda k, state: told.append((k, state.iteration)))
+    stored = read_result(path)
+    assert stored.motions[0].condition_number == result.motions[0].condition_number
+    assert stored.config_folder == str(SMOKE.parent)
+    assert told
+    assert told[0][0] == 1
+    with pytest.raises(FileError, match="exists already"):
+        plan(problem, output=path)
+
+
+def test_priors_of_any_kind_are_the_same_data(problem: Problem, tmp_path: Path) -> None:
+    first = plan(problem, output=tmp_path / "first.h5")
+    by_record = plan(problem, priors=[first])
+    by_file = plan(problem, priors=[tmp_path / "first.h5"])
+    by_motion = plan(problem, priors=motions_of(first))
+    numbers = [r.motions[0].stacked_condition_number for r in (by_record, by_file, by_motion)]
+    np.testing.assert_allclose(numbers[1:], numbers[0], rtol=1e-6)
+    assert numbers[0] < first.motions[0].condition_number
+
+
+def test_a_case_is_enough_for_data(tmp_path: Path) -> None:
+    case = load_case(SMOKE)
+    assert isinstance(case, Case)
+    assert case.base.rank == 26
+    with pytest.raises(FileError, match=r"no file .*none\.csv"):
+        load_data(case, tmp_path / "none.csv")
+    with pytest.raises(ConfigError, match="robott"):
+        load_case(SMOKE, ["robott.urdf=x"])
+
+
+def test_a_proposal_can_be_loaded(tmp_path: Path) -> None:
+    found = propose(ROOT / "data" / "smoke_arm.urdf", tmp_path)
+    (tmp_path / "arm.yaml").write_text(found.text, encoding="utf-8")
+    assert load_case(tmp_path / "arm.yaml").robot.joint_names == found.joints
+
+
+def test_examples_in_docstrings_are_right(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are run where the repository is."""
+    monkeypatch.chdir(ROOT)
+    failed, tried = doctest.testmod(excite_cli.library)
+    assert tried >= 5
+    assert not failed
+
+
+@pytest.mark.parametrize("name", ["exciting", "identifying", "diagnosing"])
+def test_example_runs(name: str, tmp_path: Path) -> None:
+    path = ROOT / "examples" / f"{name}.py"
+    assert path.read_text(encoding="utf-8").count("# %%") >= 5  # cells, for notebooks
+    run = subprocess.run(
+        [sys.executable, path],
+        cwd=tmp_path,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "TMPDIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert run.returncode == 0, run.stderr
+    expected = {
+        "exciting": "'mesh_collision': 'proved'",
+        "identifying": "of the torque on motion_2 is left",
+        "diagnosing": "coulomb_friction on elbow",
+    }
+    assert expected[name] in run.stdout
