@@ -88,7 +88,7 @@ def _effects(found: Diagnosis, verbose: bool) -> list[Table | str]:
     small = [each for each in ranked if is_small(each)]
     if verbose or len(small) < 2:  # a line about one is no shorter than the one
         small = []
-    shown = ranked[: len(ranked) - len(small)]
+    shown = [each for each in ranked if not any(each is other for other in small)]
     names = ("effect", "where", "size", *(["p"] if verbose else []), "share")
     table = new_table(
         "What the declared model lacks (share: of the residual)",
@@ -106,22 +106,20 @@ def _effects(found: Diagnosis, verbose: bool) -> list[Table | str]:
         )
     parts: list[Table | str] = [table]
     if small:
-        listed = ", ".join(
-            f"{s.effect.kind} on {place_in_words(s.effect, everything)}" for s in small
-        )
+        listed = ", ".join(_what(each.effect, everything) for each in small)
         parts.append(
-            f"and {len(small)} small ones (each below {SMALL_SHARE:.1%}): {listed} (--verbose: sizes)"
+            f"and {len(small)} small ones (each below {SMALL_SHARE:.1%}): {listed} "
+            "(--verbose: sizes)"
         )
     for named in found.named:
         if named.aliases:
-            others = [
-                f"{alias.kind} on {place_in_words(alias, everything)}" for alias in named.aliases
-            ]
-            parts.append(
-                f"{named.effect.kind} on {place_in_words(named.effect, everything)} cannot be told from: "
-                f"{', '.join(others)}"
-            )
+            others = ", ".join(_what(alias, everything) for alias in named.aliases)
+            parts.append(f"{_what(named.effect, everything)} cannot be told from: {others}")
     return parts
+
+
+def _what(record: EffectRecord, everything: int) -> str:
+    return f"{record.kind} on {place_in_words(record, everything)}"
 
 
 def _approximation_table(found: Diagnosis) -> Table:

@@ -11,14 +11,14 @@ from scipy.linalg import cholesky
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import Alias, aliases_of
+from excite_cli.diagnosis.before_after import both_models, on_sealed, training_traces
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.doubt import approximations
+from excite_cli.diagnosis.effect_trace import effect_traces
 from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.friction_line import friction_lines
-from excite_cli.diagnosis.model import KeptInertias, Model, width_of
-from excite_cli.diagnosis.modelled_run import run_name
+from excite_cli.diagnosis.model import KeptInertias, Model
 from excite_cli.diagnosis.plausibility import check_plausibility
-from excite_cli.diagnosis.prediction import errors_on
 from excite_cli.diagnosis.result import (
     Diagnosis,
     EffectRecord,
@@ -27,17 +27,17 @@ from excite_cli.diagnosis.result import (
 )
 from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.rounds import rounds_of
+from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.uncertainty import covariance_of
 from excite_cli.diagnosis.unexplained import unexplained_structure
-from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
-from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
-from excite_cli.identification.split import Split, split
+from excite_cli.identification.split import Split, run_name, split
+from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.robot.base_parameters import BaseParameters
 from excite_cli.robot.model import Array, Robot
@@ -87,13 +87,14 @@ def diagnose(
         traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
     )
     rules = traced.judge.rules
-    unexplained = unexplained_structure(
+    unexplained, dependence = unexplained_structure(
         traced.data, traced.candidates, traced.chosen, traced.signals, traced.noise,
         (rules.significance, rules.gain, rules.inflation), robot.joint_names,
     )  # fmt: skip
     doubts = approximations(traced, unexplained, robot.joint_names)
     named, rivals = _named(model, traced, parameters, covariance, doubts)
-    before, after = _errors(model, traced, parameters, parts, processing)
+    models = both_models(model, traced, parameters)
+    sealed_part = on_sealed(robot, models, [prepare(run, processing) for run in parts.sealed])
     base_values, base_std = _base_parameters(model, parameters, covariance)
     floor = noise_floor(parts.training, processing)
     return Diagnosis(
@@ -112,8 +113,8 @@ def diagnose(
         ),
         unexplained=tuple(unexplained),
         sealed_run=parts.sealed_name,
-        before=before,
-        after=after,
+        before=sealed_part.before,
+        after=sealed_part.after,
         rounds=rounds_of(traced, robot.joint_names),
         findings=(
             *dataset.findings,
@@ -128,6 +129,13 @@ def diagnose(
         versions={},
         seconds=time.monotonic() - started,
         noise_floor=floor.named(robot.joint_names) if floor else None,
+        traces=Traces(
+            torque_units(robot),
+            training_traces(robot, models, traced),
+            effect_traces(traced, parameters, robot.joint_names),
+            dependence,
+        ),
+        sealed_traces=sealed_part.traces,
     )  # fmt: skip
 
 
@@ -205,26 +213,6 @@ def _named(
         )
     order = np.argsort([-each for each in strength], kind="stable")
     return tuple(found[k] for k in order), rivals
-
-
-def _errors(
-    model: Model, traced: Traced, parameters: Array, parts: Split, processing: Processing
-) -> tuple[Errors, Errors]:
-    """Before (the declared model refitted) and after, on the sealed part, once."""
-    sealed: list[PreparedRun] = [prepare(run, processing) for run in parts.sealed]
-    names = [run_name(run.name) for run in parts.sealed]
-    declared = robust_solve(traced.data, traced.candidates, (), traced.levels)
-    width = model.declared_width
-
-    def judge(x: Array, effects: tuple[Effect, ...], count: int) -> Errors:
-        values = x[len(x) - count :] if count else np.zeros(0)
-        return errors_on(model.robot, model.full_inertias(x), effects, values, sealed, names)
-
-    found = width_of(traced.effects)
-    return (
-        judge(declared, model.declared, width),
-        judge(parameters, (*model.declared, *traced.effects), width + found),
-    )
 
 
 def _base_parameters(model: Model, parameters: Array, covariance: Array) -> tuple[Array, Array]:

@@ -14,8 +14,8 @@ import numpy as np
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.robot.model import Array
 
-_STRAIGHT = ("viscous_friction", "coulomb_friction")
-_CURVED = (
+STRAIGHT = ("viscous_friction", "coulomb_friction")
+CURVED = (
     "nonlinear_viscous_friction", "stribeck_friction", "load_dependent_friction", "friction_drift",
 )  # fmt: skip
 
@@ -29,9 +29,9 @@ def friction_lines(traced: Traced, start: int) -> Array:
     transform = np.eye(at)
     for i in traced.chosen:
         effect = traced.candidates[i].effect
-        if effect.kind not in _CURVED:
+        if effect.kind not in CURVED:
             continue
-        lines = [_find(traced, kind, effect.joints) for kind in _STRAIGHT]
+        lines = [_find(traced, kind, effect.joints) for kind in STRAIGHT]
         present = [k for k in lines if k is not None]
         if not present:
             continue

@@ -1,6 +1,5 @@
 """A run as the model sees it: rigid-body quantities, signals for effects, training columns."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -11,12 +10,10 @@ from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import effect_columns
+from excite_cli.identification.split import run_name
 from excite_cli.robot.model import Array
 from excite_cli.robot.regressor import standard_parameters
 from excite_cli.robot.rigid_body import RigidBody
-
-# What `split` adds to the name of a run for a part of it.
-_PART = re.compile(r" (?:[^ ]+-[^ ]+ s|\((?:first|second) half\))$")
 
 
 class ModelledRun:
@@ -49,11 +46,6 @@ class ModelledRun:
         )
         extra = effect_columns(effects, signals) @ np.where(in_robot, values, 0.0)
         return replace(signals, torque=load + extra)
-
-
-def run_name(part: str) -> str:
-    """The run a part of it belongs to."""
-    return _PART.sub("", part)
 
 
 def training_data(

@@ -1,6 +1,7 @@
 """Torque that a fitted model predicts for a prepared run, and its errors."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,11 +15,21 @@ from excite_cli.robot.rigid_body import RigidBody
 _SETTLED = 3
 
 
+@dataclass(frozen=True)
+class Prediction:
+    """Of one run, (T, n) at the working rate: rigid-body torque, and all of it with the effects."""
+
+    load: Array
+    torque: Array
+
+
 def predicted(
-    robot: Robot, phi: Array, effects: Sequence[Effect], values: Array, run: PreparedRun, name: str
-) -> Array:
-    """τ (T, n) at the working rate; effects that look at the torque see the model's own."""
-    body = RigidBody(robot, phi, run.q, run.v, run.a)
+    body: RigidBody, effects: Sequence[Effect], values: Array, t: Array, run: str
+) -> Prediction:
+    """What a model says of a motion at instants `t` (T,) of a run; its inertias are the body's.
+
+    Effects that look at the torque see the model's own.
+    """
     load = body.load
     torque = load
     in_robot = np.repeat(
@@ -27,28 +38,20 @@ def predicted(
     )
     total = load
     for _ in range(_SETTLED):
-        signals = Signals(run.t, run.q, run.v, run.a, load, torque, body, name)
+        signals = Signals(t, body.q, body.v, body.a, load, torque, body, run)
         columns = effect_columns(effects, signals)
         total = load + columns @ values
         if not len(effects):
             break
         torque = load + columns @ np.where(in_robot, values, 0.0)
-    return np.asarray(total)
+    return Prediction(load, np.asarray(total))
 
 
 def errors_on(
-    robot: Robot,
-    phi: Array,
-    effects: Sequence[Effect],
-    values: Array,
-    runs: Sequence[PreparedRun],
-    names: Sequence[str],
+    robot: Robot, runs: Sequence[PreparedRun], predictions: Sequence[Prediction]
 ) -> Errors:
-    """Errors of the model on `runs`, whose names (without the block) are `names`."""
-    raw = [
-        predicted(robot, phi, effects, values, run, name)
-        for run, name in zip(runs, names, strict=True)
-    ]
+    """Errors of the predictions for `runs`."""
+    raw = [each.torque for each in predictions]
     return torque_errors(
         robot.joint_names,
         [run.tau for run in runs],

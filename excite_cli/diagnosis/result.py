@@ -3,8 +3,10 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+from excite_cli.diagnosis.traces import Traces
 from excite_cli.effects.base import Value
 from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
 
@@ -101,7 +103,8 @@ class Diagnosis:
 
     `effects`: all that were added to the declared model. `noise_floor` [N·m] (N): RMS per joint of
     what changes from period to period in training runs, filtered as for the errors; None if no
-    motion was repeated.
+    motion was repeated. `traces` of the training data, `sealed_traces` of the sealed ones; files of
+    earlier versions have none.
     """
 
     config: str
@@ -126,6 +129,8 @@ class Diagnosis:
     versions: dict[str, str]
     seconds: float = 0.0
     noise_floor: dict[str, float] | None = None
+    traces: Traces | None = None
+    sealed_traces: tuple[TorqueTrace, ...] = ()
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:

@@ -13,10 +13,12 @@ import numpy as np
 from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.dependence import common_names, confirmed_shares
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.history import histories
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.result import Unexplained
+from excite_cli.diagnosis.traces import Dependence
 from excite_cli.diagnosis.training import Columns, TrainingData
 from excite_cli.effects.base import Signals
 from excite_cli.robot.model import Array
@@ -34,8 +36,8 @@ def unexplained_structure(
     noise: NoiseModel,
     rules: tuple[float, float, float],
     joint_names: Sequence[str],
-) -> list[Unexplained]:
-    """Joints whose residual depends on something, and on what.
+) -> tuple[list[Unexplained], Dependence]:
+    """Joints whose residual depends on something, and on what; and all dependences, as a map.
 
     `rules` are α of the family, least gain on runs left out, and inflation of χ². The joint with
     the strongest structure comes first, and the others are judged with it in the model: through
@@ -45,12 +47,15 @@ def unexplained_structure(
     past = _Past.of(signals)
     features = [_features(data, signals, past, joint, joint_names) for joint in range(data.n)]
     found: dict[int, Unexplained] = {}
+    shares: Array | None = None
     while len(found) < data.n:
         structures = [
             _structure(data, kept, features[joint], noise, rules)
             for joint in range(data.n)
             if joint not in found
         ]
+        if shares is None:  # nothing but the effects that were found is in the model yet
+            shares = np.stack([each.shares for each in structures])
         strongest = max(structures, key=lambda each: each.score)
         if not strongest.named or strongest.share < _LEAST_SHARE:
             break
@@ -61,7 +66,10 @@ def unexplained_structure(
             strongest.share,
         )
         kept += strongest.named
-    return [found[joint] for joint in sorted(found)]
+    assert shares is not None
+    quantities = common_names([each.quantity for each in features[0]], joint_names[0])
+    dependence = Dependence(tuple(joint_names), quantities, shares)
+    return [found[joint] for joint in sorted(found)], dependence
 
 
 @dataclass(frozen=True)
@@ -80,11 +88,15 @@ class Feature:
 
 @dataclass(frozen=True)
 class _Structure:
-    """What a joint's residual depends on, how surely, and the share of it that this explains."""
+    """What a joint's residual depends on, how surely, and the share of it that this explains.
+
+    `shares` (K,) are those that each quantity alone explains, confirmed on runs left out.
+    """
 
     named: list[Feature]
     score: float
     share: float
+    shares: Array
 
 
 @dataclass(frozen=True)
@@ -150,7 +162,12 @@ def _structure(
         named.append(best[1])
     before = plain.energy_on(base, [joint])
     share = 1.0 - plain.energy_on([*base, *named], [joint]) / max(before, 1e-300)
-    return _Structure([features[i - len(kept)] for i in named], score, float(share))
+    return _Structure(
+        [features[i - len(kept)] for i in named],
+        score,
+        float(share),
+        confirmed_shares(plain, base, joint),
+    )
 
 
 def _obvious(plain: Evidence, base: list[int], joint: int) -> list[int]:

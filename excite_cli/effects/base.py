@@ -104,6 +104,28 @@ class Value:
 
 
 @dataclass(frozen=True)
+class Abscissa:
+    """What the torque of an effect is drawn over: `values` (T,) in `unit`, and their name.
+
+    Values that lie a `period` apart are the same place, if there is one.
+    """
+
+    name: str
+    unit: str
+    values: Array
+    period: float | None = None
+
+
+# Of one joint: name, unit, and where `Signals` has it.
+_DRAWN_OVER: Mapping[Quantity, tuple[str, str, str]] = {
+    "position": ("angle", "rad", "q"),
+    "speed": ("speed", "rad/s", "v"),
+    "acceleration": ("acceleration", "rad/s²", "a"),
+    "load": ("rigid-body torque", "N·m", "load"),
+}
+
+
+@dataclass(frozen=True)
 class Effect(ABC):
     """An effect on given joints with given shape (values of its non-linear parameters).
 
@@ -188,6 +210,18 @@ class Effect(ABC):
         if self.active(signals.run):
             tau[:, list(self.rows(signals.q.shape[1]))] = self.columns(signals) @ values
         return tau
+
+    def abscissa(self, signals: Signals) -> Abscissa | None:
+        """The quantity over which a person sees the effect; None: the torque it predicts.
+
+        By default the one quantity of its one joint that it is a `function_of`.
+        """
+        if len(self.joints) != 1 or len(self.function_of) != 1:
+            return None
+        if self.function_of[0] not in _DRAWN_OVER:
+            return None
+        name, unit, series = _DRAWN_OVER[self.function_of[0]]
+        return Abscissa(name, unit, getattr(signals, series)[:, self.joints[0]])
 
     def report(self, values: Array, covariance: Array) -> dict[str, Value]:
         """Named parameters as people know them, with standard deviations."""

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.effects.base import Effect, Parameter, Scope, Signals
+from excite_cli.effects.base import Abscissa, Effect, Parameter, Scope, Signals
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.rigid_body import RigidBody
 
@@ -68,6 +68,10 @@ class Contact(Effect):
         if inside.any():
             columns[inside] = _columns(signals, inside)
         return columns
+
+    def abscissa(self, signals: Signals) -> Abscissa:
+        """Time: the touch begins and ends."""
+        return Abscissa("time", "s", signals.t)
 
 
 def _columns(signals: Signals, at: NDArray[np.bool_] | slice) -> Array:

@@ -15,7 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array, Robot
 
@@ -47,6 +47,12 @@ class CoupledFriction(Effect):
         viscous = s * v[:, ::-1]
         coulomb = np.stack([sign, s * sign], axis=-1)
         return np.stack([viscous, coulomb], axis=-1)
+
+    def abscissa(self, signals: Signals) -> Abscissa:
+        """The speed of the shaft that both joints turn."""
+        first, second = self.joints
+        shaft = signals.v[:, first] + self.shape["direction"] * signals.v[:, second]
+        return Abscissa("speed of the coupled shaft", "rad/s", shaft)
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """Viscous: the other row's weight times s; Coulomb: both through the slope of the sign."""

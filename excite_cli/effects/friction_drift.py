@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 
@@ -28,6 +28,11 @@ class FrictionDrift(Effect):
         """t sgn v_j and t v_j, (T, 1, 2)."""
         v = signals.v[:, self.joints[0]]
         return (signals.t[:, None] * np.stack([smooth_sign(v), v], axis=-1))[:, None]
+
+    def abscissa(self, signals: Signals) -> Abscissa:
+        """Time with the sign of the speed."""
+        sign = smooth_sign(signals.v[:, self.joints[0]])
+        return Abscissa("time, signed by the direction", "s", signals.t * sign)
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂v_j = t (weight₁ · slope of the sign + weight₂)."""

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 
@@ -25,6 +25,10 @@ class LoadDependentFriction(Effect):
         """|load_j| sgn v_j, (T, 1, 1)."""
         j = list(self.joints)
         return (np.abs(signals.load[:, j]) * smooth_sign(signals.v[:, j]))[:, :, None]
+
+    def abscissa(self, signals: Signals) -> Abscissa:
+        """The column itself: friction is a straight line over it."""
+        return Abscissa("load, signed by the direction", "N·m", self.columns(signals)[:, 0, 0])
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂v_j = weight · |load| · slope of the sign; ∂/∂load_j = weight · sgn load · sgn v."""

@@ -18,7 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Value, deviation
+from excite_cli.effects.base import (
+    Abscissa,
+    Cotangents,
+    Effect,
+    Parameter,
+    Signals,
+    Value,
+    deviation,
+)
 from excite_cli.robot.model import Array, Robot
 
 _CYCLES = 2.0  # least number of periods within the travelled range
@@ -83,6 +91,11 @@ class Ripple(Effect):
         """cos(N q_j) and sin(N q_j), (T, 1, 2)."""
         angle = self.shape["periods"] * signals.q[:, self.joints[0]]
         return np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None]
+
+    def abscissa(self, signals: Signals) -> Abscissa:
+        """The angle, folded into one period."""
+        period = 2 * np.pi / self.shape["periods"]
+        return Abscissa("angle within a period", "rad", signals.q[:, self.joints[0]], period)
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂q_j = N (weight of sin · cos − weight of cos · sin)."""

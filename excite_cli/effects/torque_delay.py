@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
 from excite_cli.robot.model import Array, Robot
 
 
@@ -32,6 +32,13 @@ class TorqueDelay(Effect):
     def columns(self, signals: Signals) -> Array:
         """−d(torque)/dt, (T, len(joints), 1)."""
         return -signals.rate(signals.torque[:, list(self.joints)])[:, :, None]
+
+    def abscissa(self, signals: Signals) -> Abscissa | None:
+        """The rate of the torque; of several joints each has its own, so None."""
+        if len(self.joints) != 1:
+            return None
+        rate = signals.rate(signals.torque[:, self.joints[0]])
+        return Abscissa("rate of the torque", "N·m/s", rate)
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂torque = −(transpose of the rate) weight."""

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals
 from excite_cli.robot.model import Array
 
 
@@ -21,6 +21,10 @@ class TorqueOffset(Effect):
     def columns(self, signals: Signals) -> Array:
         """Ones, (T, 1, 1)."""
         return np.ones((len(signals.t), 1, 1))
+
+    def abscissa(self, signals: Signals) -> Abscissa:
+        """Time: a constant stays where it is."""
+        return Abscissa("time", "s", signals.t)
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """Nothing: a constant does not depend on the motion."""

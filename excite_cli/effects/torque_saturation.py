@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals
 from excite_cli.robot.model import Array, Robot
 
 _MEASURED = (0.8, 0.9, 0.95, 0.97, 0.985, 0.995)  # of a cut torque, the last ones are the level
@@ -59,6 +59,10 @@ class TorqueSaturation(Effect):
         """−(|torque_j| − L)₊ sgn(torque_j), (T, 1, 1)."""
         torque, level = signals.torque[:, list(self.joints), None], self.shape["level"]
         return np.clip(torque, -level, level) - torque
+
+    def abscissa(self, signals: Signals) -> Abscissa:
+        """The model's torque, before it is cut off."""
+        return Abscissa("torque of the model", "N·m", signals.torque[:, self.joints[0]])
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂torque_j = −weight above the level, else zero."""

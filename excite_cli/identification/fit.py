@@ -99,11 +99,11 @@ class Fit:
         """τ̂ (M, n) of a run."""
         return columns_of(run, base) @ self.values
 
-    def predict_raw(self, run: RunColumns, robot: Robot) -> Array:
-        """τ̂ (T, n) at the working rate, not averaged: for the torque as recorded."""
+    def predict_raw(self, run: RunColumns, robot: Robot) -> tuple[Array, Array]:
+        """Rigid-body torque and τ̂ (T, n) at the working rate, not averaged."""
         signals = signals_of(run.prepared, robot, self.phi)
         values = self.values[self.rank :]
-        return signals.load + effect_columns(self.effects, signals) @ values
+        return signals.load, signals.load + effect_columns(self.effects, signals) @ values
 
     def _part(self, index: int) -> slice:
         first = self.rank + sum(len(e.parameters) for e in self.effects[:index])

@@ -31,6 +31,7 @@ from excite_cli.identification.prepare import prepare
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import Regression, build_regression
 from excite_cli.identification.split import Split, split
+from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.base_parameters import BaseParameters
 from excite_cli.robot.model import Robot
@@ -45,7 +46,7 @@ class Identification:
     """The fit, its errors on the sealed part and on the training part, and what was noticed.
 
     `noise_floor` [N·m] (N): RMS per joint of what changes from period to period in training runs;
-    None if no motion was repeated.
+    None if no motion was repeated. `traces`: torque over time, in `torque_units` per joint.
     """
 
     fit: Fit
@@ -56,6 +57,8 @@ class Identification:
     processing: Processing
     findings: tuple[Finding, ...]
     noise_floor: dict[str, float] | None = None
+    torque_units: tuple[str, ...] = ()
+    traces: tuple[TorqueTrace, ...] = ()
 
 
 def identify(
@@ -91,11 +94,13 @@ def identify(
     tell("closed-loop bias")
     hausman = _hausman(training, dataset, parts, processing, found, (sealed, spec.diagnosis.block))
     floor = noise_floor(parts.training, processing)
+    error, sealed_traces = _judged(found, held_out, sealed=True)
+    training_error, training_traces = _judged(found, training, sealed=False)
     return Identification(
         fit=found,
         sealed_run=parts.sealed_name,
-        error=errors_of(found, held_out),
-        training_error=errors_of(found, training),
+        error=error,
+        training_error=training_error,
         hausman=hausman,
         processing=processing,
         findings=(
@@ -104,6 +109,8 @@ def identify(
             *(floor.noticed(robot.joint_names) if floor else ()),
         ),
         noise_floor=floor.named(robot.joint_names) if floor else None,
+        torque_units=torque_units(robot),
+        traces=(*training_traces, *sealed_traces),
     )
 
 
@@ -119,9 +126,17 @@ def _regression(
 
 def errors_of(found: Fit, regression: Regression) -> Errors:
     """Errors of the fit's torque on the runs of `regression`."""
+    return _judged(found, regression, sealed=False)[0]
+
+
+def _judged(
+    found: Fit, regression: Regression, sealed: bool
+) -> tuple[Errors, tuple[TorqueTrace, ...]]:
+    """Errors of the fit's torque on the runs of `regression`, and this torque over time."""
     runs = [run.prepared for run in regression.runs]
-    raw = [found.predict_raw(run, regression.robot) for run in regression.runs]
-    return torque_errors(
+    predicted = [found.predict_raw(run, regression.robot) for run in regression.runs]
+    raw = [torque for _, torque in predicted]
+    errors = torque_errors(
         regression.robot.joint_names,
         [run.tau for run in runs],
         [run.averaged(each) for run, each in zip(runs, raw, strict=True)],
@@ -130,6 +145,10 @@ def errors_of(found: Fit, regression: Regression) -> Errors:
         [run.tau_raw for run in runs],
         raw,
         runs[0].step,
+    )
+    return errors, tuple(
+        torque_trace(run, load, torque, sealed=sealed)
+        for run, (load, torque) in zip(runs, predicted, strict=True)
     )
 
 

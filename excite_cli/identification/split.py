@@ -3,6 +3,7 @@
 Blocks are cut before any filter runs, so that nothing of a sealed block leaks into its neighbours.
 """
 
+import re
 from dataclasses import dataclass, replace
 
 from excite_cli.errors import ConfigError, nearest
@@ -11,6 +12,8 @@ from excite_cli.measurement.dataset import Dataset, Run
 # A single run is cut into about this many blocks of one to two seconds; every third is sealed.
 _BLOCKS, _SHORTEST, _LONGEST = 9, 1.0, 2.0
 _EVERY = 3
+# What is added to the name of a run for a part of it.
+_PART = re.compile(r" (?:[^ ]+-[^ ]+ s|\((?:first|second) half\))$")
 
 
 @dataclass(frozen=True)
@@ -86,3 +89,8 @@ def _blocks(run: Run, block: float | None) -> Split:
 def _named(run: Run, first: int, last: int) -> Run:
     times = f"{run.t[first]:.4g}-{run.t[last - 1]:.4g} s"
     return run.part(first, last, f"{run.name} {times}")
+
+
+def run_name(part: str) -> str:
+    """The run a part of it belongs to."""
+    return _PART.sub("", part)

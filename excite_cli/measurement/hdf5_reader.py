@@ -57,6 +57,11 @@ def _runs(path: Path, file: Any, wanted: ReadOptions) -> list[RawRun]:
         budget = sum(_count(run) for _, run in found)
         check_values(path, budget)
         return [_run(path, file, run, name, wanted) for name, run in found]
+    kind = str(file.attrs.get("kind", file.attrs.get("content", "")))
+    if kind in ("fit", "diagnosis"):
+        raise FileError(
+            f"{path} holds a {kind}, not measured data. Give the recordings that it was made from."
+        )
     if "motions" in file and "q" not in file:
         raise FileError(
             f"{path} holds planned motions, not measured data. Play them on the robot, or with "

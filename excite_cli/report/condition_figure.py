@@ -9,7 +9,7 @@ from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.stack import Stack
+from excite_cli.report.spectrum_chart import random_stack, spectrum_unit
 from excite_cli.report.style import (
     BLUE,
     VERMILION,
@@ -18,7 +18,6 @@ from excite_cli.report.style import (
     new_figure,
     styled,
 )
-from excite_cli.robot.model import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -126,7 +125,7 @@ def draw_spectrum(result: Result, problem: Problem) -> "Figure":
     axes = figure.add_subplot()
     spectra = [("optimised", BLUE, "o", singular_values(result.stack.factor))]
     if result.random:
-        spectra.append(("random", VERMILION, "s", singular_values(_random_stack(result, problem))))
+        spectra.append(("random", VERMILION, "s", singular_values(random_stack(result, problem))))
     shown = [value for *_, sigma in spectra for value in sigma if value > 0]
     logarithmic(axes, shown)
     for word, colour, marker, sigma in spectra:
@@ -142,26 +141,10 @@ def draw_spectrum(result: Result, problem: Problem) -> "Figure":
         )
     axes.xaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(integer=True))
     axes.set_xlabel("singular value, from the largest [–]")
-    axes.set_ylabel(f"size of the singular value [{_unit(problem)}]")
+    axes.set_ylabel(f"size of the singular value [{spectrum_unit(problem)}]")
     axes.set_title(_spectrum_title(result))
     axes.legend(loc="upper right")
     return figure
-
-
-def _random_stack(result: Result, problem: Problem) -> Array:
-    stack = Stack.empty(problem.columns)
-    objective = problem.objective()
-    for motion in result.random:
-        stack = stack.with_rows(objective.block(motion.coefficients))
-    return stack.factor
-
-
-def _unit(problem: Problem) -> str:
-    """Rows are torques (or shares of them); columns kg, kg·m and kg·m² unless they are scaled."""
-    row = "N·m" if problem.weighting.row_name == "none" else "weighted N·m"
-    if problem.weighting.column_name == "none":
-        return f"{row} per kg, kg·m, kg·m²"
-    return f"{row} per scaled parameter"
 
 
 def _spectrum_title(result: Result) -> str:

@@ -56,7 +56,7 @@ def test_the_reason_is_told_and_nothing_is_written(excite: Program, case: str) -
     run = excite("optimize", SMOKE, *BRIEF, *_changes(settings))
     assert run.returncode == 1, run.stderr
     reason = run.stderr.splitlines()[-1]
-    assert reason.startswith("excite: No admissible motion: ")
+    assert reason.startswith("error: No admissible motion: ")
     for words in told:
         assert words in reason
     assert run.stdout == ""

@@ -135,7 +135,7 @@ def test_people_get_tables(outcome: Outcome, excite: Program) -> None:
     run = excite("diagnose", SMOKE, outcome.data, *QUICK, "--sealed", "motion_1_take_1")
     assert run.returncode == 0, run.stderr
     for words in (
-        "What the declared model lacks", "Coulomb friction", "sealed: motion_1_take_1", "N·m",
+        "What the declared model lacks", "coulomb_friction", "N·m",
         "Error of the torque on data never used (motion_1_take_1)", "Next motion",
     ):  # fmt: skip
         assert words in run.stdout
@@ -167,7 +167,8 @@ def test_overwrite_replaces(outcome: Outcome, excite: Program) -> None:
     path = excite.folder / "found.h5"
     path.write_text("old")
     run = excite("diagnose", SMOKE, outcome.data, *QUICK, "-o", path, "--overwrite", "--quiet")
-    assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "Next motion" in run.stdout
     assert {e.effect.kind for e in read_diagnosis(path).effects} == {kind for kind, _ in PLANTED}
 
 
@@ -193,5 +194,5 @@ def test_bad_requests_get_one_message(
 def test_help_has_an_example(excite: Program) -> None:
     run = excite("diagnose", "--help")
     assert run.returncode == 0
-    assert "excite diagnose configs/ur10.yaml measured.h5" in run.stdout
+    assert "excite diagnose ur10.yaml measured.h5" in run.stdout
     assert "--sealed" in run.stdout

@@ -102,5 +102,5 @@ def test_bad_input_gives_one_message(folder: Path, excite: Program) -> None:
         assert run.returncode == 2, run.stderr
         assert message in run.stderr
         assert "Traceback" not in run.stderr
-        assert sum(line.startswith("excite: ") for line in run.stderr.splitlines()) == 1
+        assert sum(line.startswith("error: ") for line in run.stderr.splitlines()) == 1
     assert list(excite.folder.iterdir()) == []

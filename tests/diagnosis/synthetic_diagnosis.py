@@ -20,10 +20,12 @@ from excite_cli.diagnosis.result import (
     Suspect,
     Unexplained,
 )
+from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
 from excite_cli.effects.base import Value
 from excite_cli.excitation.effect_columns import EffectColumns
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.torque_trace import TorqueTrace, single
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
 from excite_cli.robot.regressor import Regressor, standard_parameters
@@ -119,3 +121,39 @@ def make_diagnosis(
         versions={"excite-cli": "0"},
         seconds=1.5,
     )
+
+
+def make_traces(
+    joints: Sequence[str], samples: int = 240
+) -> tuple[Traces, tuple[TorqueTrace, ...]]:
+    """Training and sealed traces: viscous friction of 2 N·m·s/rad on the elbow, found."""
+    n, elbow = len(joints), list(joints).index("elbow")
+    noise = np.random.default_rng(3).normal(size=(samples, n))
+
+    def trace(run: str, sealed: bool) -> TorqueTrace:
+        t = np.linspace(0.0, 6.0, samples)
+        q = np.sin(t[:, None] + np.arange(n))
+        v, load = np.cos(t[:, None] + np.arange(n)), 10.0 * q
+        friction = np.zeros_like(q)
+        friction[:, elbow] = 2.0 * v[:, elbow]
+        measured = load + friction + 0.05 * noise
+        measured[:5] = np.nan
+        arrays = [single(x) for x in (t, q, v, -q, load, measured)]
+        return TorqueTrace(
+            run, sealed, *arrays, np.abs(v) > 0.1, single(load + friction), single(load)
+        )
+
+    first, second, sealed = trace("run_1", False), trace("run_2", False), trace("run_3", True)
+    counted = first.counted[:, [elbow]] & np.isfinite(first.measured[:, [elbow]])
+    x, own = first.v[:, [elbow]], 2.0 * first.v[:, [elbow]]
+    partial = first.measured[:, [elbow]] - first.load[:, [elbow]]
+    effect = EffectTrace(
+        "viscous_friction", ("elbow",), (), ("elbow",), "speed", "rad/s", None,
+        np.zeros(samples), first.t,
+        *(single(np.where(counted, y, np.nan)) for y in (x, own, partial)),
+    )  # fmt: skip
+    shares = np.zeros((n, 3))
+    shares[elbow] = 0.3, 0.0, 0.02
+    dependence = Dependence(tuple(joints), ("q[elbow]", "time", "own direction and q"), shares)
+    units = ("N·m",) * n
+    return Traces(units, (first, second), (effect,), dependence), (sealed,)

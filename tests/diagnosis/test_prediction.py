@@ -1,5 +1,7 @@
 """What a model predicts for a run is what its regression says, and errors are counted from it."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
@@ -16,7 +18,7 @@ from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.regression import build_regression
 from excite_cli.robot.base_parameters import find_base_parameters
-from excite_cli.robot.model import Robot
+from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.regressor import standard_parameters
 from excite_cli.robot.rigid_body import RigidBody
 from tests.identification.synthetic import measured
@@ -44,6 +46,21 @@ def effects() -> tuple[Effect, ...]:
     )
 
 
+def body_of(robot: Robot, phi: Array, run: PreparedRun) -> RigidBody:
+    return RigidBody(robot, phi, run.q, run.v, run.a)
+
+
+def torque(
+    robot: Robot,
+    phi: Array,
+    kinds: Sequence[Effect],
+    values: Array,
+    run: PreparedRun,
+    name: str,
+) -> Array:
+    return predicted(body_of(robot, phi, run), kinds, values, run.t, name).torque
+
+
 def test_prediction_is_columns_times_parameters(robot: Robot, runs: list[PreparedRun]) -> None:
     """On inertias other than the URDF's; one effect looks at the load, one is in one run only."""
     rng = np.random.default_rng(0)
@@ -52,7 +69,7 @@ def test_prediction_is_columns_times_parameters(robot: Robot, runs: list[Prepare
     values = rng.uniform(0.1, 0.5, sum(len(e.parameters) for e in kinds))
     regression = build_regression(robot, find_base_parameters(robot), kinds, runs, phi)
     for run, columns in zip(runs, regression.runs, strict=True):
-        tau = predicted(robot, phi, kinds, values, run, run.name)
+        tau = torque(robot, phi, kinds, values, run, run.name)
         assert tau.shape == run.q.shape
         modelled = columns.inertial @ phi + columns.effects @ values
         assert run.averaged_for_fit(tau) == pytest.approx(modelled, rel=1e-9, abs=1e-9)
@@ -64,7 +81,7 @@ def test_an_effect_acts_in_its_runs_by_the_name_that_is_given(
     phi = standard_parameters(robot)
     payload = (Payload((0, 1, 2), {}, ("r2",)),)
     values = np.full(len(payload[0].parameters), 0.3)
-    one, two = (predicted(robot, phi, payload, values, runs[0], name) for name in ("r1", "r2"))
+    one, two = (torque(robot, phi, payload, values, runs[0], name) for name in ("r1", "r2"))
     load = RigidBody(robot, phi, runs[0].q, runs[0].v, runs[0].a).load
     assert np.array_equal(one, load)
     assert np.abs(two - load).max() > 0.1
@@ -76,7 +93,7 @@ def test_a_delay_acts_on_all_torque_that_the_robot_makes(
     """τ(t − δ) with τ = load + friction, to first order, and no delay of the delayed."""
     phi, run = standard_parameters(robot), runs[0]
     kinds = (ViscousFriction((1,)), TorqueDelay((1,)))
-    tau = predicted(robot, phi, kinds, np.array([30.0, 0.01]), run, "r1")
+    tau = torque(robot, phi, kinds, np.array([30.0, 0.01]), run, "r1")
     whole = RigidBody(robot, phi, run.q, run.v, run.a).load.copy()
     whole[:, 1] += 30.0 * run.v[:, 1]
     late = CubicSpline(run.t, whole[:, 1])(run.t - 0.01)
@@ -88,13 +105,17 @@ def test_a_delay_acts_on_all_torque_that_the_robot_makes(
 
 def test_without_effects_it_is_the_rigid_body(robot: Robot, runs: list[PreparedRun]) -> None:
     phi = standard_parameters(robot)
-    tau = predicted(robot, phi, (), np.zeros(0), runs[0], "r1")
+    tau = torque(robot, phi, (), np.zeros(0), runs[0], "r1")
     assert tau == pytest.approx(RigidBody(robot, phi, runs[0].q, runs[0].v, runs[0].a).load)
 
 
 def test_errors_are_those_of_the_residual(robot: Robot, runs: list[PreparedRun]) -> None:
     phi = 1.05 * standard_parameters(robot)
-    found = errors_on(robot, phi, (), np.zeros(0), runs, ["r1", "r2"])
+    found = errors_on(
+        robot,
+        runs,
+        [predicted(body_of(robot, phi, run), (), np.zeros(0), run.t, "r") for run in runs],
+    )
     tau = np.concatenate([run.tau for run in runs])
     model = np.concatenate(
         [run.averaged(RigidBody(robot, phi, run.q, run.v, run.a).load) for run in runs]

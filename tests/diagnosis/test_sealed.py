@@ -27,7 +27,7 @@ from excite_cli.trajectory.fourier import FourierTrajectory
 
 SECONDS, RATE = 5.0, 200.0
 # What may differ: what is measured on the sealed part, and the time it took.
-FREE = {"before", "after", "seconds"}
+FREE = {"before", "after", "sealed_traces", "seconds"}
 
 
 @pytest.fixture(scope="module")

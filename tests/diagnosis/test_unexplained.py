@@ -52,7 +52,7 @@ def found(
     plain = data.evidence([], NoiseModel.white(np.ones(robot.n) if levels is None else levels))
     left = data.residuals([], (), plain.solve(()))
     noise = fit_noise(left, [run.usable for run in prepared])
-    return unexplained_structure(data, [], [], signals, noise, RULES, robot.joint_names)
+    return unexplained_structure(data, [], [], signals, noise, RULES, robot.joint_names)[0]
 
 
 def white(regression: Regression, seed: int, size: Array | float = NOISE) -> list[Array]:

@@ -8,40 +8,18 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from threadpoolctl import threadpool_limits
 
 from excite_cli.config.load import load_spec
 from excite_cli.criteria.base import singular_values
 from excite_cli.errors import MissingExtraError
 from excite_cli.excitation.admissible import fine_margins, fine_times
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.random_baseline import RandomMotion
-from excite_cli.excitation.result import Result
-from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.report.condition_figure import draw_condition_numbers, draw_spectrum
 from excite_cli.report.motion_figure import draw_margins, draw_motion, watched_constraints
 from excite_cli.report.style import matplotlib_part, new_figure, save_figure, save_pages
+from tests.report.case import Case
 
 CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
-QUICK = ["optimizer.max_iterations=10", "sequence.motions=1"]
-
-Case = tuple[Problem, Result]
-
-
-def _silent(*_: object) -> None:
-    """Say nothing about progress."""
-
-
-@pytest.fixture(scope="session")
-def case() -> Case:
-    with threadpool_limits(limits=1):
-        problem = build_problem(load_spec(CONFIG, QUICK), CONFIG.parent)
-        result = continue_run(problem, new_result(problem, [], {}), lambda _: _silent, _silent)
-        slower = 0.5 * result.motions[0].coefficients
-        objective = problem.objective()
-        own = objective.own_condition_number(slower)
-    random = tuple(RandomMotion(i, slower, own, own) for i in (1, 2))
-    return problem, replace(result, random=random, random_candidates=(30, 20))
 
 
 def _line(axes: Axes, label: str) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from excite_cli.diagnosis.result import Diagnosis
 from excite_cli.errors import FileError
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis, write_diagnosis
 from excite_cli.store.result_file import is_result, read_result
-from tests.diagnosis.synthetic_diagnosis import make_diagnosis
+from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 from tests.store.conftest import Stored
 
 
@@ -60,6 +60,46 @@ def test_the_noise_floor_comes_back_and_older_files_have_none(
     with h5py.File(path, "a") as file:
         del file["records/noise_floor"]
     assert read_diagnosis(path).noise_floor is None
+
+
+def test_traces_come_back_and_older_files_have_none(diagnosis: Diagnosis, tmp_path: Path) -> None:
+    traces, sealed = make_traces(diagnosis.joint_names)
+    long = tmp_path / "traces.h5"
+    write_diagnosis(long, replace(diagnosis, traces=traces, sealed_traces=sealed))
+    found = read_diagnosis(long)
+    assert found.traces is not None
+    assert all(
+        np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)
+        for a, b in zip(traces.runs + sealed, found.traces.runs + found.sealed_traces, strict=True)
+        for name in ("t", "q", "v", "a", "load", "measured", "counted", "predicted", "before")
+    )
+    assert [(t.run, t.sealed) for t in found.traces.runs] == [("run_1", False), ("run_2", False)]
+    assert [(t.run, t.sealed) for t in found.sealed_traces] == [("run_3", True)]
+    for name in ("part", "t", "x", "own", "partial"):
+        expected, read = getattr(traces.effects[0], name), getattr(found.traces.effects[0], name)
+        assert np.array_equal(expected, read, equal_nan=True), name
+    for name in ("kind", "joints", "runs", "rows", "quantity", "unit", "period"):
+        assert getattr(traces.effects[0], name) == getattr(found.traces.effects[0], name), name
+    assert same(traces.dependence, found.traces.dependence)
+    assert traces.torque_units == found.traces.torque_units
+    with h5py.File(long, "a") as file:
+        del file["traces"], file["sealed_traces"]
+    assert (read_diagnosis(long).traces, read_diagnosis(long).sealed_traces) == (None, ())
+
+
+@pytest.mark.parametrize(
+    "name", ["traces/runs/0/q", "traces/effects/0/partial", "traces/dependence/shares"]
+)
+def test_damaged_traces(diagnosis: Diagnosis, tmp_path: Path, name: str) -> None:
+    traces, sealed = make_traces(diagnosis.joint_names)
+    path = tmp_path / "traces.h5"
+    write_diagnosis(path, replace(diagnosis, traces=traces, sealed_traces=sealed))
+    with h5py.File(path, "a") as file:
+        cut = file[name][:-1]
+        del file[name]
+        file[name] = cut
+    with pytest.raises(FileError, match="damaged"):
+        read_diagnosis(path)
 
 
 def test_files_are_told_apart(stored: Stored, path: Path, tmp_path: Path) -> None:

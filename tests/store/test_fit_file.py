@@ -52,6 +52,36 @@ def test_what_is_written_is_read(found: Identification, tmp_path: Path) -> None:
     assert (stored.fingerprint, stored.sources) == ("abc", ("a.h5",))
 
 
+def test_traces_come_back_and_older_files_have_none(found: Identification, tmp_path: Path) -> None:
+    path = tmp_path / "fit.h5"
+    write_fit(path, found, PROBLEM, "/somewhere", "abc")
+    stored = read_fit(path)
+    assert [(t.run, t.sealed) for t in stored.traces] == [
+        ("r1", False),
+        ("r2", False),
+        ("r3", True),
+    ]
+    for written, read in zip(found.traces, stored.traces, strict=True):
+        for name in ("t", "q", "v", "a", "load", "measured", "counted", "predicted"):
+            one, other = getattr(written, name), getattr(read, name)
+            assert np.array_equal(one, other, equal_nan=True), name
+        assert read.before is None
+    assert stored.torque_units == ("N·m",) * 3
+    assert stored.closed_loop_bias == found.hausman.sentence()
+    assert stored.processing["rate"] == found.processing.rate
+    with h5py.File(path, "a") as file:
+        del file["traces"], file.attrs["torque_units"]
+    assert (read_fit(path).traces, read_fit(path).torque_units) == ((), ())
+
+
+def test_the_traces_are_what_the_errors_say(found: Identification) -> None:
+    sealed = found.traces[-1]
+    left = sealed.measured - sealed.predicted
+    for j, name in enumerate(found.fit.joint_names):
+        rms = np.sqrt(np.nanmean(left[:, j] ** 2))
+        assert found.error.rms[name] == pytest.approx(rms, rel=1e-3)
+
+
 def test_the_noise_floor_comes_back_and_older_files_have_none(
     found: Identification, tmp_path: Path
 ) -> None:

@@ -1,0 +1,54 @@
+"""What a diagnosis keeps of the data it saw, so that a report needs no data: frozen records."""
+
+from dataclasses import dataclass
+
+from excite_cli.identification.torque_trace import TorqueTrace
+from excite_cli.robot.model import Array
+
+
+@dataclass(frozen=True)
+class EffectTrace:
+    """Training samples of one effect, on the joints where it shows most, the strongest first.
+
+    `kind`, `joints` and `runs` are the effect's. `rows` names the joints of the columns; `part`
+    (k,) numbers the stretches of time, `t` (k,) [s] from the start of their run. `x` (k, rows)
+    [`unit`] is `quantity`, within one `period` if that is given; with no quantity, `x` is the
+    effect's own torque. `own` and `partial` (k, rows) are C_e θ_e and p; NaN where a joint stands,
+    reverses or is not known.
+    """
+
+    kind: str
+    joints: tuple[str, ...]
+    runs: tuple[str, ...]
+    rows: tuple[str, ...]
+    quantity: str
+    unit: str
+    period: float | None
+    part: Array
+    t: Array
+    x: Array
+    own: Array
+    partial: Array
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """`shares` (n, K), 0 to 1: of the residual of each of `joints`, by each of `quantities`."""
+
+    joints: tuple[str, ...]
+    quantities: tuple[str, ...]
+    shares: Array
+
+
+@dataclass(frozen=True)
+class Traces:
+    """What the training data show, kept so that a report needs no data.
+
+    `torque_units` per joint; `runs` torque over time; `effects` in any order; `dependence` of what
+    is left.
+    """
+
+    torque_units: tuple[str, ...]
+    runs: tuple[TorqueTrace, ...]
+    effects: tuple[EffectTrace, ...]
+    dependence: Dependence

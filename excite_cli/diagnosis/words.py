@@ -1,0 +1,46 @@
+"""A diagnosis in words, the same ones wherever it is told."""
+
+from excite_cli.diagnosis.result import EffectRecord, NamedEffect
+from excite_cli.effects.base import Value
+from excite_cli.effects.catalogue import catalogue
+
+# Effects that explain less of the residual, and without which runs left out are hardly worse, are
+# told with few words.
+SMALL_SHARE = 0.002
+_SMALL_GAIN = 0.3
+
+
+def is_small(named: NamedEffect) -> bool:
+    """Whether few words will do. Beside kept inertias a large effect may explain little itself."""
+    return named.share_of_residual < SMALL_SHARE and named.gain < _SMALL_GAIN
+
+
+def title_of(kind: str) -> str:
+    """What a kind of effect is, or its name if this program does not have it."""
+    known = catalogue().get(kind)
+    return known.title if known is not None else kind
+
+
+def place_in_words(record: EffectRecord, joints: int) -> str:
+    """Where an effect is, on a robot with so many joints; with its runs, if not in all."""
+    whole = len(record.joints) == joints > 2
+    where = "all joints" if whole else ", ".join(record.joints)
+    return f"{where} ({', '.join(record.runs)})" if record.runs else where
+
+
+def p_in_words(p: float) -> str:
+    """A p-value; below 1e-16 it is no more than that."""
+    return "< 1e-16" if p < 1e-16 else f"{p:.1e}" if p < 1e-3 else f"{p:.2g}"
+
+
+def value_in_words(name: str, value: Value) -> str:
+    """A parameter with two standard deviations; those chosen from a grid have none."""
+    unit = "" if value.unit == "1" else f" {value.unit}"
+    if value.std != value.std:
+        return f"{name} {value.value:.3g}{unit}"
+    return f"{name} {value.value:.4g} ± {2 * value.std:.2g}{unit}"
+
+
+def counted(count: int, what: str) -> str:
+    """`1 effect`, `2 effects`."""
+    return f"{count} {what}{'' if count == 1 else 's'}"

@@ -1,0 +1,60 @@
+"""A fit in words, the same ones wherever it is told."""
+
+import math
+from collections.abc import Mapping
+from statistics import median
+
+from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.fit import Fit
+
+_STANDS_OUT = 1.5  # times the typical joint
+
+
+def fixed_by_data(fit: Fit, i: int) -> str:
+    """`yes`, `yes, small` (the fit is as good without it) or `NO`."""
+    if not fit.identifiable[i]:
+        return "NO"
+    return "yes" if fit.essential[i] else "yes, small"
+
+
+def relative_in_words(share: float) -> str:
+    """A share in per cent, with two digits that mean something."""
+    if not share < 10:
+        return "> 1000%"
+    return f"{share:.0%}" if share >= 0.1 else f"{100 * share:.2g}%"
+
+
+def short_number(value: float, digits: int) -> str:
+    """So many digits, and no exponent for hundreds and thousands."""
+    return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
+
+
+def consistency_in_words(fit: Fit) -> str:
+    """Whether a physically consistent set fits as well; empty if none was asked for."""
+    consistent = fit.consistent
+    if consistent is None:
+        return ""
+    if not consistent.solved:
+        return f"No physically consistent set of parameters was found: {consistent.status}."
+    return (
+        "A physically consistent set of all standard parameters fits as well but for "
+        f"{max(consistent.cost, 0.0) ** 0.5:.1f} standard deviations."
+    )
+
+
+def above_the_floor(error: Errors, floor: Mapping[str, float] | None) -> str:
+    """How far the RMS errors lie above the noise floor: the median joint, and the worst."""
+    ratios = {
+        joint: error.rms[joint] / level
+        for joint, level in (floor or {}).items()
+        if level > 0.0 and math.isfinite(error.rms.get(joint, math.nan))
+    }
+    if not ratios:
+        return ""
+    typical, worst = median(ratios.values()), max(ratios, key=lambda joint: ratios[joint])
+    stands_out = ratios[worst] > _STANDS_OUT * typical
+    return (
+        f"What is left is {typical:.1f} times the noise that repeated periods show"
+        + f" ({worst} {ratios[worst]:.1f} times)" * stands_out
+        + "; about 1 is the best that a model without drift can reach."
+    )

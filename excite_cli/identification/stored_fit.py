@@ -1,0 +1,34 @@
+"""What a fit file holds, as a frozen record."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.fit import Fit
+from excite_cli.identification.torque_trace import TorqueTrace
+from excite_cli.measurement.dataset import Finding
+
+
+@dataclass(frozen=True)
+class StoredFit:
+    """A fit with its errors and what was noticed.
+
+    `closed_loop_bias` is a sentence, `torque_units` per joint, `traces` torque over time; files of
+    earlier versions have none of them.
+    """
+
+    config: str
+    config_folder: str
+    fingerprint: str
+    fit: Fit
+    sealed_run: str
+    error: Errors
+    training_error: Errors
+    findings: tuple[Finding, ...]
+    sources: tuple[str, ...]
+    noise_floor: dict[str, float] | None = None
+    closed_loop_bias: str = ""
+    processing: dict[str, Any] = field(default_factory=dict)
+    versions: dict[str, str] = field(default_factory=dict)
+    torque_units: tuple[str, ...] = ()
+    traces: tuple[TorqueTrace, ...] = ()

@@ -1,0 +1,89 @@
+"""Torque over time, measured and predicted, kept with a result so that it can be shown later.
+
+The torque is the filtered one, which holds nothing above the filter's cut-off: of long runs every
+k-th sample is kept, the same ones of every quantity. Numbers are rounded to single precision.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from excite_cli.identification.factors import Mask
+from excite_cli.identification.prepare import PreparedRun
+from excite_cli.identification.split import run_name
+from excite_cli.robot.model import Array, Robot
+
+MOST_SAMPLES = 1500  # per part of a run
+
+
+@dataclass(frozen=True)
+class TorqueTrace:
+    """One run, or a part of it; all but `t` (m,) are (m, n).
+
+    `t` from the start of the run [s]; `q, v, a`; `load` rigid-body torque of the model; `measured`
+    torque, NaN where it must not be used; `counted` where a fit may use it (the joint neither
+    stands nor reverses); `predicted` torque of the model, `before` that of the model before effects
+    were added, if any were looked for. `sealed`: took no part in the fit.
+    """
+
+    run: str
+    sealed: bool
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    load: Array
+    measured: Array
+    counted: Mask
+    predicted: Array
+    before: Array | None = None
+
+
+def torque_trace(
+    run: PreparedRun,
+    load: Array,
+    predicted: Array,
+    before: Array | None = None,
+    sealed: bool = False,
+) -> TorqueTrace:
+    """The trace of a prepared run; `load`, `predicted`, `before` (T, n) at the working rate."""
+    signals = [run.t[:, None], run.q, run.v, run.a, load, predicted]
+    if before is not None:
+        signals.append(before)
+    stacked = run.averaged(np.concatenate(signals, axis=1))
+    n = run.q.shape[1]
+    t, rest = stacked[:, 0], np.split(stacked[:, 1:], np.arange(n, stacked.shape[1] - 1, n), axis=1)
+    whole = TorqueTrace(
+        run=run_name(run.name),
+        sealed=sealed,
+        t=t,
+        q=rest[0],
+        v=rest[1],
+        a=rest[2],
+        load=rest[3],
+        measured=np.where(run.valid, run.tau, np.nan),
+        counted=run.usable & run.valid,
+        predicted=rest[4],
+        before=rest[5] if before is not None else None,
+    )
+    return thinned(whole)
+
+
+def thinned(trace: TorqueTrace) -> TorqueTrace:
+    """At most `MOST_SAMPLES` samples, evenly taken, in single precision."""
+    every = slice(None, None, max(1, -(-len(trace.t) // MOST_SAMPLES)))
+    names = ("t", "q", "v", "a", "load", "measured", "predicted")
+    kept: dict[str, Any] = {name: single(getattr(trace, name)[every]) for name in names}
+    before = None if trace.before is None else single(trace.before[every])
+    return replace(trace, **kept, counted=trace.counted[every], before=before)
+
+
+def single(x: Array) -> Array:
+    """Rounded to single precision, as it is stored."""
+    return np.asarray(x, dtype=np.float32).astype(float)
+
+
+def torque_units(robot: Robot) -> tuple[str, ...]:
+    """`N·m` or `N` of every moved joint."""
+    return tuple("N" if sliding else "N·m" for sliding in robot.sliding)

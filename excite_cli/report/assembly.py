@@ -1,0 +1,131 @@
+"""One page from several files: what each kind has to say, and several of a kind side by side."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.result import Result
+from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.report.campaign import Campaign
+from excite_cli.report.campaign_sections import campaign_figures, campaign_sections
+from excite_cli.report.compare_models import compare_diagnoses, compare_fits
+from excite_cli.report.compare_section import comparable, compare_results
+from excite_cli.report.diagnosis_sections import diagnosis_figures, diagnosis_sections
+from excite_cli.report.fit_sections import fit_figures, fit_sections
+from excite_cli.report.page import KeyFigure, Page, Picture, Section
+
+
+@dataclass(frozen=True)
+class Source:
+    """One file of a report.
+
+    `name` tells it from the others on the page, `file` is its file name. A result needs the
+    `problem` that it was made for, and may have a `picture` of its robot.
+    """
+
+    name: str
+    file: str
+    content: Result | StoredFit | Diagnosis
+    problem: Problem | None = None
+    picture: Picture | None = None
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What one source says."""
+
+    source: Source
+    figures: tuple[KeyFigure, ...]
+    sections: tuple[Section, ...]
+
+
+def page_of(sources: Sequence[Source], show: Callable[[str, int], None]) -> Page:
+    """The page of `sources`, in their order; `show(name, done)` hears what is being drawn."""
+    campaigns = _campaigns(sources)
+    parts = []
+    for done, source in enumerate(sources):
+        show(source.name, done)
+        parts.append(_part(source, campaigns.get(source.name)))
+    sections = [section for part in _distinct(parts) for section in part.sections]
+    figures = [figure for part in _distinct(parts) for figure in part.figures]
+    compared = _compared(sources, campaigns)
+    # Runs of one problem are there to be compared; files of a loop are there to be read in order.
+    first = len(campaigns) == len(sources) and comparable(list(campaigns.values()))
+    return Page(
+        _title(sources),
+        "Made by excite from " + ", ".join(source.file for source in sources),
+        tuple(figures),
+        (*compared, *sections) if first else (*sections, *compared),
+    )
+
+
+def _campaigns(sources: Sequence[Source]) -> dict[str, Campaign]:
+    found: dict[str, Campaign] = {}
+    count = sum(isinstance(source.content, Result) for source in sources)
+    for source in sources:
+        if isinstance(source.content, Result):
+            assert source.problem is not None, "a result is told with its problem"
+            number, alone = len(found) + 1, count == 1
+            campaign = Campaign(source.name, source.content, source.problem, number, alone)
+            found[source.name] = campaign
+    return found
+
+
+def _part(source: Source, campaign: Campaign | None) -> _Part:
+    content = source.content
+    if campaign is not None:
+        sections = campaign_sections(campaign, source.picture)
+        return _Part(source, campaign_figures(campaign), sections)
+    if isinstance(content, StoredFit):
+        return _Part(source, fit_figures(content), fit_sections(content))
+    assert isinstance(content, Diagnosis)
+    return _Part(source, diagnosis_figures(content), diagnosis_sections(content))
+
+
+def _distinct(parts: Sequence[_Part]) -> list[_Part]:
+    """Titles, anchors and names of figures that occur twice say which file they belong to."""
+    titles = Counter(section.title for part in parts for section in part.sections)
+    anchors = Counter(section.anchor for part in parts for section in part.sections)
+    names = Counter(figure.name for part in parts for figure in part.figures)
+    found = []
+    for number, part in enumerate(parts, start=1):
+        of = part.source.name
+        sections = tuple(
+            replace(
+                section,
+                title=f"{section.title}: {of}" if titles[section.title] > 1 else section.title,
+                anchor=f"{section.anchor}-{number}"
+                if anchors[section.anchor] > 1
+                else section.anchor,
+            )
+            for section in part.sections
+        )
+        figures = tuple(
+            replace(figure, name=f"{figure.name}, {of}") if names[figure.name] > 1 else figure
+            for figure in part.figures
+        )
+        found.append(replace(part, sections=sections, figures=figures))
+    return found
+
+
+def _compared(sources: Sequence[Source], campaigns: dict[str, Campaign]) -> tuple[Section, ...]:
+    """Sections that put several files of a kind side by side."""
+    fits = {s.name: s.content for s in sources if isinstance(s.content, StoredFit)}
+    diagnoses = {s.name: s.content for s in sources if isinstance(s.content, Diagnosis)}
+    sections: list[Section] = []
+    if len(campaigns) > 1:
+        sections.append(compare_results(list(campaigns.values())))
+    if len(fits) > 1:
+        sections.append(compare_fits(fits))
+    if len(diagnoses) > 1:
+        sections.append(compare_diagnoses(diagnoses))
+    return tuple(sections)
+
+
+def _title(sources: Sequence[Source]) -> str:
+    kinds = {Result: "motions", StoredFit: "identified parameters", Diagnosis: "diagnosis"}
+    robots = dict.fromkeys(s.problem.robot.name for s in sources if s.problem is not None)
+    words = ", ".join(dict.fromkeys(kinds[type(source.content)] for source in sources))
+    return f"{', '.join(robots)}: {words}" if robots else words.capitalize()

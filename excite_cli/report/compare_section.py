@@ -1,0 +1,142 @@
+"""Several results side by side: condition numbers, worst margins, what their configs differ in."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from excite_cli.report.campaign import Campaign, in_figures
+from excite_cli.report.chart import PAPER, SERIES, Chart, draw_chart, legend_below
+from excite_cli.report.config_differences import differences
+from excite_cli.report.page import Block, Charts, Section, Table, Text
+from excite_cli.report.style import logarithmic
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_NOT_COMPARABLE = (
+    "These files differ in robot, moved joints, rows, effects or weights: their condition numbers "
+    "are about different parameters, or in different units, and do not compare."
+)
+_MARKERS = ("o", "s", "^", "D", "v", "P")
+
+
+def compare_results(campaigns: Sequence[Campaign]) -> Section:
+    """Condition numbers, worst margins and the differing keys of several result files."""
+    names = [campaign.name for campaign in campaigns]
+    configs = [campaign.result.config for campaign in campaigns]
+    tables: tuple[Block, ...] = (
+        _numbers(campaigns),
+        _margins(campaigns),
+        differences(names, configs),
+    )
+    if not comparable(campaigns):
+        return Section("compare", "Results side by side", (Text(_NOT_COMPARABLE, "bad"), *tables))
+    best = min(campaigns, key=_reached)
+    lead = "; ".join(f"{c.name}: {in_figures(_reached(c))} after {c.motions}" for c in campaigns)
+    blocks: tuple[Block, ...] = (Charts((_chart(campaigns),)), *tables)
+    lead = f"{lead}. Lowest: {best.name}."
+    return Section("compare", "Results side by side", blocks, lead)
+
+
+def comparable(campaigns: Sequence[Campaign]) -> bool:
+    """Whether condition numbers are about the same columns in the same scale."""
+    results = [campaign.result for campaign in campaigns]
+    return all(
+        first.fingerprint == other.fingerprint
+        and first.base_words == other.base_words
+        and np.array_equal(first.row_weights, other.row_weights)
+        and np.array_equal(first.column_scales, other.column_scales)
+        for first, other in pairwise(results)
+    )
+
+
+def _reached(campaign: Campaign) -> float:
+    return campaign.result.motions[-1].stacked_condition_number
+
+
+def _chart(campaigns: Sequence[Campaign]) -> Chart:
+    """Stacked condition numbers by the number of motions; a file goes on where its prior ends."""
+    offsets = [_before(campaign, campaigns) for campaign in campaigns]
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        lines = [
+            [motion.stacked_condition_number for motion in campaign.result.motions]
+            for campaign in campaigns
+        ]
+        logarithmic(axes, [value for line in lines for value in line if np.isfinite(value)])
+        for number, (campaign, line) in enumerate(zip(campaigns, lines, strict=True)):
+            begin = 1 + offsets[number]
+            axes.plot(
+                range(begin, begin + len(line)), np.where(np.isfinite(line), line, np.nan), "-",
+                color=SERIES[number % len(SERIES)], marker=_MARKERS[number % len(_MARKERS)],
+                markersize=6, markeredgecolor=PAPER, label=_cut(campaign.name),
+            )  # fmt: skip
+        count = max(offset + len(line) for offset, line in zip(offsets, lines, strict=True))
+        axes.set_xlim(0.5, count + 0.5)
+        axes.set_xticks(range(1, count + 1, -(-count // 10)))
+        axes.grid(axis="x", visible=False)
+        axes.set_xlabel("motions so far [–]")
+        axes.set_ylabel("stacked condition number [–]")
+        legend_below(figure, 2)
+
+    said = "; ".join(
+        f"{campaign.name}: "
+        + ", ".join(in_figures(m.stacked_condition_number) for m in campaign.result.motions)
+        for campaign in campaigns
+    )
+    return draw_chart("Stacked condition numbers", f"{said}.", draw, height=2.9)
+
+
+def _before(campaign: Campaign, campaigns: Sequence[Campaign]) -> int:
+    """How many motions of other files on the page a file was made on top of."""
+    earlier = {Path(prior).stem for prior in campaign.result.priors}
+    return sum(
+        len(other.result.motions)
+        for other in campaigns
+        if other is not campaign and Path(other.name).name in earlier
+    )
+
+
+def _cut(name: str, longest: int = 22) -> str:
+    return name if len(name) <= longest else f"{name[: longest - 1]}…"
+
+
+def _numbers(campaigns: Sequence[Campaign]) -> Table:
+    rows = []
+    for campaign in campaigns:
+        result = campaign.result
+        random = in_figures(result.random[-1].stacked_condition_number) if result.random else "–"
+        rows.append(
+            (
+                campaign.name,
+                str(len(result.motions)),
+                " → ".join(in_figures(m.stacked_condition_number) for m in result.motions),
+                random,
+                ", ".join(result.priors) or "–",
+                str(result.seed),
+                f"{sum(m.seconds for m in result.motions):.1f}",
+            )
+        )
+    columns = ("file", "motions", "stacked", "random", "on top of", "seed", "time [s]")
+    return Table(columns, tuple(rows), "Condition numbers", frozenset({1, 3, 5, 6}))
+
+
+def _margins(campaigns: Sequence[Campaign]) -> Table:
+    """The worst margin of every kind over all motions of each file."""
+    kinds = dict.fromkeys(c.name for campaign in campaigns for c in campaign.problem.constraints)
+    rows = tuple((kind, *(_worst(campaign, kind) for campaign in campaigns)) for kind in kinds)
+    names = tuple(campaign.name for campaign in campaigns)
+    right = frozenset(range(1, len(names) + 1))
+    return Table(("constraint", *names), rows, "Worst margins, at 1 kHz", right)
+
+
+def _worst(campaign: Campaign, kind: str) -> str:
+    found = [m.margins[kind] for m in campaign.result.motions if kind in m.margins]
+    if not found:
+        return "–"
+    worst = min(found, key=lambda each: each.share)
+    return f"{in_figures(worst.margin)} {worst.unit}"

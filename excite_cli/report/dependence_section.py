@@ -1,0 +1,217 @@
+"""What is still unexplained: on which quantities the rest depends, as a map and as pictures."""
+
+import re
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from excite_cli.diagnosis.result import Diagnosis, Unexplained
+from excite_cli.diagnosis.traces import Dependence, Traces
+from excite_cli.report.chart import (
+    BLUE,
+    INK,
+    MUTED,
+    VERMILION,
+    Chart,
+    draw_chart,
+    few_ticks,
+    legend_below,
+    limits_about,
+)
+from excite_cli.report.effect_chart import LAYOUT
+from excite_cli.report.page import Block, Charts, Section, Text
+from excite_cli.report.residual_unit import readable_unit
+from excite_cli.report.style import matplotlib_part
+from excite_cli.robot.model import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_SHOWN = 0.01  # share from which on a quantity gets a line of the map
+_MOST_ROWS = 18
+_MOST_DOTS = 400
+_NAMED = {"q": "angle", "v": "speed", "a": "acceleration", "load": "rigid-body torque"}
+_UNITS = {"q": "rad", "v": "rad/s", "a": "rad/s²", "load": "N·m", "time": "s"}
+_SYMBOL = re.compile(r"(?:history of |direction and )?\b(?:q|v|a|load)\[[^\]]+\]")
+_QUANTITY = re.compile(r"^(?:(history of|direction and) )?(\w+)(?:\[(.+)\])?$")
+
+
+def dependence_section(found: Diagnosis) -> Section:
+    """Sentences, the map, and what is left over what it depends on most."""
+    sentences: list[Block] = [
+        Text(
+            f"The residual of {each.joint} still depends on {_joined(each.depends_on)} "
+            f"({each.share_of_residual:.1%} of it); no effect of the catalogue has this form.",
+            "bad",
+        )
+        for each in found.unexplained
+    ]
+    if not found.unexplained:
+        sentences.append(
+            Text(
+                "No dependence on any quantity is left that the tests call sure: what remains "
+                "behaves like noise.",
+                "good",
+            )
+        )
+    blocks = sentences
+    if found.traces is not None:
+        pictures = [
+            chart
+            for each in found.unexplained
+            for quantity in each.depends_on[:2]
+            for chart in _picture(found, found.traces, each, quantity)
+        ]
+        if pictures:
+            blocks.append(Charts(tuple(pictures), "What is left, over what it depends on"))
+        blocks.append(_map(found.traces.dependence))
+    lead = (
+        "After all effects are in, is what remains of the torque still a function of something? "
+        "Every joint's rest is tried against time, angles, speeds and accelerations of all joints, "
+        "and its own load, direction and history."
+    )
+    return Section("diagnosis-unexplained", "What stays unexplained", tuple(blocks), lead)
+
+
+def quantity_in_words(quantity: str) -> str:
+    """`q[elbow]` → `angle of elbow`; names of quantities are those of the diagnosis."""
+    own = quantity.startswith("own ")
+    found = _QUANTITY.match(quantity.removeprefix("own "))
+    if found is None:
+        return quantity
+    past, symbol, joint = found.groups()
+    words = _NAMED.get(symbol, symbol)
+    if own:
+        words = f"own {words}"
+    elif joint:
+        words = f"{words} of {joint}"
+    if past == "history of":
+        return f"history of {words}"
+    return f"{words} and direction" if past else words
+
+
+def in_plain_words(text: str) -> str:
+    """A sentence in which quantities stand by their symbols, with their words instead."""
+    return _SYMBOL.sub(lambda found: quantity_in_words(found[0]), text)
+
+
+def _joined(quantities: Sequence[str]) -> str:
+    words = [quantity_in_words(each) for each in quantities]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _map(dependence: Dependence) -> Block:
+    most = dependence.shares.max(axis=0)
+    rows = [int(k) for k in np.argsort(-most, kind="stable")[:_MOST_ROWS] if most[k] >= _SHOWN]
+    if not rows:
+        return Text(
+            f"No smooth function of a single quantity takes {_SHOWN:.0%} or more off the rest of "
+            "any joint that runs left out confirm."
+        )
+    j = int(np.argmax(dependence.shares[:, rows[0]]))
+    words = (
+        f"Of {len(dependence.quantities)} quantities, {len(rows)} explain {_SHOWN:.0%} or more of "
+        f"the rest of some joint, at most {most[rows[0]]:.0%}: "
+        f"{quantity_in_words(dependence.quantities[rows[0]])} for {dependence.joints[j]}."
+    )
+    wide = len(dependence.joints) > 6
+    return draw_chart(
+        "Share of the rest that one quantity explains [%]",
+        words,
+        partial(_draw_map, dependence, rows, wide),
+        height=1.25 + 0.22 * len(rows),
+        wide=wide,
+        caption=(
+            "Columns: the joint whose torque is left. A share counts as far as runs left out "
+            "confirm it; shares overlap, since quantities of one motion do. Not every one is "
+            "sure: the sentences above say which are."
+        ),
+    )
+
+
+def _draw_map(dependence: Dependence, rows: Sequence[int], wide: bool, figure: "Figure") -> None:
+    axes = figure.add_subplot()
+    rectangle = matplotlib_part("patches").Rectangle
+    for y, k in enumerate(rows):
+        for x, share in enumerate(dependence.shares[:, k]):
+            if share < _SHOWN / 2:
+                continue
+            alpha = 0.08 + 0.5 * float(np.sqrt(share))
+            axes.add_patch(rectangle((x - 0.48, y - 0.46), 0.96, 0.92, fc=BLUE, alpha=alpha, lw=0))
+            axes.text(x, y, f"{100 * share:.0f}", ha="center", va="center", fontsize=8, color=INK)
+    axes.set_xlim(-0.5, len(dependence.joints) - 0.5)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_yticks(range(len(rows)), [quantity_in_words(dependence.quantities[k]) for k in rows])
+    axes.set_xticks(range(len(dependence.joints)), dependence.joints, rotation=40, ha="right",
+                    rotation_mode="anchor")  # fmt: skip
+    axes.grid(visible=False)
+    axes.tick_params(length=0)
+    for side in axes.spines.values():
+        side.set_visible(False)
+
+
+def _picture(
+    found: Diagnosis, traces: Traces, unexplained: Unexplained, quantity: str
+) -> list[Chart]:
+    """What is left of the joint over the quantity; nothing if the quantity is not stored."""
+    parsed = _QUANTITY.match(quantity)
+    if parsed is None or parsed[2] not in _UNITS:
+        return []
+    past, symbol, other = parsed.groups()
+    names = list(found.joint_names)
+    j = names.index(unexplained.joint)
+    k = names.index(other) if other in names else j
+    left = np.concatenate([run.measured[:, j] - run.predicted[:, j] for run in traces.runs])
+    x = np.concatenate([run.t if symbol == "time" else getattr(run, symbol)[:, k]
+                        for run in traces.runs])  # fmt: skip
+    forward = np.concatenate([run.v[:, j] >= 0 for run in traces.runs])
+    known = np.isfinite(left) & np.concatenate([run.counted[:, j] for run in traces.runs])
+    unit = traces.torque_units[j]
+    of_x = _UNITS[symbol]
+    if traces.torque_units[k] == "N":
+        of_x = of_x.replace("N·m", "N").replace("rad", "m")
+    axis = f"{_NAMED.get(symbol, symbol)}{f' of {names[k]}' if symbol != 'time' else ''} [{of_x}]"
+    groups = [("", known)]
+    if past:
+        groups = [("forwards", known & forward), ("backwards", known & ~forward)]
+    means = [(label, *_means(x[at], left[at])) for label, at in groups if at.sum() >= 20]
+    if not means:
+        return []
+    largest = max(float(np.abs(middle).max()) for _, _, middle in means)
+    words = (
+        f"What is left of the torque of {unexplained.joint}, over the {axis}: means reach "
+        f"{largest:.3g} {unit}, the RMS of all is "
+        f"{np.sqrt(np.mean(left[known] ** 2)):.3g} {unit}."
+    )
+
+    def draw(figure: "Figure") -> None:
+        axes: Axes = figure.add_subplot()
+        factor, scaled = readable_unit(unit, float(np.quantile(np.abs(left[known]), 0.98)))
+        dots = np.random.default_rng(0).permutation(np.flatnonzero(known))[:_MOST_DOTS]
+        axes.plot(
+            x[dots], factor * left[dots], ".", color=MUTED, ms=3.6, alpha=0.6, mew=0, label="left"
+        )
+        for colour, (label, center, middle) in zip((VERMILION, BLUE), means, strict=False):
+            axes.plot(center, factor * middle, "o-", color=colour, ms=3, lw=1.2,
+                      label=f"mean {label}".strip())  # fmt: skip
+        shown = [np.quantile(left[known], [0.005, 0.995]), *(middle for _, _, middle in means)]
+        axes.set_ylim(*limits_about(factor * np.concatenate(shown)))
+        axes.set_xlabel(axis, labelpad=2)
+        axes.set_ylabel(f"left [{scaled}]")
+        few_ticks(axes)
+        legend_below(figure)
+
+    return [draw_chart(f"{unexplained.joint}: left, over {quantity_in_words(quantity)}", words,
+                       draw, height=2.5, layout=LAYOUT)]  # fmt: skip
+
+
+def _means(x: Array, y: Array) -> tuple[Array, Array]:
+    order = np.argsort(x, kind="stable")
+    bins = np.array_split(order, int(np.clip(len(x) // 12, 2, 24)))
+    return (
+        np.array([np.median(x[own]) for own in bins]),
+        np.array([np.mean(y[own]) for own in bins]),
+    )

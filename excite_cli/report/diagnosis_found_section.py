@@ -1,0 +1,126 @@
+"""The verdict of a diagnosis: what was found, what it only comes near, what cannot be tested."""
+
+from collections.abc import Sequence
+
+from excite_cli.diagnosis.result import Diagnosis, NamedEffect
+from excite_cli.diagnosis.words import (
+    SMALL_SHARE,
+    counted,
+    is_small,
+    p_in_words,
+    place_in_words,
+    title_of,
+    value_in_words,
+)
+from excite_cli.report.dependence_section import in_plain_words
+from excite_cli.report.page import Block, Section, Table
+
+_COLUMNS = ("effect", "where", "size ± 2 standard deviations", "p", "share", "gain")
+
+
+def found_section(found: Diagnosis) -> Section:
+    """Tables of what was found, absorbed and approximated, and the sentences about them."""
+    ranked = sorted(found.named, key=lambda each: -each.share_of_residual)
+    large = [each for each in ranked if not is_small(each)]
+    small = [each for each in ranked if is_small(each)]
+    if len(small) < 2 or not large:
+        large, small = ranked, []
+    blocks: list[Block] = []
+    if large:
+        blocks.append(
+            Table(
+                (*_COLUMNS, "cannot be told from"),
+                tuple(_row(found, each) for each in large),
+                title="What the declared model lacks",
+                right=frozenset({3, 4, 5}),
+                note=(
+                    "share: of the energy of the residual before; gain: by which the error on runs "
+                    "left out falls."
+                ),
+            )
+        )
+    if small:
+        blocks.append(
+            Table(
+                (*_COLUMNS, "cannot be told from"),
+                tuple(_row(found, each) for each in small),
+                title=f"{len(small)} small ones (each below {SMALL_SHARE:.1%} of the residual)",
+                right=frozenset({3, 4, 5}),
+                folded=True,
+            )
+        )
+    if found.approximations:
+        blocks.append(
+            Table(
+                (*_COLUMNS, "stands for"),
+                tuple(_row(found, each) for each in found.approximations),
+                title="Approximations: they lower the error, but something else is there",
+                right=frozenset({3, 4, 5}),
+            )
+        )
+    if found.absorbed:
+        blocks.append(_absorbed(found))
+    return Section("diagnosis-found", "What was found", tuple(blocks), _lead(found))
+
+
+def verdict(found: Diagnosis) -> str:
+    """One sentence: how much was found and what it does to the error."""
+    low, high = found.after.interval
+    approximations = counted(len(found.approximations), "approximation")
+    what = counted(len(found.named), "effect")
+    what += f" and {approximations}" * bool(found.approximations)
+    lower = "lower" if len(found.effects) > 1 else "lowers"
+    return (
+        f"{what} {lower} the mean error of the torque on {found.sealed_run}, which took no part, "
+        f"from {found.before.mean_relative_moving:.2%} to {found.after.mean_relative_moving:.2%} "
+        f"where joints move (over all samples from {found.before.mean_relative:.2%} to "
+        f"{found.after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%})."
+    )
+
+
+def _lead(found: Diagnosis) -> str:
+    declared = (
+        ", ".join(dict.fromkeys(title_of(record.kind) for record in found.declared))
+        or "no effect beside the rigid bodies"
+    )
+    if not found.effects:
+        return (
+            f"Nothing is missing: with {declared} declared, no effect of the catalogue passes. The "
+            f"mean error of the torque on {found.sealed_run}, which took no part, is "
+            f"{found.after.mean_relative_moving:.2%} where joints move."
+        )
+    return f"Declared: {declared}. {verdict(found)}"
+
+
+def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:
+    everything = len(found.joint_names)
+    others = ", ".join(
+        f"{title_of(alias.kind)} on {place_in_words(alias, everything)}" for alias in named.aliases
+    )
+    return (
+        title_of(named.effect.kind),
+        place_in_words(named.effect, everything),
+        "; ".join(value_in_words(name, value) for name, value in named.parameters.items()),
+        p_in_words(named.p_value),
+        f"{named.share_of_residual:.2%}",
+        f"{named.gain:.1%}",
+        in_plain_words(named.approximates) or others or "–",
+    )
+
+
+def _absorbed(found: Diagnosis) -> Table:
+    rows = [
+        (title_of(each.kind), _where(each.joints, found.joint_names), ", ".join(each.by))
+        for each in found.absorbed
+    ]
+    return Table(
+        ("effect", "where", "would show as"),
+        tuple(rows),
+        title=f"Not testable: {len(rows)} would show as other values of parameters",
+        note="No data of this kind of motion can tell them from a change of these parameters.",
+        folded=len(rows) > 6,
+    )
+
+
+def _where(joints: Sequence[str], every: Sequence[str]) -> str:
+    return "all joints" if len(joints) == len(every) > 2 else ", ".join(joints)

@@ -1,0 +1,137 @@
+"""What a page says about a diagnosis, in the order in which a reader asks."""
+
+from typing import Any
+
+from excite_cli.diagnosis.next_motion import next_experiment
+from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.diagnosis.words import counted, title_of
+from excite_cli.report.dependence_section import dependence_section
+from excite_cli.report.diagnosis_found_section import found_section
+from excite_cli.report.effect_section import effect_section
+from excite_cli.report.page import Block, Fold, KeyFigure, Section, Table, Text
+from excite_cli.report.residual_error_section import by_joint, error_blocks
+from excite_cli.report.residual_findings import findings_blocks, processing_table
+from excite_cli.report.residual_section import residuals_in_time
+from excite_cli.report.suspect_section import suspect_section
+
+
+def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
+    """What sums a diagnosis up."""
+    low, high = diagnosis.after.interval
+    before, after = diagnosis.before, diagnosis.after
+    names = [title_of(each.effect.kind) for each in diagnosis.named]
+    kinds = ", ".join(dict.fromkeys(names[:3])) + (" …" if len(set(names)) > 3 else "")
+    open_questions = sum(bool(each.aliases) for each in diagnosis.effects)
+    return (
+        KeyFigure(
+            "error on sealed data, moving",
+            f"{before.mean_relative_moving:.2%} → {after.mean_relative_moving:.2%}",
+            f"all samples {after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}",
+        ),
+        KeyFigure("effects found", str(len(diagnosis.named)), kinds or "nothing is missing"),
+        KeyFigure(
+            "not told apart",
+            str(open_questions),
+            "effects with another name that fits as well" if open_questions else "every name holds",
+        ),
+        KeyFigure(
+            "unexplained",
+            counted(len(diagnosis.unexplained), "joint"),
+            ", ".join(each.joint for each in diagnosis.unexplained)
+            or "no dependence that the tests call sure",
+        ),
+    )
+
+
+def diagnosis_sections(diagnosis: Diagnosis) -> tuple[Section, ...]:
+    """Found, errors, residual in time, evidence, rest, suspects, data, and what to do next."""
+    evidence = effect_section(diagnosis)
+    return (
+        found_section(diagnosis),
+        _errors(diagnosis),
+        _in_time(diagnosis),
+        *([evidence] if evidence is not None else []),
+        dependence_section(diagnosis),
+        _next(diagnosis),
+        suspect_section(diagnosis),
+        _data(diagnosis),
+    )
+
+
+def _units(diagnosis: Diagnosis) -> tuple[str, ...]:
+    if diagnosis.traces is None:
+        return ("N·m",) * len(diagnosis.joint_names)
+    return diagnosis.traces.torque_units
+
+
+def _errors(diagnosis: Diagnosis) -> Section:
+    low, high = diagnosis.after.interval
+    blocks = error_blocks(
+        ("before", "after"),
+        diagnosis.before,
+        diagnosis.after,
+        by_joint(diagnosis.joint_names, _units(diagnosis)),
+        diagnosis.noise_floor,
+        "On sealed data; raw: after, on the torque as recorded, without any filter.",
+    )
+    lead = (
+        f"On {diagnosis.sealed_run}, which took no part in choosing or fitting. Before: the "
+        "declared model, fitted to the same training data; after: with the effects that were "
+        f"found. Mean over all samples after: {diagnosis.after.mean_relative:.2%}, 95 % interval "
+        f"{low:.2%} to {high:.2%}."
+    )
+    return Section("diagnosis-errors", "Error before and after", blocks, lead)
+
+
+def _in_time(diagnosis: Diagnosis) -> Section:
+    training = diagnosis.traces.runs if diagnosis.traces is not None else ()
+    traces = (*diagnosis.sealed_traces, *training)
+    lead = (
+        ""
+        if not traces
+        else (
+            "Filtered torque, as the fit sees it. Above what was measured and what the model with "
+            "all effects says, below what it and the declared model leave. Shaded: sealed."
+        )
+    )
+    blocks = residuals_in_time(traces, diagnosis.joint_names, _units(diagnosis))
+    return Section("diagnosis-time", "Residual in time", blocks, lead)
+
+
+def _next(diagnosis: Diagnosis) -> Section:
+    experiment = next_experiment(diagnosis)
+    pairs = experiment["pairs"]
+    if not pairs:
+        lead = (
+            "Nothing is left to tell apart: the next motion excites the model with the effects "
+            "that were found."
+        )
+        return Section("diagnosis-next", "Next motion", (_command(experiment),), lead)
+    rows = tuple((_named(pair["effect"]), _named(pair["alias"])) for pair in pairs)
+    lead = (
+        f"{counted(len(rows), 'pair')} of effects fit these data as well as each other. The next "
+        "motion is planned to tell them apart."
+    )
+    table = Table(("found", "as good on these data"), rows)
+    return Section("diagnosis-next", "Next motion", (table, _command(experiment)), lead)
+
+
+def _command(experiment: dict[str, Any]) -> Text:
+    return Text(experiment["command"], "code")
+
+
+def _named(data: dict[str, Any]) -> str:
+    return f"{title_of(data['kind'])} on {', '.join(data['joints'])}"
+
+
+def _data(diagnosis: Diagnosis) -> Section:
+    blocks: list[Block] = [*findings_blocks(diagnosis.findings)]
+    blocks.append(processing_table(diagnosis.processing, diagnosis.joint_names))
+    blocks.append(Fold("Configuration that was diagnosed", (Text(diagnosis.config, "code"),)))
+    versions = ", ".join(f"{name} {version}" for name, version in diagnosis.versions.items())
+    blocks.append(Text(f"{diagnosis.seconds:.1f} s. {versions}"))
+    lead = (
+        "To go on with the extended model, `excite diagnose … --apply NEW.yaml` writes this "
+        "configuration with the effects that were found."
+    )
+    return Section("diagnosis-data", "Data and choices", tuple(blocks), lead)

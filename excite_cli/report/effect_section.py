@@ -1,0 +1,147 @@
+"""The evidence of every effect that a diagnosis found, as cards; small ones are folded."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from excite_cli.diagnosis.friction_line import CURVED, STRAIGHT
+from excite_cli.diagnosis.result import Diagnosis, NamedEffect
+from excite_cli.diagnosis.traces import EffectTrace, Traces
+from excite_cli.diagnosis.words import (
+    SMALL_SHARE,
+    counted,
+    is_small,
+    p_in_words,
+    place_in_words,
+    title_of,
+    value_in_words,
+)
+from excite_cli.report.chart import Chart
+from excite_cli.report.dependence_section import in_plain_words
+from excite_cli.report.effect_chart import Cloud, cloud_of, draw_cloud, draw_window, together
+from excite_cli.report.page import Block, Charts, Fold, Section, Text
+
+
+def effect_section(found: Diagnosis) -> Section | None:
+    """The section, or None if nothing was found."""
+    if not found.effects:
+        return None
+    if found.traces is None:
+        old = Text(
+            "The file holds no samples to draw: it was written by an earlier version. Run "
+            "`excite diagnose` again to have the pictures."
+        )
+        return Section("diagnosis-evidence", "Evidence", (old,))
+    ranked = sorted(found.effects, key=lambda each: -each.share_of_residual)
+    large = [each for each in ranked if not is_small(each)]
+    small = [each for each in ranked if is_small(each)]
+    blocks: list[Block] = []
+    whole = _combined(found, found.traces)
+    if whole:
+        blocks.append(Charts(whole, "The parts of a joint's friction together"))
+    if large:
+        blocks.append(Charts(_cards(found, found.traces, large), "One by one, the largest first"))
+    if small:
+        cards = _cards(found, found.traces, small)
+        what = counted(len(small), "small effect")
+        text = f"{what} (each below {SMALL_SHARE:.1%} of the residual)"
+        blocks.append(Fold(text, (Charts(cards),)) if large else Charts(cards))
+    lead = (
+        "What the measured torque of the training data holds once everything else in the model is "
+        "taken away, over the quantity that the effect is a function of. If the effect is there, "
+        "the medians (blue, with the middle 80 % of the samples) follow the fitted law; if it were "
+        "not, they would lie about zero. Samples in which the joint stands or reverses are left "
+        "out, as in the fit."
+    )
+    return Section("diagnosis-evidence", "Evidence", tuple(blocks), lead)
+
+
+def _cards(found: Diagnosis, traces: Traces, effects: Sequence[NamedEffect]) -> tuple[Chart, ...]:
+    units = dict(zip(found.joint_names, traces.torque_units, strict=True))
+    charts: list[Chart] = []
+    for named in effects:
+        trace = _trace_of(named, traces)
+        if trace is None:
+            continue
+        place = place_in_words(named.effect, len(found.joint_names))
+        title = f"{_capital(title_of(named.effect.kind))}: {place}"
+        for row, joint in enumerate(trace.rows):
+            cloud = cloud_of(trace, row, units[joint])
+            if not len(cloud.x):
+                continue
+            shown = (
+                title if trace.rows == named.effect.joints[:1] else f"{title}; torque of {joint}"
+            )
+            caption = _caption(found, named) if not row else ""
+            chart = None
+            if trace.quantity == "time" and np.ptp(cloud.law) > 0:
+                chart = draw_window(shown, trace, row, units[joint], caption)
+            charts.append(draw_cloud(shown, cloud, caption) if chart is None else chart)
+        if not trace.quantity:
+            window = draw_window(f"{title}; {trace.rows[0]} in time", trace, 0,
+                                 units[trace.rows[0]])  # fmt: skip
+            charts += [window] if window is not None else []
+    return tuple(charts)
+
+
+def _trace_of(named: NamedEffect, traces: Traces) -> EffectTrace | None:
+    record = named.effect
+    key = (record.kind, record.joints, record.runs)
+    return next((t for t in traces.effects if (t.kind, t.joints, t.runs) == key), None)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _caption(found: Diagnosis, named: NamedEffect) -> str:
+    values = "; ".join(value_in_words(name, value) for name, value in named.parameters.items())
+    text = (
+        f"{values}. p {p_in_words(named.p_value)}; explains {named.share_of_residual:.2%} of the "
+        f"residual; lowers the error on runs left out by {named.gain:.1%}."
+    )
+    if named.effect.kind in CURVED and _has_a_line(found, named):
+        text += " Drawn is what deviates from the straight line of viscous and Coulomb friction."
+    everything = len(found.joint_names)
+    if named.aliases:
+        others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]
+        text += f" These data cannot tell it from: {', '.join(others)}."
+    if named.approximates:
+        text += f" An approximation only: it stands for {in_plain_words(named.approximates)}."
+    return text
+
+
+def _has_a_line(found: Diagnosis, named: NamedEffect) -> bool:
+    """Whether viscous or Coulomb friction was found on the same joint."""
+    return any(
+        each.effect.kind in STRAIGHT and each.effect.joints == named.effect.joints
+        for each in found.effects
+    )
+
+
+def _combined(found: Diagnosis, traces: Traces) -> tuple[Chart, ...]:
+    """For each joint with several effects over its speed: all of them at once."""
+    units = dict(zip(found.joint_names, traces.torque_units, strict=True))
+    charts = []
+    for joint in found.joint_names:
+        parts = [
+            trace
+            for trace in traces.effects
+            if trace.quantity == "speed" and trace.rows == (joint,) and not trace.runs
+        ]
+        if len(parts) < 2 or not _same_samples(parts):
+            continue
+        clouds: list[Cloud] = [cloud_of(trace, 0, units[joint]) for trace in parts]
+        names = ", ".join(title_of(trace.kind) for trace in parts)
+        charts.append(draw_cloud(f"Friction of {joint}", together(clouds), f"{names}."))
+    return tuple(charts)
+
+
+def _same_samples(parts: Sequence[EffectTrace]) -> bool:
+    first = parts[0]
+    return all(
+        np.array_equal(first.t, each.t)
+        and np.array_equal(first.part, each.part)
+        and np.array_equal(np.isfinite(first.partial), np.isfinite(each.partial))
+        for each in parts[1:]
+    )

@@ -1,0 +1,233 @@
+"""How far every constraint stays from its bound over time, where it is closest, what is proved."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from excite_cli.constraints.base import Constraint, Worst
+from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.constraints.joint_torque import JointTorque
+from excite_cli.excitation.admissible import fine_margins
+from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.result import Result
+from excite_cli.report.campaign import Campaign, in_figures
+from excite_cli.report.chart import (
+    BLUE,
+    FORBIDDEN,
+    INK,
+    LIMIT,
+    VERMILION,
+    Chart,
+    draw_chart,
+    few_ticks,
+    time_axis,
+)
+from excite_cli.report.motion_section import drawn_motions, not_drawn
+from excite_cli.report.page import Block, Charts, Choice, KeyFigure, Section, Table, Text
+from excite_cli.robot.model import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_POINTS = 400
+_WORDS = {
+    "joint_position": "Joint position to its limit",
+    "joint_velocity": "Joint speed to its limit",
+    "joint_acceleration": "Joint acceleration to its limit",
+    "joint_torque": "Joint torque left",
+    "balance": "Centre of mass to the edge of its region",
+    "zmp": "Zero-moment point to the edge of the support",
+    "contact": "What is left of friction, torsion and load",
+    "self_collision": "Nearest pair of links, less the margin",
+    "mesh_clearance": "Nearest pair of meshes, less the margin",
+    "surroundings": "Nearest link and thing around, less the margin",
+    "keep_out": "Outside the regions of joint space",
+}
+
+
+@dataclass(frozen=True)
+class _Line:
+    """The smallest margin (T,) of a constraint over all its columns, as it is drawn.
+
+    `unit` is `–` where margins are shares of the columns' scales.
+    """
+
+    constraint: Constraint
+    times: Array
+    values: Array
+    unit: str
+    worst: Worst
+    proved: bool | None
+
+
+def margin_section(campaign: Campaign) -> Section:
+    """A table of the worst margins, and every margin over time, the motion by choice."""
+    problem, result = campaign.problem, campaign.result
+    anchor, title = campaign.anchor("margins"), campaign.titled("Margins")
+    if not problem.constraints:
+        none = Text("The problem has no constraints, so there is nothing to keep away from.")
+        return Section(anchor, title, (none,))
+    options = []
+    shown = drawn_motions(result.motions, len(problem.constraints))
+    for motion in shown:
+        charts = tuple(_chart(line) for line in _lines(problem, motion))
+        blocks: tuple[Block, ...] = (Charts(charts),)
+        options.append((f"motion {motion.index}", blocks))
+    return Section(
+        anchor,
+        title,
+        (
+            _verdict(result),
+            worst_table(result, problem.constraints),
+            *not_drawn(result.motions, shown),
+            Choice("Motion", tuple(options)),
+        ),
+        "A margin is what is left beyond what the config asks to keep. Shaded: forbidden; the dot "
+        "is the worst instant.",
+    )
+
+
+def margin_figures(campaign: Campaign) -> tuple[KeyFigure, ...]:
+    """Whether all constraints are proved."""
+    if not campaign.problem.constraints:
+        return ()
+    found = [proved for m in campaign.result.motions for proved in m.certified.values()]
+    of = "" if campaign.alone else f", {campaign.name}"
+    broken = sum(w.violations > 0 for m in campaign.result.motions for w in m.margins.values())
+    if broken:
+        return (KeyFigure(f"constraints{of}", f"{broken} BROKEN", "at controller rate"),)
+    if not found:
+        return (KeyFigure(f"constraints{of}", "kept at 1 kHz", "not proved between instants"),)
+    all_of = f"{sum(found)} of {len(found)}"
+    if all(found):
+        return (KeyFigure(f"constraints{of}", "all proved", "at every instant of every motion"),)
+    return (KeyFigure(f"constraints{of}", f"{all_of} proved", "the others kept at 1 kHz"),)
+
+
+def _verdict(result: Result) -> Text:
+    loose = [
+        f"{name} (motion {motion.index})"
+        for motion in result.motions
+        for name, proved in motion.certified.items()
+        if not proved
+    ]
+    broken = [
+        f"{name} (motion {motion.index})"
+        for motion in result.motions
+        for name, worst in motion.margins.items()
+        if worst.violations
+    ]
+    if broken:
+        return Text(f"Broken at controller rate: {', '.join(broken)}.", "bad")
+    if not any(motion.certified for motion in result.motions):
+        return Text(
+            "Kept at every millisecond. Between these instants nothing was proved when the motions "
+            "were made (optimizer.certify: false); `excite check CONFIG FILE.h5` does.",
+            "plain",
+        )
+    if loose:
+        return Text(
+            f"Kept at every millisecond; not proved between: {', '.join(loose)}. "
+            "`excite check CONFIG FILE.h5` says why.",
+            "bad",
+        )
+    return Text("Every constraint of every motion is proved to hold at every instant.", "good")
+
+
+def worst_table(result: Result, constraints: tuple[Constraint, ...]) -> Table:
+    """The worst margin of every constraint over all motions: how much, where, when, proved."""
+    rows = []
+    for name in dict.fromkeys(constraint.name for constraint in constraints):
+        held = [motion for motion in result.motions if name in motion.margins]
+        if not held:
+            continue
+        motion = min(held, key=lambda m: m.margins[name].share)
+        worst = motion.margins[name]
+        states = [m.certified[name] for m in held if name in m.certified]
+        proved = "–" if not states else "proved" if all(states) else "sampled"
+        rows.append(
+            (
+                name,
+                f"{in_figures(worst.margin)} {worst.unit}",
+                f"{100 * worst.share:.2g} %",
+                worst.label,
+                str(motion.index),
+                f"{worst.time:.3f}",
+                "BROKEN" if worst.violations else proved,
+            )
+        )
+    return Table(
+        ("constraint", "worst margin", "share", "where", "motion", "time [s]", "verdict"),
+        tuple(rows),
+        title="Worst margins over all motions, at 1 kHz",
+        right=frozenset({1, 2, 4, 5}),
+        wordy=frozenset({3}),
+        note="Share of the size of what is bounded: half a range, a limit, a distance.",
+    )
+
+
+def _lines(problem: Problem, motion: Motion) -> list[_Line]:
+    """Margins on a grid that holds the worst instants, which were found at 1 kHz."""
+    grid = np.linspace(0.0, problem.trajectory.duration, _POINTS)
+    times = np.union1d(grid, [worst.time for worst in motion.margins.values()])
+    margins = fine_margins(problem, motion.coefficients, times)
+    return [
+        _line(constraint, margin, times, motion)
+        for constraint, margin in zip(problem.constraints, margins, strict=True)
+    ]
+
+
+def _line(constraint: Constraint, margins: Array, times: Array, motion: Motion) -> _Line:
+    units = {constraint.unit_of(column) for column in range(len(constraint.labels))}
+    shares = isinstance(constraint, JointBound | JointTorque) or len(units) > 1
+    values = (margins / constraint.scale if shares else margins).min(axis=1)
+    seen = constraint.worst(margins, times)
+    stored = motion.margins.get(constraint.name)
+    return _Line(
+        constraint=constraint,
+        times=times,
+        values=values,
+        unit="–" if shares else constraint.unit,
+        worst=seen if stored is None else stored,
+        proved=motion.certified.get(constraint.name),
+    )
+
+
+def _chart(line: _Line) -> Chart:
+    index = int(np.argmin(line.values))
+    smallest, worst = float(line.values[index]), line.worst
+    top = max(float(line.values.max()), 1e-9)
+    bottom = min(smallest, 0.0) - 0.15 * top
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        axes.axhspan(bottom, 0.0, color=FORBIDDEN, linewidth=0)
+        axes.axhline(0.0, color=LIMIT, linewidth=0.9, linestyle=(0, (4, 2)))
+        axes.plot(line.times, line.values, color=BLUE, label="smallest margin")
+        axes.plot(
+            line.times[index], smallest, "o", color=VERMILION, markersize=6, clip_on=False, zorder=5
+        )
+        axes.set_ylim(bottom, 1.08 * top)
+        axes.annotate(
+            "forbidden", (0.99, 0.015), xycoords="axes fraction", ha="right", va="bottom",
+            color=INK, fontsize=7.5,
+        )  # fmt: skip
+        time_axis(axes, line.times)
+        few_ticks(axes)
+        of_joints = isinstance(line.constraint, JointBound | JointTorque)
+        share = "share of limit" if of_joints else "share of its scale"
+        what = share if line.unit == "–" else "margin"
+        axes.set_ylabel(f"{what} [{line.unit}]", labelpad=2)
+
+    name = line.constraint.name
+    title = _WORDS.get(name, name.replace("_", " "))
+    state = {None: "", True: " Proved at every instant.", False: " Not proved between samples."}
+    said = (
+        f"Closest: {in_figures(worst.margin)} {worst.unit} at {worst.time:.3f} s, {worst.label}."
+        f"{state[line.proved]}"
+    )
+    return draw_chart(
+        title, f"{title} ({name}). {said}", draw, 1.9, caption=said, layout=(0.62, 0.1, 0.1, 0.42)
+    )

@@ -1,0 +1,70 @@
+"""What was noticed about data, and every choice made between the file and the fit."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from excite_cli.measurement.dataset import Finding
+from excite_cli.report.page import Block, Table, Text
+
+_WORDS = {
+    "recorded_rate": "recorded rate [Hz]",
+    "position_cutoff": "cut-off of the positions [Hz]",
+    "parallel_cutoff": "cut-off of torque and columns [Hz]",
+    "rate": "rate of the averaged samples [Hz]",
+    "working_stride": "every so many recorded samples are worked on",
+    "border": "cut off at both ends [s]",
+    "velocity": "speeds are",
+    "moving_speed": "a joint moves from [rad/s]",
+    "bandwidth": "bandwidth of the speeds [Hz]",
+    "reasons": "reasons",
+    "samples": "samples used",
+    "candidates": "candidates tried",
+    "inflation": "χ² of placebos, by which tests are divided",
+    "runs": "training runs",
+    "standstill_share": "samples left out at standstill and reversals",
+    "invalid_share": "samples left out as invalid",
+    "noise_orders": "order of the noise model",
+    "noise_rms": "noise that the model leaves [N·m]",
+}
+_SHARES = ("standstill_share", "invalid_share")
+
+
+def findings_blocks(findings: Sequence[Finding]) -> tuple[Block, ...]:
+    """Warnings first; a sentence if there is nothing to tell."""
+    if not findings:
+        return (Text("Nothing was noticed about the data.", "good"),)
+    ranked = sorted(findings, key=lambda each: each.severity != "warning")
+    return tuple(
+        Text(
+            f"{each.run}: {each.text}" if each.run and each.run not in each.text else each.text,
+            "bad" if each.severity == "warning" else "plain",
+        )
+        for each in ranked
+    )
+
+
+def processing_table(processing: Mapping[str, Any], joint_names: Sequence[str]) -> Table:
+    """Every choice by its name in words."""
+    rows = tuple(
+        (_WORDS.get(name, name.replace("_", " ")), _value(name, value, joint_names))
+        for name, value in processing.items()
+    )
+    return Table(("choice", "value"), rows, title="Processing of the data", folded=True)
+
+
+def _value(name: str, value: Any, joint_names: Sequence[str]) -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, list | tuple):
+        per_joint = len(value) == len(joint_names) and not any(isinstance(x, str) for x in value)
+        told = [_number(name, x) for x in value]
+        if per_joint:
+            return ", ".join(f"{j} {x}" for j, x in zip(joint_names, told, strict=True))
+        return "; ".join(told) or "none"
+    return _number(name, value)
+
+
+def _number(name: str, value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.1%}" if name in _SHARES else f"{value:.4g}"
+    return str(value)

@@ -1,0 +1,158 @@
+"""What the motions show worst: the direction of the smallest singular value, and each parameter.
+
+With the stack R = U Σ Vᵀ (columns scaled by s), the combination Σ_i v_i φ_i / s_i of the last
+column v of V is the one that moves the measured rows least: a change of the parameters by s_i v_i
+moves them by σ_min altogether. With independent noise of one unit per row the parameter i is known
+to s_i √((RᵀR)⁻¹)_ii.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.result import Result
+from excite_cli.report.campaign import Campaign, in_figures
+from excite_cli.report.page import Block, Section, Table, Text
+from excite_cli.robot.model import Array
+from excite_cli.robot.regressor import standard_parameters
+
+_SHOWN = 6
+_SINGULAR = 1e-14
+_UNITS = {"m": "kg", "x": "kg·m", "y": "kg·m", "z": "kg·m"}
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """Short names, units and scales of the columns, with the values the URDF expects (or NaN)."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    words: tuple[str, ...]
+    scales: Array
+    expected: Array
+
+
+def weakest_section(campaign: Campaign) -> Section:
+    """The weakest direction in words, its composition, and how well each parameter will show."""
+    result, problem = campaign.result, campaign.problem
+    columns = _columns(result, problem)
+    _, sigma, turned = np.linalg.svd(result.stack.factor)
+    anchor, title = campaign.anchor("weakest"), campaign.titled("What shows least")
+    if sigma[-1] <= _SINGULAR * sigma[0]:
+        words = "A combination of parameters does not show at all: the stack is singular."
+        return Section(anchor, title, (_direction_table(columns, turned[-1]),), words)
+    blocks: list[Block] = [
+        _direction_table(columns, turned[-1]),
+        _parameter_table(result, columns),
+    ]
+    if len(result.effect_names):
+        listed = ", ".join(result.effect_names)
+        blocks.append(Text(f"Columns of effects stand beside the base parameters: {listed}."))
+    return Section(anchor, title, tuple(blocks), _words(columns, sigma, turned[-1]))
+
+
+def _words(columns: _Columns, sigma: Array, direction: Array) -> str:
+    shares = direction**2
+    order = np.argsort(-shares)
+    first = [columns.names[i] for i in order[:2] if shares[i] > 0.1] or [columns.names[order[0]]]
+    together = float(shares[order[: len(first)]].sum())
+    plural = "make" if len(first) > 1 else "makes"
+    return (
+        "The combination of parameters that moves the measured torques least is mostly "
+        f"{' and '.join(first)}, which {plural} up {100 * together:.0f} % of it. Its singular "
+        f"value is {in_figures(float(sigma[-1]))}, "
+        f"{in_figures(float(sigma[0] / sigma[-1]))} times less than that of the strongest."
+    )
+
+
+def _columns(result: Result, problem: Problem) -> _Columns:
+    base = problem.base
+    names = tuple(base.names[i] for i in result.base_selection)
+    expected = base.mapping @ standard_parameters(problem.robot)
+    effects = result.effect_names
+    return _Columns(
+        names=(*names, *effects),
+        units=(*map(_unit, names), *("" for _ in effects)),
+        words=result.base_words,
+        scales=result.column_scales,
+        expected=np.concatenate([expected, np.full(len(effects), np.nan)]),
+    )
+
+
+def _unit(name: str) -> str:
+    symbol = name.partition("[")[0]
+    return "kg·m²" if symbol.startswith("I") else _UNITS[symbol[-1]]
+
+
+def _direction_table(columns: _Columns, direction: Array) -> Table:
+    """The largest parts of the direction: coefficient and share, what the parameter groups."""
+    order = np.argsort(-np.abs(direction))[:_SHOWN]
+    sign = 1.0 if direction[order[0]] > 0 else -1.0
+    rows = tuple(
+        (
+            columns.names[i],
+            f"{sign * direction[i]:+.2f}",
+            f"{100 * direction[i] ** 2:.0f} %",
+            _shortened(columns.words[i]),
+        )
+        for i in order
+    )
+    left = 1.0 - float((direction[order] ** 2).sum())
+    rest = len(direction) - len(order)
+    note = f"The other {rest} make up {100 * left:.0f} %." if rest else ""
+    return Table(
+        ("base parameter", "coefficient [–]", "share [–]", "stands for"),
+        rows,
+        title="The weakest direction",
+        right=frozenset({1, 2}),
+        wordy=frozenset({3}),
+        note=note,
+    )
+
+
+def _parameter_table(result: Result, columns: _Columns) -> Table:
+    """Standard deviations for noise of one unit per row of the stack, the worst known first."""
+    inverse = np.linalg.pinv(result.stack.factor)
+    std = columns.scales * np.linalg.norm(inverse, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = std / np.abs(columns.expected)
+    order = np.argsort(-np.where(np.isfinite(relative), relative, 0.0))
+    rows = tuple(
+        (
+            columns.names[i],
+            columns.units[i] or "–",
+            in_figures(float(columns.expected[i])),
+            in_figures(float(std[i])),
+            _percent(float(relative[i])),
+        )
+        for i in order
+    )
+    plain = bool(np.all(result.row_weights == 1.0))
+    noise = "1 N·m" if plain else "one weighted unit"
+    return Table(
+        ("base parameter", "unit", "by the URDF", "std", "of the value"),
+        rows,
+        title=f"How well each base parameter would be known, for noise of {noise} per sample",
+        right=frozenset({2, 3, 4}),
+        note=f"Independent noise of {noise} on each of the {result.stack.rows} rows of the stack "
+        "(samples of the cost grid times measured rows); the deviation goes with the noise, and "
+        "with one over the root of the number of samples. Worst known first.",
+        folded=True,
+    )
+
+
+def _percent(share: float) -> str:
+    """A share of the value; beyond ten times the value the figure says no more."""
+    if not np.isfinite(share):
+        return "–"
+    return f"{100 * share:.3g} %" if share < 10 else "> 1000 %"
+
+
+def _shortened(words: str, longest: int = 120) -> str:
+    """A grouping that is too long for a table ends after a whole term."""
+    if len(words) <= longest:
+        return words
+    cut = max(words.rfind(" + ", 0, longest), words.rfind(" - ", 0, longest))
+    terms = words.count(" + ", cut) + words.count(" - ", cut)
+    return f"{words[:cut]} and {terms} more"

@@ -1,0 +1,66 @@
+"""`excite init` as a user runs it: a config that works with no edit, or one sentence."""
+
+from pathlib import Path
+
+from excite_cli.config.load import load_spec
+from tests.cli.program import BRIEF, Program
+from tests.proposal.robots import arm
+
+
+def test_a_config_that_works_unedited(excite: Program, tmp_path: Path) -> None:
+    arm(tmp_path, 'lower="-2" upper="2" velocity="0" effort="1000"')
+    answer = excite.answer("init", "--urdf", "robot.urdf", "-o", "arm.yaml")
+    assert answer["joints"] == ["shoulder", "elbow"]
+    assert load_spec(tmp_path / "arm.yaml").robot.urdf == "robot.urdf"
+    made = excite("optimize", "arm.yaml", "-o", "arm.h5", *BRIEF)
+    assert made.returncode == 0, made.stderr
+    assert excite("check", "arm.yaml", "arm.h5").returncode == 0
+
+
+def test_it_says_what_it_chose(excite: Program, tmp_path: Path) -> None:
+    arm(tmp_path, 'lower="-2" upper="2" velocity="0" effort="50"')
+    run = excite("init", "--urdf", "robot.urdf")
+    assert run.returncode == 0, run.stderr
+    assert "moves 2 joints" in run.stdout
+    assert "shoulder: the URDF gives 0 rad/s; 3.1 rad/s assumed" in run.stdout
+    assert "excite optimize robot.yaml" in run.stdout
+
+
+def test_nothing_is_overwritten_unasked(excite: Program, tmp_path: Path) -> None:
+    arm(tmp_path)
+    (tmp_path / "robot.yaml").write_text("mine")
+    run = excite("init", "--urdf", "robot.urdf")
+    assert run.returncode == 2
+    assert "robot.yaml exists already" in run.stderr
+    assert (tmp_path / "robot.yaml").read_text() == "mine"
+    assert excite("init", "--urdf", "robot.urdf", "--overwrite").returncode == 0
+    assert (tmp_path / "robot.yaml").read_text() != "mine"
+
+
+def test_without_a_robot_and_a_terminal_it_does_not_hang(excite: Program) -> None:
+    run = excite("init")
+    assert run.returncode == 2
+    assert "--robot NAME" in run.stderr
+    assert "--urdf FILE" in run.stderr
+
+
+def test_an_unknown_robot_is_told_with_the_nearest(excite: Program) -> None:
+    run = excite("init", "--robot", "ur100")
+    assert run.returncode == 2
+    assert "Did you mean 'ur10'?" in run.stderr
+
+
+def test_a_robot_that_cannot_move_is_one_sentence(excite: Program, tmp_path: Path) -> None:
+    run = excite("init", "--robot", "iris_simple")
+    assert run.returncode == 2
+    told = run.stderr.splitlines()[1:]
+    assert len(told) == 1
+    assert "has no movable joint" in told[0]
+    assert not (tmp_path / "iris_simple.yaml").exists()
+
+
+def test_floating_base_measures_its_wrench(excite: Program, tmp_path: Path) -> None:
+    arm(tmp_path)
+    assert excite("init", "--urdf", "robot.urdf", "--base", "floating").returncode == 0
+    robot = load_spec(tmp_path / "robot.yaml").robot
+    assert (robot.base, robot.rows) == ("floating", ("base", "joints"))

@@ -1,0 +1,101 @@
+"""What a diagnosis keeps of its data agrees with what it says."""
+
+import numpy as np
+import pytest
+
+from excite_cli.config.load import load_spec
+from excite_cli.diagnosis.diagnose import diagnose
+from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.robot.base_parameters import find_base_parameters
+from excite_cli.robot.model import build_robot
+from tests.cli.program import SMOKE
+from tests.diagnosis.test_sealed import motion
+
+pytest.importorskip("mujoco")
+
+from excite_cli.simulation.planted import plant
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.simulate import simulate
+
+VISCOUS, COULOMB, CURVED = 2.0, 1.5, 4.0
+
+
+@pytest.fixture(scope="module")
+def found() -> Diagnosis:
+    """An arm with friction of three parts on its third joint."""
+    kinds = "[viscous_friction,coulomb_friction,nonlinear_viscous_friction]"
+    spec = load_spec(SMOKE, [f"diagnosis.kinds={kinds}"])
+    robot = build_robot(spec.robot, SMOKE.parent)
+    planted = [
+        plant(kind_named("viscous_friction"), (2,), VISCOUS, {}),
+        plant(kind_named("coulomb_friction"), (2,), COULOMB, {}),
+        plant(kind_named("nonlinear_viscous_friction"), (2,), CURVED, {"power": 0.5}),
+    ]
+    motions = [motion(robot, number) for number in (1, 2, 3)]
+    settings = SimulationSettings(rate=200.0, lead_in=0.5)
+    data = simulate(robot, motions, settings, planted).dataset
+    return diagnose(robot, find_base_parameters(robot), data, spec)
+
+
+def test_sealed_traces_are_what_the_errors_say(found: Diagnosis) -> None:
+    (sealed,) = found.sealed_traces
+    assert (sealed.run, sealed.sealed) == ("motion_3", True)
+    assert sealed.before is not None
+    for errors, model in ((found.before, sealed.before), (found.after, sealed.predicted)):
+        left = sealed.measured - model
+        for j, name in enumerate(found.joint_names):
+            assert errors.rms[name] == pytest.approx(np.sqrt(np.nanmean(left[:, j] ** 2)), rel=1e-3)
+
+
+def test_training_traces_show_what_effects_take_away(found: Diagnosis) -> None:
+    assert found.traces is not None
+    assert [(t.run, t.sealed) for t in found.traces.runs] == [
+        ("motion_1", False), ("motion_2", False),
+    ]  # fmt: skip
+    for trace in found.traces.runs:
+        assert trace.before is not None
+        at = trace.counted[:, 2]
+        before = np.sum((trace.measured - trace.before)[at, 2] ** 2)
+        assert np.sum((trace.measured - trace.predicted)[at, 2] ** 2) < 0.05 * before
+
+
+def test_partial_residuals_follow_the_laws_that_are_reported(found: Diagnosis) -> None:
+    assert found.traces is not None
+    traces = {(t.kind, t.joints): t for t in found.traces.effects}
+    assert set(traces) == {(e.effect.kind, e.effect.joints) for e in found.effects}
+    for named in found.effects:
+        trace = traces[named.effect.kind, named.effect.joints]
+        assert trace.rows == named.effect.joints
+        seen = np.isfinite(trace.partial[:, 0])
+        x, own, partial = (a[seen, 0] for a in (trace.x, trace.own, trace.partial))
+        assert np.sum((partial - own) ** 2) < 0.2 * np.sum(partial**2), trace.kind
+        if trace.kind == "viscous_friction":  # the straight line, not what its refinement leaves
+            assert named.parameters["viscous"].value > 1.5 * VISCOUS
+            assert own == pytest.approx(named.parameters["viscous"].value * x, rel=1e-3, abs=1e-3)
+            assert (trace.quantity, trace.unit) == ("speed", "rad/s")
+
+
+def test_the_parts_of_friction_add_up(found: Diagnosis) -> None:
+    assert found.traces is not None
+    parts = [t for t in found.traces.effects if t.quantity == "speed" and t.rows == t.joints]
+    parts = [t for t in parts if t.rows == (found.joint_names[2],)]
+    assert len(parts) == 3
+    seen = np.isfinite(parts[0].own[:, 0])
+    v = parts[0].x[seen, 0]
+    whole = np.sum([t.own[seen, 0] for t in parts], axis=0)
+    true = VISCOUS * v + COULOMB * np.sign(v) + CURVED * np.sign(v) * np.sqrt(np.abs(v))
+    fast = np.abs(v) > 0.1
+    assert whole[fast] == pytest.approx(true[fast], rel=0.03, abs=0.1)
+
+
+def test_the_map_of_dependences(found: Diagnosis) -> None:
+    assert found.traces is not None
+    dependence = found.traces.dependence
+    assert dependence.joints == found.joint_names
+    n = len(found.joint_names)
+    assert len(dependence.quantities) == 1 + 3 * n + 4
+    assert dependence.quantities[0] == "time"
+    assert dependence.quantities[-1] == "own history of load"
+    assert dependence.shares.shape == (n, len(dependence.quantities))
+    assert ((dependence.shares >= 0) & (dependence.shares <= 1)).all()

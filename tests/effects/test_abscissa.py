@@ -1,0 +1,90 @@
+"""The quantity over which a person sees an effect."""
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from excite_cli.effects.base import Effect, Parameter, Signals
+from excite_cli.effects.catalogue import catalogue, kind_named
+from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.regressor import standard_parameters
+from excite_cli.robot.rigid_body import RigidBody
+from tests.robot.random_robots import random_robot
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return random_robot(4, joints=3, branches=False, prismatic=False)
+
+
+@pytest.fixture(scope="module")
+def signals(robot: Robot) -> Signals:
+    t = np.linspace(0.0, 4.0, 401)
+    phase = np.arange(robot.n)
+    q = np.sin(2.0 * t[:, None] + phase)
+    v, a = 2.0 * np.cos(2.0 * t[:, None] + phase), -4.0 * q
+    body = RigidBody(robot, standard_parameters(robot), q, v, a)
+    return Signals(t, q, v, a, body.load, 1.5 * body.load, body, "r1")
+
+
+@pytest.mark.parametrize("kind", sorted(catalogue()))
+def test_every_kind_can_be_drawn(kind: str, robot: Robot, signals: Signals) -> None:
+    effect_kind = kind_named(kind)
+    shape, _ = effect_kind.planted(1.0, {})
+    found = effect_kind(effect_kind.places(robot)[0], shape).abscissa(signals)
+    if found is None:  # drawn over the torque that it predicts
+        assert kind in {
+            "backlash", "base_tilt", "cable_force", "elasticity", "encoder_offset", "payload",
+            "torque_delay",
+        }  # fmt: skip
+        return
+    assert found.values.shape == signals.t.shape
+    assert np.isfinite(found.values).all()
+    assert found.name
+    assert found.unit
+
+
+@pytest.mark.parametrize(
+    ("kind", "series", "unit"),
+    [("coulomb_friction", "v", "rad/s"), ("spring", "q", "rad"), ("armature", "a", "rad/s²"),
+     ("torque_gain", "load", "N·m")],
+)  # fmt: skip
+def test_one_quantity_of_its_joint(kind: str, series: str, unit: str, signals: Signals) -> None:
+    found = kind_named(kind)((1,)).abscissa(signals)
+    assert found is not None
+    assert np.array_equal(found.values, getattr(signals, series)[:, 1])
+    assert found.unit == unit
+
+
+def test_ripple_repeats_within_its_period(signals: Signals) -> None:
+    effect = kind_named("ripple")((0,), {"periods": 12.0})
+    found = effect.abscissa(signals)
+    assert found is not None
+    assert found.period == pytest.approx(2 * np.pi / 12.0)
+    angle = np.mod(found.values, found.period) * 12.0
+    columns = effect.columns(signals)[:, 0]
+    assert columns == pytest.approx(np.stack([np.cos(angle), np.sin(angle)], axis=1), abs=1e-9)
+
+
+def test_friction_with_load_is_a_line_over_its_abscissa(signals: Signals) -> None:
+    effect = kind_named("load_dependent_friction")((2,))
+    found = effect.abscissa(signals)
+    assert found is not None
+    assert np.array_equal(found.values, effect.columns(signals)[:, 0, 0])
+
+
+class Own(Effect):
+    """An effect of a user, who says nothing of how to draw it."""
+
+    kind: ClassVar = "own"
+    title: ClassVar = "own"
+    signature: ClassVar = ""
+    parameters: ClassVar = (Parameter("size", "N·m", 0.1, 1.0),)
+
+    def columns(self, signals: Signals) -> Array:
+        return np.ones((len(signals.t), 1, 1))
+
+
+def test_effects_of_users_need_none(signals: Signals) -> None:
+    assert Own((0,)).abscissa(signals) is None

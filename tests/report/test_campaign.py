@@ -1,0 +1,295 @@
+"""What the page says about motions is what the result holds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from excite_cli.config.load import parse_spec, spec_as_yaml
+from excite_cli.criteria.base import singular_values
+from excite_cli.excitation.stack import Stack
+from excite_cli.report.assembly import Source, page_of
+from excite_cli.report.campaign import Campaign, in_figures
+from excite_cli.report.campaign_sections import campaign_figures
+from excite_cli.report.compare_section import comparable, compare_results
+from excite_cli.report.condition_section import condition_section
+from excite_cli.report.config_differences import differences
+from excite_cli.report.margin_section import margin_figures, margin_section
+from excite_cli.report.motion_section import drawn_motions, motion_section
+from excite_cli.report.page import Block, Charts, Choice, Page, Section, Table, Text, render
+from excite_cli.report.weakest_section import weakest_section
+from tests.report.case import Case
+from tests.report.structure import Structure
+
+
+@pytest.fixture
+def campaign(case: Case) -> Campaign:
+    problem, result = case
+    return Campaign("smoke", result, problem)
+
+
+def _of(kind: type, blocks: tuple[Block, ...]) -> list[Block]:
+    return [block for block in blocks if isinstance(block, kind)]
+
+
+def _table(section: Section, title: str) -> Table:
+    (found,) = (b for b in section.blocks if isinstance(b, Table) and title in b.title)
+    return found
+
+
+def _said(section: Section) -> str:
+    return Structure(render(Page("t", "s", (), (section,)))).text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (5.1862, "5.19"),
+        (143.4, "143"),
+        (11332.3, "11332"),
+        (2.5e7, "2.50e+07"),
+        (0.00123, "0.00123"),
+        (1e-9, "1.00e-09"),
+        (0.0, "0"),
+        (10.0, "10.0"),
+        (float("inf"), "∞"),
+        (float("nan"), "–"),
+    ],
+)
+def test_numbers_as_people_write_them(value: float, text: str) -> None:
+    assert in_figures(value) == text
+
+
+def test_condition_numbers_beside_random_ones(campaign: Campaign) -> None:
+    result, section = campaign.result, condition_section(campaign)
+    reached, random = (
+        found[-1].stacked_condition_number for found in (result.motions, result.random)
+    )
+    assert f"{in_figures(random / reached)} times worse" in section.lead
+    assert "20 admissible random motions (30 drawn)" in section.lead
+    row = _table(section, "Motions").rows[0]
+    assert row[1:6] == tuple(
+        in_figures(number)
+        for number in (
+            result.motions[0].condition_number,
+            reached,
+            result.random[0].condition_number,
+            result.random[0].stacked_condition_number,
+            result.random[0].stacked_condition_number / reached,
+        )
+    )
+    assert [figure.value for figure in campaign_figures(campaign)][:2] == [
+        in_figures(reached),
+        in_figures(random),
+    ]
+    assert _of(Text, section.blocks) == []
+
+
+def test_without_random_motions_it_says_how_to_get_them(campaign: Campaign) -> None:
+    alone = replace(campaign, result=replace(campaign.result, random=()))
+    section = condition_section(alone)
+    assert "excite compare-random" in _said(section)
+    assert "random" not in section.lead
+    assert len(_table(section, "Motions").columns) == 6
+
+
+def test_a_condition_number_that_is_not_finite(campaign: Campaign) -> None:
+    motion = replace(campaign.result.motions[0], condition_number=float("inf"))
+    result = replace(campaign.result, motions=(motion,), random=())
+    section = condition_section(replace(campaign, result=result))
+    assert _table(section, "Motions").rows[0][1] == "∞"
+
+
+def test_a_card_for_every_joint_and_a_choice_of_motions(campaign: Campaign) -> None:
+    motion = campaign.result.motions[0]
+    two = replace(campaign.result, motions=(motion, replace(motion, index=2)))
+    section = motion_section(replace(campaign, result=two))
+    (choice,) = _of(Choice, section.blocks)
+    assert isinstance(choice, Choice)
+    assert [text for text, _ in choice.options] == ["motion 1", "motion 2"]
+    cards = choice.options[0][1][0]
+    assert isinstance(cards, Charts)
+    assert [chart.title for chart in cards.charts] == list(campaign.problem.robot.joint_names)
+    peaks = choice.options[0][1][1]
+    assert isinstance(peaks, Table)
+    q, v, _ = campaign.problem.trajectory.basis(np.linspace(0, 6, 400)).states(motion.coefficients)
+    limits = campaign.problem.robot.limits.velocity
+    for joint, row in enumerate(peaks.rows):
+        assert row[1].startswith(f"{in_figures(float(q[:, joint].min()))} … ")
+        share = np.abs(v[:, joint]).max() / limits[joint]
+        assert row[3].endswith(f"({100 * share:.0f} %)")
+    assert peaks.rows[4][1].endswith(" m")
+
+
+def test_many_motions_are_not_all_drawn(campaign: Campaign) -> None:
+    motions = tuple(replace(campaign.result.motions[0], index=k) for k in range(1, 51))
+    assert len(drawn_motions(motions, 30)) == 4
+    assert len(drawn_motions(motions, 400)) == 1
+    assert drawn_motions(motions[:3], 30) == motions[:3]
+
+
+def test_margins_name_the_worst_and_the_verdict(campaign: Campaign) -> None:
+    motion = campaign.result.motions[0]
+    assert all(motion.certified.values())
+    section = margin_section(campaign)
+    assert "proved to hold at every instant" in _said(section)
+    rows = {row[0]: row for row in _table(section, "Worst margins").rows}
+    worst = motion.margins["self_collision"]
+    assert rows["self_collision"][1:] == (
+        f"{in_figures(worst.margin)} m",
+        f"{100 * worst.share:.2g} %",
+        worst.label,
+        "1",
+        f"{worst.time:.3f}",
+        "proved",
+    )
+    (choice,) = _of(Choice, section.blocks)
+    assert isinstance(choice, Choice)
+    charts = choice.options[0][1][0]
+    assert isinstance(charts, Charts)
+    assert len(charts.charts) == len(campaign.problem.constraints)
+    said = charts.charts[-1].alternative
+    assert worst.label in said
+    assert f"{worst.time:.3f} s" in said
+    (figure,) = margin_figures(campaign)
+    assert figure.value == "all proved"
+
+
+@pytest.mark.parametrize(
+    ("certified", "violations", "words", "kind", "value"),
+    [
+        ({}, 0, "nothing was proved", "plain", "kept at 1 kHz"),
+        (
+            {"joint_torque": False, "self_collision": True},
+            0,
+            "not proved between: joint_torque (motion 1)",
+            "bad",
+            "1 of 2 proved",
+        ),
+        (
+            {"self_collision": True},
+            3,
+            "Broken at controller rate: self_collision",
+            "bad",
+            "BROKEN",
+        ),
+    ],
+)
+def test_what_is_not_proved_is_not_said_to_be(
+    campaign: Campaign,
+    certified: dict[str, bool],
+    violations: int,
+    words: str,
+    kind: str,
+    value: str,
+) -> None:
+    motion = campaign.result.motions[0]
+    worst = replace(motion.margins["self_collision"], violations=violations)
+    margins = {**motion.margins, "self_collision": worst}
+    changed = replace(motion, certified=certified, margins=margins)
+    other = replace(campaign, result=replace(campaign.result, motions=(changed,)))
+    (verdict,) = _of(Text, margin_section(other).blocks)
+    assert isinstance(verdict, Text)
+    assert words in verdict.text
+    assert verdict.kind == kind
+    (figure,) = margin_figures(other)
+    assert value in figure.value
+
+
+def test_the_weakest_direction_is_that_of_the_stack(campaign: Campaign) -> None:
+    rank = campaign.problem.base.rank
+    sizes = np.full(rank, 10.0)
+    sizes[3] = 0.5
+    stack = Stack(np.diag(sizes), 300)
+    section = weakest_section(replace(campaign, result=replace(campaign.result, stack=stack)))
+    name = campaign.problem.base.names[campaign.result.base_selection[3]]
+    assert f"mostly {name}, which makes up 100 % of it" in section.lead
+    assert "0.500, 20.0 times less" in section.lead
+    assert _table(section, "weakest direction").rows[0][:3] == (name, "+1.00", "100 %")
+    rows = {row[0]: row for row in _table(section, "would be known").rows}
+    assert rows[name][3] == "2.00"
+    assert all(row[3] == "0.100" for key, row in rows.items() if key != name)
+
+
+def test_a_singular_stack_is_told(campaign: Campaign) -> None:
+    stack = Stack(np.diag([1.0, *np.zeros(campaign.problem.base.rank - 1)]), 1)
+    section = weakest_section(replace(campaign, result=replace(campaign.result, stack=stack)))
+    assert "does not show at all" in section.lead
+
+
+def test_configs_that_differ_are_told_key_by_key(campaign: Campaign) -> None:
+    config = campaign.result.config
+    spec = parse_spec(config)
+    torque = {"constraints.torque.scale": 0.5, "seed": 7}
+    changed = parse_spec(config, overrides=[f"{key}={value}" for key, value in torque.items()])
+    table = differences(("a", "b"), (spec_as_yaml(spec), spec_as_yaml(changed)))
+    assert isinstance(table, Table)
+    assert set(table.rows) == {("constraints.torque.scale", "0.9", "0.5"), ("seed", "1", "7")}
+    same = differences(("a", "b"), (config, config))
+    assert isinstance(same, Text)
+
+
+def test_results_side_by_side(campaign: Campaign) -> None:
+    slow = replace(campaign.result.motions[0], stacked_condition_number=99.0)
+    other = replace(
+        campaign, name="other", number=2, alone=False,
+        result=replace(campaign.result, motions=(slow,), random=()),
+    )  # fmt: skip
+    section = compare_results([campaign, other])
+    assert section.lead.endswith("Lowest: smoke.")
+    assert [row[0] for row in _table(section, "Condition numbers").rows] == ["smoke", "other"]
+    assert len(_of(Charts, section.blocks)) == 1
+
+
+def test_other_weights_are_not_compared(campaign: Campaign) -> None:
+    other = replace(campaign.result, row_weights=2 * campaign.result.row_weights)
+    both = [campaign, replace(campaign, result=other)]
+    assert comparable([campaign, campaign])
+    assert not comparable(both)
+    section = compare_results(both)
+    assert "do not compare" in _said(section)
+    assert "Lowest" not in section.lead
+    assert _of(Charts, section.blocks) == []
+
+
+def test_several_files_have_sections_of_their_own(case: Case) -> None:
+    problem, result = case
+    sources = [Source(name, f"{name}.h5", result, problem) for name in ("first", "second")]
+    page = page_of(sources, lambda name, done: None)
+    anchors = [section.anchor for section in page.sections]
+    assert len(anchors) == len(set(anchors))
+    assert anchors[0] == "compare"
+    titles = [section.title for section in page.sections[1:]]
+    assert "Motions: first" in titles
+    assert "Motions: second" in titles
+    assert "same, key by key" in _said(page.sections[0])
+
+
+def test_the_spectrum_of_random_motions_stands_on_the_prior(case: Case) -> None:
+    from excite_cli.report.spectrum_chart import random_stack
+
+    problem, result = case
+    prior = Stack(1e3 * np.eye(problem.columns), 10)
+    sigma = singular_values(random_stack(replace(result, prior_stack=prior), problem))
+    assert sigma[-1] >= 1e3
+
+
+def test_weights_and_scales_are_said(campaign: Campaign) -> None:
+    assert "Of the regressor" not in condition_section(campaign).lead
+    weighting = replace(campaign.problem.weighting, row_name="effort", column_name="unit_norm")
+    problem = replace(campaign.problem, weighting=weighting)
+    section = condition_section(replace(campaign, problem=problem))
+    words = "Of the regressor with rows weighted (effort), columns scaled (unit norm)."
+    assert section.lead.endswith(words)
+
+
+def test_without_limits_cards_speak_of_peaks(campaign: Campaign) -> None:
+    free = replace(campaign, problem=replace(campaign.problem, constraints=()))
+    (choice,) = _of(Choice, motion_section(free).blocks)
+    assert isinstance(choice, Choice)
+    cards = choice.options[0][1][0]
+    assert isinstance(cards, Charts)
+    assert "share of peak [–]" in cards.charts[0].svg  # type: ignore[union-attr]
+    assert "limits none to none" in cards.charts[0].alternative
+    assert "nothing to keep away from" in _said(margin_section(free))
+    assert margin_figures(free) == ()

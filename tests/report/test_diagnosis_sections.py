@@ -1,0 +1,227 @@
+"""What a page says of a diagnosis: verdict, errors, evidence, the rest, and of older files."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from excite_cli.diagnosis.result import Diagnosis, EffectRecord, NamedEffect, Unexplained
+from excite_cli.effects.base import Value
+from excite_cli.report.chart import Chart
+from excite_cli.report.dependence_section import (
+    dependence_section,
+    in_plain_words,
+    quantity_in_words,
+)
+from excite_cli.report.diagnosis_found_section import found_section
+from excite_cli.report.diagnosis_sections import diagnosis_figures, diagnosis_sections
+from excite_cli.report.effect_chart import Cloud, law_line
+from excite_cli.report.effect_section import effect_section
+from excite_cli.report.page import (
+    Block,
+    Charts,
+    Choice,
+    Fold,
+    Page,
+    Section,
+    Table,
+    Text,
+    render,
+)
+from excite_cli.report.residual_section import residuals_in_time
+from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
+from tests.report.structure import Structure
+
+
+@pytest.fixture(scope="module")
+def plain() -> Diagnosis:
+    """As files of earlier versions hold it."""
+    return make_diagnosis()
+
+
+@pytest.fixture(scope="module")
+def diagnosis(plain: Diagnosis) -> Diagnosis:
+    traces, sealed = make_traces(plain.joint_names)
+    traces = replace(traces, runs=traces.runs[:1])
+    unexplained = (Unexplained("elbow", ("direction and q[elbow]",), 0.3),)
+    return replace(plain, traces=traces, sealed_traces=sealed, unexplained=unexplained)
+
+
+@pytest.fixture(scope="module")
+def every(diagnosis: Diagnosis) -> tuple[Section, ...]:
+    return diagnosis_sections(diagnosis)
+
+
+@pytest.fixture(scope="module")
+def sections(every: tuple[Section, ...]) -> dict[str, Section]:
+    return {each.anchor: each for each in every}
+
+
+def blocks_of(blocks: tuple[Block, ...]) -> Iterator[Block]:
+    """All blocks, those within others too."""
+    for block in blocks:
+        yield block
+        if isinstance(block, Charts):
+            yield from block.charts
+        elif isinstance(block, Fold):
+            yield from blocks_of(block.blocks)
+        elif isinstance(block, Choice):
+            for _, inner in block.options:
+                yield from blocks_of(inner)
+
+
+def charts_of(section: Section) -> list[Chart]:
+    return [block for block in blocks_of(section.blocks) if isinstance(block, Chart)]
+
+
+def small(diagnosis: Diagnosis, share: float, gain: float) -> Diagnosis:
+    """With a second effect of this size."""
+    spring = EffectRecord("spring", ("elbow",), {}, (1.0, 0.0))
+    value = {"stiffness": Value(1.0, 0.1, "N·m/rad")}
+    more = NamedEffect(spring, value, 1e-5, share, gain)
+    return replace(diagnosis, effects=(*diagnosis.effects, more, more))
+
+
+def test_all_parts_are_there_and_the_page_is_sound(
+    diagnosis: Diagnosis, every: tuple[Section, ...]
+) -> None:
+    page = Page("d", "", diagnosis_figures(diagnosis), every)
+    structure = Structure(render(page))
+    assert [each.anchor for each in page.sections] == [
+        "diagnosis-found", "diagnosis-errors", "diagnosis-time", "diagnosis-evidence",
+        "diagnosis-unexplained", "diagnosis-next", "diagnosis-suspects", "diagnosis-data",
+    ]  # fmt: skip
+    for words in (
+        "viscous friction",
+        "friction that bends over speed",
+        "time stamps jitter by 3 %",
+    ):
+        assert words in structure.text
+
+
+def test_every_chart_says_its_finding_in_figures_and_labels_its_axes(
+    sections: dict[str, Section],
+) -> None:
+    charts = [chart for section in sections.values() for chart in charts_of(section)]
+    assert len(charts) > 5
+    for chart in charts:
+        assert re.search(r"\d", chart.alternative), chart.title
+        if "explains [%]" not in chart.title:  # the map has joints and quantities
+            assert re.search(r"\[[^\]]+\]", chart.svg.replace("[CDATA[", "")), chart.title
+
+
+def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) -> None:
+    (chart,) = charts_of(sections["diagnosis-evidence"])
+    assert chart.title == "Viscous friction: elbow"
+    assert "2 ± 0.2 N·m·s/rad" in chart.caption
+    assert "cannot tell it from: friction that bends over speed on elbow" in chart.caption
+    assert "99.8%" in chart.alternative or "99.9%" in chart.alternative
+    assert "speed [rad/s]" in chart.svg
+
+
+def test_residuals_tell_sealed_from_training(sections: dict[str, Section]) -> None:
+    (choice,) = sections["diagnosis-time"].blocks
+    assert isinstance(choice, Choice)
+    labels = [label for label, _ in choice.options]
+    assert labels == ["run_3 (sealed: took no part in the fit)", "run_1"]
+    elbow = next(c for c in charts_of(sections["diagnosis-time"]) if c.title == "elbow")
+    assert "the declared model without the effects found" in elbow.alternative
+
+
+def test_sealed_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
+    traces, (sealed,) = make_traces(diagnosis.joint_names)
+    first = replace(traces.runs[0], run="only")
+    later = replace(sealed, run="only", t=sealed.t + 6.5)
+    (cards,) = residuals_in_time((later, first), diagnosis.joint_names[:2], ("N·m", "N"))
+    assert isinstance(cards, Charts)
+    assert len(cards.charts) == 2
+    assert all("var(--forbidden)" in chart.svg for chart in cards.charts)
+    assert "force [N]" in cards.charts[1].svg
+
+
+def test_what_depends_is_told_drawn_and_mapped(sections: dict[str, Section]) -> None:
+    section = sections["diagnosis-unexplained"]
+    told = [b.text for b in section.blocks if isinstance(b, Text)]
+    assert any("angle of elbow and direction (30.0% of it)" in text for text in told)
+    picture, table = charts_of(section)
+    assert "mean forwards" in picture.svg
+    assert ">30<" in table.svg.replace("\n", "")
+    assert "own angle and direction" in table.svg
+    assert ">time<" not in table.svg  # explains nothing
+
+
+def test_without_dependences_there_is_no_map(diagnosis: Diagnosis) -> None:
+    assert diagnosis.traces is not None
+    dependence = replace(
+        diagnosis.traces.dependence, shares=np.zeros_like(diagnosis.traces.dependence.shares)
+    )
+    calm = replace(
+        diagnosis, unexplained=(), traces=replace(diagnosis.traces, dependence=dependence)
+    )
+    section = dependence_section(calm)
+    assert charts_of(section) == []
+    texts = " ".join(block.text for block in section.blocks if isinstance(block, Text))
+    assert "behaves like noise" in texts
+    assert "No smooth function" in texts
+
+
+@pytest.mark.parametrize(("share", "gain", "folded"), [(1e-3, 0.05, True), (1e-3, 0.7, False)])
+def test_small_effects_are_folded_unless_they_matter(
+    diagnosis: Diagnosis, share: float, gain: float, folded: bool
+) -> None:
+    found = found_section(small(diagnosis, share, gain))
+    tables = [block for block in found.blocks if isinstance(block, Table)]
+    spring = next(t for t in tables if any(row[0] == "spring at the joint" for row in t.rows))
+    assert spring.folded == folded
+
+
+def test_nothing_found(diagnosis: Diagnosis) -> None:
+    nothing = replace(diagnosis, effects=())
+    assert "Nothing is missing" in found_section(nothing).lead
+    assert effect_section(nothing) is None
+
+
+def test_files_of_earlier_versions_get_sentences_and_names_are_escaped(plain: Diagnosis) -> None:
+    odd = replace(plain, sealed_run="<b>run</b>")
+    sections = {each.anchor: each for each in diagnosis_sections(odd)}
+    for anchor in ("diagnosis-time", "diagnosis-evidence"):
+        (text,) = sections[anchor].blocks
+        assert isinstance(text, Text)
+        assert "earlier version" in text.text
+    assert "<b>" not in render(Page("old", "", diagnosis_figures(odd), tuple(sections.values())))
+
+
+def test_joints_that_never_move_are_told_not_drawn(sections: dict[str, Section]) -> None:
+    section = sections["diagnosis-errors"]
+    assert [chart.title for chart in charts_of(section)] == ["RMS error of the torque, all samples"]
+    assert any("No joint moves" in b.text for b in section.blocks if isinstance(b, Text))
+
+
+@pytest.mark.parametrize(
+    ("symbol", "words"),
+    [
+        ("q[elbow]", "angle of elbow"),
+        ("history of load[a b]", "history of rigid-body torque of a b"),
+        ("direction and q[elbow]", "angle of elbow and direction"),
+        ("own direction and q", "own angle and direction"),
+        ("own load", "own rigid-body torque"),
+        ("time", "time"),
+    ],
+)
+def test_quantities_in_words(symbol: str, words: str) -> None:
+    assert quantity_in_words(symbol) == words
+    if not symbol.startswith("own"):
+        assert in_plain_words(f"a function of {symbol}") == f"a function of {words}"
+
+
+def test_a_law_that_jumps_is_drawn_as_a_step_and_a_line_is_not() -> None:
+    x = np.linspace(-1.0, 1.0, 400)
+    step = Cloud("speed [rad/s]", "N·m", x, np.sign(x), np.sign(x))
+    line = replace(step, law=x, partial=x)
+    assert np.isnan(law_line(step)[1]).sum() == 1
+    assert not np.isnan(law_line(line)[1]).any()
+    far = np.abs(x) > 0.4  # no samples about zero
+    gap = replace(line, x=x[far], law=x[far], partial=x[far])
+    assert not np.isnan(law_line(gap)[1]).any()

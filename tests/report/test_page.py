@@ -1,0 +1,160 @@
+"""A page is well-formed, complete in itself, readable without eyes, and trusts no name."""
+
+import base64
+import json
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+
+from excite_cli.errors import MissingExtraError
+from excite_cli.report.assembly import Source, page_of
+from excite_cli.report.chart import BLUE, VERMILION, Chart, draw_chart, time_axis
+from excite_cli.report.page import (
+    Charts,
+    Choice,
+    Fold,
+    KeyFigure,
+    Page,
+    Picture,
+    Section,
+    Table,
+    Text,
+    render,
+)
+from tests.report.case import Case
+from tests.report.structure import Structure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+EVIL = "<script>alert('$x_$')</script>\"&"
+PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJg"
+    "gg=="
+)
+
+
+def _chart(word: str = "torque") -> Chart:
+    def draw(figure: "Figure") -> None:
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        upper.plot([0.0, 1.0, 2.0], [0.0, 3.0, -1.0], color=BLUE, label=word)
+        lower.semilogy([0.0, 1.0, 2.0], [1.0, 10.0, 100.0], color=VERMILION, label="size")
+        lower.plot([0.5], [10.0], "o", label="_dot")
+        upper.set_ylabel(f"{word} [N·m]")
+        lower.set_ylabel("size [–]")
+        time_axis(lower, [0.0, 2.0])
+
+    return draw_chart(word, f"{word} rises and falls", draw, caption=word)
+
+
+def _page(word: str) -> Page:
+    chart = _chart(word)
+    picture = Picture(word, PIXEL, word, word)
+    blocks = (
+        Charts((picture, chart), word),
+        Choice(word, ((word, (chart,)), ("second", (Text(word),)))),
+        Table((word, "b"), ((word, "1"),), word, frozenset({1}), word, True),
+        Table(("a",), ((word,),), wordy=frozenset({0})),
+        Fold(word, (Text(word, "code"), Text(word, "bad"))),
+    )
+    section = Section("one", word, blocks, word)
+    return Page(word, word, (KeyFigure(word, word, word),), (section, Section("two", "B", ())))
+
+
+@pytest.fixture(scope="module")
+def report(case: Case) -> str:
+    problem, result = case
+    picture = Picture("arm", PIXEL, "an arm")
+    source = Source("smoke", "smoke.h5", result, problem, picture)
+    return render(page_of([source], lambda name, done: None))
+
+
+@pytest.fixture(scope="module", params=["made by hand", "report"])
+def page(request: pytest.FixtureRequest, report: str) -> str:
+    return report if request.param == "report" else render(_page("torque"))
+
+
+def test_tags_match_and_addresses_are_unique(page: str) -> None:
+    structure = Structure(page)
+    identifiers = [a["id"] for _, a in structure.elements if "id" in a]
+    assert len(identifiers) == len(set(identifiers))
+    referred = {a["href"][1:] for a in structure.all("a")}
+    referred |= {a["xlink:href"][1:] for a in structure.all("use")}
+    referred |= set(re.findall(r"url\(#([^)]*)\)", page))
+    referred |= {a["aria-labelledby"] for _, a in structure.elements if "aria-labelledby" in a}
+    assert referred <= set(identifiers)
+
+
+def test_nothing_is_loaded_from_elsewhere(page: str) -> None:
+    structure = Structure(page)
+    assert [tag for tag, _ in structure.elements if tag in ("link", "iframe", "object")] == []
+    for _, attributes in structure.elements:
+        for name in ("src", "href", "xlink:href", "srcset", "action"):
+            value = attributes.get(name, "")
+            assert not value or value.startswith(("#", "data:image/png;base64,"))
+    assert not re.search(r"@import|url\((?!#)", page)
+
+
+def test_every_drawing_is_told_in_words(page: str) -> None:
+    structure = Structure(page)
+    drawings = [a for a in structure.all("div") if a.get("role") == "img"]
+    assert len(drawings) == len(structure.all("svg")) > 0
+    assert all(len(a["aria-label"]) > 10 for a in drawings)
+    assert all(a["alt"] for a in structure.all("img"))
+
+
+def test_one_style_and_no_colour_of_its_own_in_drawings(page: str) -> None:
+    assert len(Structure(page).all("style")) == 1
+    for svg in re.findall(r"<svg.*?</svg>", page, re.DOTALL):
+        assert "#0a0" not in svg, "a stand-in colour was left"
+        assert "var(--" in svg
+
+
+def test_hostile_names_stay_names() -> None:
+    text = render(_page(EVIL))
+    structure = Structure(text)
+    assert len(structure.all("script")) == 1
+    assert "<script>alert" not in text
+    assert EVIL in "".join(structure.texts)
+    assert any(EVIL in a.get("aria-label", "") for a in structure.all("div"))
+
+
+def test_commands_between_backticks_are_code() -> None:
+    blocks = (Text("run `excite <check>` now"), Text("a ` alone"))
+    text = render(Page("t", "s", (), (Section("a", "A", blocks),)))
+    assert "run <code>excite &lt;check&gt;</code> now" in text
+    assert "a ` alone" in text
+
+
+def test_the_readout_knows_axes_and_lines() -> None:
+    chart = _chart()
+    upper, lower = json.loads(chart.readout)
+    assert [line[1] for line in upper["lines"]] == ["torque"]
+    assert [line[1] for line in lower["lines"]] == ["size"]
+    assert (upper["log"], lower["log"]) == (False, True)
+    assert upper["labels"] == ["time [s]", "torque [N·m]"]
+    assert upper["x"] == [0.0, 2.0]
+    assert upper["box"][1] < lower["box"][1]
+    left, top, width, height = upper["box"]
+    name = f'id="chart-prefix-{upper["lines"][0][0]}"'
+    path = re.search(r'\bd="([^"]*)"', chart.svg[chart.svg.index(name) :])
+    assert path is not None
+    points = [float(number) for number in re.findall(r"-?[\d.]+", path[1])]
+    low, high = upper["y"]
+    values = [low + (top + height - y) / height * (high - low) for y in points[1::2]]
+    assert values == pytest.approx([0.0, 3.0, -1.0], abs=0.02)
+    assert [(x - left) / width * 2.0 for x in points[::2]] == pytest.approx([0, 1, 2], abs=0.01)
+
+
+def test_without_jinja_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "jinja2", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'excite-cli\[plot\]'"):
+        render(Page("t", "s", (), ()))
+
+
+def test_equal_results_give_equal_pages(case: Case, report: str) -> None:
+    problem, result = case
+    picture = Picture("arm", PIXEL, "an arm")
+    source = Source("smoke", "smoke.h5", result, problem, picture)
+    assert render(page_of([source], lambda name, done: None)) == report

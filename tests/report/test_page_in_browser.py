@@ -1,0 +1,146 @@
+"""The page of a small campaign in a real browser: nothing fails, nothing overflows, all reacts.
+
+The browser is the one that EXCITE_BROWSER names, or the first of the usual names on the path.
+"""
+
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from excite_cli.report.assembly import Source, page_of
+from excite_cli.report.page import render
+from tests.report.case import Case
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+_OFFLINE = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
+_OVERFLOW = "document.documentElement.scrollWidth - innerWidth"
+
+
+def _browser() -> str | None:
+    named = os.environ.get("EXCITE_BROWSER")
+    return named or next((path for path in map(shutil.which, _NAMES) if path), None)
+
+
+@pytest.fixture(scope="module")
+def address(case: Case, tmp_path_factory: pytest.TempPathFactory) -> str:
+    problem, result = case
+    second = replace(result.motions[0], index=2)
+    two = replace(result, motions=(*result.motions, second))
+    source = Source("smoke", "smoke.h5", two, problem)
+    path: Path = tmp_path_factory.mktemp("page") / "smoke.html"
+    path.write_text(render(page_of([source], lambda name, done: None)), encoding="utf-8")
+    return path.as_uri()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    path = _browser()
+    if path is None:
+        pytest.skip(f"no browser: none of {', '.join(_NAMES)} is there, and no EXCITE_BROWSER")
+    with playwright.sync_playwright() as library:
+        started = library.chromium.launch(executable_path=path, args=list(_OFFLINE))
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def page(browser: Any, address: str) -> Iterator[Any]:
+    """The page, on a desk; whatever the browser complains of fails the test."""
+    complaints: list[str] = []
+    opened = browser.new_page(viewport={"width": 1280, "height": 900}, color_scheme="light")
+    opened.on("console", lambda message: complaints.append(message.text))
+    opened.on("pageerror", lambda error: complaints.append(str(error)))
+    opened.on("request", lambda r: complaints.append(r.url) if r.url != address else None)
+    opened.goto(address)
+    yield opened
+    opened.close()
+    assert complaints == []
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_nothing_is_wider_than_the_window(page: Any, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 850})
+    for part in page.query_selector_all("summary"):
+        if part.is_visible():
+            part.click()
+    assert page.evaluate(_OVERFLOW) <= 0
+
+
+def test_it_is_there_at_once(page: Any) -> None:
+    timing = "performance.getEntriesByType('navigation')[0]"
+    # Generous: a busy machine with one core. By itself it is a few tenths of a second.
+    assert page.evaluate(f"{timing}.loadEventEnd - {timing}.responseEnd") < 5000
+
+
+def test_every_chart_has_lines_and_axes_with_units(page: Any) -> None:
+    charts = page.evaluate(
+        """() => [...document.querySelectorAll(".chart")].map((chart) => ({
+             title: chart.querySelector("figcaption").textContent,
+             longest: Math.max(...[...chart.querySelectorAll("svg path")].map(
+               (path) => path.getAttribute("d").length)),
+             texts: [...chart.querySelectorAll("svg text")].map((text) => text.textContent),
+           }))"""
+    )
+    assert len(charts) == 2 + 2 * 5 + 2 * 5
+    for chart in charts:
+        assert chart["longest"] > 20, chart["title"]
+        labels = [text for text in chart["texts"] if text.endswith("]")]
+        assert len(labels) >= 2, chart["title"]
+        assert all("[" in label for label in labels)
+
+
+def test_one_motion_is_shown_and_another_can_be_chosen(page: Any) -> None:
+    assert page.locator(".choice").count() == 2
+    for choice in page.locator(".choice").all():
+        first, second = choice.locator(":scope > .option").all()
+        assert (first.is_visible(), second.is_visible()) == (True, False)
+        choice.locator("select").select_option(label="motion 2")
+        assert (first.is_visible(), second.is_visible()) == (False, True)
+
+
+def test_light_and_dark_change_paper_and_lines(page: Any) -> None:
+    colours = """() => [
+      getComputedStyle(document.body).backgroundColor,
+      getComputedStyle(document.querySelector("[id$=line-1] path")).stroke]"""
+    light = page.evaluate(colours)
+    page.click("#theme")
+    dark = page.evaluate(colours)
+    assert light[0] != dark[0]
+    assert light[1] != dark[1]
+    page.click("#theme")
+    assert page.evaluate(colours) == light
+
+
+def test_folds_open(page: Any) -> None:
+    fold = page.locator("details", has_text="The config, with all defaults")
+    assert not fold.locator("pre").is_visible()
+    fold.locator("summary").focus()
+    page.keyboard.press("Enter")
+    assert "smoke_arm.urdf" in fold.locator("pre").inner_text()
+
+
+def test_values_are_read_under_the_pointer(page: Any) -> None:
+    drawing = page.locator("[data-readout]:visible").nth(2)
+    drawing.scroll_into_view_if_needed()
+    box = drawing.bounding_box()
+    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.4 * box["height"])
+    words = page.locator(".readout:visible").inner_text()
+    assert words.startswith("time ")
+    assert " rad\n" in words
+    assert "speed" in words
+    page.mouse.move(0, 0)
+    assert page.locator(".readout:visible").count() == 0
+
+
+def test_on_paper_every_motion_is_printed_and_no_button(page: Any) -> None:
+    page.emulate_media(media="print")
+    assert all(option.is_visible() for option in page.locator(".option").all())
+    assert not page.locator("#theme").is_visible()
+    assert not page.locator("nav").is_visible()
