@@ -217,7 +217,10 @@ def few_ticks(axes: "Axes", across: int = 5, up: int = 4) -> None:
 
 def legend_below(figure: "Figure", columns: int = 3) -> None:
     """One legend for all axes, under them, where it covers nothing."""
-    figure.legend(loc="outside lower center", ncols=columns, handlelength=1.6, columnspacing=1.2)
+    if any(axes.get_legend_handles_labels()[0] for axes in figure.axes):
+        figure.legend(
+            loc="outside lower center", ncols=columns, handlelength=1.6, columnspacing=1.2
+        )
 
 
 def thinned(count: int, most: int) -> slice:

@@ -18,11 +18,13 @@ from excite_cli.robot.model import Array
 from tests.effects.motions import signals_at, signals_of, states
 from tests.robot.random_robots import random_robot
 
-PAGE = (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "effects.md").read_text(encoding="utf-8")
+OWN_EFFECT = (DOCS / "how-to" / "effect.md").read_text(encoding="utf-8")
 
 
 def _block(language: str) -> str:
-    found = re.search(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+    found = re.search(rf"```{language}\n(.*?)```", OWN_EFFECT, re.DOTALL)
     assert found is not None
     return found.group(1)
 
