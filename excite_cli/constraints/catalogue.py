@@ -29,7 +29,7 @@ from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Robot
 from excite_cli.robot.obstacle_pairs import choose_obstacle_pairs, ignored_pairs
 from excite_cli.robot.obstacles import build_obstacles
-from excite_cli.robot.pair_tables import mesh_tables
+from excite_cli.robot.pair_tables import mesh_tables, require_tabled
 from excite_cli.robot.states import States
 from excite_cli.robot.uncertainty import InertiaUncertainty
 
@@ -77,6 +77,7 @@ def _distances(spec: ConstraintsSpec, robot: Robot) -> list[Constraint]:
         pairs = choose_pairs(robot, capsules, own, bounded=bounded)
         if pairs.checked:
             found.append(SelfCollision(robot, capsules, pairs, own.margin))
+        require_tabled(robot, capsules, own.by_meshes)
         tables = mesh_tables(robot, capsules, pairs, own.ignore)
         if tables:
             found.append(MeshClearance(tables, min(KEPT, own.margin)))

@@ -11,8 +11,9 @@ from excite_cli.robot.enclosed_motion import EnclosedMotion
 from excite_cli.robot.model import Robot
 from excite_cli.robot.states import States
 
-# Distances beyond this many metres above the margin do not concern the optimiser.
-_NEAR = 0.1
+# Distances beyond this many metres above the margin do not concern the optimiser; less for a robot
+# of thin links (this many times their radius), so that a hand need not open as far as an arm.
+_NEAR, _LEAST_NEAR, _RADII = 0.1, 0.02, 2.5
 
 
 class SelfCollision(Constraint):
@@ -27,7 +28,8 @@ class SelfCollision(Constraint):
         self.capsules, self.pairs, self.margin = capsules, pairs, margin
         self._clearance = Clearance(robot, capsules, pairs)
         self.labels = tuple(f"{capsules[i].name} – {capsules[j].name}" for i, j in pairs.checked)
-        self.scale = np.full(len(self.labels), _NEAR)
+        usual = float(np.median([capsule.radius for capsule in capsules]))
+        self.scale = np.full(len(self.labels), np.clip(_RADII * usual, _LEAST_NEAR, _NEAR))
 
     def margins(self, states: States) -> Array:
         """Distance less the margin (T, m) [m]."""

@@ -34,6 +34,7 @@ class Problem:
 
     `extension` holds the effects whose columns stand beside the base regressor. With a
     `separation` a motion is sought that tells effects apart, and `extension` has the rivals too.
+    Relative paths of `spec` start from `folder`.
     """
 
     spec: Spec
@@ -49,6 +50,7 @@ class Problem:
     kinematics: BatchKinematics
     extension: Extension
     separation: Separation | None = None
+    folder: Path = Path()
 
     @property
     def variables(self) -> int:
@@ -140,6 +142,7 @@ def build_problem(
         constraint_basis=trajectory.basis(grid),
         kinematics=BatchKinematics(robot),
         extension=extension,
+        folder=(relative_to or Path()).resolve(),
     )
     return on_fine_grid(problem) if extension.fine else problem
 

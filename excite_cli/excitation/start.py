@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
-from excite_cli.constraints.base import Array
+from excite_cli.constraints.base import Array, Constraint
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.states import States
@@ -23,8 +23,16 @@ _SHARE_OF_ROOM = 2 / 3
 _SHRINK, _SMALLEST = 0.7, 1e-4
 _TRIES = 40
 # Columns whose residual is beyond this do not bind a posture.
-_FAR = 1.0
+_FAR, _WITHIN = 1.0, 4.0
 _TOLD = 8
+
+
+class NoClearPostureError(NoAdmissibleMotionError):
+    """No posture clear of all constraints was found; `posture` (n,) is the best of those tried."""
+
+    def __init__(self, message: str, posture: Array) -> None:
+        super().__init__(message)
+        self.posture = posture
 
 
 @dataclass(frozen=True)
@@ -89,8 +97,8 @@ def _unit_by_joint(task: MotionTask, x: Array) -> Array:
     return np.asarray((by_joint / length[:, None]).ravel())
 
 
-def clear_posture(task: MotionTask, seed: int) -> Start:
-    """A posture at which standing still keeps every residual clear.
+def clear_posture(task: MotionTask, seed: int, tries: int = _TRIES) -> Start:
+    """A posture at which standing still keeps every residual clear, sought from `tries` guesses.
 
     Raises
     ------
@@ -104,23 +112,42 @@ def clear_posture(task: MotionTask, seed: int) -> Start:
         return _standing_at(task, configured, True)
     rng = np.random.default_rng((seed, 7))
     best, best_clearance = configured, -np.inf
-    for attempt in range(_TRIES):
-        spread = attempt / (_TRIES - 1)
+    for attempt in range(tries):
+        spread = attempt / max(tries - 1, 1)
         guess = _blend(task, configured, rng, spread)
-        found = _pushed_clear(task, guess)
+        found = pushed_clear(task, guess)
         clearance = float(_standing(task, found).min())
         if clearance > _CLEAR_POSTURE:
             return _standing_at(task, found, False)
         if clearance > best_clearance:
             best, best_clearance = found, clearance
     values = task.values(_still(task, best))
-    raise NoAdmissibleMotionError(
+    raise NoClearPostureError(
         f"No admissible motion: no posture found that is clear of all constraints "
-        f"({_TRIES} tried from robot.posture). In the way: {blocking(task, values)}. At the best "
+        f"({tries} tried from robot.posture). In the way: {blocking(task, values)}. At the best "
         f"of them: {_all_broken(task, best)}. Give a clear robot.posture or loosen the constraint "
         "(pairs that always touch: constraints.self_collision.ignore, "
-        "constraints.surroundings.ignore)."
+        "constraints.surroundings.ignore).",
+        best,
     )
+
+
+def broken(task: MotionTask, posture: Array) -> list[tuple[Constraint, tuple[int, ...]]]:
+    """Constraints with the columns that standing at `posture` (n,) breaks."""
+    return unclear(task, posture, 0.0)
+
+
+def unclear(
+    task: MotionTask, posture: Array, room: float = _CLEAR_POSTURE
+) -> list[tuple[Constraint, tuple[int, ...]]]:
+    """Constraints with the columns whose residuals at `posture` (n,) leave no `room` to start."""
+    found = []
+    values = task.values(_still(task, posture))
+    for constraint, value in zip(task.problem.constraints, values, strict=True):
+        columns = np.flatnonzero(value[0] <= room).tolist()
+        if columns:
+            found.append((constraint, tuple(columns)))
+    return found
 
 
 def refuse_impossible(task: MotionTask, posture: Array, where: str) -> None:
@@ -178,11 +205,17 @@ def _standing(task: MotionTask, posture: Array) -> Array:
     return np.concatenate(parts) if parts else np.array([np.inf])
 
 
-def _pushed_clear(task: MotionTask, guess: Array) -> Array:
-    """Maximise s with every residual at least s, from `guess` (SLSQP, exact derivatives)."""
+def pushed_clear(task: MotionTask, guess: Array) -> Array:
+    """The posture (n,) with the largest smallest residual, sought from `guess` (n,).
+
+    Maximises s with every residual at least s (SLSQP, exact derivatives).
+    """
+
+    # What is farther off does not come into the way; it is seen to when all is judged.
+    within = _standing(task, guess) < _WITHIN
 
     def residuals(z: Array) -> Array:
-        return np.minimum(_standing(task, z[:-1]), _FAR) - z[-1]
+        return np.minimum(_standing(task, z[:-1])[within], _FAR) - z[-1]
 
     def jacobian(z: Array) -> Array:
         states, rows = _still(task, z[:-1]), []
@@ -191,7 +224,7 @@ def _pushed_clear(task: MotionTask, guess: Array) -> Array:
             by_q = task.residuals.rows(states, index, near).parts[0]
             part = np.zeros((value.shape[1], task.n)) if by_q is None else by_q
             rows.append(np.where(value[0][:, None] < _FAR, part, 0.0))
-        stacked = np.vstack(rows)
+        stacked = np.vstack(rows)[within]
         return np.hstack([stacked, -np.ones((len(stacked), 1))])
 
     limits = task.problem.robot.limits

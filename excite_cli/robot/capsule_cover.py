@@ -233,7 +233,13 @@ def _main_axes(points: Array) -> Array:
 @cache
 def _evenly_spread_points() -> Array:
     """Points (4000, 3) of the unit cube."""
-    # Imported here: it takes long, and only a first fit needs it.
-    from scipy.stats import qmc
-
-    return np.asarray(qmc.Halton(3, scramble=False).random(4000))
+    # Halton's sequence, as scipy.stats.qmc has it; that module takes seconds to import.
+    count = np.arange(4000)
+    columns = []
+    for base in (2, 3, 5):
+        left, share, column = count, 1.0 / base, np.zeros(len(count))
+        while left.any():
+            column += share * (left % base)
+            left, share = left // base, share / base
+        columns.append(column)
+    return np.stack(columns, axis=1)

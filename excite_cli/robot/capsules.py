@@ -40,16 +40,18 @@ def fit_capsules(
     joints = link_joints(robot)
     for link in given:
         _check_link(link, joints, f"constraints.self_collision.capsules.{link}")
-    for pair in spec.ignore:
-        for link in pair:
-            _check_link(link, link_names(robot), "constraints.self_collision.ignore")
+    for key, pairs in (("ignore", spec.ignore), ("by_meshes", spec.by_meshes)):
+        for pair in pairs:
+            for link in pair:
+                _check_link(link, link_names(robot), f"constraints.self_collision.{key}")
     by_hand = [
         Capsule(
             link, joints[link], np.array(one.start), np.array(one.end), one.radius, (link,), True
         )
         for link, one in given.items()
     ]
-    alone = {link for pair in spec.ignore for link in pair} | set(given) | set(apart)
+    told = {link for pair in (*spec.ignore, *spec.by_meshes) for link in pair}
+    alone = told | set(given) | set(apart)
     fitted = [c for c in _fitted(robot, alone & set(joints)) if c.links[0] not in given]
     if not fitted and not by_hand:
         raise RobotError(

@@ -27,6 +27,7 @@ _ALWAYS = 0.99  # share of the sample in contact
 _CONTACT_SAMPLES = 200
 ALWAYS = "always in contact"
 NEVER = "never near"
+BY_MESHES = "kept apart by their meshes, as configured"
 UNGUARDED = "unguarded: capsules always overlap"
 _CONTACT = 0.01  # [m] a wider margin does not make a contact; it may make the problem infeasible
 _ALLOWANCE = 0.05  # [m] beyond the margin that the nearest posture found must keep
@@ -109,6 +110,7 @@ class _Known:
         self._carried = carried_bodies(robot)
         self._neighbours = joined_links(robot)
         self._ignored = {frozenset(pair) for pair in spec.ignore}
+        self._by_meshes = {frozenset(pair) for pair in spec.by_meshes}
 
     def reason(self, first: Capsule, second: Capsule) -> str:
         between = int(np.abs(self._carried[first.joint] - self._carried[second.joint]).sum())
@@ -117,6 +119,8 @@ class _Known:
             return "same body"
         if links & self._ignored:
             return "ignored in the config"
+        if links & self._by_meshes:
+            return BY_MESHES
         if between == 1 and links & self._neighbours:
             return "adjacent"
         return ""

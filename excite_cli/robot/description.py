@@ -3,7 +3,8 @@
 `RobotDescription` proves that the file exists, is XML without a document type (no entity tricks),
 is of a sane size, and that every path it names stays inside the folders it may read: its own
 folder tree, the packages of `package_dirs`, and the example-robot-data package.
-Continuous joints become revolute ones without bounds, so that one coordinate is one velocity.
+Continuous joints become revolute ones without bounds, so that one coordinate is one velocity, and
+right angles that were rounded become exact.
 """
 
 import hashlib
@@ -19,6 +20,8 @@ EXAMPLE_PREFIX = "example-robot-data:"
 MAX_URDF_BYTES = 20_000_000
 UNBOUNDED = 1e9
 _HEAVIEST = 1e9
+# How far [rad] an angle is off a right one that was meant, and from where on that matters.
+_ROUNDED, _EXACT = 1e-4, 1e-8
 
 # The file meant by a short name where the package holds several of the same robot.
 _PREFERRED = {
@@ -115,7 +118,8 @@ def load_description(
     else:
         path = (root / urdf).resolve()
         if not path.is_file():
-            meant = f" Did you mean {EXAMPLE_PREFIX}{urdf}?" if urdf in example_robots() else ""
+            offered = [f"{EXAMPLE_PREFIX}{name}" for name in example_robots()]
+            meant = "" if "/" in urdf else nearest(f"{EXAMPLE_PREFIX}{urdf}", offered, 0.93)
             raise RobotError(
                 f"robot.urdf: there is no file {path}.{meant} Give a path relative to the YAML "
                 f"file, or {EXAMPLE_PREFIX}<name>."
@@ -203,7 +207,32 @@ def _check_inertias(path: Path, root: ElementTree.Element) -> None:
                 )
 
 
+def _square(root: ElementTree.Element) -> None:
+    """Right angles of joints' frames that were rounded (1.5708) become exact.
+
+    Tilted by some 4e-6 rad, an upright axis shows parameters through gravity that nobody can
+    measure, and condition numbers of a million come of them.
+    """
+    for origin in root.findall("joint/origin"):
+        words = origin.get("rpy", "").split()
+        try:
+            angles = [float(word) for word in words]
+        except ValueError:
+            continue
+        if not words:
+            continue
+        exact = [round(angle / (math.pi / 2)) * (math.pi / 2) for angle in angles]
+        origin.set(
+            "rpy",
+            " ".join(
+                repr(right) if _EXACT < abs(angle - right) < _ROUNDED else word
+                for word, angle, right in zip(words, angles, exact, strict=True)
+            ),
+        )
+
+
 def _without_continuous_joints(root: ElementTree.Element) -> str:
+    _square(root)
     for joint in root.findall("joint"):
         if joint.get("type") != "continuous":
             continue
@@ -216,8 +245,10 @@ def _without_continuous_joints(root: ElementTree.Element) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def check_mesh_paths(description: RobotDescription) -> None:
-    """Raise unless every collision mesh exists inside a folder that the URDF may read.
+def check_mesh_paths(description: RobotDescription, kind: str = "collision") -> None:
+    """Raise unless every mesh of the kind exists inside a folder that the URDF may read.
+
+    kind: `collision` or `visual`.
 
     Raises
     ------
@@ -225,15 +256,16 @@ def check_mesh_paths(description: RobotDescription) -> None:
         A mesh is missing, or its path leaves the URDF's folder and packages.
     """
     allowed = [Path(folder).resolve() for folder in description.package_dirs]
-    for mesh in ElementTree.fromstring(description.xml).findall("link/collision/geometry/mesh"):
+    or_drop = ", or drop constraints.self_collision" if kind == "collision" else ""
+    for mesh in ElementTree.fromstring(description.xml).findall(f"link/{kind}/geometry/mesh"):
         name = mesh.get("filename", "")
         candidates = _candidates(name, description, allowed)
         found = next((path for path in candidates if path.is_file()), None)
         if found is None:
             raise RobotError(
-                f"{description.path.name}: the collision mesh '{name}' was not found. Looked in "
+                f"{description.path.name}: the {kind} mesh '{name}' was not found. Looked in "
                 f"{', '.join(str(folder) for folder in allowed)}. Add the folder that holds the "
-                "package to robot.package_dirs, or drop constraints.self_collision."
+                f"package to robot.package_dirs{or_drop}."
             )
         if not any(found.resolve().is_relative_to(folder) for folder in allowed):
             raise RobotError(

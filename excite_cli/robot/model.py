@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 # Where a robot has no bound of its own, samples are drawn from these.
 _TURN, _FASTEST = np.pi, 10.0
+_LINK = " (link)"
 
 
 @dataclass(frozen=True)
@@ -146,8 +147,13 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
     if spec.payload is not None:
         add_payload(full, payload_on(full, spec.payload))
     names = [str(name) for name in full.names[1:] if str(name) != "root_joint"]
-    _check_types(full, names, description)
+    if spec.joints == "all":
+        _check_types(full, names, description)
     chosen = _chosen(spec, names, description.mimicking)
+    _check_types(full, chosen, description)
+    # Joints of the base that slide or float stand still at neutral: they have no single value.
+    others = [name for name in names if not _is_single(full, name)]
+    names = [name for name in names if name not in others]
     limits_full = {name: _limits_of(full, name, spec.limits.get(name)) for name in names}
     _check_limits(chosen, limits_full)
     posture = _posture(spec, names, chosen, limits_full)
@@ -157,8 +163,8 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
     if spec.base == "floating":
         rotation = pin.rpy.rpyToMatrix(*spec.base_orientation)
         reference[3:7] = pin.Quaternion(rotation).coeffs()
-    locked = [full.getJointId(name) for name in names if name not in chosen]
-    model = pin.buildReducedModel(full, locked, reference) if locked else full
+    locked = [full.getJointId(name) for name in [*others, *names] if name not in chosen]
+    model = _reduced(full, locked, reference) if locked else full
     model.gravity.linear = np.array(spec.gravity)
     moved_names = tuple(n for n in map(str, model.names[1:]) if n != "root_joint")
     floating = spec.base == "floating"
@@ -189,6 +195,22 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
         locked={name: posture[name] for name in names if name not in chosen},
         payload=None if spec.payload is None else payload_on(model, spec.payload),
     )
+
+
+def _reduced(full: pin.Model, locked: list[int], reference: Array) -> pin.Model:
+    """The model with joints locked at `reference`.
+
+    Pinocchio finds a joint's frame by its name, which a link may have too: such links have another
+    name meanwhile.
+    """
+    joints = {str(name) for name in full.names}
+    for frame in full.frames:
+        if frame.type == pin.FrameType.BODY and str(frame.name) in joints:
+            frame.name = f"{frame.name}{_LINK}"
+    model = pin.buildReducedModel(full, locked, reference)
+    for frame in model.frames:
+        frame.name = str(frame.name).removesuffix(_LINK)
+    return model
 
 
 def links_by_joint(robot: Robot) -> dict[str, list[str]]:
@@ -233,12 +255,19 @@ def _turn_base(model: pin.Model, rotation: Array) -> None:
 
 def _check_types(model: pin.Model, names: list[str], description: RobotDescription) -> None:
     for name in names:
-        joint = model.joints[model.getJointId(name)]
-        if joint.nv != 1 or joint.nq != 1:
+        if not _is_single(model, name):
+            kind = model.joints[model.getJointId(name)].shortname()
             raise RobotError(
-                f"{description.path.name}: joint '{name}' is of type {joint.shortname()}; only "
-                "revolute, continuous, prismatic and fixed joints can be used."
+                f"{description.path.name}: joint '{name}' is of type {kind}; only revolute, "
+                "continuous, prismatic and fixed joints can be used. To keep it still, name the "
+                "joints to move under robot.joints."
             )
+
+
+def _is_single(model: pin.Model, name: str) -> bool:
+    """Whether a joint has one coordinate and one velocity."""
+    joint = model.joints[model.getJointId(name)]
+    return bool(joint.nv == 1 and joint.nq == 1)
 
 
 def _chosen(spec: RobotSpec, names: list[str], mimicking: dict[str, str]) -> list[str]:

@@ -9,7 +9,7 @@ so that the gradient leads out. Distances are cut off at `FAR`.
 """
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.errors import ConfigError
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.capsule_cache import capsule_key
 from excite_cli.robot.collision_pairs import CollisionPairs
 from excite_cli.robot.hull_bounds import hull_bounds
 from excite_cli.robot.link_meshes import LinkMesh, Poses, link_meshes
 from excite_cli.robot.link_shapes import collision_model
-from excite_cli.robot.mesh_pairs import PairMeshes, movable_pairs
+from excite_cli.robot.mesh_pairs import PairMeshes, joined_links, movable_pairs
 from excite_cli.robot.model import Robot
 from excite_cli.robot.pair_distances import carried_bodies
 from excite_cli.robot.table_cache import store_arrays, stored_arrays
@@ -36,7 +37,7 @@ _STEP, _MOST = 0.03, 97  # [rad or m] between nodes; nodes of one joint
 _BEYOND = 2  # nodes beyond the limits, where an optimiser may stray
 _LEAST_SLOPE = 0.02  # [m/rad]
 _TRIALS = 400
-_VERSION = 2  # raise when the tables change
+_VERSION = 3  # raise when the tables change
 _COARSE = 4  # nodes from one to the next of a first look,
 _DOUBT = 0.012  # [m] and what a distance may fall by between them
 
@@ -106,6 +107,9 @@ class PairTable:
         return one, two
 
 
+Tables = dict[tuple[str, str], PairTable | None]
+
+
 def mesh_tables(
     robot: Robot,
     capsules: tuple[Capsule, ...],
@@ -119,49 +123,112 @@ def mesh_tables(
     capsule is given by hand, and pairs that are nearer than `kept` at the posture already (their
     meshes cannot be told apart from contact there).
     """
-    key = _key(robot, capsules, pairs, ignore, kept)
-    stored = stored_arrays(key)
-    if stored is not None:
-        return tuple(_restored(stored))
+    key = _key(robot, kept)
+    asked = _asked(key, robot, capsules, pairs, ignore)
+    last = stored_arrays(asked)
+    if last is not None:
+        return tuple(table for table in _known(last).values() if table is not None)
+    known = _known(stored_arrays(key))
     meshes = link_meshes(robot)
     guarded = _guarded(capsules, pairs)
     by_hand = {link for capsule in capsules if capsule.by_hand for link in capsule.links}
     carried = carried_bodies(robot)
-    found = []
+    found, computed = [], False
     for i, j in movable_pairs(robot, meshes, ignore):
         both = (meshes[i], meshes[j])
         names = {both[0].link, both[1].link}
         joints = np.flatnonzero(carried[both[0].joint] != carried[both[1].joint])
         if len(joints) > 2 or frozenset(names) in guarded or names & by_hand:
             continue
-        table = _table(robot, both, joints, kept)
+        if _distances(robot, both, PairMeshes(*both), robot.posture[None])[0] <= kept:
+            continue
+        pair = (both[0].link, both[1].link)
+        if pair not in known:
+            known[pair], computed = _table(robot, both, joints, kept), True
+        table = known[pair]
         if table is not None:
             found.append(table)
-    store_arrays(key, _as_arrays(found))
+    if computed:
+        store_arrays(key, _as_arrays(known))
+    store_arrays(asked, _as_arrays({(table.first, table.second): table for table in found}))
     return tuple(found)
 
 
-def _key(
+def require_tabled(
     robot: Robot,
     capsules: tuple[Capsule, ...],
-    pairs: CollisionPairs,
-    ignore: tuple[tuple[str, str], ...],
-    kept: float,
-) -> str:
-    """Hash of all that decides the tables."""
+    pairs: tuple[tuple[str, str], ...],
+    kept: float = 0.002,
+) -> None:
+    """See that `mesh_tables` guards pairs of links that are to be kept apart by their meshes.
+
+    Raises
+    ------
+    ConfigError
+        A pair has no meshes or a capsule given by hand, is joined directly or more than two joints
+        apart, or nearer than `kept` [m] at the posture, so that no table can tell it from contact.
+    """
+    if not pairs:
+        return
+    meshes = {mesh.link: mesh for mesh in link_meshes(robot)}
+    by_hand = {link for capsule in capsules if capsule.by_hand for link in capsule.links}
+    carried = carried_bodies(robot)
+    for pair in pairs:
+        where = f"constraints.self_collision.by_meshes: {pair[0]} – {pair[1]}"
+        if not set(pair) <= set(meshes) or set(pair) & by_hand:
+            raise ConfigError(
+                f"{where}: both links need collision geometry, and no capsule given by hand."
+            )
+        if frozenset(pair) in joined_links(robot):
+            raise ConfigError(f"{where}: a joint joins them, so they are not kept apart at all.")
+        one, two = meshes[pair[0]], meshes[pair[1]]
+        joints = int((carried[one.joint] != carried[two.joint]).sum())
+        if joints == 0:  # they stand still towards each other
+            continue
+        if joints > 2 or robot.n < 2:
+            raise ConfigError(
+                f"{where}: {joints} moved joints are between them; tables of meshes are for one or "
+                "two. Leave the pair out, and their capsules are kept apart."
+            )
+        both = (one, two)
+        if _distances(robot, both, PairMeshes(*both), robot.posture[None])[0] <= kept:
+            raise ConfigError(
+                f"{where}: their meshes are nearer than {kept:g} m at robot.posture. Give a "
+                "posture at which they are apart."
+            )
+
+
+def _key(robot: Robot, kept: float) -> str:
+    """Hash of all that decides the table of any pair; the posture of the others does not."""
     geometry = capsule_key(robot, collision_model(robot), ())
-    given = [(capsule.name, capsule.links, capsule.by_hand) for capsule in capsules]
-    digest = hashlib.sha256(
-        f"{_VERSION}|{geometry}|{robot.fingerprint()}|{given}|{pairs}|{ignore}|{kept}".encode()
-    )
-    for part in (robot.posture, *robot.limits.ranges()):
+    digest = hashlib.sha256(f"{_VERSION}|{geometry}|{robot.fingerprint()}|{kept}".encode())
+    for part in robot.limits.ranges():
         digest.update(part.tobytes())
     return digest.hexdigest()
 
 
-def _as_arrays(tables: list[PairTable]) -> dict[str, Array]:
-    found: dict[str, Array] = {"names": np.array([f"{t.first}|{t.second}" for t in tables])}
-    for k, table in enumerate(tables):
+def _asked(
+    key: str,
+    robot: Robot,
+    capsules: tuple[Capsule, ...],
+    pairs: CollisionPairs,
+    ignore: tuple[tuple[str, str], ...],
+) -> str:
+    """Hash of all that decides which pairs have a table: what capsules guard, and the posture."""
+    given = [(capsule.name, capsule.links, capsule.by_hand) for capsule in capsules]
+    digest = hashlib.sha256(f"{key}|{given}|{pairs}|{ignore}".encode())
+    digest.update(robot.posture.tobytes())
+    return digest.hexdigest()
+
+
+def _as_arrays(tables: Mapping[tuple[str, str], PairTable | None]) -> dict[str, Array]:
+    found: dict[str, Array] = {
+        "names": np.array([f"{first}|{second}" for first, second in tables]),
+        "guarded": np.array([table is not None for table in tables.values()]),
+    }
+    for k, table in enumerate(tables.values()):
+        if table is None:
+            continue
         found[f"values_{k}"] = table.values
         found[f"one_{k}"], found[f"two_{k}"] = table.grids
         found[f"facts_{k}"] = np.array(
@@ -170,22 +237,28 @@ def _as_arrays(tables: list[PairTable]) -> dict[str, Array]:
     return found
 
 
-def _restored(arrays: dict[str, Array]) -> Iterator[PairTable]:
+def _known(arrays: dict[str, Array] | None) -> Tables:
+    """Pairs of links that were looked at, with their tables; None: nothing to be guarded."""
+    tables: Tables = {}
+    if arrays is None:
+        return tables
     for k, names in enumerate(arrays["names"].tolist()):
         first, second = str(names).split("|")
+        if not arrays["guarded"][k]:
+            tables[first, second] = None
+            continue
         one, two, error, touching, *turning = arrays[f"facts_{k}"].tolist()
-        grids = (arrays[f"one_{k}"], arrays[f"two_{k}"])
-        values = arrays[f"values_{k}"]
-        yield PairTable(
+        tables[first, second] = PairTable(
             first,
             second,
             (int(one), int(two)),
-            grids,
-            values,
+            (arrays[f"one_{k}"], arrays[f"two_{k}"]),
+            arrays[f"values_{k}"],
             error,
             touching,
             (bool(turning[0]), bool(turning[1])),
         )
+    return tables
 
 
 def _guarded(capsules: tuple[Capsule, ...], pairs: CollisionPairs) -> set[frozenset[str]]:
@@ -217,8 +290,6 @@ def _table(
     from scipy.ndimage import distance_transform_edt  # tables are stored
 
     meshes = PairMeshes(*both)
-    if _distances(robot, both, meshes, robot.posture[None])[0] <= kept:
-        return None
     lower, upper = robot.limits.ranges()
     alone = len(joints) == 1
     if alone and robot.n == 1:
@@ -304,5 +375,6 @@ def _distances(
     values = np.full(len(poses), far)
     bounds = hull_bounds(poses, both, np.arange(len(poses)), values)
     for t in np.flatnonzero(bounds <= far).tolist():
-        values[t] = meshes.distance(poses, t, below=far)
+        # Whether meshes touch is known much sooner than that their distance is 0.
+        values[t] = 0.0 if meshes.touch(poses, t) else meshes.distance(poses, t, below=far)
     return values

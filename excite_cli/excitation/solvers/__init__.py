@@ -1,0 +1,1 @@
+"""Ways to the best motion: feasible interior point, SQP, SLSQP."""

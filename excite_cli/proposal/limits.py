@@ -1,0 +1,131 @@
+"""Limits that a plan can work with, where the URDF has none or placeholders.
+
+A figure is taken for a placeholder where no real joint has it: speeds of 0 or beyond 60 rad/s,
+torques of 0 or from 1000 N·m on, ranges that are empty or beyond two turns either way.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from excite_cli.robot.urdf_joints import UrdfJoint
+
+_FASTEST, _FASTEST_SLIDE = 60.0, 10.0
+_STRONGEST, _STRONGEST_SLIDE = 1000.0, 20_000.0
+_TWO_TURNS = 4 * math.pi + 0.1
+_LONGEST = 10.0
+ASSUMED_TURN, ASSUMED_SLIDE = 3.1, 0.1
+ASSUMED_SPEED, ASSUMED_SLIDE_SPEED = 3.1, 0.2
+# A joint reaches its top speed in this time, and accelerates no harder than this.
+_TO_TOP_SPEED = 0.2
+MOST_ACCELERATION, _MOST_SLIDE = 10.0, 2.0
+_SHORTEST = 1e-3
+
+
+@dataclass(frozen=True)
+class JointPlan:
+    """What one joint is to keep, and what of it was assumed.
+
+    lower, upper [rad or m], velocity, acceleration, effort (nan: not bounded) with a sentence for
+    each figure that is not the URDF's, by the name of the key in `robot.limits`.
+    """
+
+    name: str
+    sliding: bool
+    lower: float
+    upper: float
+    velocity: float
+    acceleration: float
+    effort: float
+    notes: dict[str, str]
+
+    @property
+    def width(self) -> float:
+        """Range [rad or m]."""
+        return self.upper - self.lower
+
+
+def plan_limits(joints: Iterable[UrdfJoint]) -> tuple[JointPlan, ...]:
+    """Limits for every joint, those of the URDF where they are sensible."""
+    joints = tuple(joints)
+    return tuple(_plan(joint, _twin(joint, joints)) for joint in joints)
+
+
+def _plan(joint: UrdfJoint, twin: UrdfJoint | None) -> JointPlan:
+    notes: dict[str, str] = {}
+    unit = "m" if joint.sliding else "rad"
+    lower, upper = _position(joint, unit, notes)
+    velocity = joint.velocity
+    if not _speed_is_real(joint):
+        given = _as_given(velocity, f"{unit}/s")
+        if twin is not None and _speed_is_real(twin):
+            velocity = twin.velocity
+            notes["velocity"] = f"the URDF gives {given}; {velocity:g} {unit}/s as {twin.name}"
+        else:
+            velocity = ASSUMED_SLIDE_SPEED if joint.sliding else ASSUMED_SPEED
+            notes["velocity"] = f"the URDF gives {given}; {velocity:g} {unit}/s assumed"
+    most = _MOST_SLIDE if joint.sliding else MOST_ACCELERATION
+    effort = joint.effort
+    if not _effort_is_real(joint):
+        force = "N" if joint.sliding else "N·m"
+        given = _as_given(effort, force)
+        if twin is not None and _effort_is_real(twin):
+            effort = twin.effort
+            notes["effort"] = f"the URDF gives {given}; {effort:g} {force} as {twin.name}"
+        else:
+            effort = math.nan
+    return JointPlan(
+        joint.name,
+        joint.sliding,
+        lower,
+        upper,
+        velocity,
+        min(most, rounded(velocity / _TO_TOP_SPEED)),
+        effort,
+        notes,
+    )
+
+
+def _position(joint: UrdfJoint, unit: str, notes: dict[str, str]) -> tuple[float, float]:
+    lower, upper = joint.lower, joint.upper
+    longest = _LONGEST if joint.sliding else _TWO_TURNS
+    if math.isfinite(lower) and math.isfinite(upper) and _SHORTEST < upper - lower <= longest:
+        return lower, upper
+    reach = ASSUMED_SLIDE if joint.sliding else ASSUMED_TURN
+    if not (math.isfinite(lower) or math.isfinite(upper)):
+        given = "no bounds"
+    elif upper - lower <= _SHORTEST:
+        given = f"the empty range [{lower:g}, {upper:g}]"
+    else:
+        given = f"[{lower:g}, {upper:g}] {unit}"
+    notes["position"] = f"the URDF gives {given}; ±{reach:g} {unit} assumed"
+    low = max(lower, -reach) if lower < 0 < upper else -reach
+    high = min(upper, reach) if lower < 0 < upper else reach
+    return low, high
+
+
+def _speed_is_real(joint: UrdfJoint) -> bool:
+    return 1e-3 < joint.velocity <= (_FASTEST_SLIDE if joint.sliding else _FASTEST)
+
+
+def _effort_is_real(joint: UrdfJoint) -> bool:
+    return 1e-3 < joint.effort < (_STRONGEST_SLIDE if joint.sliding else _STRONGEST)
+
+
+def _twin(joint: UrdfJoint, joints: tuple[UrdfJoint, ...]) -> UrdfJoint | None:
+    """The same joint of the other side, if the names tell."""
+    names = {other.name: other for other in joints}
+    for one, other in (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT")):
+        for a, b in ((one, other), (other, one)):
+            if a in joint.name:
+                return names.get(joint.name.replace(a, b))
+    return None
+
+
+def _as_given(value: float, unit: str) -> str:
+    return "none" if math.isnan(value) else f"{value:g} {unit}"
+
+
+def rounded(value: float, digits: int = 2) -> float:
+    """`value` to some significant digits."""
+    return float(f"{value:.{digits}g}")

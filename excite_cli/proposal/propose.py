@@ -1,0 +1,241 @@
+"""A problem that works for a robot of which nothing but the URDF is known."""
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from excite_cli.config.commented_yaml import commented_yaml
+from excite_cli.config.load import parse_spec
+from excite_cli.errors import RobotError
+from excite_cli.proposal.joints import Choice, choose_joints
+from excite_cli.proposal.limits import MOST_ACCELERATION, JointPlan, plan_limits
+from excite_cli.proposal.pace import Pace, choose_pace
+from excite_cli.proposal.posture import FirstPosture, first_posture
+from excite_cli.proposal.settle import Comments, Settled, Tree, settle
+from excite_cli.robot.description import (
+    RobotDescription,
+    check_mesh_paths,
+    load_description,
+)
+from excite_cli.robot.package_search import package_folders
+from excite_cli.robot.reference_postures import reference_posture
+from excite_cli.robot.urdf_joints import UrdfSurvey, survey
+
+_TORQUE_SHARE = 0.8
+_MARGIN = 0.01
+_FEW, _MANY = 10, 20
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked for.
+
+    urdf: as robot.urdf says it; folder: that of the config, from which paths start; joints: to
+    move, empty for a choice of ours.
+    """
+
+    urdf: str
+    folder: Path
+    joints: tuple[str, ...] = ()
+    base: Literal["fixed", "floating"] = "fixed"
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A config as text, and in words what was chosen and why.
+
+    `joints` are the moved ones, `left_out` the others by reason, `notes` what was assumed.
+    """
+
+    text: str
+    joints: tuple[str, ...]
+    left_out: dict[str, tuple[str, ...]]
+    notes: tuple[str, ...]
+    settled: Settled
+
+
+def propose(request: Request) -> Proposal:
+    """Choose joints, limits, posture and pace for a robot, and see that it has a clear posture.
+
+    Raises
+    ------
+    RobotError
+        The robot lacks what a plan needs; the message names it.
+    ConfigError
+        A joint that is asked for is unknown or cannot be moved.
+    NoAdmissibleMotionError
+        No posture of the robot is clear of its limits.
+    """
+    description = load_description(request.urdf, (), request.folder)
+    packages = package_folders(description)
+    dirs = tuple(_written(folder, request.folder) for folder in dict.fromkeys(packages.values()))
+    if dirs:
+        description = load_description(request.urdf, dirs, request.folder)
+    source = description.path.name
+    facts = survey(description)
+    _require_inertias(facts, source)
+    choice = choose_joints(facts.joints, source, request.joints)
+    joints = plan_limits(choice.chosen)
+    if facts.has_shapes:
+        check_mesh_paths(description)
+    notes = [f"not moved, {words}" for words in choice.in_words()]
+    for name, folder in packages.items():
+        notes.append(f"meshes of {name} are taken from {folder}")
+    posture = first_posture(
+        joints, reference_posture(description, tuple(joint.name for joint in joints))
+    )
+    pace = choose_pace(joints)
+    tree, comments = _draft(request, dirs, facts, choice, joints, posture, pace)
+    settled = settle(tree, comments, request.folder)
+    if not facts.has_shapes:
+        notes.append(f"{source} has no collision geometry: self-collision is not checked")
+    notes.append(f"posture: {settled.comments['robot', 'posture']}")
+    notes.append(f"motion: {settled.comments['trajectory',]}")
+    still = [joint.name for joint in joints if joint.name not in settled.tree["robot"]["joints"]]
+    if still:
+        notes.append(
+            f"not moved, what they carry is too near other links to swing: {', '.join(still)}"
+        )
+    notes += [
+        f"{path[2]}: {words}"
+        for path, words in settled.comments.items()
+        if path[:2] == ("robot", "limits") and len(path) == 4 and path[3] != "acceleration"
+    ]
+    notes += [
+        f"{path[2]}: {words}"
+        for path, words in settled.comments.items()
+        if path[:2] == ("constraints", "self_collision") and path[2] in ("by_meshes", "ignore")
+    ]
+    text = commented_yaml(settled.tree, settled.comments, _header(request, description))
+    parse_spec(text, "the proposed config")
+    return Proposal(text, settled.problem.robot.joint_names, choice.left_out, tuple(notes), settled)
+
+
+def _draft(
+    request: Request,
+    dirs: tuple[str, ...],
+    facts: UrdfSurvey,
+    choice: Choice,
+    joints: tuple[JointPlan, ...],
+    posture: FirstPosture,
+    pace: Pace,
+) -> tuple[Tree, Comments]:
+    """The config before its posture is known to be clear."""
+    comments: Comments = {}
+    robot: Tree = {"urdf": request.urdf}
+    if dirs:
+        robot["package_dirs"] = list(dirs)
+        comments["robot", "package_dirs"] = "hold the meshes that the URDF names"
+    robot["base"] = request.base
+    if request.base == "floating":
+        robot["rows"] = ["base", "joints"]
+        comments["robot", "rows"] = "the wrench at the base is measured, and all joint torques"
+    else:
+        comments["robot", "base"] = (
+            "bolted down, on a stand or on a hoist; floating adds the wrench at the base"
+        )
+    robot["joints"] = [joint.name for joint in joints]
+    if choice.left_out:
+        left = "; ".join(f"not moved, {words}" for words in choice.in_words())
+        comments["robot", "joints"] = left
+    robot["posture"] = {**_inside(posture.others, facts), **posture.moved}
+    comments["robot", "posture"] = posture.words
+    limits = _limits(joints, comments)
+    if limits:
+        robot["limits"] = limits
+    constraints: Tree = {"joint_limits": {"acceleration": MOST_ACCELERATION}}
+    comments["constraints", "joint_limits", "acceleration"] = (
+        "[rad/s²] no URDF gives it; raise it if the robot can do more"
+    )
+    if any(not math.isnan(joint.effort) for joint in joints):
+        constraints["torque"] = {"scale": _TORQUE_SHARE}
+        comments["constraints", "torque"] = "share of the effort limits, with the URDF's inertias"
+    if facts.has_shapes:
+        constraints["self_collision"] = {"capsules": "auto", "margin": _MARGIN}
+        comments["constraints", "self_collision", "margin"] = "[m] between capsules"
+    comments["constraints",] = "add surroundings: {floor: 0.0} and more; see docs/configuration.md"
+    tree: Tree = {
+        "robot": robot,
+        "trajectory": {
+            "family": "fourier",
+            "harmonics": pace.harmonics,
+            "base_frequency": round(pace.base_frequency, 6),
+        },
+        "sampling": {"constraints": {"samples": pace.constraint_samples}},
+        "constraints": constraints,
+        "optimizer": _effort(len(joints)),
+        "sequence": {"motions": 1},
+        "seed": 1,
+    }
+    why = (
+        "enough for every joint to use its range"
+        if pace.slowest is None
+        else f"so that {pace.slowest}, the slowest joint, can use its range"
+    )
+    comments["trajectory",] = f"{pace.duration:g} s, {why}"
+    comments["optimizer",] = (
+        "about a minute at most; more iterations and restarts: 3 find better motions"
+    )
+    comments["sequence",] = "each further motion is planned on top of the earlier ones"
+    return tree, comments
+
+
+def _limits(joints: tuple[JointPlan, ...], comments: Comments) -> Tree:
+    """Limits of the joints that differ from the URDF's, with comments."""
+    limits: Tree = {}
+    for joint in joints:
+        own: Tree = {}
+        if "position" in joint.notes:
+            own["position"] = [joint.lower, joint.upper]
+        if "velocity" in joint.notes:
+            own["velocity"] = joint.velocity
+        if joint.acceleration < MOST_ACCELERATION:
+            own["acceleration"] = joint.acceleration
+        if "effort" in joint.notes:
+            own["effort"] = joint.effort
+        if own:
+            limits[joint.name] = own
+        for key, words in joint.notes.items():
+            comments["robot", "limits", joint.name, key] = words
+    return limits
+
+
+def _inside(others: dict[str, float], facts: UrdfSurvey) -> dict[str, float]:
+    """Values of joints that stay where they are, as far as the URDF allows them."""
+    own = {joint.name: joint for joint in facts.joints if joint.mimics is None}
+    return {
+        name: value
+        for name, value in others.items()
+        if name in own and own[name].lower <= value <= own[name].upper
+    }
+
+
+def _effort(joints: int) -> Tree:
+    """How long to search: about a minute for the largest robots."""
+    iterations = 200 if joints <= _FEW else 150 if joints <= _MANY else 120
+    return {"max_iterations": iterations, "max_seconds": 60.0}
+
+
+def _require_inertias(facts: UrdfSurvey, source: str) -> None:
+    if facts.inertial_links == 0:
+        raise RobotError(
+            f"{source} has no <inertial> at all, so there are no inertial parameters to plan for: "
+            "use a URDF with the masses of its links."
+        )
+    if facts.mass <= 0:
+        raise RobotError(f"{source} has no mass: every <mass> is 0. Give the links their masses.")
+
+
+def _written(folder: Path, start: Path) -> str:
+    """A path as the config says it: relative where it is near."""
+    relative = os.path.relpath(folder, start)
+    return str(folder) if relative.count("..") > 3 else relative
+
+
+def _header(request: Request, description: RobotDescription) -> str:
+    return (
+        f"{description.name}, proposed by `excite init`. Everything may be changed; units are rad, "
+        "s, N·m, kg, m.\nPlan:  excite optimize THIS_FILE -o motions.h5"
+    )

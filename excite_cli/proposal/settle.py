@@ -1,0 +1,234 @@
+"""Settling a proposed problem: a clear posture, and what must yield so that there is one.
+
+The optimiser's own search is asked for a posture. Where it finds none, what stands in the way at
+the best posture yields: torque limits that do not hold the robot up, the distance kept between
+capsules, and capsules of neighbours, whose meshes are kept apart instead. Links whose meshes touch
+where the robot stands are told and left out, as the check of the meshes leaves them out.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.config.load import parsed_spec
+from excite_cli.constraints.joint_torque import JointTorque
+from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.errors import NoAdmissibleMotionError
+from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.start import (
+    NoClearPostureError,
+    Start,
+    broken,
+    clear_posture,
+    pushed_clear,
+    unclear,
+)
+from excite_cli.excitation.task import MotionTask
+from excite_cli.robot.collision_pairs import UNGUARDED
+from excite_cli.robot.mesh_distances import MeshDistances
+from excite_cli.robot.mesh_pairs import joined_links
+from excite_cli.robot.pair_distances import carried_bodies
+
+Array = NDArray[np.float64]
+Tree = dict[str, Any]
+Comments = dict[tuple[str, ...], str]
+
+_MARGIN, _LEAST_MARGIN = 0.002, 0.0005
+_UNBOUNDED_EFFORT = 1e6
+# Meshes nearer than this [m] cannot be told from contact by a table.
+_TABLED = 0.002
+_SELDOM_APART = 0.5
+_ROUNDS = 10
+_FEW_TRIES, _MANY_TRIES = 6, 40
+_DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A problem that has a clear posture: its tree, with comments, and what it was built of."""
+
+    tree: Tree
+    comments: Comments
+    problem: Problem
+    start: Start
+
+
+def settle(tree: Tree, comments: Comments, folder: Path) -> Settled:
+    """Find a clear posture, giving way where there is none; paths start from `folder`.
+
+    Raises
+    ------
+    NoAdmissibleMotionError
+        No posture is clear, whatever gives way.
+    """
+    comments = dict(comments)
+    tries = _FEW_TRIES
+    for _ in range(_ROUNDS):
+        problem = build_problem(parsed_spec(tree, "the proposed config"), folder)
+        task = MotionTask(problem)
+        try:
+            start = clear_posture(task, problem.spec.seed, tries)
+        except NoClearPostureError as error:
+            if not _yielded(tree, comments, task, error.posture):
+                if tries == _MANY_TRIES:
+                    raise
+                tries = _MANY_TRIES
+            continue
+        return _at(tree, comments, problem, start)
+    raise NoAdmissibleMotionError("No clear posture was found, although limits were loosened.")
+
+
+def _at(tree: Tree, comments: Comments, problem: Problem, start: Start) -> Settled:
+    """The problem with its posture written into it."""
+    posture = tree["robot"].setdefault("posture", {})
+    for name, value in zip(problem.robot.joint_names, start.posture.tolist(), strict=True):
+        posture[name] = round(value, _DIGITS)
+    if not start.as_configured:
+        comments["robot", "posture"] += ", moved until capsules, limits and torques have room"
+    _without_lasting_contacts(tree, comments, problem)
+    robot = replace(problem.robot, posture=start.posture)
+    return Settled(tree, comments, replace(problem, robot=robot), start)
+
+
+def _yielded(tree: Tree, comments: Comments, task: MotionTask, posture: Array) -> bool:
+    """Loosen what stands in the way at `posture` (n,); False if nothing is left to loosen.
+
+    In this order: torque limits, the distance between capsules, capsules of links that touch.
+    """
+    in_the_way = unclear(task, posture)
+    weak = [
+        constraint.labels[column].rsplit(" ", 1)[0]
+        for constraint, columns in broken(task, posture)
+        if isinstance(constraint, JointTorque)
+        for column in columns
+    ]
+    if weak:
+        _unbound(tree, comments, weak)
+        return True
+    for constraint, columns in in_the_way:
+        if isinstance(constraint, SelfCollision):
+            label = constraint.labels[columns[0]]
+            return (
+                _nearer(tree, comments, label, _MARGIN)
+                or _by_meshes(tree, comments, task)
+                or _nearer(tree, comments, label, _LEAST_MARGIN)
+                or _kept_still(tree, comments, task)
+            )
+    return False
+
+
+def _unbound(tree: Tree, comments: Comments, names: list[str]) -> None:
+    limits = tree["robot"].setdefault("limits", {})
+    for name in dict.fromkeys(names):
+        limits.setdefault(name, {})["effort"] = _UNBOUNDED_EFFORT
+        comments["robot", "limits", name, "effort"] = (
+            "the URDF's effort does not hold it up against gravity; not bounded"
+        )
+
+
+def _nearer(tree: Tree, comments: Comments, label: str, margin: float) -> bool:
+    own = tree["constraints"]["self_collision"]
+    if own["margin"] <= margin:
+        return False
+    own["margin"] = margin
+    comments["constraints", "self_collision", "margin"] = (
+        f"[m] between capsules; {label} leaves no room for more"
+    )
+    return True
+
+
+def _by_meshes(tree: Tree, comments: Comments, task: MotionTask) -> bool:
+    """Meshes instead of capsules for neighbours; nothing for what touches where the robot stands.
+
+    The meshes of the latter are misplaced or coarse, as `excite check` sees them too. They count
+    only if they touch at the posture as configured and at the clearest one near it.
+    """
+    robot, own = task.problem.robot, tree["constraints"]["self_collision"]
+    near = pushed_clear(task, robot.posture)
+    meshes, carried, joined = MeshDistances(robot), carried_bodies(robot), joined_links(robot)
+    before = (len(own.get("by_meshes", ())), len(own.get("ignore", ())))
+    for constraint, columns in unclear(task, near):
+        if not isinstance(constraint, SelfCollision):
+            continue
+        for column in columns:
+            first, second = (constraint.capsules[k] for k in constraint.pairs.checked[column])
+            joints = int((carried[first.joint] != carried[second.joint]).sum())
+            for one, other in product(first.links, second.links):
+                if frozenset((one, other)) in joined:
+                    continue
+                here = meshes.distance([one], [other], robot.posture)
+                if here <= 0.0 and meshes.distance([one], [other], near) <= 0.0:
+                    own.setdefault("ignore", []).append([one, other])
+                elif joints <= 2 and here > _TABLED and robot.n > 1:
+                    own.setdefault("by_meshes", []).append([one, other])
+    _explain(own, comments)
+    return (len(own.get("by_meshes", ())), len(own.get("ignore", ()))) != before
+
+
+def _kept_still(tree: Tree, comments: Comments, task: MotionTask) -> bool:
+    """Keep joints still until at most two are between links that are too near each other.
+
+    Those nearest to the links go on moving; then their meshes can be kept apart by tables.
+    """
+    robot = task.problem.robot
+    carried = carried_bodies(robot)
+    near = pushed_clear(task, robot.posture)
+    still: set[int] = set()
+    for constraint, columns in broken(task, near):
+        if not isinstance(constraint, SelfCollision):
+            continue
+        for column in columns:
+            first, second = (constraint.capsules[k] for k in constraint.pairs.checked[column])
+            one, other = carried[first.joint] > 0, carried[second.joint] > 0
+            chains = [np.flatnonzero(one & ~other), np.flatnonzero(other & ~one)]
+            if sum(map(len, chains)) <= 2:
+                continue
+            kept = 1 if all(map(len, chains)) else 2
+            still |= {int(joint) for chain in chains for joint in chain[:-kept]}
+    if not still or len(still) > robot.n / 2:
+        return False
+    names = [name for joint, name in enumerate(robot.joint_names) if joint not in still]
+    lost = [name for joint, name in enumerate(robot.joint_names) if joint in still]
+    tree["robot"]["joints"] = [name for name in tree["robot"]["joints"] if name in names]
+    before = comments.get(("robot", "joints"), "")
+    told = f"not moved, what they carry is too near other links to swing: {', '.join(lost)}"
+    comments["robot", "joints"] = f"{before}; {told}" if before else told
+    return True
+
+
+def _without_lasting_contacts(tree: Tree, comments: Comments, problem: Problem) -> None:
+    """Leave out pairs of links whose meshes touch in most postures: no motion can part them."""
+    own = tree["constraints"].get("self_collision")
+    for constraint in problem.constraints:
+        if own is None or not isinstance(constraint, SelfCollision):
+            continue
+        for pair in constraint.pairs.dropped:
+            if not pair.reason.startswith(UNGUARDED):
+                continue
+            for words in pair.reason.partition("apart: ")[2][:-1].split(", "):
+                names, _, share = words.rpartition(" ")
+                if float(share.rstrip("%")) < 100 * _SELDOM_APART:
+                    own.setdefault("ignore", []).append(names.split(" – "))
+    if own is not None:
+        _explain(own, comments)
+
+
+def _explain(own: Tree, comments: Comments) -> None:
+    """Every pair once, and why it is there."""
+    for key in ("by_meshes", "ignore"):
+        if key in own:
+            own[key] = [list(pair) for pair in dict.fromkeys(map(tuple, own[key]))]
+    if "by_meshes" in own:
+        comments["constraints", "self_collision", "by_meshes"] = (
+            "neighbours whose capsules are fatter than they are"
+        )
+    if "ignore" in own:
+        comments["constraints", "self_collision", "ignore"] = (
+            "NOT GUARDED: collision meshes that touch where the robot stands or in most postures, "
+            "so the URDF has them misplaced or too coarse; look at these links before a robot "
+            "plays a motion"
+        )

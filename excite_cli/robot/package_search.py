@@ -1,0 +1,54 @@
+"""Where the meshes of a URDF on disk lie: folders to give as `robot.package_dirs`.
+
+A `package://NAME/…` is looked for in every folder above the URDF, one folder below each of these,
+and in the folders that ROS_PACKAGE_PATH and AMENT_PREFIX_PATH name. A relative path that leaves the
+URDF's own folder (`../meshes/arm.stl`) needs the folder that holds it.
+"""
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+
+from excite_cli.robot.description import RobotDescription
+
+_PREFIX = "package://"
+
+
+def package_folders(description: RobotDescription) -> dict[str, Path]:
+    """Folders beyond those of `description` that its collision meshes need, by what they hold.
+
+    What is found nowhere is left out: the check of the meshes says so.
+    """
+    known = [Path(folder).resolve() for folder in description.package_dirs]
+    found: dict[str, Path] = {}
+    for mesh in ElementTree.fromstring(description.xml).findall("link/collision/geometry/mesh"):
+        name = mesh.get("filename", "")
+        if not name.startswith(_PREFIX):
+            path = (description.path.parent / name.removeprefix("file://")).resolve()
+            if path.is_file() and not any(path.is_relative_to(folder) for folder in known):
+                found.setdefault(str(Path(name).parent), path.parent)
+            continue
+        inside = name.removeprefix(_PREFIX)
+        package = inside.split("/")[0]
+        if package in found or any((folder / inside).is_file() for folder in known):
+            continue
+        for folder in _folders(description.path):
+            if (folder / inside).is_file():
+                found[package] = folder
+                break
+    return found
+
+
+def _folders(urdf: Path) -> Iterator[Path]:
+    for folder in urdf.parents:
+        yield folder
+        try:
+            beneath = sorted(folder.iterdir()) if folder != folder.parent else []
+        except OSError:
+            continue
+        yield from (inner for inner in beneath if inner.is_dir())
+    for variable, inner in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
+        for entry in filter(None, os.environ.get(variable, "").split(os.pathsep)):
+            yield Path(entry) / inner
+            yield Path(entry).parent / inner

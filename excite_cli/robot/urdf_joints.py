@@ -1,0 +1,142 @@
+"""What a URDF says about each of its joints, before anything is built of it.
+
+Read from the XML alone, so that joints with empty limits or of kinds that cannot be moved are seen
+like any other.
+"""
+
+import math
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+
+from excite_cli.robot.description import UNBOUNDED, RobotDescription
+
+
+@dataclass(frozen=True)
+class UrdfJoint:
+    """One joint that is not fixed.
+
+    kind: `revolute`, `prismatic`, or another type of URDF; `continuous` is a revolute one with
+    infinite `lower` and `upper`. lower, upper [rad or m], velocity [rad/s or m/s], effort [N·m or
+    N]: as written, nan where the URDF gives none. carried: share of the robot's mass beyond the
+    joint. above: movable joints between it and the base, nearest to the base first. beyond: those
+    that it carries.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    lower: float
+    upper: float
+    velocity: float
+    effort: float
+    mimics: str | None
+    carried: float
+    above: tuple[str, ...]
+    beyond: tuple[str, ...]
+
+    @property
+    def sliding(self) -> bool:
+        """Whether it is prismatic."""
+        return self.kind == "prismatic"
+
+
+@dataclass(frozen=True)
+class UrdfSurvey:
+    """The movable joints in the order of the URDF, and what else a plan must know.
+
+    mass: of all links [kg]; inertial_links: how many links have an <inertial>; has_shapes: whether
+    any link has collision geometry.
+    """
+
+    joints: tuple[UrdfJoint, ...]
+    mass: float
+    inertial_links: int
+    has_shapes: bool
+
+
+def survey(description: RobotDescription) -> UrdfSurvey:
+    """The movable joints of a URDF with all that it says about them."""
+    root = ElementTree.fromstring(description.xml)
+    masses = {link.get("name", ""): _mass(link) for link in root.findall("link")}
+    elements = root.findall("joint")
+    children: dict[str, list[ElementTree.Element]] = {}
+    parent_joint: dict[str, ElementTree.Element] = {}
+    for element in elements:
+        children.setdefault(_link(element, "parent"), []).append(element)
+        parent_joint[_link(element, "child")] = element
+    total = sum(masses.values())
+
+    def below(link: str) -> tuple[float, list[str]]:
+        mass, names, todo, seen = 0.0, [], [link], set()
+        while todo:
+            at = todo.pop()
+            if at in seen:
+                continue
+            seen.add(at)
+            mass += masses.get(at, 0.0)
+            for element in children.get(at, []):
+                todo.append(_link(element, "child"))
+                if element.get("type") != "fixed":
+                    names.append(element.get("name", ""))
+        return mass, names
+
+    def over(element: ElementTree.Element) -> list[str]:
+        names: list[str] = []
+        link, seen = _link(element, "parent"), set()
+        while link in parent_joint and link not in seen:
+            seen.add(link)
+            upper = parent_joint[link]
+            if upper.get("type") != "fixed":
+                names.append(upper.get("name", ""))
+            link = _link(upper, "parent")
+        return names[::-1]
+
+    joints = []
+    for element in elements:
+        if element.get("type") == "fixed":
+            continue
+        child = _link(element, "child")
+        mass, beyond = below(child)
+        mimic = element.find("mimic")
+        lower, upper = _limit(element, "lower", 0.0), _limit(element, "upper", 0.0)
+        joints.append(
+            UrdfJoint(
+                name=element.get("name", ""),
+                kind=element.get("type", ""),
+                parent=_link(element, "parent"),
+                child=child,
+                lower=lower if lower > -UNBOUNDED else -math.inf,
+                upper=upper if upper < UNBOUNDED else math.inf,
+                velocity=_limit(element, "velocity"),
+                effort=_limit(element, "effort"),
+                mimics=None if mimic is None else mimic.get("joint", ""),
+                carried=mass / total if total > 0 else 0.0,
+                above=tuple(over(element)),
+                beyond=tuple(beyond),
+            )
+        )
+    return UrdfSurvey(
+        joints=tuple(joints),
+        mass=total,
+        inertial_links=len(root.findall("link/inertial")),
+        has_shapes=bool(root.findall("link/collision/geometry")),
+    )
+
+
+def _link(element: ElementTree.Element, end: str) -> str:
+    found = element.find(end)
+    return "" if found is None else found.get("link", "")
+
+
+def _mass(link: ElementTree.Element) -> float:
+    element = link.find("inertial/mass")
+    return 0.0 if element is None else float(element.get("value", "0"))
+
+
+def _limit(element: ElementTree.Element, key: str, default: float = math.nan) -> float:
+    limit = element.find("limit")
+    try:
+        return default if limit is None else float(limit.get(key, default))
+    except ValueError:
+        return default

@@ -1,0 +1,56 @@
+"""Small robots as URDF text: what a proposal must cope with."""
+
+from pathlib import Path
+
+from excite_cli.robot.description import load_description
+from excite_cli.robot.urdf_joints import UrdfSurvey, survey
+
+INERTIAL = (
+    '<inertial><origin xyz="0 0 0.1"/><mass value="{mass}"/>'
+    '<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'
+)
+BOX = (
+    '<collision><origin xyz="0 0 0.12"/><geometry><box size="0.05 0.05 0.16"/></geometry>'
+    "</collision>"
+)
+
+
+def link(name: str, mass: float = 1.0, shape: str = BOX) -> str:
+    inertial = INERTIAL.format(mass=mass) if mass >= 0 else ""
+    return f'<link name="{name}">{inertial}{shape}</link>'
+
+
+def joint(
+    name: str, parent: str, child: str, limit: str = "", kind: str = "revolute", more: str = ""
+) -> str:
+    limits = f"<limit {limit}/>" if limit else ""
+    axis = "0 0 1" if kind == "continuous" else "0 1 0"
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="0 0 0.25"/><axis xyz="{axis}"/>{limits}{more}</joint>'
+    )
+
+
+GOOD = 'lower="-2" upper="2" velocity="3" effort="50"'
+
+
+def arm(folder: Path, first: str = GOOD, second: str = GOOD, mass: float = 1.0) -> Path:
+    """Two links on a base, with the limits given for its two joints."""
+    return written(
+        folder,
+        link("base", mass),
+        joint("shoulder", "base", "upper", first),
+        link("upper", mass),
+        joint("elbow", "upper", "lower", second),
+        link("lower", mass),
+    )
+
+
+def written(folder: Path, *parts: str) -> Path:
+    path = folder / "robot.urdf"
+    path.write_text('<robot name="robot">' + "".join(parts) + "</robot>", encoding="utf-8")
+    return path
+
+
+def surveyed(path: Path) -> UrdfSurvey:
+    return survey(load_description(str(path)))

@@ -1,0 +1,79 @@
+"""Which joints are chosen: arms and legs, no fingers, no wheels, unless there is nothing else."""
+
+from pathlib import Path
+
+import pytest
+
+from excite_cli.errors import ConfigError, RobotError
+from excite_cli.proposal.joints import Choice, choose_joints
+from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
+from excite_cli.robot.urdf_joints import survey
+from tests.proposal.robots import GOOD, joint, link, surveyed, written
+
+
+def chosen(name: str, asked: tuple[str, ...] = ()) -> Choice:
+    return choose_joints(survey(load_description(EXAMPLE_PREFIX + name)).joints, name, asked)
+
+
+@pytest.mark.parametrize(
+    ("robot", "count", "word"),
+    [
+        ("ur10", 6, ""),
+        ("panda", 7, "finger"),
+        ("talos", 30, "gripper"),
+        ("tiago_dual", 17, "wheel"),
+        ("b1-z1", 18, "jointGripper"),
+        ("allegro_left_hand", 16, ""),
+        ("finger_edu", 3, ""),
+        ("human", 36, ""),
+        ("romeo", 31, "LHand"),
+    ],
+)
+def test_arms_legs_and_hands_alone_are_chosen(robot: str, count: int, word: str) -> None:
+    choice = chosen(robot)
+    assert len(choice.chosen) == count, [joint.name for joint in choice.chosen]
+    assert word in " ".join(name for names in choice.left_out.values() for name in names)
+
+
+def test_a_wrist_named_after_the_gripper_moves() -> None:
+    names = [joint.name for joint in chosen("alex_nub_hands").chosen]
+    assert "LeftGripperYaw" in names
+
+
+def test_only_rotors_is_a_robot_without_anything_to_move() -> None:
+    with pytest.raises(RobotError, match=r"iris has no arm, leg or hand to move, only rotors: "):
+        chosen("iris")
+
+
+def test_what_is_asked_for_is_moved() -> None:
+    choice = chosen("panda", ("panda_finger_joint1", "panda_joint2"))
+    assert [joint.name for joint in choice.chosen] == ["panda_joint2", "panda_finger_joint1"]
+
+
+def test_a_joint_that_mimics_cannot_be_asked_for() -> None:
+    with pytest.raises(ConfigError, match=r"'panda_finger_joint2' mimics 'panda_finger_joint1'"):
+        chosen("panda", ("panda_finger_joint2",))
+
+
+def test_an_unknown_joint_is_told_with_the_nearest() -> None:
+    with pytest.raises(ConfigError, match=r"no joint 'elbow'\. Did you mean 'elbow_joint'\?"):
+        chosen("ur10", ("elbow",))
+
+
+def test_joints_of_a_mobile_base_stay(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        '<link name="world"/>',
+        joint("drive", "world", "body", kind="planar"),
+        link("body", 20),
+        joint("arm", "body", "tip", GOOD),
+        link("tip"),
+    )
+    choice = choose_joints(surveyed(path).joints, "robot")
+    assert [joint.name for joint in choice.chosen] == ["arm"]
+    assert choice.left_out == {"joints of the base": ("drive",)}
+
+
+def test_a_robot_without_joints_says_so(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="robot has no movable joint"):
+        choose_joints(surveyed(written(tmp_path, link("base"))).joints, "robot")

@@ -1,0 +1,158 @@
+"""A proposal works as it is: the config loads, its posture is clear, and it gives a motion."""
+
+from pathlib import Path
+
+import pytest
+
+from excite_cli.config.load import parse_spec
+from excite_cli.errors import RobotError
+from excite_cli.excitation.problem import build_problem
+from excite_cli.excitation.start import clear_posture
+from excite_cli.excitation.task import MotionTask
+from excite_cli.proposal.limbs import limbs
+from excite_cli.proposal.propose import Request, propose
+from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
+from excite_cli.robot.reference_postures import reference_posture
+from excite_cli.robot.urdf_joints import survey
+from tests.proposal.robots import GOOD, arm, joint, link, written
+
+BOTTOM = 'lower="0" upper="2.5" velocity="3" effort="50"'
+
+
+def test_the_posture_is_clear_as_written(tmp_path: Path) -> None:
+    arm(tmp_path, second=BOTTOM)
+    proposal = propose(Request("robot.urdf", tmp_path))
+    problem = build_problem(parse_spec(proposal.text), tmp_path)
+    assert clear_posture(MotionTask(problem), 1).as_configured
+    assert proposal.joints == ("shoulder", "elbow")
+
+
+def test_what_was_assumed_stands_beside_the_key(tmp_path: Path) -> None:
+    arm(tmp_path, 'lower="-2" upper="2" velocity="0" effort="0"')
+    text = propose(Request("robot.urdf", tmp_path)).text
+    line = next(line for line in text.splitlines() if "velocity: 3.1" in line)
+    assert "the URDF gives 0 rad/s; 3.1 rad/s assumed" in line
+
+
+def test_a_torque_that_does_not_hold_the_arm_is_given_up(tmp_path: Path) -> None:
+    """Horizontal whatever the posture, an arm of 2 kg needs more than 0.1 N·m."""
+    weak = 'lower="1.2" upper="1.9" velocity="3" effort="0.1"'
+    arm(tmp_path, weak)
+    proposal = propose(Request("robot.urdf", tmp_path))
+    assert any("shoulder: the URDF's effort does not hold it up" in n for n in proposal.notes)
+
+
+def test_the_distance_kept_yields_where_links_are_close(tmp_path: Path) -> None:
+    near = (
+        '<collision><origin xyz="{x} 0 0.12"/><geometry><box size="0.05 0.05 0.16"/></geometry>'
+        "</collision>"
+    )
+    tight = 'lower="-0.05" upper="0.05" velocity="3" effort="50"'
+    written(
+        tmp_path,
+        link("base", shape=""),
+        joint("a", "base", "one", tight),
+        link("one", shape=near.format(x=0)),
+        joint("b", "base", "two", tight),
+        link("two", shape=near.format(x=0.079)),
+    )
+    problem = propose(Request("robot.urdf", tmp_path)).settled.problem
+    assert problem.spec.constraints.self_collision is not None
+    assert 0 < problem.spec.constraints.self_collision.margin < 0.01
+
+
+def test_without_collision_geometry_distances_are_not_asked_for(tmp_path: Path) -> None:
+    written(
+        tmp_path,
+        link("base", shape=""),
+        joint("shoulder", "base", "upper", GOOD),
+        link("upper", shape=""),
+        joint("elbow", "upper", "lower", GOOD),
+        link("lower", shape=""),
+    )
+    proposal = propose(Request("robot.urdf", tmp_path))
+    assert proposal.settled.problem.spec.constraints.self_collision is None
+    assert any("no collision geometry" in note for note in proposal.notes)
+
+
+def test_without_inertias_one_sentence_says_so(tmp_path: Path) -> None:
+    arm(tmp_path, mass=-1)
+    with pytest.raises(RobotError, match=r"^robot\.urdf has no <inertial> at all"):
+        propose(Request("robot.urdf", tmp_path))
+
+
+def test_packages_are_found_above_the_urdf(tmp_path: Path) -> None:
+    mesh = tmp_path / "ws" / "src" / "arm_description" / "meshes" / "arm.stl"
+    mesh.parent.mkdir(parents=True)
+    mesh.write_text(TETRAHEDRON)
+    folder = tmp_path / "ws" / "urdf"
+    folder.mkdir()
+    shape = (
+        '<collision><origin xyz="0 0 0.1"/><geometry>'
+        '<mesh filename="package://arm_description/meshes/arm.stl"/></geometry></collision>'
+    )
+    written(
+        folder,
+        link("base", shape=""),
+        joint("shoulder", "base", "upper", GOOD),
+        link("upper", shape=shape),
+        joint("elbow", "upper", "lower", GOOD),
+        link("lower", shape=shape),
+    )
+    proposal = propose(Request("urdf/robot.urdf", tmp_path / "ws"))
+    assert "package_dirs: [src]" in proposal.text
+    assert any(note.startswith("meshes of arm_description") for note in proposal.notes)
+
+
+def test_a_mesh_that_is_nowhere_is_named(tmp_path: Path) -> None:
+    shape = '<collision><geometry><mesh filename="package://none/a.stl"/></geometry></collision>'
+    written(tmp_path, link("base"), joint("j", "base", "l", GOOD), link("l", shape=shape))
+    with pytest.raises(RobotError, match=r"collision mesh 'package://none/a\.stl' was not found"):
+        propose(Request("robot.urdf", tmp_path))
+
+
+def test_reference_postures_are_read() -> None:
+    description = load_description(EXAMPLE_PREFIX + "talos")
+    file, state, values = reference_posture(description, ("leg_left_4_joint",))
+    assert (file, state) == ("talos.srdf", "half_sitting")
+    assert values["leg_left_4_joint"] == pytest.approx(0.859395)
+
+
+def test_limbs_of_a_humanoid() -> None:
+    joints = survey(load_description(EXAMPLE_PREFIX + "talos")).joints
+    groups = limbs([joint for joint in joints if joint.mimics is None])
+    assert len(groups["leg_left"]) == 6
+    assert set(groups["torso"]) == {"torso_1_joint", "torso_2_joint"}
+
+
+TETRAHEDRON = """solid a
+facet normal 0 0 -1
+outer loop
+vertex 0 0 0
+vertex 0 0.03 0
+vertex 0.03 0 0
+endloop
+endfacet
+facet normal 0 -1 0
+outer loop
+vertex 0 0 0
+vertex 0.03 0 0
+vertex 0 0 0.1
+endloop
+endfacet
+facet normal -1 0 0
+outer loop
+vertex 0 0 0
+vertex 0 0 0.1
+vertex 0 0.03 0
+endloop
+endfacet
+facet normal 1 1 1
+outer loop
+vertex 0.03 0 0
+vertex 0 0.03 0
+vertex 0 0 0.1
+endloop
+endfacet
+endsolid a
+"""
