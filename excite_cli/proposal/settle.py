@@ -32,6 +32,7 @@ from excite_cli.robot.collision_pairs import UNGUARDED
 from excite_cli.robot.mesh_distances import MeshDistances
 from excite_cli.robot.mesh_pairs import joined_links
 from excite_cli.robot.pair_distances import carried_bodies
+from excite_cli.robot.pair_tables import near_at_posture
 
 Array = NDArray[np.float64]
 Tree = dict[str, Any]
@@ -89,7 +90,7 @@ def _at(tree: Tree, comments: Comments, problem: Problem, start: Start) -> Settl
         posture[name] = round(value, _DIGITS)
     if not start.as_configured:
         comments["robot", "posture"] += ", moved until capsules, limits and torques have room"
-    _without_lasting_contacts(tree, comments, problem)
+    _without_lasting_contacts(tree, comments, problem, start.posture)
     robot = replace(problem.robot, posture=start.posture)
     return Settled(tree, comments, replace(problem, robot=robot), start)
 
@@ -200,9 +201,16 @@ def _kept_still(tree: Tree, comments: Comments, task: MotionTask) -> bool:
     return True
 
 
-def _without_lasting_contacts(tree: Tree, comments: Comments, problem: Problem) -> None:
-    """Leave out pairs of links whose meshes touch in most postures: no motion can part them."""
+def _without_lasting_contacts(
+    tree: Tree, comments: Comments, problem: Problem, posture: Array
+) -> None:
+    """Leave out pairs of links whose meshes touch in most postures: no motion can part them.
+
+    The same for those that are as good as in contact where the robot stands: no table can keep
+    them apart.
+    """
     own = tree["constraints"].get("self_collision")
+    robot = replace(problem.robot, posture=posture)
     for constraint in problem.constraints:
         if own is None or not isinstance(constraint, SelfCollision):
             continue
@@ -213,6 +221,10 @@ def _without_lasting_contacts(tree: Tree, comments: Comments, problem: Problem) 
                 names, _, share = words.rpartition(" ")
                 if float(share.rstrip("%")) < 100 * _SELDOM_APART:
                     own.setdefault("ignore", []).append(names.split(" – "))
+        left_out = tuple((one, other) for one, other in own.get("ignore", ()))
+        near = near_at_posture(robot, constraint.capsules, constraint.pairs, left_out, _TABLED)
+        if near:
+            own.setdefault("ignore", []).extend(map(list, near))
     if own is not None:
         _explain(own, comments)
 
@@ -228,7 +240,7 @@ def _explain(own: Tree, comments: Comments) -> None:
         )
     if "ignore" in own:
         comments["constraints", "self_collision", "ignore"] = (
-            "NOT GUARDED: collision meshes that touch where the robot stands or in most postures, "
-            "so the URDF has them misplaced or too coarse; look at these links before a robot "
-            "plays a motion"
+            "NOT GUARDED: collision meshes that touch, or all but touch, where the robot stands or "
+            "in most postures, so the URDF has them misplaced or too coarse; look at these links "
+            "before a robot plays a motion"
         )

@@ -9,7 +9,7 @@ so that the gradient leads out. Distances are cut off at `FAR`.
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -129,17 +129,8 @@ def mesh_tables(
     if last is not None:
         return tuple(table for table in _known(last).values() if table is not None)
     known = _known(stored_arrays(key))
-    meshes = link_meshes(robot)
-    guarded = _guarded(capsules, pairs)
-    by_hand = {link for capsule in capsules if capsule.by_hand for link in capsule.links}
-    carried = carried_bodies(robot)
     found, computed = [], False
-    for i, j in movable_pairs(robot, meshes, ignore):
-        both = (meshes[i], meshes[j])
-        names = {both[0].link, both[1].link}
-        joints = np.flatnonzero(carried[both[0].joint] != carried[both[1].joint])
-        if len(joints) > 2 or frozenset(names) in guarded or names & by_hand:
-            continue
+    for both, joints in _neighbours(robot, capsules, pairs, ignore):
         if _distances(robot, both, PairMeshes(*both), robot.posture[None])[0] <= kept:
             continue
         pair = (both[0].link, both[1].link)
@@ -152,6 +143,43 @@ def mesh_tables(
         store_arrays(key, _as_arrays(known))
     store_arrays(asked, _as_arrays({(table.first, table.second): table for table in found}))
     return tuple(found)
+
+
+def near_at_posture(
+    robot: Robot,
+    capsules: tuple[Capsule, ...],
+    pairs: CollisionPairs,
+    ignore: tuple[tuple[str, str], ...] = (),
+    kept: float = 0.002,
+) -> tuple[tuple[str, str], ...]:
+    """Pairs of links that nothing keeps apart: nearer than `kept` [m] at the posture, not touching.
+
+    `mesh_tables` leaves them out, and the check of the meshes judges them all the same.
+    """
+    found = []
+    for both, _ in _neighbours(robot, capsules, pairs, ignore):
+        if 0.0 < _distances(robot, both, PairMeshes(*both), robot.posture[None])[0] <= kept:
+            found.append((both[0].link, both[1].link))
+    return tuple(found)
+
+
+def _neighbours(
+    robot: Robot,
+    capsules: tuple[Capsule, ...],
+    pairs: CollisionPairs,
+    ignore: tuple[tuple[str, str], ...],
+) -> Iterator[tuple[tuple[LinkMesh, LinkMesh], Indices]]:
+    """Links at most two joints apart that no capsules guard, and the joints between them."""
+    meshes = link_meshes(robot)
+    guarded = _guarded(capsules, pairs)
+    by_hand = {link for capsule in capsules if capsule.by_hand for link in capsule.links}
+    carried = carried_bodies(robot)
+    for i, j in movable_pairs(robot, meshes, ignore):
+        both = (meshes[i], meshes[j])
+        names = {both[0].link, both[1].link}
+        joints = np.flatnonzero(carried[both[0].joint] != carried[both[1].joint])
+        if len(joints) <= 2 and frozenset(names) not in guarded and not names & by_hand:
+            yield both, joints
 
 
 def require_tabled(
