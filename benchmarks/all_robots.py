@@ -84,6 +84,7 @@ def examine(name: str, folder: Path) -> Record:
         return record
     record["joints"] = len(proposal["joints"])
     record["base_parameters"] = proposal["base_parameters"]
+    record["not_guarded"] = not_guarded(config)
     found = step("optimize", config, "-o", motion, "--overwrite", "--no-progress")
     if found is None:
         return record
@@ -95,6 +96,14 @@ def examine(name: str, folder: Path) -> Record:
         return record
     record["admissible"] = True
     return record
+
+
+def not_guarded(config: Path) -> int:
+    """Number of pairs of links that the proposed config leaves out."""
+    from excite_cli.config.load import load_spec
+
+    own = load_spec(config).constraints.self_collision
+    return 0 if own is None else len(own.ignore)
 
 
 def with_random(record: Record, folder: Path) -> Record:
@@ -141,6 +150,9 @@ def table(results: Path) -> str:
         f"random column is the best of {_CANDIDATES} random motions, each as large as the",
         "constraints let it be, as in `excite compare-random`. Seconds are processor time, one",
         "thread; those of `init` are mostly for capsules and tables of meshes, made once and kept.",
+        "*Left out* counts pairs of links whose collision meshes touch, or all but touch, where the",
+        "robot stands or in many postures: their meshes are too coarse or misplaced to be kept",
+        "apart, the config says `NOT GUARDED` beside them, and `excite check` does not judge them.",
         f"{date.today():%d %B %Y}, a two-core server.",
         "",
         f"{moved} of {count} names ({len(good)} of {len(records)} different URDFs) give a motion",
@@ -148,9 +160,9 @@ def table(results: Path) -> str:
         f"{'' if len(records) == len(robots) else f' ({len(robots)} URDFs in all)'}. "
         + _summary(good),
         "",
-        "| robot | joints | base parameters | condition number | random | init [s] | optimize [s] "
-        "| outcome |",
-        "|---|---:|---:|---:|---:|---:|---:|---|",
+        "| robot | joints | base parameters | condition number | random | left out | init [s] "
+        "| optimize [s] | outcome |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---|",
     ]
     lines += [_row(record, robots[record["robot"]]) for record in records]
     return "\n".join(lines) + "\n"
@@ -182,6 +194,7 @@ def _row(record: Record, others: list[str]) -> str:
         record.get("base_parameters", ""),
         _figure(record.get("condition_number")),
         _figure(record.get("random")),
+        record.get("not_guarded", ""),
         seconds.get("init", ""),
         seconds.get("optimize", ""),
         outcome,

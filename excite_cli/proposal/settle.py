@@ -42,7 +42,7 @@ _MARGIN, _LEAST_MARGIN = 0.002, 0.0005
 _UNBOUNDED_EFFORT = 1e6
 # Meshes nearer than this [m] cannot be told from contact by a table.
 _TABLED = 0.002
-_SELDOM_APART = 0.5
+_SELDOM_APART = 0.8
 _ROUNDS = 10
 _FEW_TRIES, _MANY_TRIES = 6, 40
 _DIGITS = 4
@@ -204,7 +204,7 @@ def _kept_still(tree: Tree, comments: Comments, task: MotionTask) -> bool:
 def _without_lasting_contacts(
     tree: Tree, comments: Comments, problem: Problem, posture: Array
 ) -> None:
-    """Leave out pairs of links whose meshes touch in most postures: no motion can part them.
+    """Leave out pairs of links whose meshes touch in many postures: no motion keeps them apart.
 
     The same for those that are as good as in contact where the robot stands: no table can keep
     them apart.
@@ -241,6 +241,6 @@ def _explain(own: Tree, comments: Comments) -> None:
     if "ignore" in own:
         comments["constraints", "self_collision", "ignore"] = (
             "NOT GUARDED: collision meshes that touch, or all but touch, where the robot stands or "
-            "in most postures, so the URDF has them misplaced or too coarse; look at these links "
+            "in many postures, so the URDF has them misplaced or too coarse; look at these links "
             "before a robot plays a motion"
         )
