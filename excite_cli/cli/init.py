@@ -83,7 +83,7 @@ def init(
     problem = proposal.settled.problem
     lines = [
         f"{problem.robot.name}: moves {len(proposal.joints)} joints, "
-        f"{problem.base.rank} base parameters, {problem.trajectory.duration:g} s",
+        f"{problem.base.rank} base parameters, {problem.trajectory.duration:.4g} s",
         *proposal.notes,
         f"{path}",
         f"next:  excite optimize {path}",
