@@ -49,7 +49,7 @@ def init(
     from excite_cli.cli.setup import single_threaded
     from excite_cli.errors import ConfigError
     from excite_cli.proposal.propose import Request, propose
-    from excite_cli.robot.description import EXAMPLE_PREFIX
+    from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     if robot is not None and urdf is not None:
@@ -75,6 +75,7 @@ def init(
     check_outputs({"output": path}, overwrite)
     folder = path.resolve().parent
     source = f"{EXAMPLE_PREFIX}{name}" if robot is not None else _from(urdf or Path(), folder)
+    load_description(source, relative_to=folder)  # a wrong name is told at once
     terminal.say(f"looking at {name}: capsules and tables of its meshes take longest, once")
     asked = Request(source, folder, chosen, "floating" if base == "floating" else "fixed")
     with single_threaded():

@@ -47,6 +47,8 @@ def in_our_words(error: Exception, words: list[str], commands: Iterable[str]) ->
         )
     if "unexpected extra argument" in reason:
         extra = reason.rpartition("(")[2].rstrip(")")
+        if path.endswith(" init"):  # the one command whose robot is an option
+            usage = f" Did you mean --robot {extra}, or --urdf {extra}?"
         return ConfigError(f"{where}unexpected: {extra}.{usage}")
     return ConfigError(f"{where}{reason[:1].lower()}{reason[1:]}.{more}")
 

@@ -107,7 +107,7 @@ def view(
     Example:  excite view ur10.h5 --motion 2 --gif ur10.gif --duration 6
     """
     from excite_cli.cli.setup import single_threaded
-    from excite_cli.errors import ConfigError
+    from excite_cli.errors import ConfigError, FileError
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     if png is not None and gif is not None:
@@ -129,6 +129,8 @@ def view(
         )
         target = png or gif
         assert target is not None
+        if not file.is_file():
+            raise FileError(f"There is no file {file}.")
         _check_target(target, ".png" if png is not None else ".gif", overwrite)
         problem, segments = _motions(terminal, file, motion, config, overrides)
         segment = segments[0]

@@ -50,6 +50,19 @@ def test_an_unknown_robot_is_told_with_the_nearest(excite: Program) -> None:
     assert "Did you mean 'ur10'?" in run.stderr
 
 
+def test_a_robot_given_as_an_argument_is_understood(excite: Program) -> None:
+    run = excite("init", "panda")
+    assert run.returncode == 2
+    assert "--robot panda" in run.stderr
+
+
+def test_a_wrong_name_is_told_before_the_work_begins(excite: Program) -> None:
+    run = excite("init", "--robot", "ur11")
+    assert run.returncode == 2
+    assert "looking at" not in run.stderr
+    assert "ur10" in run.stderr
+
+
 def test_a_robot_that_cannot_move_is_one_sentence(excite: Program, tmp_path: Path) -> None:
     run = excite("init", "--robot", "iris_simple")
     assert run.returncode == 2

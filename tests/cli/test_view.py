@@ -114,8 +114,10 @@ def test_bad_input(
 
 
 def test_a_missing_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert _run("view", tmp_path / "none.h5") == 2
-    assert "There is no file" in capsys.readouterr().err
+    (tmp_path / "taken.png").write_text("mine")
+    for words in ((), ("--png", str(tmp_path / "taken.png"))):
+        assert _run("view", tmp_path / "none.h5", *words) == 2
+        assert "There is no file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -110,10 +110,9 @@ def test_xml_with_another_root(tmp_path: Path) -> None:
         urdf().replace(link("hand"), link("arm")),
         urdf("hinge"),
         urdf(inside=LIMIT.replace('"-1"', '"low"')),
-        urdf(inside=""),
         urdf().replace(joint("wrist", "arm", "hand"), ""),
     ],
-    ids=["empty", "unknown link", "twin links", "unknown type", "words", "no limit", "two roots"],
+    ids=["empty", "unknown link", "twin links", "unknown type", "words", "two roots"],
 )
 def test_xml_that_is_not_a_urdf(tmp_path: Path, text: str) -> None:
     with pytest.raises(RobotError, match=r"arm.urdf is not a URDF that can be used"):
@@ -137,6 +136,11 @@ def test_an_axis_without_direction_is_refused(tmp_path: Path) -> None:
     """Such a joint moves nothing; every number that follows would be about another robot."""
     with pytest.raises(RobotError, match="axis"):
         built(tmp_path, urdf().replace('xyz="0 1 0"', 'xyz="0 0 0"', 1))
+
+
+def test_a_joint_without_limits_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="joint 'elbow' is revolute and has no <limit>"):
+        built(tmp_path, urdf(inside=""))
 
 
 def mesh(path: str) -> str:
