@@ -2,6 +2,7 @@
 (() => {
   const root = document.documentElement;
   root.classList.add("scripted");
+  addEventListener("load", () => setTimeout(() => root.classList.remove("loading"), 0));
 
   const button = document.getElementById("theme");
   button.hidden = false;
