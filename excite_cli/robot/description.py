@@ -127,7 +127,6 @@ def load_description(
     text = _read(path)
     tree = _parsed(path, text)
     _check_axes(path, tree)
-    _check_limits(path, tree)
     _check_inertias(path, tree)
     packages = (*extra, str(_share_folder(path)), str(path.parent))
     return RobotDescription(
@@ -143,6 +142,23 @@ def load_description(
             for mimic in joint.findall("mimic")
         },
     )
+
+
+def require_limits(description: RobotDescription) -> None:
+    """See that every joint that moves within limits has them.
+
+    Raises
+    ------
+    RobotError
+        A revolute or prismatic joint has no <limit>.
+    """
+    for joint in ElementTree.fromstring(description.xml).findall("joint"):
+        if joint.get("type") in ("revolute", "prismatic") and joint.find("limit") is None:
+            raise RobotError(
+                f"{description.path}: joint '{joint.get('name')}' is {joint.get('type')} and has "
+                'no <limit>, which a URDF must give: <limit lower="…" upper="…" velocity="…" '
+                'effort="…"/>. A joint that turns without end is of type continuous.'
+            )
 
 
 def _share_folder(path: Path) -> Path:
@@ -188,16 +204,6 @@ def _check_axes(path: Path, root: ElementTree.Element) -> None:
             raise RobotError(
                 f"{path}: joint '{joint.get('name')}' has the axis '{axis.get('xyz')}'; an axis "
                 "is three numbers that are not all zero."
-            )
-
-
-def _check_limits(path: Path, root: ElementTree.Element) -> None:
-    for joint in root.findall("joint"):
-        if joint.get("type") in ("revolute", "prismatic") and joint.find("limit") is None:
-            raise RobotError(
-                f"{path}: joint '{joint.get('name')}' is {joint.get('type')} and has no <limit>, "
-                'which a URDF must give: <limit lower="…" upper="…" velocity="…" effort="…"/>. '
-                "A joint that turns without end is of type continuous."
             )
 
 

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 
 from excite_cli.config.robot_spec import JointLimits, RobotSpec
 from excite_cli.errors import ConfigError, RobotError, nearest
-from excite_cli.robot.description import UNBOUNDED, RobotDescription, load_description
+from excite_cli.robot.description import (
+    UNBOUNDED,
+    RobotDescription,
+    load_description,
+    require_limits,
+)
 from excite_cli.robot.payload import Payload, add_payload, payload_on
 
 Array = NDArray[np.float64]
@@ -226,6 +231,7 @@ def links_by_joint(robot: Robot) -> dict[str, list[str]]:
 
 
 def _parse(description: RobotDescription, spec: RobotSpec) -> pin.Model:
+    require_limits(description)  # the parser would tell it to the terminal, not to us
     try:
         if spec.base == "floating":
             model = pin.buildModelFromXML(description.xml, pin.JointModelFreeFlyer())

@@ -143,7 +143,7 @@ def test_ctrl_c_is_a_good_end(stored: Path, excite: Program) -> None:
         answer = json.loads(process.stdout.readline())
         assert answer["url"] == f"http://localhost:{answer['port']}"
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=20)
+        out, err = process.communicate(timeout=60)
     finally:
         process.kill()
     assert process.returncode == 0, err

@@ -12,7 +12,7 @@ import pytest
 from excite_cli.store.result_file import read_result
 from tests.cli.program import SMOKE, Program
 
-ASKED = ("optimize", SMOKE, "--motions", "3", "--set", "optimizer.max_iterations=12")
+ASKED = ("optimize", SMOKE, "--motions", "3", "--set", "optimizer.max_iterations=40")
 
 
 @pytest.fixture(scope="module")
