@@ -64,7 +64,7 @@ def test_files_of_another_kind_are_named(excite: Program, two_motions: Run) -> N
     assert "holds measured data" in run.stderr
     swapped = excite("check", two_motions.path, SMOKE)
     assert swapped.returncode == 2
-    assert "The config comes first" in swapped.stderr
+    assert "comes first: excite COMMAND CONFIG FILE" in swapped.stderr
 
 
 def test_what_closes_can_be_repeated(excite: Program) -> None:
