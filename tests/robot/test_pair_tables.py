@@ -3,6 +3,7 @@
 import os
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
@@ -17,7 +18,7 @@ from excite_cli.robot.collision_pairs import CollisionPairs
 from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.mesh_distances import MeshDistances
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.robot.pair_tables import FAR, PairTable, mesh_tables
+from excite_cli.robot.pair_tables import FAR, PairTable, mesh_tables, near_at_posture
 from excite_cli.robot.states import States
 
 # A bar on two crossed hinges above a plate: it strikes the plate when it tilts.
@@ -162,3 +163,19 @@ def test_tables_come_back_from_disk(wrist: Robot) -> None:
     for path in Path(os.environ["XDG_CACHE_HOME"]).glob("excite/meshes-*"):
         path.write_bytes(b"damaged")
     assert np.array_equal(only(mesh_tables(wrist, (), NONE)).distances(q), first.distances(q))
+
+
+def test_pairs_near_at_the_posture_are_named_and_get_no_table(wrist: Robot) -> None:
+    """Tilted, the bar comes near the plate; tilted more, it strikes it."""
+    meshes, near = MeshDistances(wrist), None
+    for pitch in np.linspace(0.0, 0.9, 200):
+        q = np.array([0.0, pitch, 0.0])
+        if 0.003 < meshes.distance(["plate"], ["bar"], q) < 0.012:
+            near = replace(wrist, posture=q)
+    assert near is not None
+    assert near_at_posture(near, (), NONE, kept=0.012) == (("plate", "bar"),)
+    assert near_at_posture(near, (), NONE, kept=0.003) == ()
+    assert near_at_posture(near, (), NONE, (("bar", "plate"),), kept=0.012) == ()
+    assert mesh_tables(near, (), NONE, kept=0.012) == ()
+    tilted = replace(wrist, posture=np.array([0.0, 0.9, 0.0]))
+    assert near_at_posture(tilted, (), NONE, kept=0.012) == ()  # in contact: told, not judged
