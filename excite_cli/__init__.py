@@ -8,6 +8,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from excite_cli.api import Case as Case
+    from excite_cli.api import check as check
+    from excite_cli.api import diagnose as diagnose
+    from excite_cli.api import identify as identify
+    from excite_cli.api import load_case as load_case
+    from excite_cli.api import load_data as load_data
+    from excite_cli.api import load_problem as load_problem
+    from excite_cli.api import motions_of as motions_of
+    from excite_cli.api import plan as plan
+    from excite_cli.api import plan_after as plan_after
+    from excite_cli.api import propose as propose
+    from excite_cli.api import save_config as save_config
+    from excite_cli.api import save_fit as save_fit
+    from excite_cli.api import simulate as simulate
     from excite_cli.config.spec import Spec as Spec
     from excite_cli.diagnosis.next_motion import NextMotion as NextMotion
     from excite_cli.diagnosis.result import Diagnosis as Diagnosis
@@ -20,20 +34,6 @@ if TYPE_CHECKING:
     from excite_cli.excitation.problem import Problem as Problem
     from excite_cli.excitation.result import Result as Result
     from excite_cli.identification.identify import Identification as Identification
-    from excite_cli.library import Case as Case
-    from excite_cli.library import check as check
-    from excite_cli.library import diagnose as diagnose
-    from excite_cli.library import identify as identify
-    from excite_cli.library import load_case as load_case
-    from excite_cli.library import load_data as load_data
-    from excite_cli.library import load_problem as load_problem
-    from excite_cli.library import motions_of as motions_of
-    from excite_cli.library import plan as plan
-    from excite_cli.library import plan_after as plan_after
-    from excite_cli.library import propose as propose
-    from excite_cli.library import save_config as save_config
-    from excite_cli.library import save_fit as save_fit
-    from excite_cli.library import simulate as simulate
     from excite_cli.measurement.dataset import Dataset as Dataset
     from excite_cli.measurement.hdf5_writer import write_dataset as write_dataset
     from excite_cli.proposal.propose import Proposal as Proposal
@@ -63,7 +63,7 @@ _HOMES = {
     "excitation.problem": ("Problem",),
     "excitation.result": ("Result",),
     "identification.identify": ("Identification",),
-    "library": (
+    "api": (
         "Case",
         "check",
         "diagnose",

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import excite_cli.library
+import excite_cli.api
 from excite_cli import (
     Case,
     ConfigError,
@@ -110,7 +110,7 @@ def test_a_proposal_can_be_loaded(tmp_path: Path) -> None:
 def test_examples_in_docstrings_are_right(monkeypatch: pytest.MonkeyPatch) -> None:
     """They are run where the repository is."""
     monkeypatch.chdir(ROOT)
-    failed, tried = doctest.testmod(excite_cli.library)
+    failed, tried = doctest.testmod(excite_cli.api)
     assert tried >= 5
     assert not failed
 

@@ -5,7 +5,8 @@ import numpy as np
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.enclosure.taylor import Taylor
 from excite_cli.robot.enclosed_motion import EnclosedMotion
-from excite_cli.robot.pair_tables import FAR, PairTable
+from excite_cli.robot.pair_table import PairTable
+from excite_cli.robot.pair_tables import FAR
 from excite_cli.robot.states import States
 
 KEPT = 0.002

@@ -13,7 +13,7 @@ from pathlib import Path
 _IMPORTED = [
     "excite_cli.cli.app",
     "excite_cli.cli.setup",
-    "excite_cli.library",
+    "excite_cli.api",
     "matplotlib.pyplot",
 ]
 

@@ -55,4 +55,4 @@ def test_formulas_are_mathml(site: Path) -> None:
 def test_public_functions_are_in_the_reference(site: Path) -> None:
     text = (site / "library.html").read_text(encoding="utf-8")
     for name in ("load_problem", "plan", "diagnose", "identify", "simulate", "check"):
-        assert f'id="excite_cli.library.{name}"' in text
+        assert f'id="excite_cli.api.{name}"' in text

@@ -18,7 +18,8 @@ from excite_cli.robot.collision_pairs import CollisionPairs
 from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.mesh_distances import MeshDistances
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.robot.pair_tables import FAR, PairTable, mesh_tables, near_at_posture
+from excite_cli.robot.pair_table import PairTable
+from excite_cli.robot.pair_tables import FAR, mesh_tables, near_at_posture
 from excite_cli.robot.states import States
 
 # A bar on two crossed hinges above a plate: it strikes the plate when it tilts.
