@@ -111,8 +111,8 @@ class Balance(Constraint):
     ) -> tuple[Array | None, Array | None, Array | None]:
         """−normalᵀ ∂c/∂q, with the worst inertias of each edge and instant."""
         if self.uncertainty is None:
-            jacobian = self._mass.jacobian(states)[times, :2]
-            return -np.einsum("kx,kxn->kn", self.normals[columns], jacobian), None, None
+            towards = -self.normals @ self._mass.jacobian(states)[:, :2]
+            return towards[times, columns], None, None
         rows, found = self._worst(states)
         at = (times, columns)
         proper = found.proper[at]

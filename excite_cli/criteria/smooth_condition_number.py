@@ -6,7 +6,6 @@ It bounds log cond from above, by at most (2/p) log r, and is differentiable eve
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp, softmax
 
 from excite_cli.criteria.base import Array, Criterion
 
@@ -21,12 +20,18 @@ class SmoothConditionNumber(Criterion):
     def value(self, sigma: Array) -> float:
         """Computed in logarithms, so that no power overflows."""
         logs = np.log(sigma)
-        return float((logsumexp(self.p * logs) + logsumexp(-self.p * logs)) / self.p)
+        sums = (high + np.log(np.exp(each - high).sum()) for each, high in self._powers(logs))
+        return float(sum(sums)) / self.p
 
     def derivative(self, sigma: Array) -> Array:
         """(softmax(p log σ) − softmax(−p log σ)) / σ."""
-        logs = np.log(sigma)
-        return (softmax(self.p * logs) - softmax(-self.p * logs)) / sigma
+        up, down = (np.exp(each - high) for each, high in self._powers(np.log(sigma)))
+        return np.asarray((up / up.sum() - down / down.sum()) / sigma)
+
+    def _powers(self, logs: Array) -> tuple[tuple[Array, float], tuple[Array, float]]:
+        """Logarithms of σ^p and σ^−p, each with their greatest."""
+        up, down = self.p * logs, -self.p * logs
+        return (up, float(up.max())), (down, float(down.max()))
 
     def continuation(self) -> tuple[Criterion, ...]:
         """Rising p up to this one."""

@@ -19,6 +19,7 @@ from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting
 from excite_cli.robot.adjoint import FictitiousInertiaAdjoint
 from excite_cli.robot.base_parameters import BaseParameters
+from excite_cli.robot.compiled.kernels import KERNELS
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.regressor import Regressor
 from excite_cli.robot.spatial_adjoint import SpatialAdjoint
@@ -26,7 +27,7 @@ from excite_cli.trajectory.base import Basis
 
 # Beyond this condition number the Gram matrix loses more than 1e-10 and QR + SVD take over.
 GRAM_LIMIT = 1e3
-# More pairs than this and the batched pull-back is faster than one pass per pair.
+# Uncompiled, with more pairs than this the batched pull-back is faster than one pass per pair.
 FEW_PAIRS = 5
 _NEGLIGIBLE = 1e-12
 
@@ -134,12 +135,31 @@ class Objective:
         seen = self._seen(self.basis.times, q, v, a)
         block = self._block(q, v, a, seen)
         spectrum = self.spectrum(block)
-        left, right = self.pairs(block, spectrum, criterion)
-        adjoint = self._few if len(right) <= FEW_PAIRS else self._many
-        gradient = self.basis.pull_back(*adjoint.pull_back(q, v, a, left, right))
+        gradient = self.basis.pull_back(*self._by_states(q, v, a, block, spectrum, criterion))
         if seen is not None:
             gradient += self._through_effects(seen, block, spectrum, criterion)
         return criterion.value(spectrum.sigma), gradient, spectrum
+
+    def _by_states(
+        self, q: Array, v: Array, a: Array, block: Array, spectrum: Spectrum, criterion: Criterion
+    ) -> tuple[Array, Array, Array]:
+        """Derivatives (T, n) by q, v, a through the regressor."""
+        weight = criterion.derivative(spectrum.sigma)
+        kept = np.flatnonzero(np.abs(weight) > _NEGLIGIBLE * np.abs(weight).max())
+        if KERNELS is None and len(kept) <= FEW_PAIRS:
+            return self._few.pull_back(q, v, a, *self.pairs(block, spectrum, criterion))
+        # ∂f/∂C = C V diag(w/σ) Vᵀ, the product that is cheaper first.
+        vectors, rank = spectrum.right[:, kept], self.base.rank
+        scaled = vectors * (weight[kept] / spectrum.sigma[kept])
+        inertial = vectors[:rank].T
+        few = len(kept) < rank // 2
+        by_block = (block @ scaled) @ inertial if few else block @ (scaled @ inertial)
+        by_block = by_block.reshape(len(q), -1, rank)
+        if not self._plain:
+            by_block = by_block * self.weighting.rows[:, None] * self.weighting.columns
+        weights = np.zeros((*by_block.shape[:2], len(self.base.names)))
+        weights[:, :, self.base.selection] = by_block
+        return self._many.pull_back_dense(q, v, a, weights)
 
     def effect_gradient(self, coefficients: Array, criterion: Criterion) -> Array:
         """The part (K, n) of the gradient that goes through columns of effects."""

@@ -10,13 +10,14 @@ weighted sums over thousands of rows collapse to one matrix product per pair of 
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.robot.compiled.kernels import KERNELS
 from excite_cli.robot.states import States
 from excite_cli.trajectory.base import Basis
 
@@ -47,14 +48,15 @@ class GridProducts:
 
     @cached_property
     def squares(self) -> dict[tuple[int, int], Array]:
-        """b_t b_t'ᵀ flattened, (T, K²), for every pair of orders."""
-        return {
-            (i, j): (self.orders[i][:, :, None] * self.orders[j][:, None, :]).reshape(
-                self.samples, -1
-            )
-            for i in range(3)
-            for j in range(i, 3)
-        }
+        """b_t b_t'ᵀ for every pair of orders: (T, K²), or the lower half of it where they agree."""
+        found = {}
+        low, high = np.tril_indices(self.size)
+        for i in range(3):
+            found[i, i] = self.orders[i][:, low] * self.orders[i][:, high]
+            for j in range(i + 1, 3):
+                both = self.orders[i][:, :, None] * self.orders[j][:, None, :]
+                found[i, j] = both.reshape(self.samples, -1)
+        return found
 
     def add_gradient(self, gradient: Array, per_instant: list[Array | None]) -> None:
         """Add Σ_t b_t g_tᵀ to `gradient` (K, n), `per_instant` being (T, n) per order."""
@@ -64,18 +66,31 @@ class GridProducts:
 
     def add_joint_curvature(self, hessian: Array, order: int, weights: Array) -> None:
         """Add the blocks of separate joints: weights (T, n) on the squared basis."""
-        k, n = self.size, weights.shape[1]
-        blocks = (self.squares[order, order].T @ weights).reshape(k, k, n)
-        joints = np.arange(n)
+        blocks = (self.squares[order, order].T @ weights)[_unfolded(self.size)]
+        joints = np.arange(weights.shape[1])
         hessian[joints, :, joints, :] += blocks.transpose(2, 0, 1)
 
     def add_curvature(self, hessian: Array, i: int, j: int, weights: Array) -> None:
         """Add Σ_t (b_t^i b_t^jᵀ) ⊗ G_t, weights G (T, n, n), to `hessian` (n, K, n, K)."""
         k, n = self.size, weights.shape[1]
+        if i == j:  # symmetric in the basis and in the joints: a quarter of the products
+            low, high = np.tril_indices(n)
+            blocks = weights[:, low, high].T @ self.squares[i, i]
+            blocks = blocks[_unfolded(n)][:, :, _unfolded(k)]
+            hessian += blocks.transpose(0, 2, 1, 3)
+            return
         blocks = (self.squares[i, j].T @ weights.reshape(self.samples, -1)).reshape(k, k, n, n)
         hessian += blocks.transpose(2, 0, 3, 1)
-        if i != j:
-            hessian += blocks.transpose(3, 1, 2, 0)
+        hessian += blocks.transpose(3, 1, 2, 0)
+
+
+@cache
+def _unfolded(size: int) -> Indices:
+    """Where the entries of a symmetric matrix (size, size) are in the list of its lower half."""
+    place = np.zeros((size, size), dtype=np.intp)
+    low, high = np.tril_indices(size)
+    place[low, high] = place[high, low] = np.arange(len(low))
+    return place
 
 
 class Residuals:
@@ -122,7 +137,23 @@ def summed_per_instant(rows: Rows, weights: Array, samples: int) -> list[Array |
 
 
 def squared_per_instant(rows: Rows, weights: Array, samples: int) -> dict[tuple[int, int], Array]:
-    """Σ over the rows of each instant of weight·(gᵢ gⱼᵀ), (T, n, n) per pair of orders.
+    """Σ over the rows of each instant of weight·(gᵢ gⱼᵀ), (T, n, n) per pair of orders."""
+    if KERNELS is None:
+        return _squared_at_once(rows, weights, samples)
+    found = {}
+    parts = {i: np.ascontiguousarray(p) for i, p in enumerate(rows.parts) if p is not None}
+    times, weights = np.ascontiguousarray(rows.times), np.ascontiguousarray(weights)
+    for i, left in parts.items():
+        for j, right in parts.items():
+            if j >= i:
+                n = left.shape[1]
+                found[i, j] = np.zeros((samples, n, n))
+                KERNELS.call("squared", len(times), n, times, weights, left, right, found[i, j])
+    return found
+
+
+def _squared_at_once(rows: Rows, weights: Array, samples: int) -> dict[tuple[int, int], Array]:
+    """`squared_per_instant` in NumPy.
 
     Rows are laid out by instant, short instants filled with zeros, for one batched product.
     """

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from excite_cli.robot.compiled.kernels import KERNELS
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]
@@ -31,6 +32,8 @@ class BatchKinematics:
     """Forward kinematics of `robot` for a whole array of moved-joint positions.
 
     Bodies are the joints 1 .. njoints-1 of `robot.model` in order; body b is joint b + 1.
+    `parents` (B,), -1 for the world; `variable` (B,), the moved joint that turns or slides the
+    body, -1 for none; `twists` (nv, 6), unit twists [linear; angular] in the frame of their body.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -39,11 +42,11 @@ class BatchKinematics:
         self.nv = int(model.nv)
         self._n = robot.n
         self._columns_body = np.zeros(self.nv, dtype=np.intp)
-        self._columns_axis = np.zeros((self.nv, 6))
+        self.twists = np.zeros((self.nv, 6))
         self._rotation_basis = np.zeros((self.n_bodies, 3, 9))
         self._offset = np.zeros((self.n_bodies, 3))
         self._slide = np.zeros((self.n_bodies, 3))
-        self._variable = np.full(self.n_bodies, -1)
+        self.variable = np.full(self.n_bodies, -1, dtype=np.intp)
         first_column = int(robot.moved[0])
         reference = model.createData()
         pin.forwardKinematics(model, reference, robot.reference)
@@ -52,15 +55,16 @@ class BatchKinematics:
             columns = slice(joint.idx_v, joint.idx_v + joint.nv)
             self._columns_body[columns] = body
             axis = np.array(joint.createData().S, dtype=float).reshape(6, joint.nv)
-            self._columns_axis[columns] = axis.T
+            self.twists[columns] = axis.T
             if joint.idx_v < first_column:
                 self._set_fixed(body, reference.liMi[body + 1])
             else:
                 self._set_moved(body, model.jointPlacements[body + 1], axis[:, 0])
-                self._variable[body] = joint.idx_v - first_column
-        self._axes_split = self._columns_axis.reshape(self.nv, 2, 3).swapaxes(1, 2).copy()
-        self._moving = self._variable >= 0
-        self._levels = _levels([int(parent) - 1 for parent in model.parents[1:]])
+                self.variable[body] = joint.idx_v - first_column
+        self._axes_split = self.twists.reshape(self.nv, 2, 3).swapaxes(1, 2).copy()
+        self._moving = self.variable >= 0
+        self.parents = np.array([int(parent) - 1 for parent in model.parents[1:]], dtype=np.intp)
+        self._levels = _levels(self.parents.tolist())
 
     def _set_fixed(self, body: int, placement: pin.SE3) -> None:
         self._rotation_basis[body, 0] = placement.rotation.ravel()
@@ -79,9 +83,21 @@ class BatchKinematics:
 
         `q` (T, n) are the positions of the moved joints [rad or m].
         """
-        q = np.asarray(q, dtype=float).reshape(-1, self._n)
+        q = np.ascontiguousarray(q, dtype=float).reshape(-1, self._n)
+        if KERNELS is None:
+            return self._placements_by_level(q)
+        rotations = np.empty((len(q), self.n_bodies, 3, 3))
+        translations = np.empty((len(q), self.n_bodies, 3))
+        KERNELS.call(
+            "placements", len(q), self.n_bodies, self._n, self.parents, self.variable,
+            self._rotation_basis, self._offset, self._slide, q, rotations, translations,
+        )  # fmt: skip
+        return rotations, translations
+
+    def _placements_by_level(self, q: Array) -> tuple[Array, Array]:
+        """`placements` in NumPy, joints of equal depth at once."""
         angle = np.zeros((self.n_bodies, len(q)))
-        angle[self._moving] = q.T[self._variable[self._moving]]
+        angle[self._moving] = q.T[self.variable[self._moving]]
         terms = np.stack([np.ones_like(angle), np.sin(angle), np.cos(angle)], axis=-1)
         local = np.matmul(terms, self._rotation_basis).reshape(self.n_bodies, len(q), 3, 3)
         shift = self._offset[:, None] + angle[:, :, None] * self._slide[:, None]
@@ -103,6 +119,14 @@ class BatchKinematics:
         Column j is the spatial velocity of all bodies after joint j for unit velocity of joint j:
         what `pin.computeJointJacobians` gives. Takes the answer of `placements`.
         """
+        if KERNELS is not None:
+            columns = np.empty((len(rotations), self.nv, 6))
+            KERNELS.call(
+                "axes", len(rotations), self.n_bodies, self.nv, self._columns_body,
+                self.twists, np.ascontiguousarray(rotations),
+                np.ascontiguousarray(translations), columns,
+            )  # fmt: skip
+            return columns
         turn = rotations[:, self._columns_body]
         place = translations[:, self._columns_body]
         columns = np.empty((*place.shape[:2], 6))

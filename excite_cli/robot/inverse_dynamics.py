@@ -1,5 +1,7 @@
 """Torques of the moved joints with the URDF's inertias, and their derivatives."""
 
+from collections.abc import Iterable
+
 import numpy as np
 import pinocchio as pin
 
@@ -9,9 +11,11 @@ from excite_cli.robot.model import Array, Robot
 class InverseDynamics:
     """τ(q, v, a) for many samples; not to be shared between threads."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, model: pin.Model | None = None) -> None:
+        """`model`: the same robot with other inertias or gravity; None: as the URDF says."""
         self.robot = robot
-        self._data = robot.model.createData()
+        self._model = robot.model if model is None else model
+        self._data = self._model.createData()
 
     def _pinocchio_states(self, q: Array, v: Array, a: Array) -> zip:
         robot = self.robot
@@ -19,18 +23,30 @@ class InverseDynamics:
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
         """τ (T, n) [N·m or N]."""
-        model, data = self.robot.model, self._data
+        model, data = self._model, self._data
         full = [pin.rnea(model, data, *state).copy() for state in self._pinocchio_states(q, v, a)]
         return np.array(full).reshape(len(q), model.nv)[:, self.robot.moved]
 
     def derivatives(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """∂τ/∂q, ∂τ/∂v, ∂τ/∂a, each (T, n, n)."""
-        model, data, moved = self.robot.model, self._data, self.robot.moved
-        parts = np.empty((3, len(q), len(moved), len(moved)))
-        at = np.ix_(moved, moved)
-        for t, state in enumerate(self._pinocchio_states(q, v, a)):
-            pin.computeRNEADerivatives(model, data, *state)
-            mass = np.triu(data.M)
-            mass = mass + np.triu(mass, 1).T
-            parts[:, t] = data.dtau_dq[at], data.dtau_dv[at], mass[at]
-        return parts[0], parts[1], parts[2]
+        by_q, by_v, by_a = rnea_derivatives(
+            self._model, self._data, self._pinocchio_states(q, v, a), len(q)
+        )
+        moved = self.robot.moved
+        at = (slice(None), *np.ix_(moved, moved))
+        return by_q[at], by_v[at], by_a[at]
+
+
+def rnea_derivatives(
+    model: pin.Model, data: pin.Data, states: Iterable[tuple[Array, Array, Array]], count: int
+) -> tuple[Array, Array, Array]:
+    """∂τ/∂q, ∂τ/∂v, ∂τ/∂a of all degrees of freedom at `count` states, each (T, nv, nv)."""
+    by_q = np.empty((count, model.nv, model.nv))
+    by_v, by_a = np.empty_like(by_q), np.empty_like(by_q)
+    view_q, view_v, view_a = data.dtau_dq, data.dtau_dv, data.M
+    for t, state in enumerate(states):
+        pin.computeRNEADerivatives(model, data, *state)
+        by_q[t], by_v[t], by_a[t] = view_q, view_v, view_a
+    low, high = np.tril_indices(model.nv, -1)  # Pinocchio fills the upper triangle of the mass
+    by_a[:, low, high] = by_a[:, high, low]
+    return by_q, by_v, by_a

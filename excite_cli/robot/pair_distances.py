@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.compiled.kernels import KERNELS
 from excite_cli.robot.model import Robot
 from excite_cli.robot.segments import Nearest, nearest_points, normals
 from excite_cli.robot.states import States
@@ -38,7 +39,7 @@ class PairDistances:
         self._robot = robot
         checked = np.array(pairs, dtype=np.intp).reshape(-1, 2)
         used, place = np.unique(checked, return_inverse=True)
-        self._first, self._second = place.reshape(-1, 2).T
+        self._first, self._second = np.ascontiguousarray(place.reshape(-1, 2).T)
         kept = [capsules[index] for index in used]
         self._axes = CapsuleAxes(robot, kept)
         radius = np.array([capsule.radius for capsule in kept])
@@ -47,6 +48,7 @@ class PairDistances:
         self._balls = ball[self._first] + ball[self._second]
         carried = carried_bodies(robot)[self._axes.joints]  # (C, n)
         self._sign = carried[self._second] - carried[self._first]
+        self._moved = np.array(robot.moved, dtype=np.intp)
 
     @property
     def n_pairs(self) -> int:
@@ -60,6 +62,8 @@ class PairDistances:
         that bound is returned instead, which saves most of the work for robots of many links.
         """
         world = self._axes.in_world(q)
+        if KERNELS is not None:
+            return self._compiled_distances(world, float(exact_below))
         if np.isfinite(exact_below):
             bounds = self._bounds(world)
             cols, rows = np.nonzero(bounds < exact_below)
@@ -82,6 +86,18 @@ class PairDistances:
         result -= self._radii[:, None]
         return result.T
 
+    def _compiled_distances(self, world: WorldSegments, exact_below: float) -> Array:
+        assert KERNELS is not None
+        axes, (rotations, translations) = self._axes, world.placements
+        found = np.empty((len(rotations), self.n_pairs))
+        KERNELS.call(
+            "distances", len(rotations), rotations.shape[1], len(axes.joints), self.n_pairs,
+            axes.joints, axes.start, axes.along, self._first, self._second, self._radii,
+            self._balls, exact_below, rotations, translations, np.empty(9 * len(axes.joints)),
+            found,
+        )  # fmt: skip
+        return found
+
     def _bounds(self, world: WorldSegments) -> Array:
         """Lower bounds (P, T) of the distances, from balls around the segments."""
         middle = world.start + 0.5 * world.along
@@ -96,6 +112,28 @@ class PairDistances:
     def gradients(self, q: Array | States, rows: Indices, cols: Indices) -> Array:
         """Derivatives (K, n) of the distance at instant rows[k] of pair cols[k] by q."""
         world = self._axes.in_world(q)
+        if KERNELS is not None:
+            return self._compiled_gradients(world, rows, cols)
+        return self._gradients(world, rows, cols)
+
+    def _compiled_gradients(self, world: WorldSegments, rows: Indices, cols: Indices) -> Array:
+        assert KERNELS is not None
+        axes, (rotations, translations) = self._axes, world.placements
+        columns = np.ascontiguousarray(world.columns())
+        found = np.empty((len(rows), len(self._moved)))
+        KERNELS.call(
+            "gradients", len(rows), rotations.shape[1], columns.shape[1], len(self._moved),
+            axes.joints, axes.start, axes.along, self._first, self._second, self._sign,
+            self._moved, rotations, translations, columns, np.ascontiguousarray(rows),
+            np.ascontiguousarray(cols), found,
+        )  # fmt: skip
+        crossed = np.flatnonzero(np.isnan(found[:, 0]))
+        if len(crossed):
+            found[crossed] = self._gradients(world, rows[crossed], cols[crossed])
+        return found
+
+    def _gradients(self, world: WorldSegments, rows: Indices, cols: Indices) -> Array:
+        """`gradients` in NumPy; it alone knows what to do where segments cross."""
         nearest, start, along, along_second = self._nearest_at(world, rows, cols)
         normal = normals(nearest, along, along_second).T
         point = (start + nearest.share_first * along + 0.5 * nearest.gap).T

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.robot.compiled.kernels import KERNELS
+
 Array = NDArray[np.float64]
 
 
@@ -34,14 +36,37 @@ class PairTable:
 
         return RectBivariateSpline(*self.grids, self.values, kx=3, ky=3)
 
+    @cached_property
+    def _slope_splines(self) -> tuple[Any, Any]:
+        return self._spline.partial_derivative(1, 0), self._spline.partial_derivative(0, 1)
+
     def distances(self, q: Array) -> Array:
         """Distances (T,) [m], cut off at 0.02 m, at q (T, n)."""
+        if KERNELS is not None:
+            return self._value_and_slopes(q)[:, 0]
         return np.asarray(self._spline.ev(*self._at(q)))
 
     def slopes(self, q: Array) -> Array:
         """Derivatives (T, 2) by the two joints."""
+        if KERNELS is not None:
+            return self._value_and_slopes(q)[:, 1:]
         at = self._at(q)
-        return np.stack([self._spline.ev(*at, dx=1), self._spline.ev(*at, dy=1)], axis=1)
+        return np.stack([spline(*at, grid=False) for spline in self._slope_splines], axis=1)
+
+    def _value_and_slopes(self, q: Array) -> Array:
+        assert KERNELS is not None
+        first, second, coefficients = self._knots_and_coefficients
+        at = np.ascontiguousarray(self.positions(q))
+        found = np.empty((len(at), 3))
+        KERNELS.call(
+            "bicubic", len(at), len(first), len(second), first, second, coefficients, at, found
+        )
+        return found
+
+    @cached_property
+    def _knots_and_coefficients(self) -> tuple[Array, Array, Array]:
+        first, second, coefficients = (np.ascontiguousarray(part) for part in self._spline.tck)
+        return first, second, coefficients
 
     def holds(self, at: Array) -> NDArray[np.bool_]:
         """Whether positions (T, 2) of the two joints are within the table (T,)."""
@@ -54,6 +79,8 @@ class PairTable:
     def positions(self, q: Array) -> Array:
         """Positions (T, 2) of the two joints, within one turn where they turn without end."""
         at = q[:, list(self.joints)]
+        if not any(self.turning):
+            return at
         wrapped = np.mod(at + np.pi, 2 * np.pi) - np.pi
         return np.where(self.turning, wrapped, at)
 

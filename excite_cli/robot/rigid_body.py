@@ -80,7 +80,7 @@ class RigidBody:
 
     @cached_property
     def _derivatives(self) -> tuple[Array, Array, Array]:
-        return _Dynamics(self.robot, self._model).derivatives(self.q, self.v, self.a)
+        return InverseDynamics(self.robot, self._model).derivatives(self.q, self.v, self.a)
 
     @property
     def by_position(self) -> Array:
@@ -131,22 +131,3 @@ class RigidBody:
 
 def _frame_of(model: pin.Model, joint: int) -> int:
     return int(model.getFrameId(str(model.names[joint]), pin.FrameType.JOINT))
-
-
-class _Dynamics(InverseDynamics):
-    """Inverse dynamics of another model of the same robot."""
-
-    def __init__(self, robot: Robot, model: pin.Model) -> None:
-        self.robot, self._other = robot, model
-        self._data = model.createData()
-
-    def derivatives(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        moved = self.robot.moved
-        parts = np.empty((3, len(q), len(moved), len(moved)))
-        at = np.ix_(moved, moved)
-        for t, state in enumerate(self._pinocchio_states(q, v, a)):
-            pin.computeRNEADerivatives(self._other, self._data, *state)
-            mass = np.triu(self._data.M)
-            mass = mass + np.triu(mass, 1).T
-            parts[:, t] = self._data.dtau_dq[at], self._data.dtau_dv[at], mass[at]
-        return parts[0], parts[1], parts[2]

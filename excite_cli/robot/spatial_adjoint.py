@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.robot.compiled.kernels import KERNELS
 from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Array, Robot
 
@@ -95,8 +96,10 @@ class SpatialAdjoint:
         carries = np.zeros((robot.n_bodies, robot.n_bodies))
         for body in range(1, model.njoints):
             carries[body - 1, [int(j) - 1 for j in model.supports[body] if j > 0]] = 1.0
-        self._dof_body = np.array(dof_body)
-        self._carried = carries[:, self._dof_body]
+        self._dof_body = np.array(dof_body, dtype=np.intp)
+        self._moved = np.array(robot.moved, dtype=np.intp)
+        self._rows = np.array(robot.rows, dtype=np.intp)
+        self._carried = np.ascontiguousarray(carries[:, self._dof_body])
         strict = self._carried[self._dof_body][:, :] - np.equal.outer(dof_body, dof_body)
         self._strict = strict[np.ix_(robot.moved, robot.rows)]
         self._gravity = np.concatenate([-np.asarray(model.gravity.linear), np.zeros(3)])
@@ -122,6 +125,24 @@ class SpatialAdjoint:
         -------
         gq, gv, ga, each (T, n)
         """
+        if KERNELS is None:
+            return self._pull_back_by_passes(q, v, a, weights)
+        robot, tree = self.robot, self._kinematics
+        samples, n = len(q), robot.n
+        states = [np.ascontiguousarray(part) for part in (v, a, weights)]
+        found = np.empty((3, samples, n))
+        work = np.empty(12 * tree.nv + 42 * robot.n_bodies)
+        KERNELS.call(
+            "pull_back", samples, robot.n_bodies, tree.nv, n, len(robot.rows), tree.parents,
+            self._dof_body, tree.variable, self._moved, self._rows, self._carried, tree.twists,
+            self._gravity, _BY_SPIN, _BY_SPIN_TWICE, *tree.placements(q), *states, work, *found,
+        )  # fmt: skip
+        return found[0], found[1], found[2]
+
+    def _pull_back_by_passes(
+        self, q: Array, v: Array, a: Array, weights: Array
+    ) -> tuple[Array, Array, Array]:
+        """`pull_back_dense` in NumPy, all samples at once."""
         robot, moved = self.robot, self.robot.moved
         samples, rows = len(q), len(robot.rows)
         motion = self.body_motion(q, v, a)

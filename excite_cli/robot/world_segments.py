@@ -1,6 +1,7 @@
 """Axes of capsules in the world at many instants, with the motion columns that move them."""
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,24 +19,37 @@ class WorldSegments:
     """Axes of C capsules at T instants: `start` and `along` (3, C, T) [m]."""
 
     def __init__(self, placements: tuple[Array, Array], axes: "CapsuleAxes") -> None:
-        self._placements, self._axes = placements, axes
+        self.placements, self._axes = placements, axes
         self._columns: Array | None = None
         self._states: States | None = None
-        rotations, translations = placements
-        joints, start, along = axes.joints, axes.start, axes.along
-        count = len(rotations)
-        self.start = np.empty((3, len(joints), count))
-        self.along = np.empty((3, len(joints), count))
+
+    @property
+    def start(self) -> Array:
+        """Where the axes start (3, C, T) [m]."""
+        return self._ends[0]
+
+    @property
+    def along(self) -> Array:
+        """From their starts to their other ends (3, C, T) [m]."""
+        return self._ends[1]
+
+    @cached_property
+    def _ends(self) -> tuple[Array, Array]:
+        rotations, translations = self.placements
+        joints, start, along = self._axes.joints, self._axes.start, self._axes.along
+        starts = np.empty((3, len(joints), len(rotations)))
+        alongs = np.empty_like(starts)
         still = joints == 0
-        self.start[:, still] = start[still].T[:, :, None]
-        self.along[:, still] = along[still].T[:, :, None]
+        starts[:, still] = start[still].T[:, :, None]
+        alongs[:, still] = along[still].T[:, :, None]
         moving = ~still
         turn = rotations.swapaxes(0, 1)[joints[moving] - 1]  # (C, T, 3, 3)
         shift = translations.swapaxes(0, 1)[joints[moving] - 1]
         local = np.stack([start[moving], along[moving]], axis=-1)[:, None]
         both = turn @ local  # (C, T, 3, 2)
-        self.start[:, moving] = np.moveaxis(both[..., 0] + shift, -1, 0)
-        self.along[:, moving] = np.moveaxis(both[..., 1], -1, 0)
+        starts[:, moving] = np.moveaxis(both[..., 0] + shift, -1, 0)
+        alongs[:, moving] = np.moveaxis(both[..., 1], -1, 0)
+        return starts, alongs
 
     def share_columns(self, states: States) -> None:
         """Take the Jacobian columns from `states`, which computes them once for all."""
@@ -46,7 +60,7 @@ class WorldSegments:
         if self._states is not None:
             return self._states.columns
         if self._columns is None:
-            self._columns = self._axes.kinematics.axes(*self._placements)
+            self._columns = self._axes.kinematics.axes(*self.placements)
         return self._columns
 
 

@@ -56,7 +56,8 @@ def test_gradients_equal_coal_and_differences(name: str) -> None:
 def test_distances_at_are_those_of_the_whole_table() -> None:
     ours, _, q = spread("panda")
     rows, cols = np.array([3, 3, 17]), np.array([0, 5, 2])
-    np.testing.assert_array_equal(ours.distances_at(q, rows, cols), ours.distances(q)[rows, cols])
+    some = ours.distances_at(q, rows, cols)
+    np.testing.assert_allclose(some, ours.distances(q)[rows, cols], atol=1e-14)
 
 
 def test_a_changed_array_is_computed_anew() -> None:
