@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from excite_cli.identification.covariance import Rows, estimate_covariance
 from excite_cli.identification.factors import run_factors, solve, stacked
@@ -145,7 +145,7 @@ def hausman_test(
         source=source,
         statistic=statistic,
         degrees=extra,
-        p_value=float(f_distribution.sf(statistic, extra, freedom)),
+        p_value=float(fdtrc(extra, freedom, statistic)),
         bias=bias,
         bias_std=bias_std,
     )

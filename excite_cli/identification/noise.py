@@ -8,7 +8,6 @@ Samples that may not be used break the series; only stretches without a gap ente
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from excite_cli.identification.factors import Mask, triangle_of
 from excite_cli.robot.model import Array
@@ -25,6 +24,8 @@ class Noise:
 
     def whitened(self, x: Array) -> Array:
         """A x along time for x (M, n, …): noise of this model becomes white."""
+        from scipy.signal import lfilter  # takes a second to import
+
         out = np.empty_like(x)
         for j, polynomial in enumerate(self.polynomials):
             out[:, j] = lfilter(polynomial, [1.0], x[:, j], axis=0)
@@ -32,6 +33,8 @@ class Noise:
 
     def spread_back(self, x: Array) -> Array:
         """A⁻ᵀ x along time for x (M, n, …), with noise covariance A⁻¹ A⁻ᵀ per unit innovation."""
+        from scipy.signal import lfilter  # takes a second to import
+
         out = np.empty_like(x)
         for j, polynomial in enumerate(self.polynomials):
             out[:, j] = lfilter([1.0], polynomial, x[::-1, j], axis=0)[::-1]

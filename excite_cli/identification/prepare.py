@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
-from scipy.signal import butter, sosfiltfilt
 from scipy.sparse import csr_matrix
 
 from excite_cli.errors import FileError
@@ -168,6 +167,8 @@ def _smooth(x: Array, cutoff: float, fs: float, name: str) -> Array:
             f"run '{name}' was recorded at {fs:.4g} Hz: too slow for the cut-off of the positions, "
             f"{cutoff:.3g} Hz. Record all runs at one rate, or lower measurement.filter.position."
         )
+    from scipy.signal import butter, sosfiltfilt  # takes a second to import
+
     sections = butter(4, cutoff, fs=fs, output="sos")
     pad = min(int(3 * fs / cutoff), len(x) - 2)
     if pad < 10:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from scipy.signal import welch
 
 from excite_cli.config.data_spec import FilterSpec
 from excite_cli.errors import ConfigError
@@ -86,6 +85,8 @@ def choose_processing(
 
 def _spectra(runs: Sequence[Run], fs: float) -> tuple[Array, Array]:
     """Mean spectrum of the positions (F, n) over the runs, on one grid of frequencies."""
+    from scipy.signal import welch  # takes a second to import
+
     length = min(min(len(run.t) for run in runs), max(64, int(5.0 * fs)))
     total, weight = np.zeros(1), 0.0
     frequency = np.zeros(1)

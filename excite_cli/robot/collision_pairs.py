@@ -19,6 +19,7 @@ from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.mesh_distances import MeshDistances
 from excite_cli.robot.mesh_pairs import joined_links
 from excite_cli.robot.model import Robot
+from excite_cli.robot.pair_choice_cache import choice_key, store_reasons, stored_reasons
 from excite_cli.robot.pair_distances import PairDistances, carried_bodies
 
 Array = NDArray[np.float64]
@@ -83,11 +84,13 @@ def choose_pairs(
         else:
             possible.append(pair)
     if possible:
-        for pair, reason in zip(
-            possible,
-            _by_sampling(robot, capsules, possible, spec.margin, samples, seed),
-            strict=True,
-        ):
+        asked = (robot, capsules, possible, spec.margin, samples, seed)
+        key = choice_key(*asked)
+        reasons = stored_reasons(key, len(possible))
+        if reasons is None:
+            reasons = _by_sampling(*asked)
+            store_reasons(key, reasons)
+        for pair, reason in zip(possible, reasons, strict=True):
             if reason and (bounded or NEVER not in reason):
                 dropped[pair] = reason
     return CollisionPairs(

@@ -1,7 +1,11 @@
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from excite_cli.config.constraints_spec import SelfCollisionSpec
+from excite_cli.robot import collision_pairs
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.clearance import Clearance
 from excite_cli.robot.collision_pairs import CollisionPairs, choose_pairs
@@ -119,3 +123,26 @@ def test_a_pair_that_random_postures_miss_is_found_by_descent() -> None:
 def test_same_seed_same_pairs() -> None:
     robot, capsules = robot_of("ur10"), capsules_of("ur10")
     assert choose_pairs(robot, capsules, SelfCollisionSpec()) == pairs_of("ur10")
+
+
+def test_the_choice_is_kept_and_foreign_content_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    calls: list[int] = []
+    real = collision_pairs._by_sampling
+    monkeypatch.setattr(collision_pairs, "_by_sampling", lambda *a: calls.append(1) or real(*a))
+    robot, capsules, spec = robot_of("ur10"), capsules_of("ur10"), SelfCollisionSpec(margin=0.012)
+    first = choose_pairs(robot, capsules, spec)
+    assert choose_pairs(robot, capsules, spec) == first
+    assert len(calls) == 1
+    assert choose_pairs(robot, capsules, spec, seed=1).checked == first.checked
+    fatter = tuple(replace(capsule, radius=capsule.radius + 0.02) for capsule in capsules)
+    choose_pairs(robot, fatter, spec)
+    choose_pairs(robot, capsules, spec.model_copy(update={"margin": 0.02}))
+    assert len(calls) == 4
+    for content in (b"", b"no archive"):
+        for file in tmp_path.glob("excite/meshes-*"):
+            file.write_bytes(content)
+        assert choose_pairs(robot, capsules, spec) == first
+    assert len(calls) == 6
