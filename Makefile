@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
-.PHONY: install run plan loop test lint docs bench battery robots clean
+.PHONY: install run plan loop test lint lock audit docs bench peers trust battery robots clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
 
@@ -40,20 +40,47 @@ docs: $(STAMP)           ## the documentation, into site/; a warning is an error
 robots: $(STAMP)         ## every robot of example-robot-data, into docs/robots.md (an hour or two)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.all_robots --workers 2 --resume
 
-bench: $(STAMP)          ## cost and gradient, growth, whole motions
+bench: $(STAMP)          ## cost and gradient, growth, memory, whole motions, two workers
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.gradient
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.growth
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.memory
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.clearance
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.motions
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.scaling
+
+FIGAROH ?= figaroh-env/bin/python
+peers: $(STAMP)          ## beside FIGAROH and finite differences (docs/peers.md), ten minutes
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.peers --figaroh-python $(FIGAROH) \
+	  --markdown docs/peers_table.md
+
+trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism (an hour; root)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.fuzz --count 10000
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.kill --kills 500
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.disk
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.determinism
 
 battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about 20 minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.diagnosis_battery --cases 130 --seed 11001
 
-$(STAMP): pyproject.toml
+# Development and CI use the pinned versions of requirements/ci.txt, checked by their hashes; the
+# program alone takes what pyproject.toml allows, as it does in an environment of a user's own.
+$(STAMP): pyproject.toml requirements/ci.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade "pip>=24"
-	$(BIN)/python -m pip install --quiet -e ".[dev]"
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements/ci.txt
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	touch $(STAMP) $(USER_STAMP)
+
+lock:                    ## pin all dependencies anew, for Python 3.11 and newer
+	$(PYTHON) -m venv $(VENV)-lock
+	$(VENV)-lock/bin/python -m pip install --quiet "uv>=0.5"
+	$(VENV)-lock/bin/uv pip compile pyproject.toml requirements/build.in --quiet --upgrade \
+	  --universal --python-version 3.11 --all-extras --generate-hashes \
+	  --custom-compile-command "make lock" --output-file requirements/ci.txt
+	rm -rf $(VENV)-lock
+
+audit: $(STAMP)          ## known vulnerabilities of the pinned versions (asks the registry)
+	$(BIN)/python -m pip install --quiet pip-audit
+	$(BIN)/pip-audit -r requirements/ci.txt --disable-pip --require-hashes
 
 $(USER_STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)

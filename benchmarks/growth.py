@@ -1,67 +1,120 @@
-"""How cost and gradient grow with joints, samples, harmonics and stacked motions.
+"""How time and memory grow with samples, joints and stacked motions: fitted exponents.
+
+For each case: cost and gradient; one iteration of the whole optimisation with all constraints; the
+peak of what is allocated while it runs (tracemalloc, so without the libraries themselves). Samples
+are those of cost and of constraints together. An exponent e says: twice as many, 2^e times as much.
 
 Run: python -m benchmarks.growth
 """
 
 import json
+import time
+import tracemalloc
+from collections.abc import Sequence
+from dataclasses import dataclass
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.bare import BareCalls
-from benchmarks.problems import WITHOUT_GEOMETRY, motion, problem
+from benchmarks.problems import CONFIGS, motion, problem
 from benchmarks.timing import interleaved
-from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
+from excite_cli.config.load import load_spec
+from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.solvers.base import Effort
+from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.start import random_start
+from excite_cli.excitation.task import MotionTask
 
-ARM = json.dumps([f"arm_left_{i}_joint" for i in range(1, 8)])
+_ITERATIONS = 6
+_REPEATS = 15
+ARMS = [f"arm_{side}_{i}_joint" for side in ("left", "right") for i in range(1, 8)]
+LEGS = [f"leg_{side}_{i}_joint" for side in ("left", "right") for i in range(1, 7)]
+REST = ["torso_1_joint", "torso_2_joint", "head_1_joint", "head_2_joint"]
+SETS = {7: ARMS[:7], 14: ARMS, 18: ARMS + REST, 30: ARMS + REST + LEGS}
 
 
-def row(label: str, of: Problem, stacked: int = 0) -> None:
-    alpha = motion(of)
-    stack = Stack.empty(of.base.rank)
+@dataclass(frozen=True)
+class Cost:
+    """Milliseconds of cost and gradient, of the bare calls, of an iteration; peak in MB."""
+
+    gradient: float
+    bare: float
+    iteration: float
+    memory: float
+
+
+def measured(of: Problem, stacked: int = 0) -> Cost:
+    alpha, stack = motion(of), Stack.empty(of.base.rank)
     for seed in range(stacked):
         stack = stack.with_rows(of.objective().block(motion(of, 100 + seed)))
     objective, bare = of.objective(stack), BareCalls(of, alpha)
     found = interleaved(
-        {
-            "bare": bare.run,
-            "gradient": lambda: objective.value_and_gradient(alpha, of.criterion),
-            "smooth": lambda: objective.value_and_gradient(alpha, SmoothConditionNumber(4.0)),
-        },
-        15,
+        {"bare": bare.run, "gradient": lambda: objective.value_and_gradient(alpha, of.criterion)},
+        _REPEATS,
     )
-    print(
-        f"{label:34} {of.variables:5} {of.base.rank:5} {1e3 * found['bare']:9.2f} "
-        f"{1e3 * found['gradient']:9.2f} {1e3 * found['smooth']:9.2f} "
-        f"{found['gradient'] / found['bare']:8.2f}"
+    task = MotionTask(of, stack)
+    x = random_start(task, base_motion(task, 1), (1, 1, 0))
+    _iterate(of, stack, x)
+    began = time.perf_counter()
+    _iterate(of, stack, x)
+    seconds = time.perf_counter() - began
+    tracemalloc.start()
+    _iterate(of, stack, x)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return Cost(
+        1e3 * found["gradient"], 1e3 * found["bare"], 1e3 * seconds / _ITERATIONS, peak / 1e6
     )
+
+
+def _iterate(of: Problem, stack: Stack, x: np.ndarray) -> None:
+    effort = Effort(_ITERATIONS, 600.0, 0.0)
+    build_solver(of.spec.optimizer).solve(MotionTask(of, stack), x, effort, lambda progress: None)
+
+
+def family(name: str, cases: Sequence[tuple[int, Problem, int]]) -> None:
+    print(f"\n{name:>16} {'base par.':>10} {'gradient ms':>12} {'/ bare':>7} "
+          f"{'iteration ms':>13} {'memory MB':>10}")  # fmt: skip
+    sizes, costs = [], []
+    for size, of, stacked in cases:
+        cost = measured(of, stacked)
+        sizes.append(size)
+        costs.append(cost)
+        print(f"{size:16} {of.base.rank:10} {cost.gradient:12.2f} {cost.gradient / cost.bare:7.2f} "
+              f"{cost.iteration:13.1f} {cost.memory:10.1f}", flush=True)  # fmt: skip
+    exponents = [
+        np.polyfit(np.log(sizes), np.log([getattr(cost, what) for cost in costs]), 1)[0]
+        for what in ("gradient", "iteration", "memory")
+    ]
+    print(f"{'exponent':>16} {'':10} {exponents[0]:12.2f} {'':7} {exponents[1]:13.2f} "
+          f"{exponents[2]:10.2f}")  # fmt: skip
 
 
 def main() -> None:
-    print(
-        f"{'':34} {'var.':>5} {'base':>5} {'bare ms':>9} {'grad ms':>9} {'smooth ms':>9} "
-        f"{'grad/bare':>9}"
-    )
-    arms = ("talos_arms", WITHOUT_GEOMETRY)
-    row("7 joints", problem(*arms, f"robot.joints={ARM}", "robot.posture={}"))
-    row("14 joints", problem(*arms))
-    row("30 joints, floating base", problem("talos_whole_body", WITHOUT_GEOMETRY))
-    row(
-        "32 joints, floating base",
-        problem("talos_whole_body", WITHOUT_GEOMETRY, "robot.joints=all"),
-    )
-    for samples in (20, 80, 160):
-        row(
-            f"14 joints, {samples} samples",
-            problem(*arms, f"sampling.cost={{samples: {samples}, step: {8 / samples}}}"),
+    def sampled(k: int) -> Problem:
+        return problem(
+            "talos_arms",
+            f"sampling.cost={{samples: {40 * k}, step: {0.2 / k}}}",
+            f"sampling.constraints={{samples: {400 * k}, step: {0.02 / k}}}",
         )
-    for harmonics in (5, 20):
-        row(
-            f"14 joints, {harmonics} harmonics", problem(*arms, f"trajectory.harmonics={harmonics}")
+
+    def with_joints(names: list[str]) -> Problem:
+        limits = load_spec(CONFIGS / "talos_whole_body.yaml").robot.limits
+        kept = {name: limit.model_dump() for name, limit in limits.items() if name in names}
+        return problem(
+            "talos_whole_body",
+            f"robot.joints={json.dumps(names)}",
+            f"robot.limits={json.dumps(kept)}",
+            *("robot.base=fixed", "robot.rows=[joints]"),
         )
-    for stacked in (1, 10, 50):
-        row(f"14 joints, {stacked} stacked motions", problem(*arms), stacked)
+
+    family("cost samples", [(40 * k, sampled(k), 0) for k in (1, 2, 4, 8)])
+    family("joints", [(count, with_joints(names), 0) for count, names in SETS.items()])
+    arms = problem("talos_arms")
+    family("stacked motions", [(count, arms, count) for count in (1, 5, 20, 50)])
 
 
 if __name__ == "__main__":

@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     from excite_cli.store.result_file import read_result as read_result
     from excite_cli.store.result_file import write_result as write_result
     from excite_cli.trajectory.chain import Segment as Segment
+    from excite_cli.workers.base import Workers as Workers
+    from excite_cli.workers.catalogue import open_workers as open_workers
 
 __version__ = "0.1.0"
 
@@ -88,6 +90,8 @@ _HOMES = {
     "store.fit_file": ("read_fit",),
     "store.result_file": ("read_result", "write_result"),
     "trajectory.chain": ("Segment",),
+    "workers.base": ("Workers",),
+    "workers.catalogue": ("open_workers",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

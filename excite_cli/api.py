@@ -58,6 +58,7 @@ from excite_cli.store.result_file import read_result, write_result
 from excite_cli.store.versions import versions
 from excite_cli.trajectory.catalogue import build_trajectory
 from excite_cli.trajectory.chain import Segment
+from excite_cli.workers.base import Workers
 
 PlanProgress = Callable[[int, Progress], None]
 Prior = str | Path | Result | Dataset | Segment | Stack
@@ -151,6 +152,7 @@ def plan(
     output: str | Path | None = None,
     overwrite: bool = False,
     progress: PlanProgress = lambda motion, progress: None,
+    workers: Workers | None = None,
 ) -> Result:
     """Motions one after the other, each with all earlier data stacked: `excite optimize`.
 
@@ -158,6 +160,7 @@ def plan(
     measured data of the diagnosis come first. `priors` are earlier results (or their files),
     measured data, or motions; the search of motion k starts from the k-th of `starts`. With
     `output` the result is on disk after every motion. `progress(k, state)` is called by the solver.
+    `workers` (`open_workers`) share the starts of a motion, with the same result.
 
     Returns
     -------
@@ -200,6 +203,7 @@ def plan(
         store,
         following.model if following else None,
         starts,
+        workers,
     )
 
 

@@ -5,6 +5,8 @@ that is not an `ExciteError` is a bug of ours (exit status 70).
 """
 
 import difflib
+import errno
+import re
 from collections.abc import Iterable
 
 _ENOUGH_TO_GUESS = 3  # letters
@@ -48,3 +50,32 @@ def nearest(word: str, allowed: Iterable[str], cutoff: float = 0.6) -> str:
     if not match and len(word) >= _ENOUGH_TO_GUESS:
         match = [each for each in options if each.lower().startswith(word.lower())]
     return f" Did you mean '{match[0]}'?" if match else ""
+
+
+# What a file system may refuse, and what helps.
+REFUSALS = {
+    errno.EACCES: "no permission. Change it with chmod, or give another place.",
+    errno.EPERM: "no permission. Change it with chmod, or give another place.",
+    errno.EROFS: "this file system is read-only. Give another place.",
+    errno.ENOSPC: "no space is left on the disk. Free some, or give another place.",
+    errno.EDQUOT: "the disk quota is used up. Free some space, or give another place.",
+    errno.EFBIG: "it is larger than files may be here (ulimit -f). Give another place.",
+    errno.ENOTDIR: "a part of this path is a file, not a folder. Give another place.",
+    errno.EEXIST: "a part of this path is a file, not a folder. Give another place.",
+    errno.ENOENT: "its folder is gone, or cannot be made. Give another place.",
+    errno.ENAMETOOLONG: "this name is too long. Give a shorter one.",
+    errno.ELOOP: "its symbolic links lead in a circle. Give another place.",
+    errno.EIO: "the disk reports an error. Give another place.",
+}
+
+
+def refusal(error: OSError) -> str:
+    """Why the file system refused, and what helps.
+
+    Libraries that write files themselves hide the number of the error in the text.
+    """
+    number = error.errno
+    hidden = re.search(r"errno = (\d+)", str(error))
+    if number not in REFUSALS and hidden is not None:
+        number = int(hidden[1])
+    return REFUSALS.get(number or 0, f"{error.strerror or error}.")

@@ -20,6 +20,8 @@ from excite_cli.cli.report import report
 from excite_cli.cli.robots import robots
 from excite_cli.cli.schema import schema
 from excite_cli.cli.simulate import simulate
+from excite_cli.cli.stopping import heed_signals
+from excite_cli.cli.study import study
 from excite_cli.cli.usage_errors import USAGE_ERROR, in_our_words
 from excite_cli.cli.verify_gradient import verify_gradient
 from excite_cli.cli.view import view
@@ -45,6 +47,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "identify": identify,
     "simulate": simulate,
     "diagnose": diagnose,
+    "study": study,
     "export": export,
     "report": report,
     "view": view,
@@ -57,6 +60,7 @@ _GROUPS = {
     "Plan motions": ("optimize", "check", "compare-random", "verify-gradient"),
     "Look at them, hand them on": ("report", "view", "export"),
     "From measured data": ("simulate", "identify", "diagnose"),
+    "Much of it": ("study",),
 }
 _ORDER = [name for names in _GROUPS.values() for name in names]
 _ORDER += [name for name in _COMMANDS if name not in _ORDER]
@@ -107,4 +111,5 @@ def main() -> None:
         if isinstance(status, int) and status:
             raise SystemExit(status)
 
+    heed_signals()
     sys.exit(run_guarded(act))

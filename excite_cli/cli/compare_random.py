@@ -15,6 +15,15 @@ def compare_random(
     candidates: Annotated[
         int, typer.Option("--candidates", min=1, help="Least number of random motions.")
     ] = 300,
+    budget: Annotated[
+        float | None,
+        typer.Option(
+            "--seconds",
+            min=0.0,
+            help="Draw at least this long; 0: the number alone counts, so that the result can be "
+            "reproduced. Default: as long as the optimiser took.",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -32,6 +41,8 @@ def compare_random(
     overrides: options.Set = None,
     overwrite: options.Overwrite = False,
     threads: options.Threads = 1,
+    workers: options.Workers = 1,
+    scheduler: options.Scheduler = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
@@ -40,22 +51,24 @@ def compare_random(
     """Compare with random motions under the same constraints, as in the paper's Tables I and II.
 
     The problem is optimised first (or taken from --optimized); then at least --candidates random
-    motions are drawn, and more until as much time has passed as the optimiser took.
+    motions are drawn, and more until as much time has passed as the optimiser took. --workers share
+    both, starts of the optimiser and random motions.
 
     Examples:
       excite compare-random ur10.yaml --candidates 100
+      excite compare-random ur10.yaml --candidates 40 --seconds 0
       excite compare-random ur10.yaml --optimized ur10.h5 -o compared.h5
     """
     from dataclasses import replace
 
     from rich.table import Table
 
-    from excite_cli.cli.best_so_far import Best
     from excite_cli.cli.setup import load_problem, output_path, single_threaded
+    from excite_cli.cli.start_line import iterations_of, start_line
     from excite_cli.cli.tables import comparison_table, motion_data
+    from excite_cli.cli.working import working
     from excite_cli.config.load import parse_spec
     from excite_cli.errors import FileError
-    from excite_cli.excitation.motion import Progress, ProgressCallback
     from excite_cli.excitation.random_baseline import random_baseline
     from excite_cli.excitation.result import matches
     from excite_cli.excitation.run import continue_run, new_result
@@ -66,7 +79,7 @@ def compare_random(
     path = output_path(output, config, overwrite) if output else None
     extra = [f"sequence.motions={motions}"] if motions is not None else []
     extra += [f"seed={seed}"] if seed is not None else []
-    with single_threaded(threads):
+    with single_threaded(threads), working(terminal, workers, scheduler, threads) as place:
         problem = load_problem(terminal, config, overrides, extra)
         if optimized is not None:
             result = read_result(optimized)
@@ -83,25 +96,13 @@ def compare_random(
                     f"{config}. Compare with the config it was made with."
                 )
         else:
-            with terminal.live("optimising", problem.spec.optimizer.max_iterations) as show:
-                total = problem.spec.sequence.motions
-
-                def report(index: int) -> ProgressCallback:
-                    best = Best()
-
-                    def tell(progress: Progress) -> None:
-                        show(
-                            f"motion {index} of {total}: {best.words(progress)}",
-                            progress.iteration,
-                        )
-
-                    return tell
-
+            with terminal.live("optimising", iterations_of(problem.spec)) as show:
                 result = continue_run(
                     problem,
                     new_result(problem, [], versions(), config.resolve().parent),
-                    report,
+                    start_line(show, problem.spec),
                     lambda step, current: None,
+                    workers=place,
                 )
         seconds = sum(motion.seconds for motion in result.motions)
         with terminal.live("random motions", candidates) as show:
@@ -110,9 +111,10 @@ def compare_random(
                 len(result.motions),
                 problem.spec.seed,
                 candidates,
-                seconds,
+                seconds if budget is None else budget,
                 lambda drawn, best: show(f"{drawn} of {candidates} drawn, best {best:.1f}", drawn),
                 result.prior_stack,
+                place,
             )
     result = replace(
         result,

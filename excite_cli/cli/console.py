@@ -30,7 +30,9 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from excite_cli import __version__
-from excite_cli.errors import ExciteError
+from excite_cli.claim import leave_claims
+from excite_cli.cli.stopping import stopped
+from excite_cli.errors import REFUSALS, ExciteError, refusal
 
 BUG, INTERRUPTED = 70, 130
 # Off a terminal rows stay whole, so that they can be searched and cut.
@@ -186,37 +188,50 @@ def run_guarded(action: Callable[[], None]) -> int:
     """Run a command; return its exit status, with one message instead of a traceback."""
     try:
         action()
+        sys.stdout.flush()
     except ExciteError as error:
         _tell(f"error: {error}")
         return error.exit_status
     except KeyboardInterrupt:
-        _tell("interrupted; every finished motion is in the file.")
-        return INTERRUPTED
+        status, words = stopped(sys.argv[1:])
+        _tell(words)
+        return status
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_nowhere()
         return 0
     except MemoryError:
         _tell("error: out of memory; take fewer samples, harmonics or joints.")
         return 2
     except OSError as error:
-        if error.filename is None or error.errno not in _NOT_OUR_FAULT:
-            return _bug(error)
-        _tell(f"error: {error.filename}: {_NOT_OUR_FAULT[error.errno]}")
-        return 2
+        return _refused(error)
     except Exception as error:
         return _bug(error)
+    finally:
+        leave_claims()
     return 0
 
 
-# What a file system may refuse, and what helps.
-_NOT_OUR_FAULT = {
-    errno.EACCES: "no permission. Change it with chmod, or give another place.",
-    errno.EPERM: "no permission. Change it with chmod, or give another place.",
-    errno.EROFS: "this file system is read-only. Give another place.",
-    errno.ENOSPC: "no space is left on the disk.",
-    errno.ENOTDIR: "a part of this path is a file, not a folder. Give another place.",
-    errno.ENAMETOOLONG: "this name is too long. Give a shorter one.",
-}
+# Nothing that a user could mend: the program looked for a file that it should have asked for.
+_OUR_FAULT = (errno.ENOENT, errno.EEXIST)
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def _refused(error: OSError) -> int:
+    """What the file system refused, to a file or to the output."""
+    printed = error.filename is None and error.errno in _FULL
+    if error.errno not in REFUSALS or error.errno in _OUR_FAULT:
+        return _bug(error)
+    if error.filename is None and not printed:
+        return _bug(error)
+    if printed:
+        _print_nowhere()
+    _tell(f"error: {'standard output' if printed else error.filename}: {refusal(error)}")
+    return 2
+
+
+def _print_nowhere() -> None:
+    """So that Python's own last flush does not fail once more."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _bug(error: Exception) -> int:

@@ -171,9 +171,11 @@ def _check_paths(paths: list[Path], exporter: "MotionExporter", overwrite: bool)
     if not exporter.folder:
         check_outputs({f"output ({path})": path for path in paths}, overwrite)
         return
+    from excite_cli.claim import claim
     from excite_cli.export.motion_rosbag2 import is_bag
 
     for path in paths:
+        claim(path)
         if path.exists() and not (overwrite and is_bag(path)):
             replace = ", or replace it with --overwrite" if is_bag(path) else ""
             raise FileError(f"{path} exists already. Give another name{replace}.")

@@ -14,8 +14,8 @@ from typing import Any, get_args
 from typer.core import TyperCommand, TyperGroup
 
 # Groups of options are told in this order; those of no group come first, as "Options".
-OUTPUT, MESSAGES = "What is written", "What is said"
-_LAST = (OUTPUT, MESSAGES)
+WORK, OUTPUT, MESSAGES = "Who does the work", "What is written", "What is said"
+_LAST = (WORK, OUTPUT, MESSAGES)
 _INDENT = 2
 _NARROWEST, _WIDEST_NAMES = 50, 26
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from excite_cli.cli.completion import complete_key
-from excite_cli.cli.help_page import MESSAGES, OUTPUT
+from excite_cli.cli.help_page import MESSAGES, OUTPUT, WORK
 
 Config = Annotated[Path, typer.Argument(help="The problem, a YAML file.", show_default=False)]
 Data = Annotated[
@@ -61,4 +61,23 @@ Overwrite = Annotated[
 ]
 Threads = Annotated[
     int, typer.Option("--threads", min=1, help="Threads of the linear algebra library.")
+]
+Workers = Annotated[
+    int,
+    typer.Option(
+        "--workers",
+        min=1,
+        metavar="N",
+        help="Processes on this machine that share the work.",
+        rich_help_panel=WORK,
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Share the work on the dask cluster of this scheduler, as tcp://host:8786.",
+        rich_help_panel=WORK,
+    ),
 ]

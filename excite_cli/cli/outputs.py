@@ -1,23 +1,26 @@
-"""Where a command writes: refused before the work begins, not after it."""
+"""Where a command writes: refused before the work begins, not after it; and claimed."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
+from excite_cli.claim import claim
 from excite_cli.errors import FileError
 
 
 def check_outputs(outputs: Mapping[str, Path | None], overwrite: bool) -> None:
     """See that every output (by the name of its option) can be written, and none twice.
 
+    They are then claimed by this process: another run on the same output is refused until it ends.
+
     Raises
     ------
     FileError
-        An output is a folder, or exists and may not be replaced; or two have the same name.
+        An output is no regular file, or exists and may not be replaced; two have the same name; one
+        is being written by another run, or its folder cannot be written to.
     """
     given = {option: path for option, path in outputs.items() if path is not None}
     for path in given.values():
-        if path.is_dir():
-            raise FileError(f"{path} is a folder. Give a file name.")
+        claim_file(path)
         if path.exists() and not overwrite:
             raise FileError(
                 f"{path} exists already. Give another name, or replace it with --overwrite."
@@ -27,3 +30,18 @@ def check_outputs(outputs: Mapping[str, Path | None], overwrite: bool) -> None:
         other = taken.setdefault(path.resolve(), option)
         if other != option:
             raise FileError(f"--{other} and --{option} both name {path}. Give two names.")
+
+
+def claim_file(path: Path) -> None:
+    """Claim `path` for this process.
+
+    Raises
+    ------
+    FileError
+        It is no regular file, another run is writing it, or its folder cannot be written to.
+    """
+    if path.is_dir():
+        raise FileError(f"{path} is a folder. Give a file name.")
+    if path.exists() and not path.is_file():
+        raise FileError(f"{path} is no regular file. Give a file name.")
+    claim(path)

@@ -75,8 +75,10 @@ def _paths(target: Path, kind: Format | None, names: list[str], overwrite: bool)
     Raises
     ------
     FileError
-        One exists and nothing says to replace it, or `target` does not suit the format.
+        One exists and nothing says to replace it, another run is writing it, or `target` does not
+        suit the format.
     """
+    from excite_cli.cli.outputs import claim_file
     from excite_cli.errors import FileError
 
     if target.suffix.lower() in (".png", ".svg") and not target.is_dir():
@@ -95,6 +97,8 @@ def _paths(target: Path, kind: Format | None, names: list[str], overwrite: bool)
         )
     else:
         paths = [target / f"{name}.{kind or Format.png}" for name in names]
+    for path in paths:
+        claim_file(path)
     present = [path for path in paths if path.exists()]
     if present and not overwrite:
         raise FileError(

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.outputs import claim_file
 from excite_cli.cli.telling import tell_problem
 from excite_cli.config.load import load_spec
 from excite_cli.errors import FileError
@@ -85,7 +86,6 @@ def load_priors(
         A file cannot be read, or is a diagnosis.
     """
     from excite_cli.cli.motions import is_motion, load_motions
-    from excite_cli.diagnosis.measured_prior import measured_stack
     from excite_cli.excitation.planned_prior import planned_stack
     from excite_cli.store.diagnosis_file import is_diagnosis
     from excite_cli.store.result_file import is_result, read_result
@@ -101,6 +101,9 @@ def load_priors(
             motion = load_motions(terminal, path, problem.robot, problem.spec)[0]
             stack, words = planned_stack(problem, motion)
         else:
+            # It brings signal processing, which takes a second to import.
+            from excite_cli.diagnosis.measured_prior import measured_stack
+
             data = load_dataset(terminal, problem.robot, problem.spec, [path])
             stack, words = measured_stack(problem, data)
         terminal.say(f"--prior {path}: {words}")
@@ -153,13 +156,13 @@ def output_path(output: Path | None, config: Path, overwrite: bool, resume: bool
     Raises
     ------
     FileError
-        It exists already and nothing says to replace or resume it.
+        It exists already and nothing says to replace or resume it, another run is writing it, or
+        it cannot be written.
     """
     path = output or Path(f"{config.stem}.h5")
     if path.is_file() and config.is_file() and path.samefile(config):
         load_spec(config)  # tells that this is no config
-    if path.is_dir():
-        raise FileError(f"{path} is a folder. Give a file name with -o.")
+    claim_file(path)
     if path.exists() and not overwrite and not resume:
         raise FileError(
             f"{path} exists already. Give another name with -o, go on with --resume, or replace "

@@ -238,12 +238,12 @@ def _motions(
 
 
 def _check_target(target: Path, suffix: str, overwrite: bool) -> None:
+    from excite_cli.cli.outputs import claim_file
     from excite_cli.errors import FileError
 
     if target.suffix.lower() != suffix:
         raise FileError(f"--{suffix[1:]} {target}: give a name that ends in {suffix}.")
-    if target.is_dir():
-        raise FileError(f"{target} is a folder. Give a file name.")
+    claim_file(target)
     if target.exists() and not overwrite:
         raise FileError(f"{target} exists already. Give another name, or --overwrite.")
 

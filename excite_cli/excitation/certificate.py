@@ -8,7 +8,7 @@ again. The bounds approach the margins with the third power of the width (first 
 that whatever has a margin of more than rounding is proved after few cuts.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,7 +27,8 @@ State = Literal["proved", "sampled", "broken"]
 _WIDTH = 0.04  # [s] of the first intervals
 _CUTS = 16
 _MOST_OPEN = 4000
-_CHUNK = 200
+_CHUNK = 6000  # joints times intervals that are enclosed at once
+_LEAST_CHUNK = 200
 _TRIFLE = 1e-4  # share of the scale
 
 
@@ -65,6 +66,12 @@ class Path:
     coefficients: Array
     states_at: Callable[[Array], States]
 
+    def chunks(self, intervals: Intervals) -> Iterator[Intervals]:
+        """The intervals in portions: large ones cost less each, very large ones much memory."""
+        size = max(_LEAST_CHUNK, _CHUNK // self.robot.n)
+        for begin in range(0, len(intervals), size):
+            yield intervals.only(slice(begin, begin + size))
+
     def enclosed(self, intervals: Intervals) -> EnclosedMotion:
         """Everything that can happen in the intervals."""
         states = enclosed_states(self.trajectory, self.coefficients, intervals)
@@ -76,8 +83,7 @@ def certify(path: Path, constraints: Sequence[Constraint]) -> tuple[Verdict, ...
     intervals = intervals_of(path.trajectory, _WIDTH)
     open_: list[list[Intervals]] = [[] for _ in constraints]
     known = [True] * len(constraints)
-    for begin in range(0, len(intervals), _CHUNK):
-        some = intervals.only(slice(begin, begin + _CHUNK))
+    for some in path.chunks(intervals):
         motion = path.enclosed(some)
         for index, constraint in enumerate(constraints):
             least = constraint.least(motion)
@@ -137,8 +143,7 @@ def _still_open(
     """Those of the intervals that are not proved, and in which columns (m,) any is not."""
     keep: list[Intervals] = []
     columns = np.zeros(len(constraint.labels), dtype=bool)
-    for begin in range(0, len(intervals), _CHUNK):
-        some = intervals.only(slice(begin, begin + _CHUNK))
+    for some in path.chunks(intervals):
         least = constraint.least(path.enclosed(some))
         assert least is not None, "a bound that was known once is known always"
         keep.append(some.only(_doubtful(least, constraint)))

@@ -1,4 +1,4 @@
-"""One admissible motion: start, solve, look between the instants, mend, judge."""
+"""One admissible motion: the best of its starts, judged."""
 
 import time
 from dataclasses import replace
@@ -7,19 +7,21 @@ import numpy as np
 
 from excite_cli.constraints.base import Array
 from excite_cli.errors import NoAdmissibleMotionError
-from excite_cli.excitation.admissible import lacking_margins, verdicts, worst_margins
+from excite_cli.excitation.admissible import verdicts, worst_margins
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.given_start import start_from
-from excite_cli.excitation.motion import Motion, Outcome, Progress, ProgressCallback
+from excite_cli.excitation.motion import Motion, Outcome, ProgressCallback
+from excite_cli.excitation.one_start import FoundMotion, OneStart, Search, solve_start
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.solvers.base import Effort, Solver
+from excite_cli.excitation.solvers.base import Solver
 from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.start import Start, moved_note, random_start
+from excite_cli.excitation.start import Start, moved_note
+from excite_cli.excitation.start_progress import followed
 from excite_cli.excitation.task import MotionTask
 from excite_cli.trajectory.chain import Segment
+from excite_cli.workers.base import Workers
+from excite_cli.workers.here import Here
 
-_GUARD_ROUNDS = 6
-_GUARD_GROWTH = 1.3
 # Beyond this condition number some parameters do not show at all.
 _BLIND = 1e9
 # A motion counts as an improvement of the stack from this change of the (logarithmic) criterion.
@@ -34,10 +36,13 @@ def generate_motion(
     seed: int,
     report: ProgressCallback,
     given: Segment | None = None,
+    workers: Workers | None = None,
 ) -> Motion:
     """Motion `index` on top of `stack`, the best of `optimizer.restarts` starts.
 
-    The first start is made of the motion `given`, if there is one.
+    The first start is made of the motion `given`, if there is one. Starts are spread over
+    `workers` (default: done here), whose solver is that of the problem's config; the motion is the
+    same wherever they are done.
 
     Raises
     ------
@@ -48,7 +53,9 @@ def generate_motion(
     task = MotionTask(problem, stack)
     start = base_motion(task, seed)
     first, told = (None, "") if given is None else start_from(task, start, given)
-    outcome = _best_of_starts(task, solver, start, (seed, index), report, first)
+    outcome, cut = _best_of_starts(
+        task, solver, start, (seed, index), report, first, workers or Here()
+    )
     coefficients = task.coefficients(outcome.x)
     value = task.objective.value(coefficients, problem.criterion)
     stacked = task.objective.stacked_condition_number(coefficients)
@@ -72,7 +79,7 @@ def generate_motion(
         evaluations=outcome.evaluations,
         margins=worst_margins(problem, coefficients),
         certified=_certified(problem, coefficients),
-        note="; ".join(filter(None, [moved_note(task, start), told])),
+        note="; ".join(filter(None, [moved_note(task, start), told, cut])),
     )
 
 
@@ -88,37 +95,39 @@ def _best_of_starts(
     start: Start,
     seed: tuple[int, int],
     report: ProgressCallback,
-    first: Array | None = None,
-) -> Outcome:
+    first: Array | None,
+    workers: Workers,
+) -> tuple[Outcome, str]:
     """The outcome with the lowest criterion, with iterations and evaluations of all starts.
 
-    A start that fails is passed over; its error is raised only if all fail.
+    Also what is to be told of it. Of equal ones the first is taken, so that it does not matter who
+    was ready first. A start that fails is passed over; the last error is raised only if all fail.
     """
-    problem, spec = task.problem, task.problem.spec.optimizer
-    effort = Effort(spec.max_iterations, spec.max_seconds, spec.tolerance)
-    found: list[tuple[float, Outcome]] = []
-    failure: NoAdmissibleMotionError | None = None
-    for restart in range(spec.restarts):
-        run = MotionTask(problem, task.stack)
-        told = _labelled(report, restart, spec.restarts)
-        try:
-            x = first if first is not None and restart == 0 else None
-            x = random_start(run, start, (*seed, restart)) if x is None else x
-            outcome = solver.solve(run, x, effort, told)
-            outcome = kept_between_instants(run, solver, start, outcome, effort, told)
-        except NoAdmissibleMotionError as error:
-            failure = error
-            continue
-        value = run.objective.value(run.coefficients(outcome.x), problem.criterion)
-        found.append((value, outcome))
+    restarts = task.problem.spec.optimizer.restarts
+    tasks = [
+        OneStart(task.stack, start, (*seed, number), first if number == 0 else None)
+        for number in range(restarts)
+    ]
+    watch = followed(report, task.problem, restarts)
+    ended = workers.map(solve_start, Search(task.problem, solver), tasks, watch)
+    found = [each for each in ended if isinstance(each, FoundMotion)]
     if not found:
-        assert failure is not None
-        raise failure
-    _, best = min(found, key=lambda pair: pair[0])
-    return replace(
-        best,
-        iterations=sum(outcome.iterations for _, outcome in found),
-        evaluations=sum(outcome.evaluations for _, outcome in found),
+        raise ended[-1]
+    best = min(found, key=lambda each: each.value).outcome
+    cut = sum(each.outcome.status == "time limit" for each in found)
+    told = ""
+    if cut and best.status != "time limit":
+        told = (
+            f"{cut} of {restarts} starts ended at optimizer.max_seconds, so another run may find "
+            "another best one; raise it"
+        )
+    return (
+        replace(
+            best,
+            iterations=sum(each.outcome.iterations for each in found),
+            evaluations=sum(each.outcome.evaluations for each in found),
+        ),
+        told,
     )
 
 
@@ -128,72 +137,3 @@ def is_improvement(task: MotionTask, value: float) -> bool:
     if task.stack.rows == 0 or sigma[-1] <= np.finfo(float).eps * sigma[0]:
         return True
     return value < task.problem.criterion.value(sigma) - _IMPROVEMENT
-
-
-def kept_between_instants(
-    task: MotionTask,
-    solver: Solver,
-    start: Start,
-    outcome: Outcome,
-    effort: Effort,
-    report: ProgressCallback,
-) -> Outcome:
-    """The outcome, mended until every constraint is proved between the instants.
-
-    Where a margin is negative (without certificates: at controller rate) the guard of that column
-    is raised by it, and the solver goes on from the nearest point towards the base motion that has
-    the new guards.
-    """
-    problem = task.problem
-    began = time.perf_counter()
-    for round_ in range(_GUARD_ROUNDS + 1):
-        lacking = lacking_margins(problem, task.coefficients(outcome.x))
-        if not any(lack.any() for lack in lacking):
-            return outcome
-        if round_ == _GUARD_ROUNDS:
-            break
-        guards = [
-            guard + _GUARD_GROWTH * lack for guard, lack in zip(task.guards, lacking, strict=True)
-        ]
-        tighter = task.with_guards(guards)
-        inside = _drawn_inside(tighter, outcome.x, start)
-        short = Effort(
-            max_iterations=max(10, effort.max_iterations // 8),
-            max_seconds=max(1.0, effort.max_seconds / 4 - (time.perf_counter() - began)),
-            tolerance=effort.tolerance,
-            polish=True,
-        )
-        again = solver.solve(tighter, inside, short, report)
-        outcome = Outcome(
-            again.x,
-            "time limit" if again.status == "time limit" else outcome.status,
-            outcome.iterations + again.iterations,
-            outcome.evaluations + again.evaluations,
-        )
-        task = tighter
-    raise NoAdmissibleMotionError(
-        "The motion could not be kept admissible between the instants of sampling.constraints. "
-        "Take a smaller sampling.constraints.step."
-    )
-
-
-def _drawn_inside(task: MotionTask, x: Array, start: Start) -> Array:
-    """The point nearest to x on the way to the base motion whose residuals are all positive."""
-    for share in np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 60)]):
-        candidate = x + share * (start.base - x)
-        if all(value.min() > 0 for value in task.values(task.states(candidate))):
-            return candidate
-    raise NoAdmissibleMotionError(
-        "Nothing about the start has room any more once the motion is kept clear between instants. "
-        "Take a smaller sampling.constraints.step."
-    )
-
-
-def _labelled(report: ProgressCallback, restart: int, restarts: int) -> ProgressCallback:
-    if restarts == 1:
-        return report
-
-    def labelled(progress: Progress) -> None:
-        report(replace(progress, stage=f"start {restart + 1}/{restarts}, {progress.stage}"))
-
-    return labelled

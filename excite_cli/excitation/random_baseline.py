@@ -20,10 +20,16 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import Start, random_direction
 from excite_cli.excitation.task import MotionTask
+from excite_cli.workers.base import News, Tell, Workers
+from excite_cli.workers.here import Here
 
 _LARGEST, _GROWTH, _STEPS = 1.5, 0.75, 14
 _REFINE = 3
 _EXCHANGE_ROUNDS = 10
+# Candidates that one task draws: enough that handing them out costs nothing.
+_BATCH = 4
+# What tells the random numbers of candidates from those of starts.
+_STREAM = 16
 
 
 @dataclass(frozen=True)
@@ -54,10 +60,13 @@ def random_baseline(
     seconds: float,
     report: Callable[[int, float], None],
     stack: Stack | None = None,
+    workers: Workers | None = None,
 ) -> RandomBaseline:
     """Draw at least `candidates`, and more while `seconds` last; select `count` motions.
 
-    `report(drawn, best)` is called after every candidate with the best condition number so far.
+    Candidate k depends on (seed, k) only, so with `seconds` 0 the result is the same however many
+    `workers` draw (default: all are drawn here). `report(drawn, best)` is called as candidates come
+    in, with the best condition number so far.
 
     Raises
     ------
@@ -65,32 +74,75 @@ def random_baseline(
         Not one candidate is admissible.
     """
     began = time.perf_counter()
+    place = workers or Here()
     task = MotionTask(problem, stack)
-    start = base_motion(task, seed)
-    rng = np.random.default_rng((seed, 16))
-    found: list[Array] = []
-    grams: list[Array] = []
+    draw = _Draw(problem, task.stack, base_motion(task, seed), seed)
+    kept: list[_Candidate] = []
     drawn, best = 0, float("inf")
     prior = task.stack.factor.T @ task.stack.factor
-    while drawn < candidates or time.perf_counter() - began < seconds:
-        drawn += 1
-        x = _candidate(task, start, rng)
-        if x is None:
-            continue
-        block = task.objective.block(task.coefficients(x))
-        found.append(x)
-        grams.append(block.T @ block)
-        best = min(best, _condition(prior + grams[-1]))
-        report(drawn, best)
-    if not found:
+
+    def watch(news: News) -> None:
+        nonlocal drawn, best
+        if news.result is not None:
+            found, number = news.result
+            drawn += number
+            best = min([best, *(each.condition_number for each in found)])
+            report(drawn, best)
+
+    wanted = candidates
+    while wanted:
+        first = drawn
+        batches = [
+            range(k, min(k + _BATCH, first + wanted)) for k in range(first, first + wanted, _BATCH)
+        ]
+        for found, _ in place.map(_draw_batch, draw, batches, watch):
+            kept += found
+        # A budget of time is spent in rounds that give every worker a batch.
+        late = time.perf_counter() - began >= seconds
+        wanted = 0 if late else _BATCH * place.count
+    if not kept:
         raise NoAdmissibleMotionError(f"None of {drawn} random motions is admissible.")
-    chosen = _select(np.array(grams), prior, min(count, len(found)))
+    grams = np.array([each.gram for each in kept])
+    chosen = _select(grams, prior, min(count, len(kept)))
     return RandomBaseline(
-        _as_motions(task, [found[i] for i in chosen]),
+        _as_motions(task, [kept[i].x for i in chosen]),
         drawn,
-        len(found),
+        len(kept),
         time.perf_counter() - began,
     )
+
+
+@dataclass(frozen=True)
+class _Draw:
+    """What all candidates share."""
+
+    problem: Problem
+    stack: Stack
+    start: Start
+    seed: int
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """An admissible random motion: free variables, CᵀC, and the condition number with C_0."""
+
+    x: Array
+    gram: Array
+    condition_number: float
+
+
+def _draw_batch(draw: _Draw, numbers: range, tell: Tell) -> tuple[list[_Candidate], int]:
+    """The admissible ones among the candidates of these numbers, and how many were drawn."""
+    task = MotionTask(draw.problem, draw.stack)
+    prior = task.stack.factor.T @ task.stack.factor
+    found = []
+    for number in numbers:
+        x = _candidate(task, draw.start, np.random.default_rng((draw.seed, _STREAM, number)))
+        if x is not None:
+            block = task.objective.block(task.coefficients(x))
+            gram = block.T @ block
+            found.append(_Candidate(x, gram, _condition(prior + gram)))
+    return found, len(numbers)
 
 
 def _candidate(task: MotionTask, start: Start, rng: np.random.Generator) -> Array | None:

@@ -17,6 +17,7 @@ from excite_cli.excitation.sequence import Step, generate_sequence
 from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.stack import Stack
 from excite_cli.trajectory.chain import Segment
+from excite_cli.workers.base import Workers
 
 
 def new_result(
@@ -105,19 +106,21 @@ def continue_run(
     on_motion: Callable[[Step, Result], None],
     model: Problem | None = None,
     starts: Sequence[Segment] = (),
+    workers: Workers | None = None,
 ) -> Result:
     """Generate the motions that are still missing, calling `on_motion` after each.
 
-    The search of motion k starts from the k-th of `starts`, as far as there are any.
+    The search of motion k starts from the k-th of `starts`, as far as there are any. With
+    `optimizer.restarts` the starts of a motion are spread over `workers` (default: done here), to
+    the same result.
 
     Where `problem` separates effects, `model` is the problem that the result is kept for: the same
     without the rivals. Stack and condition numbers are then its own.
     """
-    solver = build_solver(problem.spec.optimizer)
+    solver, seed = build_solver(problem.spec.optimizer), problem.spec.seed
     remaining = range(len(result.motions) + 1, problem.spec.sequence.motions + 1)
-    for step in generate_sequence(
-        problem, solver, _running(problem, result), remaining, problem.spec.seed, report, starts
-    ):
+    stack = _running(problem, result)
+    for step in generate_sequence(problem, solver, stack, remaining, seed, report, starts, workers):
         stored = step if model is None else _judged(step, model, result.stack)
         result = result.with_step(stored)
         on_motion(stored, result)

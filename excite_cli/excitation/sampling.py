@@ -14,6 +14,7 @@ _COST_SAMPLES = 40
 _CONSTRAINT_STEP, _FEWEST, _MOST = 0.02, 100, 1000
 _ROUNDING = 1e-5
 _LONGEST = 3600.0
+_MOST_VALUES = 2_000_000  # samples times coefficients of a joint
 
 
 def with_sampling(spec: Spec, trajectory: Trajectory) -> Spec:
@@ -35,6 +36,12 @@ def with_sampling(spec: Spec, trajectory: Trajectory) -> Spec:
     grid = _filled(spec.sampling.constraints, usual, duration)
     for name, section in (("cost", cost), ("constraints", grid)):
         samples, step = _both(section)
+        if samples * trajectory.n_coefficients > _MOST_VALUES:
+            raise ConfigError(
+                f"sampling.{name}: {samples:,} samples of {trajectory.n_coefficients} coefficients "
+                f"are more than fits in memory with all that is computed of them (up to "
+                f"{_MOST_VALUES:,}). Take fewer samples or a larger step."
+            )
         if (samples - 1) * step > duration * (1 + _ROUNDING):
             raise ConfigError(
                 f"sampling.{name}: {samples} samples every {step:g} s last longer than the "
@@ -67,4 +74,5 @@ def _filled(grid: GridSpec, usual: int, duration: float) -> GridSpec:
     samples, step = grid.samples, grid.step
     if samples is None:
         samples = usual if step is None else max(2, math.ceil(duration / step - _ROUNDING))
-    return GridSpec(samples=samples, step=step if step is not None else duration / samples)
+    step = step if step is not None else duration / samples
+    return GridSpec.model_construct(samples=samples, step=step)

@@ -1,13 +1,13 @@
 """A rosbag2 with one JointTrajectory message, ready for `ros2 bag play`."""
 
-import os
-import shutil
-import tempfile
+import errno
+import sqlite3
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from excite_cli.atomic import write_folder_atomically
 from excite_cli.errors import FileError, MissingExtraError
 from excite_cli.export.joint_trajectory import joint_trajectory
 from excite_cli.export.motion_exporter import MotionExporter
@@ -31,26 +31,22 @@ class Rosbag2Exporter(MotionExporter):
         _require_rosbags()
         if path.exists() and not is_bag(path):
             raise FileError(f"{path} is there and is no bag. Give another name.")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
-                bag = Path(folder) / path.name
-                self._write(bag, motion)
-                if path.exists():
-                    shutil.rmtree(path)
-                os.replace(bag, path)
-        except OSError as error:
-            raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
+        write_folder_atomically(path, lambda temporary: self._write(temporary, motion))
 
     def _write(self, path: Path, motion: TimedMotion) -> None:
         from rosbags.rosbag2 import StoragePlugin, Writer
         from rosbags.typesys import Stores, get_typestore
 
         store = get_typestore(Stores.ROS2_HUMBLE)
-        with Writer(path, version=_VERSION, storage_plugin=StoragePlugin[self.storage]) as writer:
-            connection = writer.add_connection(TOPIC, MESSAGE, typestore=store)
-            message = message_of(store, joint_trajectory(motion))
-            writer.write(connection, 0, store.serialize_cdr(message, MESSAGE))
+        message = store.serialize_cdr(message_of(store, joint_trajectory(motion)), MESSAGE)
+        plugin = StoragePlugin[self.storage]
+        try:
+            with Writer(path, version=_VERSION, storage_plugin=plugin) as writer:
+                connection = writer.add_connection(TOPIC, MESSAGE, typestore=store)
+                writer.write(connection, 0, message)
+        except sqlite3.Error as error:  # what SQLite says of a disk that refuses
+            number = errno.ENOSPC if "full" in str(error) else errno.EIO
+            raise OSError(number, str(error)) from error
 
 
 class McapExporter(Rosbag2Exporter):

@@ -23,6 +23,7 @@ _BRIEF = ("--set", "optimizer.max_iterations=3", "--set", "optimizer.restarts=1"
 SHORTER: dict[str, tuple[str, ...]] = {
     "optimize": _BRIEF,
     "compare-random": (*_BRIEF, "--candidates", "10"),
+    "study": _BRIEF,
     "simulate": ("--rate", "200"),
     "check": ("--rate", "50"),
 }

@@ -1,0 +1,286 @@
+"""A campaign of many starts with one worker and with two, and what that says of more.
+
+One motion is sought from 32 starts by one process, by two, by two of which one is killed on the
+way, and by a dask cluster of two; all results are compared to the last bit. Then
+
+    t(N) = start-up + serial + overhead · starts + longest queue(N)
+
+with serial the time outside the starts, and the queue that of N workers who take the measured
+starts in order, each as soon as it is free. The same with work / N for the queue is a lower bound.
+
+Run: python -m benchmarks.scaling [--quick] [--no-dask] [--config talos_arms] [--starts 32]
+"""
+
+import argparse
+import heapq
+import os
+import pickle
+import resource
+import signal
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from benchmarks.problems import problem
+from excite_cli.excitation.one_start import FoundMotion, Search
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.result import Result
+from excite_cli.excitation.run import continue_run, new_result
+from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.workers.base import Function, News, Watch, Workers, unwatched
+from excite_cli.workers.here import Here
+from excite_cli.workers.processes import Processes
+
+GOAL = 1.8
+BEYOND = (8, 32, 128)
+_NOTHINGS = 300
+
+
+class Timed(Workers):
+    """Other workers, with the seconds spent in `map` and those of every start."""
+
+    def __init__(self, inner: Workers) -> None:
+        self.inner, self.inside = inner, 0.0
+        self.starts: list[float] = []
+
+    @property
+    def count(self) -> int:
+        return self.inner.count
+
+    def map(
+        self,
+        function: Function,
+        shared: Any,
+        tasks: Sequence[Any],
+        watch: Watch = unwatched,
+        *,
+        keep_failures: bool = False,
+    ) -> list[Any]:
+        def seen(news: News) -> None:
+            if isinstance(news.result, FoundMotion):
+                self.starts.append(news.result.seconds)
+            watch(news)
+
+        began = time.perf_counter()
+        found = self.inner.map(function, shared, tasks, seen, keep_failures=keep_failures)
+        self.inside += time.perf_counter() - began
+        return found
+
+    def close(self) -> None:
+        self.inner.close()
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A campaign: seconds in all, outside the starts, of every start; processor time of workers."""
+
+    result: Result
+    seconds: float
+    serial: float
+    starts: tuple[float, ...]
+    processor: float
+
+
+def campaign(of: Problem, open_: Callable[[], Workers]) -> Measured:
+    """From opening the workers to the finished motion."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    began = time.perf_counter()
+    with Timed(open_()) as workers:
+        result = continue_run(
+            of,
+            new_result(of, [], {}),
+            lambda index: lambda progress: None,
+            lambda step, current: None,
+            workers=workers,
+        )
+        seconds = time.perf_counter() - began
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    inside = workers.inside
+    return Measured(result, seconds, seconds - inside, tuple(workers.starts), processor)
+
+
+def identical(first: Result, second: Result) -> bool:
+    """Whether all that is stored of the motions is the same to the last bit, except seconds."""
+    pairs = zip(first.motions, second.motions, strict=True)
+    return np.array_equal(first.stack.factor, second.stack.factor) and all(
+        np.array_equal(a.coefficients, b.coefficients)
+        and {**vars(a), "coefficients": 0, "seconds": 0}
+        == {**vars(b), "coefficients": 0, "seconds": 0}
+        for a, b in pairs
+    )
+
+
+def nothing(shared: Any, task: Any, tell: Any) -> Any:
+    return task
+
+
+def start_up(of: Problem) -> tuple[float, float, int]:
+    """Seconds until a worker has done a first task, of one task more, bytes that it was sent."""
+    from benchmarks.scaling import nothing  # workers import it by this name, not from __main__
+
+    shared = Search(of, build_solver(of.spec.optimizer))
+    stack = np.zeros((of.columns, of.columns))
+    began = time.perf_counter()
+    with Processes(1) as workers:
+        workers.map(nothing, shared, [stack])
+        ready = time.perf_counter() - began
+        began = time.perf_counter()
+        workers.map(nothing, shared, [stack] * _NOTHINGS)
+        each = (time.perf_counter() - began) / _NOTHINGS
+    return ready, each, len(pickle.dumps(shared, pickle.HIGHEST_PROTOCOL))
+
+
+def queue(starts: Sequence[float], workers: int) -> float:
+    """Seconds until `workers` have done all starts, each taking the next as soon as it is free."""
+    free = [0.0] * workers
+    for seconds in starts:
+        heapq.heappush(free, heapq.heappop(free) + seconds)
+    return max(free)
+
+
+class Killing(Processes):
+    """Two processes of which one is killed after a while."""
+
+    def __init__(self, after: float) -> None:
+        super().__init__(2)
+        self.killed = 0
+        timer = threading.Timer(after, self._kill)
+        timer.daemon = True
+        timer.start()
+
+    def _kill(self) -> None:
+        for pid in self.pids[:1]:
+            os.kill(pid, signal.SIGKILL)
+            self.killed = pid
+
+
+def in_dask(of: Problem, kill_after: float | None = None) -> Measured:
+    from distributed import LocalCluster
+
+    from excite_cli.workers.cluster import Cluster
+
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster:
+        if kill_after is not None:
+            pid = next(iter(cluster.workers.values())).pid
+            timer = threading.Timer(kill_after, os.kill, (pid, signal.SIGKILL))
+            timer.daemon = True
+            timer.start()
+        return campaign(of, lambda: Cluster(cluster.scheduler_address, warn=print))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--config", default="talos_arms")
+    parser.add_argument("--starts", type=int, default=32)
+    parser.add_argument("--iterations", type=int, default=120)
+    parser.add_argument("--repeats", type=int, default=2, help="of one and two workers, in turn")
+    parser.add_argument("--quick", action="store_true", help="8 short starts, once")
+    parser.add_argument("--no-dask", action="store_true")
+    asked = parser.parse_args()
+    if asked.quick:
+        asked.starts, asked.iterations, asked.repeats = 8, 15, 1
+    of = problem(
+        asked.config,
+        f"optimizer.restarts={asked.starts}",
+        f"optimizer.max_iterations={asked.iterations}",
+        "optimizer.max_seconds=3600",
+        "sequence.motions=1",
+    )
+    print(
+        f"{asked.config}, {of.variables} variables; one motion, {asked.starts} starts of at most "
+        f"{asked.iterations} iterations; {len(os.sched_getaffinity(0))} processors, load "
+        f"{os.getloadavg()[0]:.1f} before"
+    )
+    ready, each, sent = start_up(of)
+    print(
+        f"a worker is ready after {ready:.2f} s (the problem is {sent / 1e6:.2f} MB for it), a "
+        f"task costs {1e3 * each:.2f} ms more than its work"
+    )
+    one, two = _one_and_two(of, asked.repeats)
+    ratio = one.seconds / two.seconds
+    print(
+        f"one worker {one.seconds:.1f} s, two {two.seconds:.1f} s: {ratio:.2f} times as fast "
+        f"(goal {GOAL}); processor time of the workers {one.processor:.1f} and "
+        f"{two.processor:.1f} s"
+    )
+    motion = one.result.motions[0]
+    print(
+        f"best of {asked.starts} starts: condition number {motion.condition_number:.4f}; starts "
+        f"take {min(one.starts):.2f} to {max(one.starts):.2f} s, {np.mean(one.starts):.2f} s on "
+        f"average; {one.serial:.2f} s outside them"
+    )
+    _identical("two workers", one, two)
+    if asked.quick:
+        _identical("in this process", one, campaign(of, Here))
+    pools: list[Killing] = []
+
+    def opened() -> Workers:
+        pools.append(Killing(ready + 0.25 * two.seconds))
+        return pools[-1]
+
+    killed = campaign(of, opened)
+    hit = "one killed" if pools[0].killed else "none killed in time"
+    _identical(f"two workers, {hit} ({killed.seconds:.1f} s)", one, killed)
+    if not asked.no_dask:
+        dask = in_dask(of)
+        _identical(f"dask cluster of two ({dask.seconds:.1f} s)", one, dask)
+        dask = in_dask(of, 3.0 + 0.25 * two.seconds)
+        _identical(f"dask, one killed ({dask.seconds:.1f} s)", one, dask)
+    _predict(one, two, ready, each)
+
+
+def _one_and_two(of: Problem, repeats: int) -> tuple[Measured, Measured]:
+    """The median of each, in turn."""
+    ones, twos = [], []
+    for number in range(repeats):
+        pair = [(ones, 1), (twos, 2)]
+        for found, count in pair if number % 2 == 0 else pair[::-1]:
+            found.append(campaign(of, lambda count=count: Processes(count)))
+            print(
+                f"  {count} worker{'s' if count > 1 else ''}: {found[-1].seconds:.1f} s", flush=True
+            )
+    middle = (repeats - 1) // 2
+    ones.sort(key=lambda each: each.seconds)
+    twos.sort(key=lambda each: each.seconds)
+    return ones[middle], twos[middle]
+
+
+def _identical(words: str, one: Measured, other: Measured) -> None:
+    same = "identical to the last bit" if identical(one.result, other.result) else "DIFFERENT"
+    print(f"{words}: {same}", flush=True)
+
+
+def _predict(one: Measured, two: Measured, ready: float, each: float) -> None:
+    """What more workers would take, each on a processor of its own like these."""
+    starts, serial = list(one.starts), one.serial
+    work = sum(starts)
+    many = list(np.random.default_rng(1).choice(starts, 1024))
+
+    def predicted(durations: Sequence[float], workers: int) -> float:
+        return ready + serial + each * len(durations) + queue(durations, workers)
+
+    check = predicted(starts, 2)
+    print(f"t(2) predicted from one worker: {check:.1f} s, measured {two.seconds:.1f} s")
+    print(f"{'workers':>8} {len(starts):>5} starts  times   work/N   1024 starts  times")
+    for workers in (1, 2, *BEYOND):
+        now, much = predicted(starts, workers), predicted(many, workers)
+        least = ready + serial + work / workers
+        print(
+            f"{workers:8} {now:10.1f} s {predicted(starts, 1) / now:6.1f} {least:7.1f} s "
+            f"{much:10.1f} s {predicted(many, 1) / much:6.1f}"
+        )
+    print(
+        f"(start-up {ready:.2f} s, serial {serial:.2f} s, {1e3 * each:.2f} ms a task; the one "
+        f"process that hands out tasks is busy from {np.mean(starts) / each:.0f} workers on)"
+    )
+
+
+if __name__ == "__main__":
+    with threadpool_limits(1):
+        main()

@@ -1,0 +1,175 @@
+"""Killing one command several times in one folder, and judging what is there after each kill."""
+
+import re
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.trust.kill_commands import N_MOTIONS, Command, Content, numbers
+from benchmarks.trust.kill_start import Ended, Moment, Start, run
+
+_LEFT = re.compile(r"\..+\.(lock|[a-z0-9_]{8}\.part)")
+_AT_EVENTS = 0.7  # share of kills at an event in the folder; the others at any instant
+_DELAY = 0.002  # s, mean, of every second kill at an event
+
+
+@dataclass
+class Tally:
+    """What came of the kills of one command; `broken` must stay empty."""
+
+    kills: int = 0
+    late: int = 0  # the run ended before it could be killed
+    writing: int = 0  # kills that left a temporary file: they came while one was written
+    states: dict[str, int] = field(default_factory=dict)
+    swept: int = 0  # temporary files that a later run removed
+    finished: int = 0  # runs after kills, until their end: `--resume`, or the same once more
+    broken: list[str] = field(default_factory=list)
+
+    def add(self, other: "Tally") -> None:
+        """Count what `other` counted."""
+        for name in ("kills", "late", "writing", "swept", "finished"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for state, count in other.states.items():
+            self.states[state] = self.states.get(state, 0) + count
+        self.broken += other.broken
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A run that nobody disturbed: its files in `folder`, their content, its time and events."""
+
+    folder: Path
+    contents: dict[str, Content]
+    ended: Ended
+
+
+def undisturbed(start: Start, command: Command, folder: Path) -> Reference:
+    """Run `command` in the new folder `folder` to its end."""
+    folder.mkdir()
+    ended = run(start, (*command.arguments, "--overwrite"), folder)
+    said = (folder.parent / "said.txt").read_text()
+    assert ended.status == 0, f"{command.name} failed undisturbed: {said}"
+    contents = {name: read(folder / name) for name, read in command.outputs.items()}
+    return Reference(folder, contents, ended)
+
+
+class Series:
+    """Kills in one folder, which begins empty or with the old files of `old`."""
+
+    def __init__(
+        self, start: Start, command: Command, reference: Reference, folder: Path, old: Path | None
+    ) -> None:
+        self.start, self.command, self.reference = start, command, reference
+        self.folder, self.tally = folder, Tally()
+        if old is None:
+            folder.mkdir()
+        else:
+            shutil.copytree(old, folder, ignore=shutil.ignore_patterns(".*"))
+        self.fresh = self._stats()
+
+    def play(self, kills: int, rng: np.random.Generator) -> Tally:
+        """Kill `kills` times, then run to the end and compare with the reference."""
+        try:
+            for _ in range(kills):
+                before = self._stats()
+                ended = run(self.start, self._arguments(), self.folder, self._moment(rng))
+                self.tally.kills += ended.killed
+                self.tally.late += not ended.killed
+                if not ended.killed and ended.status != 0:
+                    self._fail(f"status {ended.status}: {self._said()}")
+                self._judge(before)
+                if self._share_left() == 0.0:
+                    break
+            self._finish()
+        except Exception as error:
+            self._fail(f"{type(error).__name__}: {error}")
+        return self.tally
+
+    def _arguments(self) -> tuple[str, ...]:
+        """`--resume` where there is something new to go on with."""
+        output = next(iter(self.command.outputs))
+        now, path = self._stats()[output], self.folder / output
+        resumes = self.command.resumable and now != self.fresh[output] and path.exists()
+        return (*self.command.arguments, "--resume" if resumes else "--overwrite")
+
+    def _moment(self, rng: np.random.Generator) -> Moment:
+        ended, share = self.reference.ended, self._share_left()
+        if rng.random() < _AT_EVENTS:
+            event = int(rng.integers(1, max(2, share * ended.events)))
+            return Moment(float(rng.exponential(_DELAY)) * float(rng.integers(2)), event)
+        return Moment(float(rng.uniform(0.0, max(0.3, share) * ended.seconds)))
+
+    def _share_left(self) -> float:
+        """How much of the work is left to do: 1, or what `--resume` has still to do."""
+        if "--resume" not in self._arguments():
+            return 1.0
+        content = numbers(self.folder / next(iter(self.command.outputs)))
+        done = sum(key.endswith("/coefficients") for key in content)
+        return 1.0 - done / N_MOTIONS
+
+    def _judge(self, before: dict[str, object]) -> None:
+        """Every file is as it was, or new and whole; what else is there is recognisable."""
+        now, states = self._stats(), []
+        for name, read in self.command.outputs.items():
+            if now[name] == before[name]:
+                states.append("absent" if now[name] is None else "old")
+                continue
+            if now[name] is None:
+                self._fail(f"{name} is gone")
+                continue
+            try:
+                self._compare(name, read(self.folder / name))
+                states.append("new")
+            except Exception as error:
+                self._fail(f"{name} is broken: {type(error).__name__}: {error}")
+        state = states[0] if len(set(states)) == 1 else "mixed"
+        self.tally.states[state] = self.tally.states.get(state, 0) + 1
+        others = [each.name for each in self.folder.iterdir() if each.name not in now]
+        self.tally.writing += any(name.endswith(".part") for name in others)
+        for name in others:
+            if not _LEFT.fullmatch(name):
+                self._fail(f"{name} was left")
+
+    def _compare(self, name: str, content: Content) -> None:
+        expected = self.reference.contents[name]
+        if self.command.resumable:  # the first motions of all
+            content = {key: bits for key, bits in content.items() if key.startswith("motions/")}
+            expected = {key: expected[key] for key in content}
+        assert content == expected, "other content than an undisturbed run's"
+
+    def _finish(self) -> None:
+        """Run to the end: the same content as if nothing had been killed, and nothing left over."""
+        left = sum(each.name.endswith(".part") for each in self.folder.iterdir())
+        arguments = self._arguments()
+        ended = run(self.start, arguments, self.folder)
+        if ended.status != 0:
+            self._fail(f"{arguments[-1]} failed: {self._said()}")
+            return
+        for name, read in self.command.outputs.items():
+            if read(self.folder / name) != self.reference.contents[name]:
+                self._fail(f"{name}: other content after {arguments[-1]} than undisturbed")
+        over = [each.name for each in self.folder.iterdir() if each.name.startswith(".")]
+        if over:
+            self._fail(f"left after the last run: {', '.join(over)}")
+        self.tally.swept += left
+        self.tally.finished += 1
+
+    def _stats(self) -> dict[str, object]:
+        """What tells a file from another with the same name."""
+        found: dict[str, object] = {}
+        for name in self.command.outputs:
+            path = self.folder / name
+            if path.exists():
+                stat = path.stat()
+                found[name] = (stat.st_ino, stat.st_mtime_ns, stat.st_size)
+            else:
+                found[name] = None
+        return found
+
+    def _fail(self, why: str) -> None:
+        self.tally.broken.append(f"{self.command.name} ({self.folder.name}): {why}")
+
+    def _said(self) -> str:
+        return (self.folder.parent / "said.txt").read_text()[-400:]

@@ -1,0 +1,43 @@
+"""How a command is stopped from outside: Ctrl-C, SIGTERM, a terminal that closes.
+
+All end as Ctrl-C does, so that temporary files and claims are removed on the way out.
+"""
+
+import os
+import signal
+from collections.abc import Sequence
+from types import FrameType
+
+_RESUMED = "optimize"
+_last = signal.SIGINT
+
+
+def heed_signals() -> None:
+    """Let SIGTERM and SIGHUP (unless ignored, as `nohup` does) interrupt this process."""
+    for each in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(each) is signal.SIG_DFL:
+            signal.signal(each, _stop)
+
+
+def stopped(arguments: Sequence[str]) -> tuple[int, str]:
+    """Exit status, and one message for the command line `arguments`."""
+    command = next((each for each in arguments if not each.startswith("-")), "")
+    if command == _RESUMED:
+        return 128 + _last, "interrupted; every finished motion is in the file: see --resume."
+    return 128 + _last, "interrupted; no file is half-written."
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    global _last
+    _last = signal.Signals(number)
+    raise KeyboardInterrupt
+
+
+def _as_usual() -> None:
+    """In a forked child: a pool ends its workers by SIGTERM, and they need no way out."""
+    for each in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(each) is _stop:
+            signal.signal(each, signal.SIG_DFL)
+
+
+os.register_at_fork(after_in_child=_as_usual)

@@ -1,0 +1,87 @@
+"""From a config, logs and varied keys to the cases of a study, all checked before any is done."""
+
+import hashlib
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from excite_cli.config.load import load_spec, spec_as_yaml
+from excite_cli.errors import ConfigError, FileError
+from excite_cli.study.case import StudyCase, StudyTask
+from excite_cli.study.vary import Varied, combinations
+
+_LONGEST = 100  # letters of a name, so that a file system takes it
+
+
+def planned_cases(
+    task: StudyTask, logs: Sequence[Path], varied: Sequence[Varied]
+) -> list[StudyCase]:
+    """Every combination of values, for every log if there are any.
+
+    Raises
+    ------
+    ConfigError
+        Nothing is varied and there is no log; or the config does not allow a combination.
+    FileError
+        A log does not exist, or is given twice.
+    """
+    if not logs and not varied:
+        raise ConfigError(
+            "A study needs something to vary: --vary KEY=VALUE,VALUE,…, or logs to work on."
+        )
+    _check_logs(logs)
+    chosen = combinations(varied)
+    short = _short_keys([each.key for each in varied])
+    cases: list[StudyCase] = []
+    each: Sequence[Path | None] = logs or [None]
+    for log in each:
+        for values in chosen:
+            settings = [f"{key}={value}" for key, value in values.items()]
+            spec = load_spec(task.config, [*task.overrides, *settings])
+            words = [f"{short[key]}={_plain(value)}" for key, value in values.items()]
+            name = "_".join([*([_plain(log.stem)] if log is not None else []), *words])
+            asked = [spec_as_yaml(spec), str(task.config.resolve().parent)]
+            if log is not None:
+                asked += [str(log.resolve()), _size(log), str(task.diagnosed)]
+            request = hashlib.sha256("\n".join(asked).encode()).hexdigest()
+            cases.append(StudyCase(name[:_LONGEST], values, log, request))
+    return _distinct(cases)
+
+
+def _check_logs(logs: Sequence[Path]) -> None:
+    seen: set[Path] = set()
+    for log in logs:
+        if not log.exists():
+            raise FileError(f"There is no file {log}.")
+        if log.resolve() in seen:
+            raise FileError(f"{log} is given twice.")
+        seen.add(log.resolve())
+
+
+def _size(log: Path) -> str:
+    files = [log] if log.is_file() else sorted(each for each in log.rglob("*") if each.is_file())
+    return ",".join(str(each.stat().st_size) for each in files)
+
+
+def _short_keys(keys: Sequence[str]) -> dict[str, str]:
+    """The last word of every key where that tells them apart, else the whole key."""
+    last = [key.rpartition(".")[2] for key in keys]
+    return {
+        key: word if last.count(word) == 1 else key for key, word in zip(keys, last, strict=True)
+    }
+
+
+def _plain(text: str) -> str:
+    """What a name of a file may hold of a value or a name: letters, digits, points and dashes."""
+    return re.sub(r"[^\w.+-]+", "-", text.strip("[]{}'\" "))
+
+
+def _distinct(cases: list[StudyCase]) -> list[StudyCase]:
+    """Names that are the same once they are file names get the request's first letters."""
+    names = [case.name.lower() for case in cases]
+    return [
+        StudyCase(f"{case.name}_{case.request[:8]}", case.values, case.log, case.request)
+        if names.count(case.name.lower()) > 1
+        else case
+        for case in cases
+    ]

@@ -1,0 +1,97 @@
+"""A parameter study: whole cases spread over workers, each kept as soon as it is done."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from excite_cli.errors import ExciteError, FileError
+from excite_cli.study.case import DoneCase, StudyCase, StudyTask, do_case
+from excite_cli.study.records import TABLE, CaseRecord, keep_case, kept_case, write_table
+from excite_cli.workers.base import News, Workers
+from excite_cli.workers.here import Here
+
+# Figures of which the lowest is the best, the first that a case has.
+BEST = ("condition_number", "after", "identified_error")
+
+
+@dataclass(frozen=True)
+class StudyNews:
+    """How far a study is: cases done (those kept from before too), running, all; the best figure.
+
+    `told`: what a running case said last, or how one ended.
+    """
+
+    done: int
+    running: int
+    total: int
+    best: float
+    told: str
+
+
+def run_study(
+    task: StudyTask,
+    cases: Sequence[StudyCase],
+    folder: Path,
+    workers: Workers | None = None,
+    resume: bool = False,
+    report: Callable[[StudyNews], None] = lambda news: None,
+) -> list[CaseRecord]:
+    """Do all cases, in `folder` a record and the files of each; a failure is a record too.
+
+    With `resume` cases that are there already are not done again, failed ones are. The table of all
+    is written at the end. Results do not depend on `workers`, but seconds do.
+
+    Raises
+    ------
+    FileError
+        The folder holds a study and `resume` is not asked for, or of other cases; it cannot be
+        written to.
+    """
+    if not resume and (folder / TABLE).exists():
+        raise FileError(
+            f"{folder} holds a study already. Go on with --resume, or give another folder with -o."
+        )
+    records: dict[int, CaseRecord] = {}
+    for index, case in enumerate(cases):
+        kept = kept_case(folder, case)
+        if kept is not None and not resume:
+            raise FileError(
+                f"{folder} holds cases of a study already. Go on with --resume, or give another "
+                "folder with -o."
+            )
+        if kept is not None:
+            records[index] = kept
+    before = len(records)
+    left = [index for index in range(len(cases)) if index not in records]
+
+    def watch(news: News) -> None:
+        told = str(news.word or "")
+        if news.result is not None:
+            index = left[news.index]
+            records[index] = keep_case(folder, cases[index], _expected(news.result))
+            told = records[index].message or "done"
+        best = min((figure_of(record) for record in records.values()), default=float("inf"))
+        told = f"{cases[left[news.index]].name}: {told}"
+        report(StudyNews(before + news.done, news.running, len(cases), best, told))
+
+    place = workers or Here()
+    place.map(do_case, task, [cases[index] for index in left], watch, keep_failures=True)
+    found = [records[index] for index in range(len(cases))]
+    write_table(folder, found)
+    return found
+
+
+def figure_of(record: CaseRecord) -> float:
+    """The figure that a study is about, infinite where a case has none."""
+    return next(
+        (float(record.figures[name]) for name in BEST if record.figures.get(name) is not None),
+        float("inf"),
+    )
+
+
+def _expected(outcome: DoneCase | Exception) -> DoneCase | Exception:
+    """The outcome; a bug of ours says that it is one."""
+    if isinstance(outcome, Exception) and not isinstance(outcome, ExciteError | MemoryError):
+        kind = type(outcome).__name__
+        return RuntimeError(f"a bug of excite, not of your input ({kind}: {outcome})")
+    return outcome

@@ -1,0 +1,85 @@
+"""The process of one worker: takes tasks from its parent, one at a time, until that is gone.
+
+A program of its own instead of multiprocessing's, which runs the caller's main module again in
+every child. The two talk over a socket: its end tells either side that the other one is gone.
+"""
+
+import os
+import pickle
+import select
+import signal
+import threading
+import time
+from multiprocessing.connection import Connection
+from typing import Any
+
+from excite_cli.workers.base import Tell
+from excite_cli.workers.travel import able_to_travel
+
+# Words of a task are passed on this often at most [s].
+_EVERY = 0.2
+
+
+def serve(descriptor: int, threads: int) -> None:
+    """Do tasks that come over the socket `descriptor`; linear algebra uses `threads`."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is asked, and ends its workers
+    connection = Connection(descriptor)
+    threading.Thread(target=_end_with_parent, args=(descriptor,), daemon=True).start()
+    shared = _Shared()
+    try:
+        connection.send(("ready", os.getpid()))
+        while True:
+            kind, body = connection.recv()
+            if kind == "shared":
+                shared = _Shared(body)
+            else:
+                connection.send_bytes(_answer(shared, body, threads, _teller(connection)))
+    except (EOFError, OSError):
+        os._exit(0)  # the parent is gone
+
+
+class _Shared:
+    """What all tasks share, unpickled with the first of them: if it fails, that is told."""
+
+    def __init__(self, body: bytes = b"") -> None:
+        self._body, self._value, self._ready = body, None, False
+
+    def value(self, threads: int) -> Any:
+        if not self._ready:
+            from threadpoolctl import threadpool_limits
+
+            self._value, self._ready = pickle.loads(self._body), True
+            self._body = b""
+            # Libraries came with it; those that come later see the variables of the environment.
+            threadpool_limits(limits=threads)
+        return self._value
+
+
+def _answer(shared: _Shared, body: bytes, threads: int, tell: Tell) -> bytes:
+    """The message with what the task of `body` gives."""
+    try:
+        value = shared.value(threads)
+        function, task = pickle.loads(body)
+        return pickle.dumps(("done", function(value, task, tell)), pickle.HIGHEST_PROTOCOL)
+    except Exception as error:  # all of them are raised by the caller
+        return pickle.dumps(("failed", able_to_travel(error)))
+
+
+def _teller(connection: Connection) -> Tell:
+    last = -_EVERY
+
+    def tell(word: Any) -> None:
+        nonlocal last
+        if time.monotonic() - last >= _EVERY:
+            last = time.monotonic()
+            connection.send(("told", word))
+
+    return tell
+
+
+def _end_with_parent(descriptor: int) -> None:
+    """End this process, whatever it is doing, when the other end of the socket is closed."""
+    watched = select.poll()
+    watched.register(descriptor, 0)  # nothing but hang-up and errors
+    watched.poll()
+    os._exit(0)

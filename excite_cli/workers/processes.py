@@ -1,0 +1,234 @@
+"""Worker processes on this machine; one that dies is replaced and its task done again.
+
+`concurrent.futures` has a pool too, but there the death of one process is the end of all. Here
+every worker has a socket of its own, so a death concerns the task that it was doing, nothing else.
+"""
+
+import contextlib
+import json
+import os
+import pickle
+import socket
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from excite_cli.workers.base import (
+    LOSSES,
+    Function,
+    LostWorkersError,
+    News,
+    Watch,
+    Workers,
+    unwatched,
+)
+
+# The parent's path of imports comes first, so that a checkout finds itself.
+_BOOT = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[3]); "
+    "from excite_cli.workers.child import serve; serve(int(sys.argv[1]), int(sys.argv[2]))"
+)
+_THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_PATIENCE = 1.0  # [s] that a worker has to end
+
+
+class _Worker:
+    """One process with the socket to it; `task` is what it does, `knows` what it was sent."""
+
+    def __init__(self, threads: int) -> None:
+        ours, theirs = socket.socketpair()
+        with ours, theirs:
+            descriptor = theirs.fileno()
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", _BOOT, str(descriptor), str(threads), json.dumps(sys.path)],
+                pass_fds=[descriptor],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,  # stdout is the answer of the command
+                env={**os.environ, **dict.fromkeys(_THREAD_VARIABLES, str(threads))},
+                process_group=0,  # Ctrl-C is for the parent
+            )
+            self.connection = Connection(ours.detach())
+        self.ready = False
+        self.knows: bytes | None = None
+        self.task: int | None = None
+
+    def end(self) -> int | None:
+        """Close the socket, which ends the process; its exit status."""
+        with contextlib.suppress(OSError):
+            self.connection.close()
+        try:
+            return self.process.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.process.wait()
+
+
+@dataclass
+class _Round:
+    """The state of one `map`."""
+
+    function: Function
+    shared: bytes
+    tasks: Sequence[Any]
+    watch: Watch
+    keep_failures: bool
+    waiting: deque[int]
+    results: dict[int, Any] = field(default_factory=dict)
+    failures: dict[int, Exception] = field(default_factory=dict)
+    losses: dict[int, int] = field(default_factory=dict)
+    running: int = 0
+
+    def tell(self, index: int, word: Any = None, result: Any = None) -> None:
+        self.watch(News(len(self.results), self.running, len(self.tasks), index, word, result))
+
+    def done(self, index: int, result: Any) -> None:
+        """Keep a result, and tell."""
+        self.results[index] = result
+        self.tell(index, result=result)
+
+    def fail(self, index: int, error: Exception) -> None:
+        """Tasks are handed out in order: what comes after a failure need not be begun."""
+        if self.keep_failures:
+            self.done(index, error)
+        else:
+            self.failures[index] = error
+            self.waiting = deque(each for each in self.waiting if each < index)
+
+
+class Processes(Workers):
+    """`count` processes, each with `threads` threads of linear algebra; started when needed."""
+
+    def __init__(self, count: int, threads: int = 1) -> None:
+        self._count, self._threads = count, threads
+        self._workers: list[_Worker] = []
+        self._failed_starts = 0
+
+    @property
+    def count(self) -> int:
+        """Number of processes."""
+        return self._count
+
+    @property
+    def pids(self) -> tuple[int, ...]:
+        """Process ids of the workers that are running."""
+        return tuple(worker.process.pid for worker in self._workers)
+
+    def map(
+        self,
+        function: Function,
+        shared: Any,
+        tasks: Sequence[Any],
+        watch: Watch = unwatched,
+        *,
+        keep_failures: bool = False,
+    ) -> list[Any]:
+        """As `Workers.map`."""
+        if not tasks:
+            return []
+        blob = pickle.dumps(shared, pickle.HIGHEST_PROTOCOL)
+        waiting = deque(range(len(tasks)))
+        round_ = _Round(function, blob, tasks, watch, keep_failures, waiting)
+        try:
+            while len(self._workers) < min(self._count, len(tasks)):
+                self._workers.append(_Worker(self._threads))
+            for worker in list(self._workers):
+                self._hand_out(worker, round_)
+            while round_.running or round_.waiting:
+                for connection in wait([worker.connection for worker in self._workers]):
+                    worker = next(w for w in self._workers if w.connection is connection)
+                    self._listen(worker, round_)
+        except BaseException:
+            self.close()  # tasks may be running that nobody waits for any more
+            raise
+        if round_.failures:
+            raise round_.failures[min(round_.failures)]
+        return [round_.results[index] for index in range(len(tasks))]
+
+    def close(self) -> None:
+        """End all processes."""
+        for worker in self._workers:
+            with contextlib.suppress(OSError):
+                worker.connection.close()  # all of them at once, then wait
+        for worker in self._workers:
+            worker.end()
+        self._workers = []
+
+    def _hand_out(self, worker: _Worker, round_: _Round) -> None:
+        """Send the next task to a worker that is ready and idle."""
+        if not worker.ready or worker.task is not None or not round_.waiting:
+            return
+        index = round_.waiting.popleft()
+        worker.task = index
+        round_.running += 1
+        body = pickle.dumps((round_.function, round_.tasks[index]), pickle.HIGHEST_PROTOCOL)
+        try:
+            if worker.knows != round_.shared:
+                worker.connection.send(("shared", round_.shared))
+                worker.knows = round_.shared
+            worker.connection.send(("task", body))
+        except OSError:
+            self._replace(worker, round_)
+
+    def _listen(self, worker: _Worker, round_: _Round) -> None:
+        """Take one message of a worker, or notice that it is gone."""
+        try:
+            kind, value = worker.connection.recv()
+        except (EOFError, OSError):
+            self._replace(worker, round_)
+            return
+        if kind == "ready":
+            worker.ready, self._failed_starts = True, 0
+        else:
+            assert worker.task is not None
+            index = worker.task
+            if kind == "told":
+                round_.tell(index, word=value)
+                return
+            worker.task = None
+            round_.running -= 1
+            if kind == "failed":
+                round_.fail(index, value)
+            else:
+                round_.done(index, value)
+        self._hand_out(worker, round_)
+
+    def _replace(self, worker: _Worker, round_: _Round) -> None:
+        """A new worker for one that died; its task comes next.
+
+        Raises
+        ------
+        LostWorkersError
+            Workers cannot be started.
+        """
+        status = worker.end()
+        if worker.task is not None:
+            index = worker.task
+            round_.running -= 1
+            round_.losses[index] = round_.losses.get(index, 0) + 1
+            if round_.losses[index] >= LOSSES:
+                lost = LostWorkersError(
+                    f"Task {index + 1} of {len(round_.tasks)} was given up: {LOSSES} times its "
+                    f"worker ended while doing it ({_words(status)}). Often memory is short: take "
+                    "fewer --workers."
+                )
+                round_.fail(index, lost)
+            elif not any(failed < index for failed in round_.failures):
+                round_.waiting.appendleft(index)
+        elif not worker.ready:
+            self._failed_starts += 1
+            if self._failed_starts >= LOSSES:
+                raise LostWorkersError(
+                    f"Workers cannot be started: {LOSSES} ended at once ({_words(status)}). Run "
+                    "without --workers, or take fewer."
+                )
+        self._workers[self._workers.index(worker)] = _Worker(self._threads)
+
+
+def _words(status: int | None) -> str:
+    if status is not None and status < 0:
+        return f"killed by signal {-status}"
+    return f"exit status {status}"

@@ -1,0 +1,48 @@
+"""`--workers` and `--scheduler` as a user gives them."""
+
+import json
+
+import h5py
+import numpy as np
+
+from tests.cli.program import SMOKE, Program
+
+BRIEF = (
+    "--set", "optimizer.max_iterations=4", "--set", "constraints.self_collision=null",
+    "--set", "optimizer.max_seconds=600", "--motions", "1",
+)  # fmt: skip
+
+
+def test_starts_shared_by_two_are_stored_alike(excite: Program) -> None:
+    asked = ("optimize", SMOKE, *BRIEF, "--starts", "2", "--json")
+    runs = [excite(*asked, "-o", "alone.h5"), excite(*asked, "-o", "shared.h5", "--workers", "500")]
+    assert "500 workers share" in runs[1].stderr
+    alone, shared = (json.loads(run.stdout) for run in runs)
+    assert alone["motions"][0]["iterations"] == 8
+    for answer in (alone, shared):
+        del answer["motions"][0]["seconds"], answer["output"]
+    assert alone == shared
+    compared: list[str] = []
+    with (
+        h5py.File(excite.folder / "alone.h5") as first,
+        h5py.File(excite.folder / "shared.h5") as second,
+    ):
+
+        def compare(name: str, item: h5py.Dataset | h5py.Group) -> None:
+            compared.append(name)
+            for key, value in item.attrs.items():
+                if key != "seconds":
+                    assert np.array_equal(second[name].attrs[key], value), f"{name}: {key}"
+            if isinstance(item, h5py.Dataset):
+                assert np.array_equal(item[()], second[name][()]), name
+
+        first.visititems(compare)
+        compare("/", first)
+    assert "motions/1/coefficients" in compared
+
+
+def test_two_places_are_one_too_many(excite: Program) -> None:
+    run = excite("optimize", SMOKE, *BRIEF, "--workers", "2", "--scheduler", "tcp://127.0.0.1:9")
+    assert run.returncode == 2
+    assert "give one of them" in run.stderr
+    assert list(excite.folder.iterdir()) == []

@@ -1,0 +1,142 @@
+"""Files and folders old or new, never between, whatever the file system refuses."""
+
+import errno
+import os
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli import atomic
+from excite_cli.atomic import write_atomically, write_folder_atomically
+from excite_cli.errors import FileError
+from excite_cli.export.motions import MOTION_EXPORTERS
+from excite_cli.measurement.timed_motion import TimedMotion
+from excite_cli.robot.table_cache import store_arrays, stored_arrays
+
+WRITERS = pytest.mark.parametrize("write", [write_atomically, write_folder_atomically])
+Writer = Callable[[Path, Callable[[Path], None]], None]
+
+
+def bag(text: str) -> Callable[[Path], None]:
+    def make(folder: Path) -> None:
+        folder.mkdir()
+        (folder / "metadata.yaml").write_text(text)
+
+    return make
+
+
+@WRITERS
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), "no space is left on the disk. Free"),
+        (OSError("Can't write data (errno = 28, error message = 'No …')"), "no space is left"),
+        (OSError(errno.EDQUOT, "Disk quota exceeded"), "quota is used up"),
+        (OSError("something odd"), "something odd"),
+    ],
+    ids=["full", "full-hdf5", "quota", "odd"],
+)
+def test_a_refusal_is_one_message_and_leaves_nothing(
+    write: Writer, error: OSError, words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "out"
+
+    def fail(temporary: Path) -> None:
+        if write is write_folder_atomically:
+            bag("half")(temporary)
+        raise error
+
+    with pytest.raises(FileError, match=f"{path} cannot be written: .*{words}"):
+        write(path, fail)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("one_step", [True, False], ids=["exchange", "two-renames"])
+def test_a_folder_takes_the_place_of_another(
+    one_step: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not one_step:
+        monkeypatch.setattr(atomic.ctypes, "CDLL", lambda *_, **__: object())
+    for text in ("old", "new"):
+        write_folder_atomically(tmp_path / "bag", bag(text))
+    assert (tmp_path / "bag" / "metadata.yaml").read_text() == "new"
+    assert [each.name for each in tmp_path.iterdir()] == ["bag"]
+
+
+def test_an_old_folder_is_exchanged_in_one_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_folder_atomically(tmp_path / "bag", bag("old"))
+
+    def never(*_: object) -> None:
+        raise AssertionError("there would be an instant without a bag")
+
+    monkeypatch.setattr(atomic.os, "replace", never)
+    write_folder_atomically(tmp_path / "bag", bag("new"))
+    assert (tmp_path / "bag" / "metadata.yaml").read_text() == "new"
+
+
+def test_all_is_on_the_disk_before_it_is_in_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps: list[str] = []
+    replace = os.replace
+    monkeypatch.setattr(
+        atomic.os, "replace", lambda old, new: (steps.append("replace"), replace(old, new))
+    )
+    monkeypatch.setattr(atomic, "_to_disk", lambda path: steps.append(path.name[-5:]))
+    write_atomically(tmp_path / "out", lambda file: file.write_text("1"))
+    assert steps == [".part", "replace", tmp_path.name[-5:]]
+
+
+def test_a_link_stays_and_its_file_is_written(tmp_path: Path) -> None:
+    (tmp_path / "far").mkdir()
+    (tmp_path / "out.h5").symlink_to(tmp_path / "far" / "real.h5")
+    write_atomically(tmp_path / "out.h5", lambda file: file.write_text("1"))
+    assert (tmp_path / "out.h5").is_symlink()
+    assert (tmp_path / "far" / "real.h5").read_text() == "1"
+
+
+def test_devices_and_folders_are_never_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FileError, match="no regular file"):
+        write_atomically(tmp_path / "pipe", lambda file: file.write_text("1"))
+    with pytest.raises(FileError, match="is a folder"):
+        write_atomically(tmp_path, lambda file: file.write_text("1"))
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_a_cache_that_cannot_be_written_is_no_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (tmp_path / "excite").write_text("a file in the place of the folder")
+    store_arrays("k" * 32, {"a": np.ones(3)})
+    assert stored_arrays("k" * 32) is None
+    (tmp_path / "excite").unlink()
+    store_arrays("k" * 32, {"a": np.ones(3)})
+    found = stored_arrays("k" * 32)
+    assert found is not None
+    assert found["a"].tolist() == [1.0, 1.0, 1.0]
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", "/nonexistent/home")
+    store_arrays("k" * 32, {"a": np.ones(3)})  # nor is a home that is not there
+
+
+def test_a_bag_that_fills_the_disk_is_told_as_any_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writer = pytest.importorskip("rosbags.rosbag2").Writer
+
+    def full(*_: object) -> None:
+        raise sqlite3.OperationalError("database or disk is full")
+
+    monkeypatch.setattr(writer, "write", full)
+    t = np.arange(5.0)
+    motion = TimedMotion("m", ("a",), t, np.zeros((5, 1)), np.zeros((5, 1)), np.zeros((5, 1)))
+    with pytest.raises(FileError, match="bag cannot be written: no space is left on the disk"):
+        MOTION_EXPORTERS["rosbag2"].write(tmp_path / "bag", motion)
+    assert list(tmp_path.iterdir()) == []

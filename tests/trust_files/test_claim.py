@@ -1,0 +1,128 @@
+"""One output, one run: claims of processes that live, die, fork and give up."""
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from excite_cli import claim as module
+from excite_cli.atomic import write_atomically
+from excite_cli.claim import claim, claimed
+from excite_cli.errors import FileError
+
+
+class Other:
+    """Another process that does `action` and then waits to be killed."""
+
+    def __init__(self, action: Callable[[], None]) -> None:
+        ready, tell = os.pipe()
+        self.number = os.fork()
+        if not self.number:
+            try:
+                action()
+                os.write(tell, b"x")
+                signal.pause()
+            finally:
+                os._exit(1)
+        os.close(tell)
+        assert os.read(ready, 1), "the other process failed"
+        os.close(ready)
+
+    def kill(self) -> None:
+        os.kill(self.number, signal.SIGKILL)
+        os.waitpid(self.number, 0)
+
+
+@pytest.fixture(autouse=True)
+def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_PATIENCE", 0.0)
+
+
+def test_a_second_run_is_refused_and_told_who_has_it_until_the_first_is_killed(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "out.h5"
+    other = Other(lambda: claim(path))
+    with pytest.raises(FileError, match=rf"another run \(process {other.number} on "):
+        claim(path)
+    with pytest.raises(FileError, match="another run"):
+        write_atomically(path, lambda file: file.write_text("mine"))
+    with claimed(tmp_path / "other.h5"):  # the claim is on one file, not on the folder
+        pass
+    other.kill()
+    assert [each.name for each in tmp_path.iterdir()] == [".out.h5.lock"]
+    write_atomically(path, lambda file: file.write_text("mine"))
+    assert [each.name for each in tmp_path.iterdir()] == ["out.h5"]
+
+
+def test_the_same_run_may_write_what_it_has_claimed(tmp_path: Path) -> None:
+    with claimed(tmp_path / "out.h5"):
+        write_atomically(tmp_path / "out.h5", lambda file: file.write_text("1"))
+        assert (tmp_path / ".out.h5.lock").exists()
+    assert [each.name for each in tmp_path.iterdir()] == ["out.h5"]
+
+
+def test_a_worker_that_outlives_its_run_does_not_keep_the_claim(tmp_path: Path) -> None:
+    path, workers = tmp_path / "out.h5", tmp_path / "worker"
+
+    def run() -> None:
+        claim(path)
+        worker = os.fork()
+        if not worker:
+            signal.pause()
+        workers.write_text(str(worker))
+
+    other = Other(run)
+    with pytest.raises(FileError, match="another run"):
+        claim(path)
+    other.kill()
+    try:
+        with claimed(path):
+            pass
+    finally:
+        os.kill(int(workers.read_text()), signal.SIGKILL)
+
+
+def test_what_a_killed_run_left_is_removed_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "out.h5"
+
+    def write() -> None:
+        def die(file: Path) -> None:
+            file.write_text("half")
+            os.kill(os.getpid(), signal.SIGKILL)
+
+        write_atomically(path, die)
+
+    process = os.fork()
+    if not process:
+        write()
+    os.waitpid(process, 0)
+    left = [each.name for each in tmp_path.iterdir()]
+    assert len(left) == 2
+    assert any(name.startswith(".out.h5.") and name.endswith(".part") for name in left)
+    others = {".out.h5.old.abcdefgh.part", ".out.h5.bak", "out.h5.part", ".out.h5.ABCDEFGH.part"}
+    for name in others:
+        (tmp_path / name).write_text("somebody's")
+    write_atomically(path, lambda file: file.write_text("whole"))
+    assert {each.name for each in tmp_path.iterdir()} == {*others, "out.h5"}
+
+
+def test_folders_made_for_a_run_that_wrote_nothing_go_with_it(tmp_path: Path) -> None:
+    (tmp_path / "here").mkdir()
+    with claimed(tmp_path / "here" / "a" / "b" / "out.h5"):
+        assert (tmp_path / "here" / "a" / "b").is_dir()
+    assert list(tmp_path.iterdir()) == [tmp_path / "here"]
+    assert list((tmp_path / "here").iterdir()) == []
+
+
+def test_without_locks_of_the_file_system_files_are_written_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(handle: int, how: int) -> None:
+        raise OSError(module.errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(module.fcntl, "flock", refuse)
+    write_atomically(tmp_path / "out.h5", lambda file: file.write_text("1"))
+    assert [each.name for each in tmp_path.iterdir()] == ["out.h5"]

@@ -1,0 +1,84 @@
+"""The judge of killed commands sees what a writer does that is not whole, and nothing else."""
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.trust.kill_commands import Command
+from benchmarks.trust.kill_start import Start
+from benchmarks.trust.kill_trial import Series, Tally, undisturbed
+from excite_cli.atomic import write_atomically
+
+WHOLE = "x" * 4096
+PART = 64
+
+
+def read(path: Path) -> str:
+    text = path.read_text()
+    assert len(text) == len(WHOLE), "cut off"
+    return text
+
+
+COMMAND = Command("writer", (), {"out.txt": read})
+
+
+def slowly(path: Path) -> None:
+    with path.open("w") as file:
+        for first in range(0, len(WHOLE), PART):
+            file.write(WHOLE[first : first + PART])
+            file.flush()
+            time.sleep(0.0002)
+
+
+def forking(write: Callable[[], None]) -> Start:
+    """A program that does `write` in its folder."""
+
+    def start(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) -> int:
+        (folder.parent / "said.txt").write_text("")
+        process = os.fork()
+        if process:
+            return process
+        try:
+            os.setsid()
+            os.chdir(folder)
+            write()
+            os._exit(0)
+        finally:
+            os._exit(1)
+
+    return start
+
+
+def killed(write: Callable[[], None], folder: Path, old: bool) -> Tally:
+    start = forking(write)
+    reference = undisturbed(start, COMMAND, folder / "reference")
+    series = Series(start, COMMAND, reference, folder / "series", reference.folder if old else None)
+    return series.play(20, np.random.default_rng(1))
+
+
+@pytest.mark.parametrize("old", [True, False], ids=["over-old", "new"])
+def test_a_file_written_in_place_is_found_broken(old: bool, tmp_path: Path) -> None:
+    tally = killed(lambda: slowly(Path("out.txt")), tmp_path, old)
+    assert any("out.txt is broken" in why for why in tally.broken)
+
+
+@pytest.mark.parametrize("old", [True, False], ids=["over-old", "new"])
+def test_a_file_put_in_place_whole_is_not(old: bool, tmp_path: Path) -> None:
+    tally = killed(lambda: write_atomically(Path("out.txt"), slowly), tmp_path, old)
+    assert tally.broken == []
+    assert tally.kills >= 10
+    assert tally.writing >= 1
+    assert tally.finished == 1
+
+
+def test_what_nobody_would_know_is_told(tmp_path: Path) -> None:
+    def write() -> None:
+        slowly(Path("out.tmp"))
+        os.replace("out.tmp", "out.txt")
+
+    tally = killed(write, tmp_path, True)
+    assert any("out.tmp was left" in why for why in tally.broken)

@@ -1,0 +1,161 @@
+"""Tasks in processes: order, errors, deaths, what reaches a worker, what is left behind."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from excite_cli.errors import ConfigError, NoAdmissibleMotionError
+from excite_cli.workers.base import LostWorkersError, News, Workers
+from excite_cli.workers.catalogue import open_workers
+from excite_cli.workers.here import Here
+from excite_cli.workers.processes import Processes
+from tests.workers import work
+
+
+@pytest.fixture(scope="module")
+def two() -> Iterator[Processes]:
+    with Processes(2) as workers:
+        yield workers
+
+
+@pytest.fixture(params=["here", "processes"])
+def workers(request: pytest.FixtureRequest, two: Processes) -> Workers:
+    return Here() if request.param == "here" else two
+
+
+def alive(pid: int) -> bool:
+    """Whether the process runs; one that ended and was not waited for does not."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state not in "ZX"
+
+
+def gone(pid: int, within: float = 5.0) -> bool:
+    end = time.monotonic() + within
+    while alive(pid) and time.monotonic() < end:
+        time.sleep(0.02)
+    return not alive(pid)
+
+
+def test_results_come_in_the_order_of_the_tasks(workers: Workers) -> None:
+    assert workers.map(work.later_first, 0.2, [0, 1, 2, 3]) == [0, 1, 2, 3]
+    assert workers.map(work.square, 10, [3, 4]) == [19, 26]
+    assert workers.map(work.square, 10, []) == []
+
+
+def test_everything_is_told(workers: Workers) -> None:
+    heard: list[News] = []
+    workers.map(work.square, 0, [5, 6, 7], heard.append)
+    ends = [news for news in heard if news.result is not None]
+    assert sorted((news.index, news.result) for news in ends) == [(0, 25), (1, 36), (2, 49)]
+    assert [news.done for news in ends] == [1, 2, 3]
+    assert all(news.total == 3 and 0 <= news.running <= workers.count for news in heard)
+    assert ("at 5", 0) in {(news.word, news.index) for news in heard}
+
+
+def test_the_first_failure_is_raised_whoever_was_ready_first(workers: Workers) -> None:
+    with pytest.raises(ConfigError, match="task 1 is wrong"):
+        workers.map(work.fails, 1, [0, 1, 2, 3])
+
+
+def test_failures_can_be_kept(workers: Workers) -> None:
+    first, second, third = workers.map(work.fails, 1, [0, 1, 2], keep_failures=True)
+    assert first == 0
+    assert isinstance(second, ConfigError)
+    assert str(third) == "a later one, sooner"
+
+
+def test_errors_travel_as_the_nearest_that_can(two: Processes) -> None:
+    with pytest.raises(NoAdmissibleMotionError, match="no way"):
+        two.map(work.long_winded, 0, [1])
+    with pytest.raises(KeyError) as caught:
+        two.map(work.bug, 0, [1])
+    assert "work.py" in "".join(caught.value.__notes__), "the place of a bug is lost"
+
+
+def test_a_worker_that_dies_costs_its_task_a_second_try(two: Processes, tmp_path: Path) -> None:
+    assert two.map(work.dies_once, str(tmp_path), [2, 3, 4, 5]) == [4, 9, 16, 25]
+    assert len(two.pids) == 2
+
+
+def test_a_task_that_kills_every_worker_is_given_up(two: Processes) -> None:
+    with pytest.raises(LostWorkersError, match=r"Task 1 of 1 was given up: 3 times .*signal 9"):
+        two.map(work.always_dies, 0, [1])
+    assert two.map(work.square, 0, [2]) == [4]
+
+
+def test_one_killed_from_outside_changes_nothing(two: Processes) -> None:
+    two.map(work.square, 0, [1, 2])
+
+    def kill() -> None:
+        time.sleep(0.3)
+        os.kill(two.pids[0], signal.SIGKILL)
+
+    threading.Thread(target=kill).start()
+    before = set(two.pids)
+    seen = two.map(work.pid, None, [0.6, 0.6, 0.01])
+    assert len(set(seen) - before) >= 1, "the killed task was not done by a new worker"
+
+
+def test_linear_algebra_is_limited(two: Processes) -> None:
+    with Processes(1, threads=2) as wide:
+        assert set(wide.map(work.threads, 0, [1])[0]) == {min(2, os.cpu_count() or 2)}
+    assert set(two.map(work.threads, 0, [1])[0]) == {1}
+
+
+def test_an_interrupt_leaves_nothing_behind() -> None:
+    heard: list[int] = []
+
+    def interrupted(news: News) -> None:
+        heard.extend(workers.pids)
+        raise KeyboardInterrupt
+
+    with Processes(2) as workers, pytest.raises(KeyboardInterrupt):
+        workers.map(work.later_first, 5.0, [0, 20, 0], interrupted)
+    assert heard
+    assert all(gone(pid) for pid in heard)
+
+
+def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+    script = (
+        "import time\n"
+        "from excite_cli.workers.processes import Processes\n"
+        "from tests.workers import work\n"
+        "workers = Processes(2)\n"
+        "workers.map(work.square, 0, [1, 2])\n"
+        "print(*workers.pids, flush=True)\n"
+        "workers.map(work.pid, None, [60.0, 60.0])\n"
+    )
+    root = Path(__file__).parents[2]
+    parent = subprocess.Popen(
+        [sys.executable, "-c", script], cwd=root, stdout=subprocess.PIPE, text=True
+    )
+    assert parent.stdout is not None
+    pids = [int(word) for word in parent.stdout.readline().split()]
+    assert len(pids) == 2
+    assert all(alive(pid) for pid in pids)
+    time.sleep(0.3)  # they are at work now
+    parent.kill()
+    parent.communicate()
+    assert all(gone(pid) for pid in pids)
+
+
+def test_what_is_asked_for_decides_where() -> None:
+    assert isinstance(open_workers(), Here)
+    with open_workers(3) as three:
+        assert isinstance(three, Processes)
+        assert three.count == 3
+        assert three.pids == (), "processes were started before there is a task"
+    with pytest.raises(ConfigError, match="give one of them"):
+        open_workers(2, "tcp://localhost:8786")
+    with pytest.raises(ConfigError, match="1 or more"):
+        open_workers(0)

@@ -1,0 +1,73 @@
+"""Functions that the workers of the tests import."""
+
+import os
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+from excite_cli.errors import ConfigError, NoAdmissibleMotionError
+from excite_cli.workers.base import Tell
+
+
+class LongWindedError(NoAdmissibleMotionError):
+    """An error that does not survive a pickle."""
+
+    def __init__(self, message: str, detail: int) -> None:
+        super().__init__(message)
+        self.detail = detail
+
+
+def square(shared: int, task: int, tell: Tell) -> int:
+    tell(f"at {task}")
+    return shared + task**2
+
+
+def later_first(shared: float, task: int, tell: Tell) -> int:
+    """The first tasks take longest."""
+    time.sleep(shared / (1 + task))
+    return task
+
+
+def fails(shared: Any, task: int, tell: Tell) -> int:
+    if task == shared:
+        time.sleep(0.2)
+        raise ConfigError(f"task {task} is wrong")
+    if task > shared:
+        raise ConfigError("a later one, sooner")
+    return task
+
+
+def long_winded(shared: Any, task: int, tell: Tell) -> int:
+    raise LongWindedError("no way", task)
+
+
+def bug(shared: Any, task: int, tell: Tell) -> int:
+    return {}["nothing"]
+
+
+def dies_once(shared: str, task: int, tell: Tell) -> int:
+    """Kills its process in the middle of the work; the first attempt of every task."""
+    mark = Path(shared) / f"tried_{task}"
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return task**2
+
+
+def always_dies(shared: Any, task: int, tell: Tell) -> int:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return task
+
+
+def pid(shared: Any, task: float, tell: Tell) -> int:
+    time.sleep(task)
+    return os.getpid()
+
+
+def threads(shared: Any, task: int, tell: Tell) -> list[int]:
+    import numpy as np
+    from threadpoolctl import threadpool_info
+
+    np.linalg.qr(np.eye(3))
+    return [each["num_threads"] for each in threadpool_info()]
