@@ -14,6 +14,7 @@ from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
 from excite_cli.robot.model import Array, Robot
 
+_TOGETHER = 16  # effects that are filtered at once
 _TOUCH = 0.1  # s: what is shorter is a blow or a fault of the record, and no contact
 
 
@@ -140,21 +141,42 @@ def with_columns(
     runs: Sequence[PreparedRun],
 ) -> list[Candidate]:
     """Candidates with their filtered columns; those that are zero everywhere are left out."""
-    found = []
-    for effect, tests in effects:
-        n = signals[0].q.shape[1]
-        rows = effect.rows(n)
-        blocks = tuple(
-            run.averaged_for_fit(effect.columns(signal), rows)
-            if effect.active(signal.run)
-            else np.zeros((run.averages.shape[0], len(rows), len(effect.parameters)))
-            for signal, run in zip(signals, runs, strict=True)
-        )
-        if any(np.abs(block).max(initial=0.0) > 0 for block in blocks) and all(
-            np.isfinite(block).all() for block in blocks
-        ):
-            found.append(Candidate(effect, rows, blocks, tests))
+    n = signals[0].q.shape[1]
+    alike: dict[tuple[int, ...], list[int]] = {}
+    for i, (effect, _) in enumerate(effects):
+        alike.setdefault(effect.rows(n), []).append(i)
+    found: dict[int, Candidate] = {}
+    for rows, members in alike.items():
+        own = [effects[i][0] for i in members]
+        parts = [_filtered(own, rows, *pair) for pair in zip(signals, runs, strict=True)]
+        for i, *blocks in zip(members, *parts, strict=True):
+            if any(np.abs(block).max(initial=0.0) > 0 for block in blocks) and all(
+                np.isfinite(block).all() for block in blocks
+            ):
+                effect, tests = effects[i]
+                found[i] = Candidate(effect, rows, tuple(blocks), tests)
+    return [found[i] for i in sorted(found)]
+
+
+def _filtered(
+    effects: Sequence[Effect], rows: tuple[int, ...], signals: Signals, run: PreparedRun
+) -> list[Array]:
+    """Columns (M, len(rows), p) in one run of effects on the same rows, filtered together."""
+    present = [i for i, effect in enumerate(effects) if effect.active(signals.run)]
+    size = run.averages.shape[0], len(rows)
+    found = [np.zeros((*size, len(effect.parameters))) for effect in effects]
+    for some in _portions(present):
+        columns = [effects[i].columns(signals) for i in some]
+        ends = np.cumsum([block.shape[2] for block in columns])
+        filtered = run.averaged_for_fit(np.concatenate(columns, axis=2), rows)
+        for i, block in zip(some, np.split(filtered, ends[:-1], axis=2), strict=True):
+            found[i] = block.copy()
     return found
+
+
+def _portions(members: list[int]) -> list[list[int]]:
+    """So few at once that their columns at the working rate take little memory."""
+    return [members[at : at + _TOGETHER] for at in range(0, len(members), _TOGETHER)]
 
 
 def record_of(

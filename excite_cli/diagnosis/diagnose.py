@@ -242,7 +242,7 @@ def _information(model: Model, traced: Traced, rivals: list[tuple[Alias, Array]]
     pool = [traced.candidates[i] for i in traced.chosen]
     pool += [traced.candidates[alias.candidate] for alias, _ in unique.values()]
     evidence = data.evidence(pool, traced.noise)
-    gram = evidence.raw.sum(axis=(0, 1))[:-1, :-1]
+    gram = evidence.grams.total()[:-1, :-1]
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     unit = gram / np.outer(scale, scale)
     unit[np.diag_indices(len(unit))] += 1e-12

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from excite_cli.diagnosis.grams import Grams
 from excite_cli.robot.model import Array
 
 # A direction of a candidate of which less than this share is left is absorbed by the model.
@@ -26,6 +27,7 @@ ABSORBED = 1e-3
 SHARED = 1e-7
 _COLLINEAR = 1e-9
 _RIDGE = 1e-11
+_KEPT = 6  # projections that are kept: a step of a search asks for the same few again
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Gain:
 
 
 class Evidence:
-    """Gram matrices per fold and joint, (F, n, K, K), of normalised columns; torque is the last.
+    """Gram matrices per fold and joint of normalised columns; torque is the last.
 
     `blocks[i]` are the columns of candidate i; the first `fixed` columns are the declared model,
     with prior precision `prior` (fixed,) in the units of the raw columns.
@@ -46,23 +48,27 @@ class Evidence:
 
     def __init__(
         self,
-        grams: Array,
+        grams: Grams,
         fixed: int,
         blocks: Sequence[NDArray[np.intp]],
         rows_of: Sequence[tuple[int, ...]],
         prior: Array | None = None,
     ) -> None:
-        self.raw, self.fixed, self.blocks = grams, fixed, list(blocks)
+        self.grams, self.fixed, self.blocks = grams, fixed, list(blocks)
         self.rows_of = list(rows_of)
-        total = grams.sum(axis=(0, 1))
+        total = grams.total()
         norms = np.sqrt(np.diag(total))
         norms[norms < 1e-100] = 1.0
         norms[-1] = 1.0
         self.norms = norms
         self.total = total / np.outer(norms, norms)
         self.prior = np.zeros(fixed) if prior is None else np.asarray(prior)
-        self._known: dict[tuple, Array] = {}
-        self._fitted: dict[tuple[int, ...], Array] = {}
+        # Searches come back to the same models: what was solved once is kept.
+        self._left_out: dict[tuple, Array] = {}
+        self._without: dict[tuple[int, ...], Array] = {}
+        self._solved: dict[tuple[int, ...], Array] = {}
+        self._schurs: dict[tuple[int, ...], Schur] = {}
+        self._bases: dict[int, Array] = {}
 
     @property
     def torque(self) -> int:
@@ -92,86 +98,104 @@ class Evidence:
 
     def solve(self, chosen: Sequence[int]) -> Array:
         """Parameters (raw units) of the model with the chosen candidates."""
-        at = self.columns(chosen)
-        x = cho_solve(cho_factor(self._normal(self.total, at)), self.total[at, self.torque])
-        return np.asarray(x / self.norms[at])
+        key = tuple(chosen)
+        if key not in self._solved:
+            at = self.columns(key)
+            x = cho_solve(self.factor(key), self.total[at, self.torque])
+            self._solved[key] = np.asarray(x / self.norms[at])
+        return self._solved[key]
 
     def covariance(self, chosen: Sequence[int]) -> Array:
         """Covariance of `solve`'s parameters for unit noise."""
         at = self.columns(chosen)
-        inverse = cho_solve(cho_factor(self._normal(self.total, at)), np.eye(len(at)))
+        inverse = cho_solve(self.factor(chosen), np.eye(len(at)))
         return np.asarray(inverse / np.outer(self.norms[at], self.norms[at]))
 
     def energy(self, chosen: Sequence[int]) -> float:
         """Residual energy (with the prior's, if any) of the model with the chosen candidates."""
         at = self.columns(chosen)
         rhs = self.total[at, self.torque]
-        x = cho_solve(cho_factor(self._normal(self.total, at)), rhs)
+        x = cho_solve(self.factor(chosen), rhs)
         return float(self.total[self.torque, self.torque] - x @ rhs)
 
     def schur(self, chosen: Sequence[int]) -> "Schur":
         """What is left of every candidate once the chosen model has taken its part."""
+        key = tuple(chosen)
+        if key not in self._schurs:
+            if len(self._schurs) == _KEPT:
+                self._schurs.pop(next(iter(self._schurs)))
+            self._schurs[key] = self._schur(key)
+        return self._schurs[key]
+
+    def _schur(self, chosen: Sequence[int]) -> "Schur":
         at = self.columns(chosen)
-        rest = np.arange(self.fixed, self.torque)
-        factor = cho_factor(self._normal(self.total, at))
-        shared = self.total[np.ix_(at, rest)]
-        solved = cho_solve(factor, shared)
-        left = self.total[np.ix_(rest, rest)] - shared.T @ solved
+        shared = self.total[at, self.fixed : self.torque]
+        solved = cho_solve(self.factor(chosen), shared)
+        rest = slice(self.fixed, self.torque)
+        left = self.total[rest, rest] - shared.T @ solved
         cross = self.total[rest, self.torque] - solved.T @ self.total[at, self.torque]
         return Schur(self, left, cross)
 
     @cached_property
     def _folds(self) -> Array:
         """Normalised Gram matrices of the folds (F, K, K)."""
-        return self.raw.sum(axis=1) / np.outer(self.norms, self.norms)
+        return self.grams.by_fold() / np.outer(self.norms, self.norms)
 
     def _part(
-        self, fold: int | None, joints: Sequence[int] | None, at: NDArray[np.intp]
-    ) -> tuple[Array, Array, float]:
-        """Normal matrix, product with the torque, and energy of a fold's rows of some joints."""
-        grams = self.raw if fold is None else self.raw[fold : fold + 1]
-        rows = range(grams.shape[1]) if joints is None else joints
+        self, folds: Sequence[int], joints: Sequence[int] | None, at: NDArray[np.intp]
+    ) -> Array:
+        """Gram matrix (k + 1, k + 1) of some folds' rows of some joints, the torque last."""
         both = np.append(at, self.torque)
-        index = (both[:, None], both)
-        own = sum(grams[f, j][index] for f in range(len(grams)) for j in rows)
+        everywhere = joints is None or len(joints) == len(self.grams.joints)
+        if everywhere and len(folds) == 1:
+            return np.asarray(self._folds[folds[0]][both[:, None], both])
+        rows = range(len(self.grams.joints)) if joints is None else joints
         norms = self.norms[both]
-        own = own / (norms[:, None] * norms)
-        return own[:-1, :-1], own[:-1, -1], float(own[-1, -1])
+        return self.grams.on(folds, rows, both) / (norms[:, None] * norms)
 
     def left_out(self, chosen: Sequence[int], joints: Sequence[int] | None) -> Array:
         """Energy (F,) on the rows of `joints` of each fold, fitted to all other folds."""
         key = (tuple(sorted(chosen)), None if joints is None else tuple(joints))
-        if key not in self._known:
+        if key not in self._left_out:
             at = self.columns(key[0])
-            x = self._without_folds(at, key[0])
-            found = np.empty(len(self.raw))
-            for fold in range(len(self.raw)):
-                own, cross, energy = self._part(fold, joints, at)
-                found[fold] = energy - 2 * x[fold] @ cross + x[fold] @ own @ x[fold]
-            self._known[key] = np.maximum(found, 0.0)
-        return self._known[key]
+            fitted = self._without_folds(at, key[0])
+            found = [_energy(self._part([fold], joints, at), x) for fold, x in enumerate(fitted)]
+            self._left_out[key] = np.maximum(found, 0.0)
+        return self._left_out[key]
 
     def _without_folds(self, at: NDArray[np.intp], chosen: tuple[int, ...]) -> Array:
         """Parameters (F, k) fitted to all folds but one."""
-        if chosen not in self._fitted:
+        if chosen not in self._without:
             index = (at[:, None], at)
             normal = self.total[index] - self._folds[:, at[:, None], at]
             diagonal = np.arange(len(at))
             normal[:, diagonal, diagonal] += self._ridge(at)
             rhs = self.total[at, self.torque] - self._folds[:, at, self.torque]
-            self._fitted[chosen] = np.linalg.solve(normal, rhs[:, :, None])[:, :, 0]
-        return self._fitted[chosen]
-
-    def torque_energy(self, joint: int) -> float:
-        """Energy of the torque itself on a joint's rows."""
-        return float(self.raw[:, joint, -1, -1].sum())
+            self._without[chosen] = np.linalg.solve(normal, rhs[:, :, None])[:, :, 0]
+        return self._without[chosen]
 
     def energy_on(self, chosen: Sequence[int], joints: Sequence[int] | None) -> float:
         """Residual energy on the rows of `joints` of the model fitted to everything."""
         at = self.columns(chosen)
-        x = self.solve(chosen) * self.norms[at]
-        own, cross, energy = self._part(None, joints, at)
-        return max(float(energy - 2 * x @ cross + x @ own @ x), 0.0)
+        part = self._part(range(self.grams.folds), joints, at)
+        return max(_energy(part, self.solve(chosen) * self.norms[at]), 0.0)
+
+    def basis(self, candidate: int) -> Array:
+        """Orthonormal directions (p, d) of a candidate's columns, without collinear ones."""
+        if candidate not in self._bases:
+            self._bases[candidate] = self.basis_of(self.blocks[candidate])
+        return self._bases[candidate]
+
+    def basis_of(self, at: NDArray[np.intp]) -> Array:
+        """Orthonormal directions (k, d) of the columns `at`, without collinear ones."""
+        values, vectors = np.linalg.eigh(self.total[np.ix_(at, at)])
+        kept = values > _COLLINEAR * values[-1]
+        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
+
+
+def _energy(gram: Array, x: Array) -> float:
+    """‖y − C x‖² from the Gram matrix of [C y]."""
+    return float(gram[-1, -1] - 2 * x @ gram[:-1, -1] + x @ gram[:-1, :-1] @ x)
 
 
 class Schur:
@@ -186,22 +210,22 @@ class Schur:
         Directions of which less than `absorbed` is left do not count.
         """
         e = self.evidence
-        at = np.concatenate([e.blocks[i] for i in candidates]) - e.fixed
-        own = e.total[np.ix_(at + e.fixed, at + e.fixed)]
-        left, cross = self.matrix[np.ix_(at, at)], self.cross[at]
+        columns = np.concatenate([e.blocks[i] for i in candidates])
+        at = columns - e.fixed
         if len(at) == 1:
-            share = float(left[0, 0] / max(own[0, 0], 1e-300))
+            k = int(at[0])
+            left, cross = float(self.matrix[k, k]), float(self.cross[k])
+            share = left / max(float(e.total[columns[0], columns[0]]), 1e-300)
             if share < absorbed:
                 return Gain(0.0, 0, share)
-            return Gain(float(cross[0] ** 2 / left[0, 0]), 1, share)
-        values, vectors = np.linalg.eigh(own)
-        kept = values > _COLLINEAR * values[-1]
-        basis = vectors[:, kept] / np.sqrt(values[kept])
-        shares, turned = np.linalg.eigh(basis.T @ left @ basis)
+            return Gain(cross * cross / left, 1, share)
+        basis = e.basis(candidates[0]) if len(candidates) == 1 else e.basis_of(columns)
+        left = basis.T @ self.matrix[at[:, None], at] @ basis
+        shares, turned = np.linalg.eigh(left)
         alive = shares > absorbed
         if not alive.any():
             return Gain(0.0, 0, float(shares.max(initial=0.0)))
-        z = turned[:, alive].T @ (basis.T @ cross)
+        z = turned[:, alive].T @ (basis.T @ self.cross[at])
         return Gain(float(np.sum(z**2 / shares[alive])), int(alive.sum()), float(shares[-1]))
 
     @cached_property

@@ -137,7 +137,7 @@ class Judgement:
         for joint in sorted({j for i in added for j in self.white.rows_of[i]}):
             before = self.plain.energy_on(chosen, [joint])
             after = self.plain.energy_on([*chosen, *added], [joint])
-            whole = self.plain.torque_energy(joint)
+            whole = self.plain.grams.torque_energy(joint)
             largest = max(largest, (before - after) / max(whole, 1e-300))
         return float(np.sqrt(largest))
 

@@ -23,6 +23,7 @@ class ModelledRun:
         self.model, self.run = model, run
         body = RigidBody(model.robot, standard_parameters(model.robot), run.q, run.v, run.a)
         self.regressor = body.regressor
+        self._body = body
         self.take(run)
 
     def take(self, run: PreparedRun) -> None:
@@ -32,9 +33,7 @@ class ModelledRun:
 
     def signals(self, phi: Array, effects: Sequence[Effect], values: Array) -> Signals:
         """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
-        run = self.run
-        body = RigidBody(self.model.robot, phi, run.q, run.v, run.a)
-        body.__dict__["regressor"] = self.regressor
+        run, body = self.run, self._at(phi)
         load = body.load
         signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run_name(run.name))
         if not len(values):
@@ -46,6 +45,14 @@ class ModelledRun:
         )
         extra = effect_columns(effects, signals) @ np.where(in_robot, values, 0.0)
         return replace(signals, torque=load + extra)
+
+    def _at(self, phi: Array) -> RigidBody:
+        """The rigid body at φ; the last one is kept, with all that was computed of it."""
+        if not np.array_equal(phi, self._body.phi):
+            run = self.run
+            self._body = RigidBody(self.model.robot, phi, run.q, run.v, run.a)
+            self._body.__dict__["regressor"] = self.regressor
+        return self._body
 
 
 def training_data(

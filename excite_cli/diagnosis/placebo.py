@@ -57,17 +57,20 @@ def placebo_gains(
         local = [c for c in candidates if c.rows == (joint,) and c.width == 1]
         if not local:
             continue
-        own = [data.columns(candidates, chosen, part, joint) for part in range(len(data.runs))]
+        parts = []
+        for part, run in enumerate(data.runs):
+            clean = noise.clean(run.usable[:, joint])
+            own = noise.whitened(data.columns(candidates, chosen, part, joint), joint)[clean]
+            rest = noise.whitened(residuals[part][:, joint, None], joint)[clean, 0]
+            columns = np.stack([c.columns[part][:, 0, 0] for c in local], axis=1)
+            parts.append((columns, own, rest, clean))
         for _ in range(_SHIFTS):
             cross = np.zeros((len(at), len(local)))
             square, product = np.zeros(len(local)), np.zeros(len(local))
-            for part, run in enumerate(data.runs):
-                columns = np.stack([c.columns[part][:, 0, 0] for c in local], axis=1)
+            for columns, own, rest, clean in parts:
                 shift = int(rng.integers(len(columns) // 4, max(3 * len(columns) // 4, 2)))
-                clean = noise.clean(run.usable[:, joint])
                 moved = noise.whitened(np.roll(columns, shift, axis=0), joint)[clean]
-                rest = noise.whitened(residuals[part][:, joint, None], joint)[clean, 0]
-                cross += noise.whitened(own[part], joint)[clean].T @ moved
+                cross += own.T @ moved
                 square += np.sum(moved**2, axis=0)
                 product += rest @ moved
             cross /= white.norms[at][:, None]

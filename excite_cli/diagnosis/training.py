@@ -1,12 +1,14 @@
 """The training data of a diagnosis: motion, inertial columns and torque of every part."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
 from excite_cli.diagnosis.evidence import Evidence
+from excite_cli.diagnosis.grams import Grams, JointGram
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
@@ -61,26 +63,47 @@ class TrainingData:
                 blocks.append(np.zeros((len(declared), c.width)))
         return np.concatenate(blocks, axis=1)
 
-    def evidence(self, candidates: Sequence[Columns], noise: NoiseModel) -> Evidence:
-        """Gram matrices of all columns, whitened by `noise`; linear in the number of samples."""
+    def evidence(
+        self,
+        candidates: Sequence[Columns],
+        noise: NoiseModel,
+        known: Mapping[int, JointGram] | None = None,
+    ) -> Evidence:
+        """Gram matrices of all columns, whitened by `noise`; linear in the number of samples.
+
+        `known`: Gram matrices, with this noise, of joints whose rows hold no candidate but those
+        they were made with, which come first here too.
+        """
+        known = known or {}
+        starts = self.declared[0].shape[2] + np.cumsum([0, *(c.width for c in candidates)])
+        grams = [
+            known[joint] if joint in known else self.gram(candidates, noise, joint)
+            for joint in range(self.n)
+        ]
+        return Evidence(
+            Grams(grams, int(starts[-1]) + 1),
+            int(starts[0]),
+            [np.arange(*ends) for ends in pairwise(starts)],
+            [c.rows for c in candidates],
+            self.prior_precision,
+        )
+
+    def gram(self, candidates: Sequence[Columns], noise: NoiseModel, joint: int) -> JointGram:
+        """Gram matrices of the whitened rows of one joint."""
         fixed = self.declared[0].shape[2]
         starts = fixed + np.cumsum([0, *(c.width for c in candidates)])
-        blocks = [np.arange(starts[i], starts[i + 1]) for i in range(len(candidates))]
-        size = int(starts[-1]) + 1
-        grams = np.zeros((max(self.folds) + 1, self.n, size, size))
-        for joint in range(self.n):
-            touching = [i for i, c in enumerate(candidates) if joint in c.rows]
-            active = np.concatenate(
-                [np.arange(fixed), *(blocks[i] for i in touching), [size - 1]]
-            ).astype(np.intp)
-            for part, fold in enumerate(self.folds):
-                columns = self.columns(candidates, touching, part, joint)
-                x = np.hstack([columns, self.tau[part][:, joint, None]])
-                clean = noise.clean(self.runs[part].usable[:, joint])
-                white = noise.whitened(x, joint)[clean]
-                grams[fold, joint][np.ix_(active, active)] += white.T @ white
-        rows_of = [c.rows for c in candidates]
-        return Evidence(grams, fixed, blocks, rows_of, self.prior_precision)
+        touching = [i for i, c in enumerate(candidates) if joint in c.rows]
+        active = np.concatenate(
+            [np.arange(fixed), *(np.arange(starts[i], starts[i + 1]) for i in touching)]
+        ).astype(np.intp)
+        own = np.zeros((max(self.folds) + 1, len(active) + 1, len(active) + 1))
+        for part, fold in enumerate(self.folds):
+            columns = self.columns(candidates, touching, part, joint)
+            x = np.hstack([columns, self.tau[part][:, joint, None]])
+            clean = noise.clean(self.runs[part].usable[:, joint])
+            white = noise.whitened(x, joint)[clean]
+            own[fold] += white.T @ white
+        return JointGram(active, own)
 
     def residuals(
         self, candidates: Sequence[Columns], chosen: Sequence[int], parameters: Array

@@ -15,6 +15,7 @@ from scipy.stats import chi2
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.dependence import common_names, confirmed_shares
 from excite_cli.diagnosis.evidence import Evidence
+from excite_cli.diagnosis.grams import JointGram
 from excite_cli.diagnosis.history import histories
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.result import Unexplained
@@ -48,9 +49,14 @@ def unexplained_structure(
     features = [_features(data, signals, past, joint, joint_names) for joint in range(data.n)]
     found: dict[int, Unexplained] = {}
     shares: Array | None = None
+    plain_noise = NoiseModel.white(noise.sigma)
     while len(found) < data.n:
+        known = _Known(
+            {joint: data.gram(kept, plain_noise, joint) for joint in range(data.n)},
+            {joint: data.gram(kept, noise, joint) for joint in range(data.n)},
+        )
         structures = [
-            _structure(data, kept, features[joint], noise, rules)
+            _structure(data, kept, features[joint], noise, known, rules)
             for joint in range(data.n)
             if joint not in found
         ]
@@ -100,6 +106,17 @@ class _Structure:
 
 
 @dataclass(frozen=True)
+class _Known:
+    """Gram matrices of every joint's rows without features, plain and whitened.
+
+    Features of one joint leave those of all others as they are.
+    """
+
+    plain: dict[int, JointGram]
+    white: dict[int, JointGram]
+
+
+@dataclass(frozen=True)
 class _Past:
     """Histories (T, n, 3) of the positions and of the loads of every part."""
 
@@ -138,19 +155,21 @@ def _structure(
     kept: Sequence[Columns],
     features: list[Feature],
     noise: NoiseModel,
+    known: _Known,
     rules: tuple[float, float, float],
 ) -> _Structure:
     """Add the features of one joint to the model with those `kept`, while they pass."""
     joint = features[0].rows[0]
     pool: list[Columns] = [*kept, *features]
-    plain = data.evidence(pool, NoiseModel.white(noise.sigma))
+    plain_others, others = _without(known.plain, joint), _without(known.white, joint)
+    plain = data.evidence(pool, NoiseModel.white(noise.sigma), plain_others)
     base = list(range(len(kept)))
     obvious = _obvious(plain, base, joint)
     if obvious:
         with_them = [*base, *obvious]
         left = data.residuals(pool, with_them, plain.solve(with_them))
-        noise = fit_noise(left, [run.usable for run in data.runs])
-    white = data.evidence(pool, noise)
+        noise, others = fit_noise(left, [run.usable for run in data.runs]), {}
+    white = data.evidence(pool, noise, others)
     named: list[int] = []
     score = -np.inf
     tests = len(features) * data.n
@@ -168,6 +187,10 @@ def _structure(
         float(share),
         confirmed_shares(plain, base, joint),
     )
+
+
+def _without(grams: dict[int, JointGram], joint: int) -> dict[int, JointGram]:
+    return {j: gram for j, gram in grams.items() if j != joint}
 
 
 def _obvious(plain: Evidence, base: list[int], joint: int) -> list[int]:

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from excite_cli.effects.base import Effect, Parameter, Signals
@@ -33,6 +34,7 @@ _GAPS = 1e-3, 3e-2  # rad
 _WIDTH = 0.01  # s, of a blow in the search, about that of a filter of 20 Hz
 _FINE = 2e-3  # s, the step in which flights are followed
 _CHUNK = 256  # samples that are looked at first for the end of a flight
+_PORTION = 2**17  # values of columns that are searched at once
 
 
 class Backlash(Effect):
@@ -62,21 +64,20 @@ class Backlash(Effect):
         """The gap whose flights and blows, smoothed a little, explain most of the residuals."""
         if not any(len(s.t) > 2 for s in signals):
             return []
-        r = np.concatenate(residuals)
-        weights = 1.0 / np.maximum(np.mean(r**2, axis=0), 1e-300)
+        weights = 1.0 / np.maximum(np.mean(np.concatenate(residuals) ** 2, axis=0), 1e-300)
         motions = [_Motion.of(s, joints[0]) for s in signals]
 
-        def energy(gap: float) -> float:
-            column = np.concatenate(
-                [_smooth(motion.column(gap), s) for motion, s in zip(motions, signals, strict=True)]
-            )
-            fitted = max(float(np.sum(weights * column * r)), 0.0)  # a negative share is no play
-            return fitted**2 / (float(np.sum(weights * column**2)) + 1e-300)
+        def best(gaps: Array) -> float:
+            product, square = np.zeros(len(gaps)), np.zeros(len(gaps))
+            for motion, s, left in zip(motions, signals, residuals, strict=True):
+                for some in _few(len(gaps), left.size):
+                    columns = _smooth(motion.columns(gaps[some]), s)
+                    product[some] += np.einsum("gtr,tr->g", columns, left * weights)
+                    square[some] += np.einsum("gtr,gtr->gr", columns, columns) @ weights
+            fitted = np.maximum(product, 0.0)  # a negative share is no play
+            return float(gaps[int(np.argmax(fitted**2 / (square + 1e-300)))])
 
-        gaps = np.geomspace(*_GAPS, 48)
-        best = gaps[int(np.argmax([energy(gap) for gap in gaps]))]
-        near = best * np.geomspace(0.93, 1.07, 21)
-        return [{"gap": float(near[int(np.argmax([energy(gap) for gap in near]))])}]
+        return [{"gap": best(best(np.geomspace(*_GAPS, 48)) * np.geomspace(0.93, 1.07, 21))}]
 
     def rows(self, n: int) -> tuple[int, ...]:
         """All joints."""
@@ -84,7 +85,8 @@ class Backlash(Effect):
 
     def columns(self, signals: Signals) -> Array:
         """Flights, blows, and the shift of the link, in all rows, (T, n, 1)."""
-        return _Motion.of(signals, self.joints[0]).column(self.shape["gap"])[:, :, None]
+        gaps = np.array([self.shape["gap"]])
+        return _Motion.of(signals, self.joints[0]).columns(gaps)[0][:, :, None]
 
 
 @dataclass(frozen=True)
@@ -121,35 +123,46 @@ class _Motion:
             signals.body.by_position[:, :, j],
         )
 
-    def column(self, gap: float) -> Array:
-        """The effect (T, n) of a gap [rad]."""
-        lost, behind = np.zeros(len(self.load)), 0.5 * gap * np.sign(self.load)
-        for first, last, closed in self.flights.across(gap):
-            lost[first:last] = -self.load[first:last]
-            behind[first:last] = 0.0
-            if closed:
-                lost[last] += self.load[first:last].sum()
-        lost, behind = _averaged(lost, self.finer), _averaged(behind, self.finer)
-        return np.asarray(self.pull * lost[:, None] - self.slope * behind[:, None])
+    def columns(self, gaps: Array) -> Array:
+        """The effect (G, T, n) of gaps [rad]."""
+        load, count = self.load, len(self.load)
+        turns, lost = np.zeros((len(gaps), count + 1), dtype=np.int8), np.zeros((len(gaps), count))
+        for g, flights in enumerate(self.flights.across(gaps)):
+            for first, last, closed in flights:
+                turns[g, first], turns[g, last] = 1, -1
+                if closed:
+                    lost[g, last] = load[first:last].sum()
+        flying = np.cumsum(turns[:, :-1], axis=1, dtype=np.int8).astype(bool)
+        lost = _averaged(np.where(flying, -load, lost), self.finer)
+        behind = 0.5 * gaps[:, None] * np.sign(load)
+        behind = _averaged(np.where(flying, 0.0, behind), self.finer)
+        return np.asarray(self.pull * lost[:, :, None] - self.slope * behind[:, :, None])
+
+
+def _few(count: int, size: int) -> list[slice]:
+    """`count` gaps in portions whose columns of `size` values each fit into a cache."""
+    step = max(1, _PORTION // max(size, 1))
+    return [slice(at, at + step) for at in range(0, count, step)]
 
 
 def _averaged(x: Array, finer: int) -> Array:
-    """Means over the samples' own intervals, of values on a grid that is `finer` times as fine."""
+    """Means over the samples' own intervals, of (G, T') on a grid that is `finer` times as fine."""
     half = finer // 2
-    padded = np.zeros(len(x) + finer - 1)
-    padded[half : half + len(x)] = x
-    means = padded.reshape(-1, finer).sum(axis=1)
-    means[1:-1] /= finer
-    means[0] /= finer - half  # at the ends, half of the interval lies outside
-    means[-1] /= half + 1
+    padded = np.zeros((len(x), x.shape[1] + finer - 1))
+    padded[:, half : half + x.shape[1]] = x
+    means = padded.reshape(len(x), -1, finer).sum(axis=2)
+    means[:, 1:-1] /= finer
+    means[:, 0] /= finer - half  # at the ends, half of the interval lies outside
+    means[:, -1] /= half + 1
     return np.asarray(means)
 
 
-def _smooth(column: Array, signals: Signals) -> Array:
+def _smooth(columns: Array, signals: Signals) -> Array:
+    """Columns (G, T, n), smoothed over time."""
     if len(signals.t) < 3:
-        return column
+        return columns
     width = _WIDTH / float(signals.t[1] - signals.t[0])
-    smooth: Array = gaussian_filter1d(column, width, axis=0)
+    smooth: Array = gaussian_filter1d(columns, width, axis=1)
     return smooth
 
 
@@ -168,24 +181,32 @@ class Flights:
         self._changes = np.flatnonzero(negative[1:] != negative[:-1]) + 1
         self._paths: dict[int, Array] = {}
 
-    def across(self, gap: float) -> list[tuple[int, int, bool]]:
-        """First sample of each flight, first one after it, and whether a flank was met."""
-        count, found, k = len(self._acceleration), [], 0
-        while k < len(self._changes):
-            first = int(self._changes[k])
-            last, closed = self._end(first, gap)
-            found.append((first, last, closed))
-            if last >= count:
-                break
-            k = int(np.searchsorted(self._changes, last, side="right"))
+    def across(self, gaps: Array) -> list[list[tuple[int, int, bool]]]:
+        """Flights of each gap: first sample, first one after it, and whether a flank was met.
+
+        Flights that begin at the same change of sign share their path, whatever the gap.
+        """
+        starts = self._changes.tolist()
+        found: list[list[tuple[int, int, bool]]] = [[] for _ in gaps]
+        waiting: dict[int, list[NDArray[np.intp]]] = {0: [np.arange(len(gaps))]}
+        for k, first in enumerate(starts):
+            if k not in waiting:
+                continue
+            own = np.concatenate(waiting.pop(k))
+            last, closed = self._ends(first, gaps[own])
+            following = np.searchsorted(self._changes, last, side="right")
+            for g, end, met in zip(own.tolist(), last.tolist(), closed.tolist(), strict=True):
+                found[g].append((first, end, met))
+            for later in np.unique(following):
+                waiting.setdefault(int(later), []).append(own[following == later])
         return found
 
-    def _end(self, first: int, gap: float) -> tuple[int, bool]:
+    def _ends(self, first: int, gaps: Array) -> tuple[Array, NDArray[np.bool_]]:
         """The first sample at a flank again; the end of the run if there is none."""
-        farthest = self._path(first, gap)
-        end = first + int(np.searchsorted(farthest, gap)) + 1
-        count = len(self._acceleration)
-        return (end, True) if end < count and end <= first + len(farthest) else (count, False)
+        farthest = self._path(first, float(gaps.max()))
+        end, count = first + np.searchsorted(farthest, gaps) + 1, len(self._acceleration)
+        closed = (end < count) & (end <= first + len(farthest))
+        return np.where(closed, end, count), closed
 
     def _path(self, first: int, gap: float) -> Array:
         """How far the link has been from its flank, until it is back (∞) or beyond the gap."""

@@ -47,7 +47,7 @@ class Taylor:
     @property
     def size(self) -> Array:
         """A bound on |x(s)|, entry by entry."""
-        return np.asarray(np.abs(self.terms).sum(axis=0) + self.radius)
+        return np.asarray(_absolute(self.terms) + self.radius)
 
     @property
     def reach(self) -> Array:
@@ -81,15 +81,20 @@ class Taylor:
 
     def times(self, other: "Taylor") -> "Taylor":
         """The product, entry by entry."""
-        a, b = self.terms, other.terms
-        terms = np.stack(
-            [a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + a[1] * b[1] + a[2] * b[0]]
-        )
-        radius = np.abs(a[1] * b[2] + a[2] * b[1]) + np.abs(a[2] * b[2])
+        (a0, a1, a2), (b0, b1, b2) = self.terms, other.terms
+        terms = np.empty((3, *np.broadcast_shapes(self.shape, other.shape)))
+        np.multiply(a0, b0, out=terms[0])
+        np.multiply(a0, b1, out=terms[1])
+        terms[1] += a1 * b0
+        np.multiply(a0, b2, out=terms[2])
+        terms[2] += a1 * b1
+        terms[2] += a2 * b0
+        radius = np.abs(a1 * b2 + a2 * b1)
+        radius += np.abs(a2 * b2)
         if other.radius.any():
-            radius = radius + np.abs(a).sum(axis=0) * other.radius
+            radius += _absolute(self.terms) * other.radius
         if self.radius.any():
-            radius = radius + self.radius * other.size
+            radius += self.radius * other.size
         return Taylor(terms, radius)
 
     def through(self, matrix: Array) -> "Taylor":
@@ -118,6 +123,12 @@ class Taylor:
         return np.asarray(self.terms[0] + s * (self.terms[1] + s * self.terms[2]))
 
 
+def _absolute(terms: Array) -> Array:
+    """|c₀| + |c₁| + |c₂|."""
+    one, two, three = np.abs(terms)
+    return np.asarray(one + two + three)
+
+
 def matmul(a: Taylor, b: Taylor) -> Taylor:
     """The matrix product over the last two axes."""
     products = a.terms[:, None] @ b.terms[None]
@@ -129,7 +140,7 @@ def matmul(a: Taylor, b: Taylor) -> Taylor:
         ]
     )
     radius = np.abs(products[1, 2] + products[2, 1]) + np.abs(products[2, 2])
-    radius = radius + np.abs(a.terms).sum(axis=0) @ b.radius + a.radius @ b.size
+    radius = radius + _absolute(a.terms) @ b.radius + a.radius @ b.size
     return Taylor(terms, radius)
 
 

@@ -23,11 +23,13 @@ def ball_bounds(poses: Poses, meshes: tuple[LinkMesh, ...], pairs: Indices) -> A
     """Lower bounds (P, T) [m] of the distance of pairs (P, 2) of links, from balls around them."""
     if not len(pairs):
         return np.zeros((0, len(poses)))
-    centers = np.stack([poses.points(mesh.joint, mesh.center) for mesh in meshes])
-    radii = np.array([mesh.radius for mesh in meshes])
-    between = centers[pairs[:, 0]] - centers[pairs[:, 1]]
-    apart = np.sqrt(np.einsum("ptk,ptk->pt", between, between))
-    return np.asarray(apart - radii[pairs].sum(axis=1)[:, None])
+    centers = [np.ascontiguousarray(poses.points(m.joint, m.center).T) for m in meshes]
+    found = np.empty((len(pairs), len(poses)))
+    for bounds, (first, second) in zip(found, pairs.tolist(), strict=True):
+        x, y, z = centers[first] - centers[second]
+        np.sqrt(x * x + y * y + z * z, out=bounds)
+        bounds -= meshes[first].radius + meshes[second].radius
+    return found
 
 
 def hull_bounds(

@@ -32,9 +32,8 @@ class InverseDynamics:
         by_q, by_v, by_a = rnea_derivatives(
             self._model, self._data, self._pinocchio_states(q, v, a), len(q)
         )
-        moved = self.robot.moved
-        at = (slice(None), *np.ix_(moved, moved))
-        return by_q[at], by_v[at], by_a[at]
+        rows, columns = np.ix_(self.robot.moved, self.robot.moved)
+        return by_q[:, rows, columns], by_v[:, rows, columns], by_a[:, rows, columns]
 
 
 def rnea_derivatives(

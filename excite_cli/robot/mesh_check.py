@@ -180,44 +180,51 @@ class MeshCheck:
         q = np.atleast_2d(q)
         distance = np.full((len(q), len(self.judged)), -np.inf)
         broken = np.zeros(distance.shape, dtype=bool)
+        wanted = np.ones(distance.shape, dtype=bool) if asked is None else asked
         for begin in range(0, len(q), _BLOCK):
             some = slice(begin, begin + _BLOCK)
             poses = Poses.of(self._robot, q[some])
-            balls = ball_bounds(poses, self.meshes, self._indices(self.judged))
-            for p, pair in enumerate(self.judged):
-                wanted = np.arange(len(poses))
-                if asked is not None:
-                    wanted = np.flatnonzero(asked[some, p])
-                if not len(wanted):
-                    continue
-                part = poses if len(wanted) == len(poses) else poses.at(wanted)
-                moved = np.full(len(wanted), np.inf)
-                if reach is not None:
-                    moved = reach[begin + wanted, pair.first] + reach[begin + wanted, pair.second]
-                if change is not None:
-                    both = (self.meshes[pair.first], self.meshes[pair.second])
-                    turned = self._reach.between(part, *both, change[begin + wanted])
-                    moved = np.minimum(moved, turned)
-                found = self._kept(pair, part, balls[p, wanted], moved + _ROUNDING, margin)
-                distance[begin + wanted, p], broken[begin + wanted, p] = found
+            bounds = ball_bounds(poses, self.meshes, self._indices(self.judged))
+            far, turned = (None if each is None else each[some] for each in (reach, change))
+            moved = self._moved(poses, far, turned, wanted[some]) + _ROUNDING
+            open_ = wanted[some].T & (bounds <= moved + margin)
+            for p in np.flatnonzero(open_.any(axis=1)):
+                at = np.flatnonzero(open_[p])
+                found = self._kept(self.judged[p], poses, at, bounds[p], moved[p] + margin)
+                broken[begin + at, p] = found <= margin
+                bounds[p, at] = found
+            distance[some] = np.where(wanted[some], (bounds - moved).T, -np.inf)
         return MeshProof(distance, distance > margin, broken)
 
+    def _moved(
+        self, poses: Poses, reach: Array | None, change: Array | None, wanted: Mask
+    ) -> Array:
+        """How far (P, K) [m] the links of judged pairs can approach each other."""
+        moved = np.full((len(self.judged), len(poses)), np.inf)
+        turned = None if change is None else self._reach.at(poses, change)
+        for p in np.flatnonzero(wanted.any(axis=0)):
+            pair = self.judged[p]
+            if reach is not None:
+                moved[p] = reach[:, pair.first] + reach[:, pair.second]
+            if turned is not None:
+                both = (self.meshes[pair.first], self.meshes[pair.second])
+                np.minimum(moved[p], turned.between(*both), out=moved[p])
+        return moved
+
     def _kept(
-        self, pair: MeshPair, poses: Poses, bounds: Array, moved: Array, margin: float
-    ) -> tuple[Array, Mask]:
-        """Distance [m] that a pair keeps in intervals, and where it has not even the margin."""
+        self, pair: MeshPair, poses: Poses, at: Indices, bounds: Array, needed: Array
+    ) -> Array:
+        """Lower bounds of a pair's distance [m] `at` some instants, where balls say too little.
+
+        `bounds` (K,) are those of the balls, `needed` (K,) [m] what proves the pair apart.
+        """
         both = (self.meshes[pair.first], self.meshes[pair.second])
-        needed = moved + margin
-        open_ = np.flatnonzero(bounds <= needed)
-        hulls = hull_bounds(poses, both, open_, needed[open_])
-        bounds[open_] = np.maximum(bounds[open_], hulls)
-        broken = np.zeros(len(bounds), dtype=bool)
+        bounds = np.maximum(bounds[at], hull_bounds(poses, both, at, needed[at]))
         meshes = self._meshes(pair.first, pair.second)
-        for k in open_[bounds[open_] <= needed[open_]].tolist():
+        for k in np.flatnonzero(bounds <= needed[at]).tolist():
             # A little beyond what is needed: what passes shall pass with a margin.
-            bounds[k] = meshes.distance(poses, k, below=float(needed[k]) + _SPARE)
-            broken[k] = bounds[k] <= margin
-        return bounds - moved, broken
+            bounds[k] = meshes.distance(poses, int(at[k]), below=float(needed[at[k]]) + _SPARE)
+        return bounds
 
     def _follow(
         self, state: "_Running", pair: MeshPair, q: Array, poses: Poses, balls: Array, begin: int

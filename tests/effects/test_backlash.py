@@ -1,6 +1,7 @@
 """Play in a gear: flights of known length, and a motor and a link with a gap between them."""
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -23,7 +24,7 @@ def test_flight_lasts_as_the_gap_asks() -> None:
     step, rate, gap = 1e-4, 30.0, 0.01
     t = step * np.arange(-2000, 4000)
     for side in (1.0, -1.0):
-        ((first, last, closed),) = Flights(side * rate * t, step).across(gap)
+        ((first, last, closed),) = Flights(side * rate * t, step).across(np.array([gap]))[0]
         assert closed
         assert (last - first) * step == pytest.approx((6 * gap / rate) ** (1 / 3), abs=3e-4)
 
@@ -33,15 +34,28 @@ def test_flight_ends_where_the_link_comes_back() -> None:
     step = 1e-3
     t = step * np.arange(9000)
     acceleration = np.concatenate([[-1e-9], np.cos(t) - 0.2])
-    ((first, last, closed), *_) = Flights(acceleration, step).across(10.0)
+    ((first, last, closed), *_) = Flights(acceleration, step).across(np.array([10.0]))[0]
     assert (first, closed) == (1, True)
     back = brentq(lambda x: 1 - np.cos(x) - 0.1 * x**2, 3.0, 6.0)
     assert (last - first) * step == pytest.approx(back, abs=0.01)
 
 
 def test_flight_that_outlasts_the_run_has_no_blow() -> None:
-    assert Flights(np.array([-1.0, 1.0, 1.0, 1.0]), 1e-3).across(1.0) == [(1, 4, False)]
-    assert Flights(np.ones(5), 1e-3).across(1.0) == []
+    gaps = np.array([1.0, 1e-7])
+    wide, narrow = Flights(np.array([-1.0, 1.0, 1.0, 1.0]), 1e-3).across(gaps)
+    assert wide == [(1, 4, False)]
+    assert narrow == [(1, 2, True)]
+    assert Flights(np.ones(5), 1e-3).across(gaps) == [[], []]
+
+
+def test_flights_of_many_gaps_are_those_of_each_alone() -> None:
+    acceleration = np.random.default_rng(2).normal(size=4000).cumsum()
+    gaps = np.geomspace(1e-3, 1.0, 9)
+    together = Flights(acceleration, 1e-2).across(gaps)
+    for gap, found in zip(gaps, together, strict=True):
+        assert found == Flights(acceleration, 1e-2).across(np.array([gap]))[0]
+        assert all(last < first for (_, last, _), (first, _, _) in pairwise(found))
+    assert len(together[0]) > len(together[-1])
 
 
 @cache
