@@ -51,7 +51,7 @@ bench: $(STAMP)          ## cost and gradient, growth, memory, whole motions, tw
 FIGAROH ?= figaroh-env/bin/python
 peers: $(STAMP)          ## beside FIGAROH and finite differences (docs/peers.md), ten minutes
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.peers --figaroh-python $(FIGAROH) \
-	  --markdown docs/peers_table.md
+	  --markdown docs/peers_table.md --readme README.md
 
 trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism (an hour; root)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.fuzz --count 10000

@@ -38,6 +38,10 @@ _BOUNDS = {
     "less_than_equal": ("le", "a number less than or equal to {}"),
 }
 
+_MOST = 20  # places that are told
+_LONGEST = 120  # characters of what was given
+_LONGEST_WHOLE = 10**100
+
 Path = tuple[Any, ...]
 
 
@@ -52,12 +56,15 @@ def explain(
     for item in error.errors(include_url=False):
         found.setdefault(_path_in_file(item, tree), []).append(item)
     # Where something inside a value is wrong, what the value might have been instead is noise.
-    deepest = [path for path in found if not any(_inside(other, path) for other in found)]
+    outer = {path[:length] for path in found for length in range(len(path))}
+    deepest = [path for path in found if path not in outer]
     told = []
-    for path in deepest:
+    for path in deepest[:_MOST]:
         line = line_of(path)
         where = source if line is None else f"{source}, line {line}"
         told.append(f"{where}: {_named(path)}: {_reason(found[path], path, tree)}")
+    if len(deepest) > _MOST:
+        told.append(f"{source}: and {len(deepest) - _MOST} more.")
     return "\n".join(told)
 
 
@@ -79,12 +86,13 @@ def _path_in_file(item: Any, tree: Any) -> Path:
     return tuple(path)
 
 
-def _inside(inner: Path, outer: Path) -> bool:
-    return len(inner) > len(outer) and inner[: len(outer)] == outer
-
-
 def _named(path: Path) -> str:
-    return ".".join(str(part) for part in path) or "the file"
+    return _short(".".join(_short(str(part)) for part in path)) or "the file"
+
+
+def _short(text: str) -> str:
+    """What a person reads of a word that is far too long."""
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}… ({len(text)} characters)"
 
 
 def _reason(items: list[Any], path: Path, tree: Any) -> str:
@@ -118,7 +126,7 @@ def _wrong_tag(item: Any) -> str:
         return f"give '{key}' to say which kind is meant."
     expected = context["expected_tags"].replace("'", "")
     tag = str(context["tag"])
-    return f"unknown kind '{tag}'.{nearest(tag, expected.split(', '))} Allowed: {expected}."
+    return f"unknown kind '{_short(tag)}'.{nearest(tag, expected.split(', '))} Allowed: {expected}."
 
 
 def _allowed(item: Any) -> str:
@@ -165,7 +173,10 @@ def _literals(item: Any) -> list[str]:
 
 def _given(item: Any) -> str:
     value = item.get("input")
-    return f" (given: {value!r})" if isinstance(value, str | int | float | bool | None) else ""
+    if not isinstance(value, str | int | float | bool | None):
+        return ""
+    long = isinstance(value, int) and abs(value) > _LONGEST_WHOLE  # Python refuses to print those
+    return f" (given: {'a huge number' if long else _short(repr(value))})"
 
 
 def _keys_at(path: Path, tree: Any) -> list[str]:

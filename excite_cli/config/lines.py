@@ -4,6 +4,8 @@ from typing import Any
 
 import yaml
 
+from excite_cli.config.strict_yaml import composed
+
 
 def line_at(text: str, path: tuple[Any, ...]) -> int | None:
     """The line, from 1, of the key or list item at `path`; None if the text does not have it.
@@ -11,7 +13,7 @@ def line_at(text: str, path: tuple[Any, ...]) -> int | None:
     A path whose last key is missing (a required one) gives the line of its section.
     """
     try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = composed(text)
     except (yaml.YAMLError, ValueError, RecursionError):
         return None
     line: int | None = None

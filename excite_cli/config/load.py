@@ -1,8 +1,6 @@
 """From a YAML file and `--set` overrides to a checked `Spec`, and back to text.
 
-YAML is read with the safe loader, within limits of size and depth and without aliases, so that a
-foreign file can neither run code nor grow in memory. Errors name the key's path, what is allowed
-and the nearest known key.
+Errors name the key's path, what is allowed and the nearest known key.
 """
 
 from collections.abc import Callable
@@ -16,10 +14,10 @@ from excite_cli.config.explain import Path as Place
 from excite_cli.config.explain import explain
 from excite_cli.config.lines import line_at
 from excite_cli.config.spec import Spec
+from excite_cli.config.strict_yaml import load_strict
 from excite_cli.errors import ConfigError, nearest
 
 MAX_BYTES = 1_000_000
-MAX_DEPTH = 30
 # What is given by mistake for a config, by its suffix.
 _KINDS = {
     ".h5": "an HDF5 file (a result, a fit or measured data)",
@@ -29,31 +27,6 @@ _KINDS = {
     ".mcap": "a bag",
     ".npz": "a NumPy file",
 }
-
-
-class _StrictLoader(yaml.SafeLoader):
-    """Safe loader that refuses aliases and duplicate keys."""
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        """Refuse aliases: they make small files huge."""
-        if self.check_event(yaml.AliasEvent):
-            event = self.peek_event()
-            raise yaml.MarkedYAMLError(None, None, "aliases (*) are not allowed", event.start_mark)
-        return super().compose_node(parent, index)
-
-    def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-        """Refuse a key given twice."""
-        seen = set()
-        for key_node, _ in node.value:
-            if not isinstance(key_node, yaml.ScalarNode):
-                mark = key_node.start_mark
-                raise yaml.MarkedYAMLError(None, None, "a key must be a plain word", mark)
-            key = key_node.value
-            if key in seen:
-                mark = key_node.start_mark
-                raise yaml.MarkedYAMLError(None, None, f"key '{key}' is given twice", mark)
-            seen.add(key)
-        return super().construct_mapping(node, deep)
 
 
 def load_spec(path: Path, overrides: list[str] | None = None) -> Spec:
@@ -98,7 +71,7 @@ def _near(path: Path) -> str:
 
 def parse_spec(text: str, source: str = "config", overrides: list[str] | None = None) -> Spec:
     """As `load_spec`, from YAML text; `source` is named in messages."""
-    tree = _load(text, source)
+    tree = load_strict(text, source)
     if not isinstance(tree, dict):
         raise ConfigError(f"{source}: a problem is a mapping with at least the key 'robot'.")
     for override in overrides or []:
@@ -137,34 +110,6 @@ def spec_as_yaml(spec: Spec) -> str:
     return yaml.safe_dump(spec.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
 
-def _load(text: str, source: str) -> Any:
-    if _too_deep(text):
-        raise ConfigError(f"{source}: nested deeper than {MAX_DEPTH} levels.")
-    try:
-        return yaml.load(text, Loader=_StrictLoader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        where = f", line {mark.line + 1}" if mark else ""
-        raise ConfigError(f"{source}{where}: not valid YAML: {error.problem}") from error
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise ConfigError(f"{source}: not valid YAML: {error}") from error
-
-
-def _too_deep(text: str) -> bool:
-    depth = 0
-    try:
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            if isinstance(event, yaml.CollectionStartEvent):
-                depth += 1
-                if depth > MAX_DEPTH:
-                    return True
-            elif isinstance(event, yaml.CollectionEndEvent):
-                depth -= 1
-    except (yaml.YAMLError, RecursionError):
-        return False  # told with its line by the loader
-    return False
-
-
 def _apply(tree: dict[str, Any], override: str) -> None:
     """Set one `key.path=value`; the value is YAML."""
     key, separator, text = override.partition("=")
@@ -185,4 +130,4 @@ def _apply(tree: dict[str, Any], override: str) -> None:
         node = node[part]
         if not isinstance(node, dict):
             raise ConfigError(f"--set {override}: '{part}' holds a value, not further keys.")
-    node[parts[-1]] = _load(text, f"--set {key}")
+    node[parts[-1]] = load_strict(text, f"--set {key}")

@@ -1,5 +1,6 @@
 """What a YAML file may say about the robot."""
 
+from collections import Counter
 from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -68,7 +69,7 @@ class RobotSpec(Section):
         if value != "all":
             if not value:
                 raise ValueError("name at least one joint, or write 'all'")
-            twice = sorted({j for j in value if list(value).count(j) > 1})
+            twice = sorted(j for j, count in Counter(value).items() if count > 1)
             if twice:
                 raise ValueError(f"named twice: {', '.join(twice)}")
         return value

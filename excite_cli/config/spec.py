@@ -56,7 +56,9 @@ class OptimizerSpec(Section):
     qp_solver: Literal["daqp", "piqp"] = Field("daqp", description="used by method: sqp")
     max_seconds: Positive = Field(30.0, description="per start of a motion")
     max_iterations: Integer = Field(400, ge=1, le=100_000, description="per start of a motion")
-    restarts: Integer = Field(1, ge=1, le=100, description="starts tried per motion, the best kept")
+    restarts: Integer = Field(
+        1, ge=1, le=10_000, description="starts tried per motion, the best kept"
+    )
     tolerance: Positive = Field(
         1e-3, description="change of the (logarithmic) criterion over 8 iterations that ends a run"
     )

@@ -1,5 +1,6 @@
 """From a file's columns to the robot's joints: matched by name, never by position alone."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.measurement.dataset import Array, Finding, Run
 from excite_cli.measurement.reader import CHANNELS, RawRun
 
+_LISTED, _LONGEST = 40, 60  # names that are told; characters of each
 _CHANNEL_WORDS = {"q": "position", "tau": "torque", "dq": "speed"}
 
 
@@ -20,8 +22,7 @@ def check_names(names: Mapping[str, str], joints: Sequence[str]) -> None:
                 f"measurement.names: '{column}' is led to '{joint}', which the robot does not "
                 f"move.{nearest(joint, joints)} Moved joints: {', '.join(joints)}."
             )
-    led = list(names.values())
-    twice = sorted({joint for joint in led if led.count(joint) > 1})
+    twice = sorted(joint for joint, count in Counter(names.values()).items() if count > 1)
     if twice:
         raise ConfigError(f"measurement.names leads twice to '{twice[0]}'; each joint once.")
 
@@ -62,7 +63,7 @@ def arrange(
         raise FileError(_missing(source, raw.name, "tau", list(joints), []))
     others = sorted({names.get(column, column) for column in positions} - set(joints))
     if others:
-        text = f"joints that the robot does not move, kept as further channels: {', '.join(others)}"
+        text = f"joints that the robot does not move, kept as further channels: {listed(others)}"
         findings.append(Finding("other_joints", "note", text, raw.name))
     valid = matrices.pop("valid", None)
     kept = {name: matrix for name, matrix in matrices.items() if name not in CHANNELS}
@@ -83,12 +84,18 @@ def _numbered(columns: list[str], joints: tuple[str, ...], source: str) -> dict[
     first = numbers[0]
     if first not in (0, 1) or numbers != list(range(first, first + len(joints))):
         raise FileError(
-            f"{source}: its columns are numbered {', '.join(map(str, numbers))}, and the robot "
-            f"moves {len(joints)} joints ({', '.join(joints)}). Numbers 1 to {len(joints)} are "
-            "taken in this order; else name the columns by joint, or say which is which: "
+            f"{source}: its columns are numbered {listed([str(x) for x in numbers])}, and the "
+            f"robot moves {len(joints)} joints ({', '.join(joints)}). Numbers 1 to {len(joints)} "
+            "are taken in this order; else name the columns by joint, or say which is which: "
             f"measurement.names: {{'{numbers[0]}': {joints[0]}, …}}."
         )
     return {str(number): joint for number, joint in zip(numbers, joints, strict=True)}
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names of a file for a message: the first of them, and what a person reads of each."""
+    told = [name if len(name) <= _LONGEST else f"{name[:_LONGEST]}…" for name in names[:_LISTED]]
+    return ", ".join([*told, *(["…"] if len(names) > _LISTED else [])]) or "none"
 
 
 def _missing(source: str, run: str, channel: str, missing: list[str], columns: list[str]) -> str:
@@ -97,7 +104,7 @@ def _missing(source: str, run: str, channel: str, missing: list[str], columns: l
     rest = f" (nor of {', '.join(missing[1:])})" if len(missing) > 1 else ""
     return (
         f"{where}: there is no {_CHANNEL_WORDS[channel]} of joint '{joint}'{rest}."
-        f"{nearest(joint, columns, 0.5)} The file names: {', '.join(columns) or 'none'}. Say "
+        f"{nearest(joint, columns, 0.5)} The file names: {listed(columns)}. Say "
         f"which is which: measurement.names: {{<name in the file>: {joint}}}, or leave the joint "
         "out of robot.joints."
     )

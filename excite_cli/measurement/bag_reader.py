@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from excite_cli.config.plain_yaml import parse_plain
 from excite_cli.errors import ExciteError, FileError, MissingExtraError, nearest
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.joint_states import JointStates
@@ -18,6 +19,7 @@ from excite_cli.measurement.reader import RawRun, Reader, ReadOptions, check_siz
 
 _TYPES = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
 _STORAGE = (".db3", ".mcap")
+_MAX_METADATA = 500_000  # bytes
 
 
 class BagReader(Reader):
@@ -35,19 +37,17 @@ class BagReader(Reader):
     def read(self, path: Path, wanted: ReadOptions) -> list[RawRun]:
         """The bag's only run: one topic of JointState, in the order of its stamps."""
         _require_rosbags()
-        for file in _stored(path) if path.is_dir() else [path]:
-            check_size(file)
+        check_bag(path)
         try:
             with ExitStack() as stack:
                 readers = [stack.enter_context(reader) for reader in _readers(path)]
-                states = _collect(path, readers, wanted)
+                run = _collect(path, readers, wanted).run(path, wanted)
         except ExciteError:
             raise
         # The library lets pass whatever damaged bytes lead to: assertions, struct and database
         # errors, wrong enumerations. None of it is ours, and all of it means the same.
         except Exception as error:
             raise FileError(_damaged(path, error)) from error
-        run = states.run(path, wanted)
         pending = path.with_name(f"{path.name}-wal")
         if pending.is_file() and pending.stat().st_size:
             text = (
@@ -57,6 +57,30 @@ class BagReader(Reader):
             found = Finding("truncated", "warning", text)
             run = replace(run, findings=(*run.findings, found))
         return [run]
+
+
+def check_bag(path: Path) -> None:
+    """Refuse what the library would take for ever for, or fill memory with: size and metadata.
+
+    Raises
+    ------
+    FileError
+        A storage file is too large, or metadata.yaml is, or it is more than plain values.
+    """
+    for file in _stored(path) if path.is_dir() else [path]:
+        check_size(file)
+    metadata = path / "metadata.yaml"
+    if not metadata.is_file():
+        return
+    if metadata.stat().st_size > _MAX_METADATA:
+        raise FileError(
+            f"{metadata} is larger than {_MAX_METADATA // 1000} kB. Give one storage file of the "
+            "bag, or split the recording."
+        )
+    try:
+        parse_plain(metadata.read_text(encoding="utf-8"), str(metadata))
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileError(f"{metadata} cannot be read as text: {error}.") from error
 
 
 def _require_rosbags() -> None:
@@ -98,7 +122,7 @@ def _collect(path: Path, readers: list[Any], wanted: ReadOptions) -> JointStates
     check_values(path, 20 * sum(c.msgcount for c in connections if c.topic == topic))
     states = JointStates(topic)
     for stamp, data in _messages(readers, topic):
-        states.add(stamp, decode(data, _TYPES[0]))
+        states.add(int(stamp), decode(data, _TYPES[0]))
     return states
 
 

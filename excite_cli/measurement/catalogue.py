@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import ConfigError, FileError, nearest
-from excite_cli.measurement.arrange import arrange, check_names
+from excite_cli.measurement.arrange import arrange, check_names, listed
 from excite_cli.measurement.bag_reader import BagReader
 from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
@@ -72,11 +73,19 @@ def read_dataset(
             run = replace(run, t=_seconds(raw, spec))
             arranged.append(to_joints(run, spec, joint_names, turning))
             findings += more
-        parts, more = checked(arranged, spec, joint_names, known)
+        parts, more = _checked(path, arranged, spec, joint_names, known)
         runs += parts
         findings += more
     _check_all_met(spec.names, seen)
     return Dataset(joint_names, tuple(runs), tuple(map(str, paths)), tuple(findings))
+
+
+def _checked(path: Path, runs: list[Run], *about: Any) -> tuple[list[Run], list[Finding]]:
+    """The runs of a file, checked; errors name the file beside the run."""
+    try:
+        return checked(runs, *about)
+    except FileError as error:
+        raise FileError(f"{path}: {error}") from error
 
 
 def reader_for(path: Path) -> Reader:
@@ -133,5 +142,5 @@ def _check_all_met(names: dict[str, str], seen: set[str]) -> None:
         if name not in seen:
             raise ConfigError(
                 f"measurement.names: no file has a joint '{name}'.{nearest(name, seen)} "
-                f"The files name: {', '.join(sorted(seen))}."
+                f"The files name: {listed(sorted(seen))}."
             )

@@ -8,6 +8,7 @@ from excite_cli.measurement.dataset import Finding, Run
 from excite_cli.measurement.speeds import speeds
 
 _LAG = 0.01  # s, worth a word
+_MOST_LAGS = 2000  # samples: the time taken grows with it, and no robot is sampled so fast
 _FOREIGN, _OWN, _OPPOSITE = 0.9, 0.5, -0.8
 
 
@@ -62,7 +63,7 @@ def speed_lag(run: Run, longest: float = 0.1) -> float:
     NaN where no speed was recorded. `run` is equidistant.
     """
     count = len(run.t)
-    reach = min(int(np.ceil(longest / run.step)), count // 4)
+    reach = int(min(np.ceil(longest / run.step), count // 4, _MOST_LAGS))
     if run.dq is None or reach < 2:
         return float("nan")
     scale = np.maximum(run.dq.std(axis=0), 1e-300)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from excite_cli.errors import FileError, nearest
+from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.csv_table import read_table
 from excite_cli.measurement.dataset import Array
 from excite_cli.measurement.reader import RawRun, Reader, ReadOptions, times_from_rate
@@ -22,7 +23,7 @@ class CsvReader(Reader):
         """The file's only run; columns are matched by name."""
         table = read_table(path)
         columns = dict(table.columns)
-        words = ", ".join(list(columns)[:30])
+        words = listed(list(columns))
         if not any(_joint_of(name, wanted.called("q") or "q") for name in columns):
             raise FileError(_no_columns(path, "q", wanted, words))
         if not any(_joint_of(name, wanted.called("tau") or "tau") for name in columns):

@@ -7,6 +7,7 @@ import csv
 import gzip
 import re
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +16,14 @@ import numpy as np
 
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Finding
-from excite_cli.measurement.reader import check_size, check_values
+from excite_cli.measurement.reader import (
+    check_size,
+    check_unpacked,
+    check_values,
+)
 
 _MAX_LINE = 2**20
+_OFTEN = 4096  # rows between looks at how much it has become
 _MAX_TEXT = 2 * 2**30  # unpacked
 _BLANKS = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
 _DECIMAL_COMMA = re.compile(r"\d,\d")
@@ -57,6 +63,7 @@ def read_table(path: Path) -> Table:
     """
     check_size(path)
     try:
+        _check_unpacked(path)
         layout = _layout(path)
         findings: list[Finding] = []
         try:
@@ -77,10 +84,9 @@ def read_table(path: Path) -> Table:
 
 def _lines(path: Path) -> Iterator[str]:
     """Lines without their ends, within limits."""
-    packed = path.name.lower().endswith(".gz")
     with (
         gzip.open(path, "rt", encoding="utf-8-sig", newline=None)
-        if packed
+        if _is_packed(path)
         else path.open(encoding="utf-8-sig", newline=None)
     ) as file:
         total = 0
@@ -92,6 +98,21 @@ def _lines(path: Path) -> Iterator[str]:
                     f"{_MAX_TEXT // 2**30} GiB of text. Cut it into several runs."
                 )
             yield line.rstrip("\n")
+
+
+def _check_unpacked(path: Path) -> None:
+    """Unpack a `.gz` once without looking at it, which is quick, before any of it is understood."""
+    if not _is_packed(path):
+        return
+    with gzip.open(path, "rb") as file:
+        total = 0
+        while piece := file.read(_MAX_LINE):
+            total += len(piece)
+            check_unpacked(path, total)
+
+
+def _is_packed(path: Path) -> bool:
+    return path.name.lower().endswith(".gz")
 
 
 def _layout(path: Path) -> _Layout:
@@ -132,7 +153,7 @@ def _laid_out(path: Path, header: str, row: str, count: int) -> _Layout:
     names = _split(header, separator if separator in header else None)
     if names and not names[-1]:  # a separator at the end of each line
         names = names[:-1]
-    twice = sorted({name for name in names if names.count(name) > 1})
+    twice = sorted(name for name, count in Counter(names).items() if count > 1)
     if twice or not all(names):
         what = f"column '{twice[0]}' is there twice" if twice else "a column has no name"
         raise FileError(f"{path}: {what}. Give every column its own name in the header.")
@@ -149,6 +170,8 @@ def _split(line: str, separator: str | None) -> list[str]:
 
 def _rows(path: Path, layout: _Layout) -> Iterator[str]:
     for number, line in enumerate(_lines(path)):
+        if number % _OFTEN == 0:
+            check_values(path, number * len(layout.header))
         if number >= layout.first_row and line.strip() and not line.lstrip().startswith(("#", "%")):
             yield line.replace(",", ".") if layout.decimal_comma else line
 

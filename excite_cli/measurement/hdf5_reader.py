@@ -10,17 +10,21 @@ from typing import Any
 import h5py
 import numpy as np
 
-from excite_cli.errors import FileError
+from excite_cli.errors import ExciteError, FileError
+from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.dataset import Array, Finding
+from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.measurement.reader import (
     RawRun,
     Reader,
     ReadOptions,
     check_size,
+    check_unpacked,
     check_values,
     times_from_rate,
 )
 
+_MOST_RUNS = 1000
 _DEPTH = 2  # groups below /runs: a run, and the parts it was split into
 _EXAMPLE = "h5py.File(path, 'a').attrs['joint_names'] = ['joint_1', …]"
 
@@ -35,14 +39,17 @@ class Hdf5Reader(Reader):
         """All runs, in the file's order; columns carry the names of `joint_names`."""
         check_size(path)
         try:
-            with h5py.File(path, "r") as file:
+            with limited_memory(path), h5py.File(path, "r") as file:
                 return _runs(path, file, wanted)
         except OSError as error:
             raise FileError(
                 f"{path} is not a readable HDF5 file ({error}). If it was being written when the "
                 "program ended, it is lost."
             ) from error
-        except (KeyError, ValueError, TypeError, RuntimeError, AttributeError) as error:
+        # Damaged bytes lead the library to whatever error: also of indices, sizes and encodings.
+        except ExciteError:
+            raise
+        except Exception as error:
             raise FileError(f"{path} is damaged, or not measured data: {error}.") from error
 
 
@@ -52,10 +59,16 @@ def _runs(path: Path, file: Any, wanted: ReadOptions) -> list[RawRun]:
         if not isinstance(group, h5py.Group):
             raise FileError(f"{path}: 'runs' is not a group; runs lie in /runs/<name>/.")
         found = _groups(path, group, wanted, "", _DEPTH)
+        if len(found) > _MOST_RUNS:
+            raise FileError(
+                f"{path} holds {len(found):,} runs; up to {_MOST_RUNS:,} are read. Join them, or "
+                "give several files."
+            )
         if not found:
             raise FileError(f"{path}: /runs has no group with {_needed(wanted)}.")
         budget = sum(_count(run) for _, run in found)
         check_values(path, budget)
+        check_unpacked(path, 8 * budget)
         return [_run(path, file, run, name, wanted) for name, run in found]
     kind = str(file.attrs.get("kind", file.attrs.get("content", "")))
     if kind in ("fit", "diagnosis"):
@@ -68,6 +81,7 @@ def _runs(path: Path, file: Any, wanted: ReadOptions) -> list[RawRun]:
             "`excite simulate`."
         )
     check_values(path, _count(file))
+    check_unpacked(path, 8 * _count(file))
     return [_run(path, file, file, "", wanted)]
 
 
@@ -124,7 +138,7 @@ def _run(path: Path, file: Any, group: Any, name: str, wanted: ReadOptions) -> R
         called = wanted.called(channel) or channel
         if called not in group:
             raise FileError(
-                f"{where} has no dataset '{called}'; it has: {', '.join(group) or 'nothing'}. "
+                f"{where} has no dataset '{called}'; it has: {listed(list(group))}. "
                 f"Needed: {_needed(wanted)}; one of another name: measurement.channels: "
                 f"{{{channel}: …}}."
             )
@@ -156,7 +170,7 @@ def _run(path: Path, file: Any, group: Any, name: str, wanted: ReadOptions) -> R
     if stamped:
         t = arrays.pop(str(time)).reshape(samples, -1)[:, 0]
     else:
-        t = times_from_rate(path, samples, wanted, ", ".join(group))
+        t = times_from_rate(path, samples, wanted, listed(list(group)))
     columns, others = _by_channel(where, arrays, names, wanted)
     text = f"not numbers per sample, left out: {', '.join(skipped)}"
     findings = (Finding("left_out", "note", text),) if skipped else ()

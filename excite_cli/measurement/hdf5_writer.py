@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from excite_cli.atomic import write_atomically
 from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.hdf5_file import new_hdf5
 
 
 def write_dataset(path: Path, dataset: Dataset, attributes: Mapping[str, Any]) -> None:
@@ -25,7 +25,7 @@ def write_dataset(path: Path, dataset: Dataset, attributes: Mapping[str, Any]) -
 
 
 def _write(path: Path, dataset: Dataset, attributes: Mapping[str, Any]) -> None:
-    with h5py.File(path, "w") as file:
+    with new_hdf5(path) as file:
         file.attrs.update(dict(attributes))
         file.attrs["joint_names"] = list(dataset.joint_names)
         file.attrs["units"] = "t: s, q: rad (m), dq: rad/s, tau: N·m at the joint"

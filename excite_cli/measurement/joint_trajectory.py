@@ -15,6 +15,7 @@ from excite_cli.measurement.dataset import Array
 from excite_cli.measurement.reader import check_values
 from excite_cli.measurement.timed_motion import TimedMotion
 
+_LONGEST = 10**12  # of whole seconds or nanoseconds
 _FIELDS = ("positions", "velocities", "accelerations")
 _SHAPE = "{joint_names: […], points: [{positions: […], time_from_start: {sec: …, nanosec: …}}, …]}"
 
@@ -51,7 +52,7 @@ def _seconds(path: Path, point: Mapping[str, Any], row: int) -> float:
     stamp = point.get("time_from_start")
     if isinstance(stamp, Mapping):
         sec, nanosec = stamp.get("sec", stamp.get("secs")), stamp.get("nanosec", stamp.get("nsecs"))
-        if type(sec) is int and type(nanosec) is int:
+        if type(sec) is int and type(nanosec) is int and max(abs(sec), abs(nanosec)) < _LONGEST:
             return seconds(sec, nanosec)
     raise FileError(
         f"{path}: point {row + 1} has no time_from_start: {{sec: …, nanosec: …}} of whole numbers."

@@ -1,4 +1,8 @@
-"""NaN and infinite values: taken out, filled and masked, and always said."""
+"""NaN and infinite values: taken out, filled and masked, and always said.
+
+What is larger than anything measured (`BEYOND`) counts as infinite: recorders write such numbers
+where they have none, and arithmetic with them overflows.
+"""
 
 from dataclasses import replace
 
@@ -7,6 +11,13 @@ from numpy.typing import NDArray
 
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+
+BEYOND = 1e12  # s, rad, m, N·m, N
+
+
+def known_values(values: Array) -> Mask:
+    """Where there is a number that can have been measured."""
+    return np.asarray(np.abs(values) < BEYOND)  # false for NaN too
 
 
 def without_missing(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]:
@@ -22,11 +33,11 @@ def without_missing(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Findin
         Nothing is left.
     """
     findings = []
-    stamped = np.isfinite(run.t)
+    stamped = known_values(run.t)
     if not stamped.all():
         text = f"{np.count_nonzero(~stamped)} rows without a time stamp are left out"
         findings.append(Finding("nan", "warning", text, run.name))
-    placed = np.isfinite(run.q)
+    placed = known_values(run.q)
     rows = stamped & placed.all(axis=1)
     for joint, missing in zip(joints, (~placed & stamped[:, None]).sum(axis=0), strict=True):
         if missing:
@@ -43,7 +54,7 @@ def without_missing(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Findin
     kept = rows_of(run, rows) if not rows.all() else run
     kept, more = _fill_torque(kept, joints)
     findings += more
-    if kept.dq is not None and not np.isfinite(kept.dq).all():
+    if kept.dq is not None and not known_values(kept.dq).all():
         dq, more = _fill_speed(kept, joints)
         kept, findings = replace(kept, dq=dq), findings + more
     return kept, findings
@@ -67,7 +78,7 @@ def rows_of(run: Run, rows: Mask | NDArray[np.int64]) -> Run:
 
 
 def _fill_torque(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]:
-    known = np.isfinite(run.tau)
+    known = known_values(run.tau)
     if known.all():
         return run, []
     findings = []
@@ -87,7 +98,7 @@ def _fill_torque(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]
 
 def _fill_speed(run: Run, joints: tuple[str, ...]) -> tuple[Array | None, list[Finding]]:
     assert run.dq is not None
-    known = np.isfinite(run.dq)
+    known = known_values(run.dq)
     names = tuple(np.array(joints)[~known.all(axis=0)])
     if not known.any(axis=0).all():
         text = f"recorded speed of {', '.join(names)} is NaN; recorded speeds are not used"
@@ -100,7 +111,7 @@ def _filled(values: Array) -> Array:
     """Linear between what is known; 0 where nothing is."""
     filled, places = values.copy(), np.arange(len(values))
     for column in filled.T:
-        known = np.isfinite(column)
+        known = known_values(column)
         if not known.any():
             column[:] = 0.0
         elif not known.all():

@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli.errors import ExciteError, FileError, MissingExtraError
+from excite_cli.measurement.bag_reader import check_bag
 from excite_cli.measurement.joint_trajectory import motion_of
 from excite_cli.measurement.motion_reader import MotionReader
-from excite_cli.measurement.reader import check_size
 from excite_cli.measurement.timed_motion import TimedMotion
 
 MESSAGE = "trajectory_msgs/msg/JointTrajectory"
@@ -25,6 +25,7 @@ class MotionBag(MotionReader):
         if not folder and not super().recognises(path):
             return False
         try:
+            check_bag(path)
             with _opened(path) as reader:
                 return any(connection.msgtype == MESSAGE for connection in reader.connections)
         except MissingExtraError:
@@ -34,8 +35,7 @@ class MotionBag(MotionReader):
 
     def read(self, path: Path) -> TimedMotion:
         """The only message of that type."""
-        for file in path.iterdir() if path.is_dir() else [path]:
-            check_size(file)
+        check_bag(path)
         try:
             with _opened(path) as reader:
                 tree = _only_message(path, reader)

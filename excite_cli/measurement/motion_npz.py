@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.errors import FileError
+from excite_cli.errors import ExciteError, FileError
 from excite_cli.measurement.dataset import Array
 from excite_cli.measurement.motion_reader import MotionReader
-from excite_cli.measurement.reader import MAX_VALUES
+from excite_cli.measurement.reader import MAX_VALUES, check_unpacked
 from excite_cli.measurement.timed_motion import TimedMotion
 
 
@@ -37,7 +37,10 @@ class MotionNpz(MotionReader):
                     _array(path, archive, name, "fiu").astype(float) if name in there else None
                     for name in ("q", "v", "a")
                 ]
-        except (zipfile.BadZipFile, OSError, EOFError, ValueError, KeyError) as error:
+        except ExciteError:
+            raise
+        # Damaged headers lead the library to errors of its own parser, of zlib, of anything.
+        except Exception as error:
             raise FileError(f"{path} is not a readable .npz file: {error}.") from error
         shape = (len(t) if t.ndim == 1 else -1, names.size)
         for name, array in zip(("q", "v", "a"), states, strict=True):
@@ -68,6 +71,7 @@ def _array(path: Path, archive: zipfile.ZipFile, name: str, kinds: str) -> Any:
         raise FileError(f"{path}: '{name}' holds {dtype}, not {what}. Pickles are never opened.")
     if count > MAX_VALUES or count * dtype.itemsize > archive.getinfo(member).file_size:
         raise FileError(f"{path}: '{name}' claims {count:,} values, more than are there or read.")
+    check_unpacked(path, count * dtype.itemsize)
     with archive.open(member) as file:
         array: Array = np.lib.format.read_array(file, allow_pickle=False)
     return array

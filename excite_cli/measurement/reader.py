@@ -17,6 +17,7 @@ from excite_cli.measurement.dataset import Array, Finding
 
 MAX_BYTES = 4 * 2**30  # of a file
 MAX_VALUES = 2**28  # numbers taken from a file: 2 GiB in memory
+ALWAYS, PACKED = 2**27, 50  # bytes that any file may unpack to; times its size
 CHANNELS = ("q", "dq", "tau")
 
 
@@ -107,6 +108,20 @@ def check_values(path: Path, count: int) -> None:
         raise FileError(
             f"{path} holds {count:,} numbers; up to {MAX_VALUES:,} are read. Cut it into several "
             "runs, or lower its rate."
+        )
+
+
+def check_unpacked(path: Path, claimed: int) -> None:
+    """Refuse files that make far more of themselves than they have: `claimed` bytes in memory.
+
+    Packed zeros, and shapes without anything stored, are a thousand times as large and more.
+    Recordings pack to a tenth.
+    """
+    size = path.stat().st_size
+    if claimed > ALWAYS and claimed > PACKED * size:
+        raise FileError(
+            f"{path} has {size / 2**20:.3g} MiB and claims to hold {claimed / 2**20:,.0f} MiB: it "
+            "is damaged, or made to fill the memory. No recording packs so well."
         )
 
 

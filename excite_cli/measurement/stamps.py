@@ -13,14 +13,16 @@ from scipy.interpolate import CubicSpline
 
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
-from excite_cli.measurement.missing_values import rows_of
+from excite_cli.measurement.missing_values import BEYOND, rows_of
 
 _EVEN = 0.05  # of a step
 _BRIDGED = 0.02  # s
 _SHORTEST_PART = 0.5  # s
+_SHORTEST_STEP = 1e-15  # s
 _FEWEST = 10  # samples of a run
 _BURST = 0.2  # share of stamps that follow at once
 _MANY = 1000  # parts
+_FILLED = 20  # times as many instants as there are samples, at most
 
 
 @dataclass
@@ -45,6 +47,12 @@ def equidistant(run: Run) -> tuple[list[Run], list[Finding]]:
         raise FileError(f"Run {run.name} has {len(run.t)} samples; at least {_FEWEST} are needed.")
     if not (run.t != run.t[0]).any():
         raise FileError(f"Run {run.name}: time stands still at {run.t[0]:g}: all stamps are equal.")
+    if not run.duration < BEYOND or 0 < _typical(np.diff(run.t)) < _SHORTEST_STEP:
+        raise FileError(
+            f"Run {run.name}: samples follow each other within {_typical(np.diff(run.t)):.3g} s, "
+            f"from {run.t[0]:g} to {run.t[-1]:g} s: no clock gives such time stamps. Check "
+            "measurement.time and the recorder."
+        )
     pieces = []
     for recording in _recordings(_without_strays(run, notes), notes):
         ordered = _spread_bursts(_ordered(recording, notes), notes)
@@ -54,6 +62,12 @@ def equidistant(run: Run) -> tuple[list[Run], list[Finding]]:
         raise FileError(
             f"Run {run.name} falls into {len(pieces)} pieces, none longer than {_SHORTEST_PART} s: "
             "its time stamps are too irregular. Check measurement.time and the recorder."
+        )
+    if len(long[0].t) < _FEWEST:
+        raise FileError(
+            f"Run {run.name}: of {len(run.t)} samples, {len(long[0].t)} have a time stamp of their "
+            f"own that fits the others; at least {_FEWEST} are needed. Check measurement.time and "
+            "the recorder."
         )
     if len(long) < len(pieces):
         lost = sum(len(p.t) for p in pieces) - sum(len(p.t) for p in long)
@@ -170,7 +184,14 @@ def _resampled(run: Run, notes: _Notes) -> Run:
     step = float(np.median(steps))
     spread = 1.4826 * float(np.median(np.abs(steps - step)))
     missed = steps > max(1.75 * step, step + 5 * spread)
-    count = len(run.t) + int(np.round(steps[missed] / step - 1).sum())
+    whole = len(run.t) + float(np.round(steps[missed] / step - 1).sum())
+    if not whole <= _FILLED * len(run.t):
+        raise FileError(
+            f"Run {run.name}: most of its {len(run.t)} samples follow each other within "
+            f"{step:.3g} s, and others come after up to {steps.max():.3g} s: its time stamps are "
+            "too irregular. Check measurement.time and the recorder."
+        )
+    count = int(whole)
     grid = np.linspace(run.t[0], run.t[-1], count)
     width = run.duration / (count - 1)
     if count == len(run.t):

@@ -4,6 +4,7 @@ Units: s, rad, rad/s, rad/s² (m for prismatic joints). What comes from a file i
 is used: increasing instants, finite numbers, and columns matched to joints by name.
 """
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -49,7 +50,7 @@ def checked(path: Path, motion: TimedMotion) -> TimedMotion:
         Fewer than two instants, instants that do not increase, or a value that is no number.
     """
     names, t = motion.joint_names, motion.t
-    twice = sorted({name for name in names if names.count(name) > 1})
+    twice = sorted(name for name, count in Counter(names).items() if count > 1)
     if twice:
         raise FileError(f"{path} has joint '{twice[0]}' twice. Give every joint once.")
     if len(t) < 2 or not names:

@@ -7,7 +7,6 @@ the same as none; a folder that cannot be written is no error.
 import hashlib
 import json
 import os
-import tempfile
 from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from excite_cli.atomic import write_atomically
+from excite_cli.errors import FileError
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 
@@ -65,16 +66,15 @@ def store_capsules(key: str, capsules: Iterable[Capsule]) -> None:
         }
         for capsule in capsules
     ]
+    text = json.dumps({"key": key, "capsules": records})
     try:
-        path = _path(key)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(
-            "w", dir=path.parent, prefix=".capsules-", delete=False, encoding="utf-8"
-        ) as file:
-            json.dump({"key": key, "capsules": records}, file)
-        os.replace(file.name, path)
-    except (OSError, RuntimeError):
+        write_atomically(_path(key), lambda file: _write(file, text))
+    except (FileError, RuntimeError):
         return
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
 
 
 def _path(key: str) -> Path:

@@ -1,8 +1,9 @@
 """From a URDF's name to checked XML with every mesh found.
 
 `RobotDescription` proves that the file exists, is XML without a document type (no entity tricks),
-is of a sane size, and that every path it names stays inside the folders it may read: its own
-folder tree, the packages of `package_dirs`, and the example-robot-data package.
+is one tree of links and joints of a sane size (`urdf_check`), and that every path it names stays
+inside the folders it may read: its own folder tree, the packages of `package_dirs`, and the
+example-robot-data package.
 Continuous joints become revolute ones without bounds, so that one coordinate is one velocity, and
 right angles that were rounded become exact.
 """
@@ -15,11 +16,13 @@ from importlib import metadata
 from pathlib import Path
 
 from excite_cli.errors import RobotError, nearest
+from excite_cli.robot.mesh_trial import try_meshes
+from excite_cli.robot.urdf_check import parsed
 
 EXAMPLE_PREFIX = "example-robot-data:"
 MAX_URDF_BYTES = 20_000_000
 UNBOUNDED = 1e9
-_HEAVIEST = 1e9
+_LONGEST = 200  # characters of a mesh's name that are told
 # How far [rad] an angle is off a right one that was meant, and from where on that matters.
 _ROUNDED, _EXACT = 1e-4, 1e-8
 
@@ -125,9 +128,7 @@ def load_description(
                 f"file, or {EXAMPLE_PREFIX}<name>."
             )
     text = _read(path)
-    tree = _parsed(path, text)
-    _check_axes(path, tree)
-    _check_inertias(path, tree)
+    tree = parsed(path, text)
     packages = (*extra, str(_share_folder(path)), str(path.parent))
     return RobotDescription(
         name=path.stem,
@@ -181,49 +182,6 @@ def _read(path: Path) -> str:
     return text
 
 
-def _parsed(path: Path, text: str) -> ElementTree.Element:
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise RobotError(f"{path} is not well-formed XML: {error}") from error
-    if root.tag != "robot":
-        raise RobotError(f"{path} is not a URDF: its root is <{root.tag}>, not <robot>.")
-    return root
-
-
-def _check_axes(path: Path, root: ElementTree.Element) -> None:
-    for joint in root.findall("joint"):
-        axis = joint.find("axis")
-        if axis is None or joint.get("type") == "fixed":
-            continue
-        try:
-            length = sum(float(word) ** 2 for word in axis.get("xyz", "1 0 0").split()) ** 0.5
-        except ValueError:
-            length = 0.0
-        if length < 1e-6:
-            raise RobotError(
-                f"{path}: joint '{joint.get('name')}' has the axis '{axis.get('xyz')}'; an axis "
-                "is three numbers that are not all zero."
-            )
-
-
-def _check_inertias(path: Path, root: ElementTree.Element) -> None:
-    for link in root.findall("link"):
-        for tag in ("mass", "inertia"):
-            element = link.find(f"inertial/{tag}")
-            values = [] if element is None else list(element.attrib.values())
-            try:
-                numbers = [float(value) for value in values]
-            except ValueError:
-                numbers = [math.nan]
-            wrong = any(not math.isfinite(x) or abs(x) > _HEAVIEST for x in numbers)
-            if wrong or (tag == "mass" and any(x < 0 for x in numbers)):
-                raise RobotError(
-                    f"{path}: link '{link.get('name')}' has <{tag}> {' '.join(values)}; it must be "
-                    "finite numbers of a real robot, and a mass not negative."
-                )
-
-
 def _square(root: ElementTree.Element) -> None:
     """Right angles of joints' frames that were rounded (1.5708) become exact.
 
@@ -263,35 +221,53 @@ def _without_continuous_joints(root: ElementTree.Element) -> str:
 
 
 def check_mesh_paths(description: RobotDescription, kind: str = "collision") -> None:
-    """Raise unless every mesh of the kind exists inside a folder that the URDF may read.
+    """Raise unless every mesh of the kind is in a folder that the URDF may read, and can be read.
 
-    kind: `collision` or `visual`.
+    kind: `collision` or `visual`; of the latter only those are refused that would end the process.
 
     Raises
     ------
     RobotError
-        A mesh is missing, or its path leaves the URDF's folder and packages.
+        A mesh is missing, its path leaves the URDF's folder and packages, or it is damaged.
     """
     allowed = [Path(folder).resolve() for folder in description.package_dirs]
     or_drop = ", or drop constraints.self_collision" if kind == "collision" else ""
+    meshes = []
     for mesh in ElementTree.fromstring(description.xml).findall(f"link/{kind}/geometry/mesh"):
         name = mesh.get("filename", "")
-        candidates = _candidates(name, description, allowed)
-        found = next((path for path in candidates if path.is_file()), None)
+        found = _found(name, description, allowed)
         if found is None:
             raise RobotError(
-                f"{description.path.name}: the {kind} mesh '{name}' was not found. Looked in "
-                f"{', '.join(str(folder) for folder in allowed)}. Add the folder that holds the "
-                f"package to robot.package_dirs{or_drop}."
+                f"{description.path.name}: the {kind} mesh '{name[:_LONGEST]}' was not found. "
+                f"Looked in {', '.join(str(folder) for folder in allowed)}. Add the folder that "
+                f"holds the package to robot.package_dirs{or_drop}."
             )
-        if not any(found.resolve().is_relative_to(folder) for folder in allowed):
+        if not any(found.is_relative_to(folder) for folder in allowed):
             raise RobotError(
-                f"{description.path.name}: the mesh path '{name}' leaves the robot's own folders. "
-                "If that is meant, add its folder to robot.package_dirs."
+                f"{description.path.name}: the mesh path '{name[:_LONGEST]}' leaves the robot's "
+                "own folders. If that is meant, add its folder to robot.package_dirs."
             )
+        meshes.append(found)
+    if not description.source.startswith(EXAMPLE_PREFIX):
+        try:
+            try_meshes(meshes, any_format=kind != "collision")
+        except RobotError as error:
+            raise RobotError(f"{description.path.name}: {error}") from error
 
 
-def _candidates(name: str, description: RobotDescription, allowed: list[Path]) -> list[Path]:
+def mesh_file(path: Path) -> Path | None:
+    """The file that `path` leads to, by whatever links; None where there is none.
+
+    Names from a URDF may be anything: too long, with a NUL in them, or links in a circle.
+    """
+    try:
+        return path.resolve() if path.is_file() else None
+    except (OSError, ValueError, RuntimeError):
+        return None
+
+
+def _found(name: str, description: RobotDescription, allowed: list[Path]) -> Path | None:
+    places = [description.path.parent / name.removeprefix("file://")]
     if name.startswith("package://"):
-        return [folder / name.removeprefix("package://") for folder in allowed]
-    return [description.path.parent / name.removeprefix("file://")]
+        places = [folder / name.removeprefix("package://") for folder in allowed]
+    return next(filter(None, map(mesh_file, places)), None)

@@ -10,7 +10,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
 
-from excite_cli.robot.description import RobotDescription
+from excite_cli.robot.description import RobotDescription, mesh_file
 
 _PREFIX = "package://"
 
@@ -25,16 +25,16 @@ def package_folders(description: RobotDescription) -> dict[str, Path]:
     for mesh in ElementTree.fromstring(description.xml).findall("link/collision/geometry/mesh"):
         name = mesh.get("filename", "")
         if not name.startswith(_PREFIX):
-            path = (description.path.parent / name.removeprefix("file://")).resolve()
-            if path.is_file() and not any(path.is_relative_to(folder) for folder in known):
+            path = mesh_file(description.path.parent / name.removeprefix("file://"))
+            if path is not None and not any(path.is_relative_to(folder) for folder in known):
                 found.setdefault(str(Path(name).parent), path.parent)
             continue
         inside = name.removeprefix(_PREFIX)
         package = inside.split("/")[0]
-        if package in found or any((folder / inside).is_file() for folder in known):
+        if package in found or any(mesh_file(folder / inside) for folder in known):
             continue
         for folder in _folders(description.path):
-            if (folder / inside).is_file():
+            if mesh_file(folder / inside):
                 found[package] = folder
                 break
     return found

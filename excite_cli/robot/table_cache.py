@@ -4,14 +4,14 @@ One .npz file per key in the folder of the capsules. A file that is missing or d
 as none; a folder that cannot be written is no error.
 """
 
-import os
-import tempfile
 import zipfile
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.atomic import write_atomically
+from excite_cli.errors import FileError
 from excite_cli.robot.capsule_cache import cache_folder
 
 Array = NDArray[np.float64]
@@ -29,15 +29,14 @@ def stored_arrays(key: str) -> dict[str, Array] | None:
 def store_arrays(key: str, arrays: dict[str, Array]) -> None:
     """Write arrays under `key`, whole or not at all."""
     try:
-        path = _path(key)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(
-            "wb", dir=path.parent, prefix=".meshes-", delete=False
-        ) as file:
-            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
-        os.replace(file.name, path)
-    except (OSError, RuntimeError):
+        write_atomically(_path(key), lambda file: _write(file, arrays))
+    except (FileError, RuntimeError):
         return
+
+
+def _write(path: Path, arrays: dict[str, Array]) -> None:
+    with path.open("wb") as file:  # a name would be given the suffix .npz
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
 
 def _path(key: str) -> Path:

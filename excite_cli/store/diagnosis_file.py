@@ -25,6 +25,8 @@ from excite_cli.diagnosis.result import (
 )
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Finding
+from excite_cli.measurement.hdf5_file import new_hdf5
+from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.robot.model import Array
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 from excite_cli.store.trace_groups import (
@@ -84,13 +86,16 @@ def is_diagnosis(path: Path) -> bool:
     """Whether `path` is a file that `write_diagnosis` wrote."""
     if not (path.is_file() and h5py.is_hdf5(path)):
         return False
-    with h5py.File(path, "r") as file:
-        return str(file.attrs.get("content", "")) == CONTENT
+    try:
+        with limited_memory(path), h5py.File(path, "r") as file:
+            return str(file.attrs.get("content", "")) == CONTENT
+    except Exception:  # damaged, in whatever way: whoever reads it says so
+        return False
 
 
 def _write(path: Path, diagnosis: Diagnosis) -> None:
     information = diagnosis.information
-    with h5py.File(path, "w") as file:
+    with new_hdf5(path) as file:
         file.attrs.update(
             {
                 "program": PROGRAM,

@@ -21,6 +21,8 @@ from excite_cli.identification.fit import Fit
 from excite_cli.identification.identify import Identification
 from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.measurement.dataset import Finding
+from excite_cli.measurement.hdf5_file import new_hdf5
+from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 from excite_cli.store.trace_groups import read_torque_traces, write_torque_traces
 from excite_cli.store.versions import versions
@@ -71,7 +73,7 @@ def write_fit(
 
 def _write(path: Path, found: Identification, attributes: dict[str, Any]) -> None:
     fit = found.fit
-    with h5py.File(path, "w") as file:
+    with new_hdf5(path) as file:
         file.attrs.update(attributes)
         write_torque_traces(file.create_group("traces"), found.traces)
         group = file.create_group("parameters")
@@ -128,9 +130,9 @@ def is_fit(path: Path) -> bool:
     if not (path.is_file() and h5py.is_hdf5(path)):
         return False
     try:
-        with h5py.File(path, "r") as file:
+        with limited_memory(path), h5py.File(path, "r") as file:
             return str(file.attrs.get("kind", "")) == KIND
-    except OSError:  # damaged: whoever reads it says so
+    except Exception:  # damaged, in whatever way: whoever reads it says so
         return False
 
 

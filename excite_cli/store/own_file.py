@@ -9,9 +9,13 @@ from typing import Any
 import h5py
 from pydantic import ValidationError
 
-from excite_cli.errors import FileError
+from excite_cli.errors import ExciteError, FileError
+from excite_cli.measurement.memory_limit import limited_memory
 
 PROGRAM = "excite"
+_LONGEST = 500  # characters of a library's message
+_MOST_OBJECTS = 200_000
+_ALWAYS, _PACKED = 2**27, 200  # bytes that any file may unpack to; times its size
 
 
 @dataclass(frozen=True)
@@ -36,8 +40,9 @@ def opened(path: Path, own: OwnFile) -> Iterator[Any]:
     if not path.is_file():
         raise FileError(f"There is no file {path}.")
     try:
-        with h5py.File(path, "r") as file:
+        with limited_memory(path), h5py.File(path, "r") as file:
             _check(file.attrs, path, own)
+            _check_contents(file, path)
             yield file
     except OSError as error:
         raise FileError(f"{path} is not a readable HDF5 file ({error}).") from error
@@ -45,10 +50,43 @@ def opened(path: Path, own: OwnFile) -> Iterator[Any]:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise FileError(f"{path} is damaged: {where or 'a record'}: {first['msg']}.") from error
-    except (KeyError, ValueError, TypeError, AttributeError, IndexError, RuntimeError) as error:
+    except ExciteError as error:
+        if str(path) in str(error):
+            raise
+        raise FileError(f"{path}: {error}") from error
+    # Damaged bytes lead HDF5 and JSON to whatever error; all of it means the same.
+    except Exception as error:
+        reason = str(error)[:_LONGEST]
         raise FileError(
-            f"{path} is damaged or not {own.what} of this program: {error}. {own.written_by}"
+            f"{path} is damaged or not {own.what} of this program: {reason}. {own.written_by}"
         ) from error
+
+
+def _check_contents(file: Any, path: Path) -> None:
+    """See that the file holds only data of its own, of a size that fits it, before any is read."""
+    todo, count, total = [file], 0, 0
+    seen = set()
+    while todo:
+        group = todo.pop()
+        for name in group:
+            count += 1
+            if count > _MOST_OBJECTS:
+                raise ValueError(f"it has more than {_MOST_OBJECTS:,} parts")
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                raise ValueError(f"'{name}' is a link; only data in the file itself is read")
+            member = group[name]
+            if isinstance(member, h5py.Dataset):
+                if member.is_virtual or member.external:
+                    raise ValueError(f"'{name}' keeps its data in other files")
+                total += member.nbytes
+            elif isinstance(member, h5py.Group):
+                place = h5py.h5o.get_info(member.id).addr
+                if place in seen:
+                    raise ValueError(f"'{name}' leads round in a circle")
+                seen.add(place)
+                todo.append(member)
+    if total > _ALWAYS and total > _PACKED * path.stat().st_size:
+        raise ValueError(f"it claims to hold {total / 2**20:,.0f} MiB, more than it can")
 
 
 def _check(attributes: Any, path: Path, own: OwnFile) -> None:

@@ -21,6 +21,8 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
+from excite_cli.measurement.hdf5_file import new_hdf5
+from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 
 Matrix = NDArray[np.float64]
@@ -40,7 +42,7 @@ def write_result(path: Path, result: Result, problem: Problem) -> None:
 
 
 def _write(path: Path, result: Result, problem: Problem) -> None:
-    with h5py.File(path, "w") as file:
+    with new_hdf5(path) as file:
         file.attrs.update(
             {
                 "program": PROGRAM,
@@ -156,9 +158,9 @@ def is_result(path: Path) -> bool:
     if not (path.is_file() and h5py.is_hdf5(path)):
         return False
     try:
-        with h5py.File(path, "r") as file:
+        with limited_memory(path), h5py.File(path, "r") as file:
             return "base_parameters" in file or "stack" in file
-    except OSError:
+    except Exception:  # damaged, in whatever way: whoever reads it says so
         return True
 
 

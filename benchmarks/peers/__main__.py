@@ -1,0 +1,102 @@
+"""Peers on the UR10 of FIGAROH's example, in one run: same robot, limits and samples.
+
+    python -m benchmarks.peers --figaroh-python ENV/bin/python --markdown docs/peers_table.md
+
+Contestants take turns, seed by seed, each in a process of its own on one thread: FIGAROH with
+self-collision and without, this program with its exact gradient, with forward differences in its
+place, and without self-collision. Times are processor times, which other programs on the machine
+hardly change. Without FIGAROH the others run, by their own columns. docs/peers.md says how it is
+kept fair.
+"""
+
+import argparse
+import os
+import platform
+import time
+from importlib import metadata
+from pathlib import Path
+
+from benchmarks.peers import figaroh_races, our_races
+from benchmarks.peers.judge import Judge
+from benchmarks.peers.race import Race
+from benchmarks.peers.table import Comparison, Entry, markdown, placed
+from benchmarks.problems import CONFIGS
+from excite_cli.atomic import write_atomically
+
+CONFIG = CONFIGS / "ur10_figaroh.yaml"
+_FOUND = "condition number {:.2f} after {:.1f} s"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2])
+    parser.add_argument("--figaroh-python", type=Path, help="interpreter that has FIGAROH")
+    parser.add_argument("--config", type=Path, default=CONFIG, help="ours; FIGAROH gets its URDF")
+    parser.add_argument("--seconds", type=float, default=250.0, help="FIGAROH's, processor time")
+    parser.add_argument("--markdown", type=Path, help="write the table there too")
+    parser.add_argument("--readme", type=Path, help="put the goals between the marks of this page")
+    arguments = parser.parse_args()
+    judge = Judge(arguments.config.resolve())
+    peer = figaroh_races.find(arguments.figaroh_python, judge.problem.robot.description)
+    if peer is None:
+        print(figaroh_races.HOW_TO_INSTALL, "\nGoing on with the others.\n", flush=True)
+    judge.keeps_config(judge.problem.still(judge.problem.robot.posture), True)  # fills all caches
+    entries: list[Entry] = []
+    for seed in arguments.seeds:
+        entries += one_seed(judge, peer, seed, arguments.seconds)
+    told = setting(judge, [entry.race for entry in entries])
+    comparison = Comparison(time.strftime("%Y-%m-%d"), told, tuple(entries))
+    text = markdown(comparison)
+    print(text)
+    if arguments.readme is not None:
+        page = placed(arguments.readme.read_text(encoding="utf-8"), comparison)
+        write_atomically(arguments.readme, lambda path: _write(path, page))
+    if arguments.markdown is not None:
+        write_atomically(arguments.markdown, lambda path: _write(path, text))
+
+
+def one_seed(
+    judge: Judge, peer: figaroh_races.Figaroh | None, seed: int, seconds: float
+) -> list[Entry]:
+    """All contestants, one after the other."""
+    columns: tuple[int, ...] | None = None
+    entries = []
+    if peer is not None:
+        for self_collision in (True, False):
+            for race in peer.races(seed, self_collision, seconds):
+                columns = race.columns
+                entries.append(_judged(judge, race, columns))
+    for gradient, self_collision in (("exact", True), ("differences", True), ("exact", False)):
+        race = our_races.race(judge, seed, gradient, self_collision, columns)
+        entries.append(_judged(judge, race, columns))
+    return entries
+
+
+def _judged(judge: Judge, race: Race, columns: tuple[int, ...] | None) -> Entry:
+    told = "no motion" if not len(race.curve) else _FOUND.format(race.best, race.curve[-1, 1])
+    print(f"seed {race.seed}, {race.contestant}: {told}; {race.processor:.1f} s in all", flush=True)
+    return Entry(race, judge.judge(race, columns))
+
+
+def setting(judge: Judge, races: list[Race]) -> str:
+    """Machine, versions and sizes, in sentences."""
+    versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("pin", "numpy", "scipy"))
+    chosen = {race.columns for race in races if race.columns is not None}
+    of_peer = {0: "FIGAROH not installed, our own columns", 1: "FIGAROH's columns"}.get(
+        len(chosen), "FIGAROH's columns, other ones from seed to seed"
+    )
+    free = judge.problem.boundary.free.shape[1] * judge.problem.robot.n
+    return (
+        f"{platform.machine()}, {os.cpu_count()} cores, one thread for each program, {versions}. "
+        f"Condition numbers: {of_peer}, {len(judge.cost)} samples. Variables: FIGAROH 36, excite "
+        f"{free}. Times are processor times from the start of the search (seconds); a number in "
+        "brackets is the worst over the seeds."
+    )
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+"""One judge for all contestants: limits, torques and meshes at 1 kHz, and both matrices."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from benchmarks.peers.figaroh_races import ACCELERATION, JOINTS, LIMITS
+from benchmarks.peers.race import Race, States
+from excite_cli.api import load_problem
+from excite_cli.constraints.base import Array
+from excite_cli.excitation.admissible import smallest_margins
+from excite_cli.excitation.problem import Problem
+from excite_cli.robot.inverse_dynamics import InverseDynamics
+from excite_cli.robot.mesh_check import MeshCheck
+from excite_cli.robot.regressor import Regressor
+
+RATE = 1000.0
+_SHARE_EVERY = 10  # share of samples in collision: at 100 Hz
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A motion at 1 kHz: what it breaks (in words), share of samples in collision, both matrices.
+
+    `largest`: share of the limit that is used, by kind; `gap`: least distance of meshes [m].
+    """
+
+    broken: tuple[str, ...]
+    colliding: float
+    gap: float
+    largest: dict[str, float]
+    by_figaroh: float
+    by_excite: float
+
+
+@dataclass(frozen=True)
+class Judge:
+    """The problem of a config, and what every motion is judged by.
+
+    Limits are the full ones of FIGAROH's example, wider than what either program was asked for.
+    """
+
+    config: Path
+
+    @cached_property
+    def problem(self) -> Problem:
+        return load_problem(self.config)
+
+    @cached_property
+    def _meshes(self) -> MeshCheck:
+        return MeshCheck(self.problem.robot)
+
+    @property
+    def fine(self) -> Array:
+        """Instants at 1 kHz, both ends included."""
+        duration = self.problem.trajectory.duration
+        return np.linspace(0.0, duration, round(duration * RATE) + 1)
+
+    @property
+    def cost(self) -> Array:
+        """Instants of the cost."""
+        return self.problem.cost_basis.times
+
+    def keeps_config(self, coefficients: Array, self_collision: bool) -> bool:
+        """Whether a motion of ours keeps every constraint of the config at 1 kHz."""
+        least = smallest_margins(self.problem, coefficients, self.fine)
+        return all(
+            margin.min() >= 0.0
+            for constraint, margin in zip(self.problem.constraints, least, strict=True)
+            if self_collision or constraint.name not in ("self_collision", "mesh_clearance")
+        )
+
+    def condition_number(self, samples: States, columns: tuple[int, ...] | None) -> float:
+        """Of the regressor's `columns`, or of our own, over the samples of the cost."""
+        chosen = self.problem.base.selection if columns is None else np.array(columns)
+        y = Regressor(self.problem.robot).evaluate(samples.q, samples.v, samples.a)
+        return float(np.linalg.cond(y[:, :, chosen].reshape(-1, len(chosen))))
+
+    def judge(self, race: Race, columns: tuple[int, ...] | None) -> Verdict | None:
+        """The contestant's best motion; None where it has none."""
+        fine, samples = race.fine, race.samples
+        if fine is None or samples is None:
+            return None
+        used = self._used(fine)
+        broken = [kind for kind, share in used.items() if share > 1.0 + _ROUNDING]
+        gaps = self._meshes.least(fine.q)
+        if gaps.broken:
+            broken.append("self-collision")
+        gap = min((each.distance for each in gaps.near), default=gaps.beyond)
+        return Verdict(
+            tuple(broken),
+            self._colliding(fine.q[::_SHARE_EVERY]),
+            max(gap, 0.0),
+            used,
+            self.condition_number(samples, columns),
+            self.condition_number(samples, None),
+        )
+
+    def _used(self, fine: States) -> dict[str, float]:
+        """Largest share of the limit by kind."""
+        limits = [LIMITS[name] for name in self.problem.robot.joint_names]
+        assert self.problem.robot.joint_names == JOINTS
+        bounds = {
+            "position": np.array([limit["position"][1] for limit in limits]),
+            "velocity": np.array([limit["velocity"] for limit in limits]),
+            "acceleration": np.full(len(limits), ACCELERATION),
+            "torque": np.array([limit["effort"] for limit in limits]),
+        }
+        torques = InverseDynamics(self.problem.robot).torques(fine.q, fine.v, fine.a)
+        values = dict(zip(bounds, (fine.q, fine.v, fine.a, torques), strict=True))
+        return {kind: float((np.abs(values[kind]) / bounds[kind]).max()) for kind in bounds}
+
+    def _colliding(self, q: Array) -> float:
+        """Share of the postures q (T, n) in which meshes of links that are not neighbours touch."""
+        robot = self.problem.robot
+        description = robot.description
+        geometry = pin.buildGeomFromUrdfString(
+            robot.model,
+            description.xml,
+            pin.GeometryType.COLLISION,
+            None,
+            list(description.package_dirs),
+        )
+        objects = geometry.geometryObjects
+        for i, first in enumerate(objects):
+            for j in range(i):
+                one, other = first.parentJoint, objects[j].parentJoint
+                parents = robot.model.parents
+                if one != other and parents[one] != other and parents[other] != one:
+                    geometry.addCollisionPair(pin.CollisionPair(j, i))
+        data, found = robot.model.createData(), geometry.createData()
+        touching = [
+            pin.computeCollisions(robot.model, data, geometry, found, posture, True)
+            for posture in robot.configurations(q)
+        ]
+        return float(np.mean(touching))
+
+
+def motion_states(problem: Problem, coefficients: Array, times: Array) -> States:
+    """A motion of ours at `times`."""
+    return States(times, *problem.trajectory.states(times, coefficients))

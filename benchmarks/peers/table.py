@@ -1,0 +1,214 @@
+"""The table of a comparison, as Markdown: dated, with goals, every figure from the races."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.peers.figaroh_races import BLIND, CLAIMED, CLEAR
+from benchmarks.peers.judge import Verdict
+from benchmarks.peers.our_races import NAMES
+from benchmarks.peers.race import Race
+
+FASTER = 20.0
+OURS = NAMES["exact", True]
+THEIRS = (CLEAR, CLAIMED, BLIND)
+ROUND_TARGETS = (30.0, 20.0, 16.7, 12.0)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A race and what the judge says of its best motion."""
+
+    race: Race
+    verdict: Verdict | None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All races of one run; `date` and `setting` are told above the table."""
+
+    date: str
+    setting: str
+    entries: tuple[Entry, ...]
+
+    @property
+    def contestants(self) -> tuple[str, ...]:
+        """Names in the order in which they ran first."""
+        return tuple(dict.fromkeys(entry.race.contestant for entry in self.entries))
+
+    def races(self, contestant: str) -> list[Race]:
+        return [entry.race for entry in self.entries if entry.race.contestant == contestant]
+
+    def best(self, contestant: str) -> Race | None:
+        """Its race with the lowest condition number; None where it found no motion at all."""
+        found = [race for race in self.races(contestant) if np.isfinite(race.best)]
+        return min(found, key=lambda race: race.best, default=None)
+
+    @property
+    def targets(self) -> tuple[float, ...]:
+        """Round condition numbers, and the best of FIGAROH in each of its ways."""
+        bests = [race.best for name in THEIRS if (race := self.best(name))]
+        return tuple(sorted({*ROUND_TARGETS, *bests}, reverse=True))
+
+
+def markdown(comparison: Comparison) -> str:
+    """The whole table."""
+    parts = [
+        "# Beside other programs: the table",
+        "Made by `python -m benchmarks.peers`, see [how it is kept fair](peers.md).",
+        f"Measured on {comparison.date}. {comparison.setting}",
+        goals(comparison),
+        reached(comparison),
+        motions(comparison),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+BEGIN, END = "<!-- peers: written by benchmarks.peers -->", "<!-- peers: end -->"
+
+
+def placed(page: str, comparison: Comparison) -> str:
+    """`page` with the dated goals between the two marks.
+
+    Raises
+    ------
+    ValueError
+        The page lacks the marks.
+    """
+    before, _, rest = page.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not end:
+        raise ValueError(f"the page lacks {BEGIN} … {END}")
+    return f"{before}{BEGIN}\nMeasured on {comparison.date}.\n\n{goals(comparison)}\n{END}{after}"
+
+
+def goals(comparison: Comparison) -> str:
+    """How much faster FIGAROH's own best is reached, and how low at equal time."""
+    rows = []
+    for name in THEIRS:
+        theirs, ours = comparison.best(name), comparison.races(OURS)
+        if theirs is None or not ours:
+            continue
+        for words, share in (("its best", 1.0), ("within 1 % of it", 1.01)):
+            target = theirs.best * share
+            slow = theirs.reached(target)[1]
+            quick = [race.reached(target)[1] for race in ours]
+            rows.append(
+                [
+                    f"{name}: {words}, {target:.2f}",
+                    seconds(slow),
+                    spread(quick, seconds),
+                    spread([slow / each for each in quick], times, low_is_worst=True),
+                    f"≥ {FASTER:g} ×",
+                    passed(slow / max(quick) >= FASTER),
+                ]
+            )
+        low = [race.at(theirs.processor) for race in ours]
+        rows.append(
+            [
+                f"{name}: condition number after its {theirs.processor:.0f} s",
+                number(theirs.best),
+                spread(low, number),
+                spread([theirs.best / each for each in low], times, low_is_worst=True),
+                "lower",
+                passed(max(low) < theirs.best),
+            ]
+        )
+    heads = ["goal", "FIGAROH", "excite, median (worst)", "ratio", "asked", ""]
+    return _table(heads, rows) if rows else ""
+
+
+def reached(comparison: Comparison) -> str:
+    """Processor time to given condition numbers, median and worst over the seeds."""
+    heads = ["processor time [s] to", *(number(target) for target in comparison.targets)]
+    rows = []
+    for name in comparison.contestants:
+        races = comparison.races(name)
+        rows.append(
+            [
+                name,
+                *(
+                    spread([race.reached(target)[1] for race in races], seconds)
+                    for target in comparison.targets
+                ),
+            ]
+        )
+    return _table(heads, rows)
+
+
+def motions(comparison: Comparison) -> str:
+    """What every race ended with, judged at 1 kHz."""
+    heads = [
+        "contestant", "seed", "condition number", "by our columns", "search [s]", "wall [s]",
+        "start-up [s]", "samples in collision", "least gap [mm]", "admissible at 1 kHz",
+    ]  # fmt: skip
+    rows = []
+    for entry in comparison.entries:
+        race, verdict = entry.race, entry.verdict
+        head = [race.contestant, str(race.seed)]
+        spent = [f"{race.processor:.1f}", f"{race.wall:.1f}", f"{race.before:.1f}"]
+        if verdict is None:
+            rows.append([*head, "none", "", *spent, "", "", _why(race)])
+            continue
+        rows.append(
+            [
+                *head,
+                number(verdict.by_figaroh),
+                number(verdict.by_excite),
+                *spent,
+                f"{verdict.colliding:.1%}",
+                f"{1e3 * verdict.gap:.1f}",
+                _admissible(race, verdict),
+            ]
+        )
+    return _table(heads, rows)
+
+
+def _why(race: Race) -> str:
+    start, says = race.words.get("start"), str(race.words.get("says", "no motion"))
+    return f"random start {start}; it {says}" if start else says
+
+
+def _admissible(race: Race, verdict: Verdict) -> str:
+    if verdict.broken:
+        return f"no: {', '.join(verdict.broken)}"
+    return "yes, proved at every instant" if race.proved else "yes"
+
+
+def spread(
+    values: Iterable[float], told: Callable[[float], str], low_is_worst: bool = False
+) -> str:
+    """Median and, in brackets, the worst; where not all are finite, how many."""
+    listed = list(values)
+    finite = [value for value in listed if np.isfinite(value) and value > 0]
+    if not finite:
+        return "never"
+    worst = min(finite) if low_is_worst else max(finite)
+    words = told(float(np.median(finite)))
+    if len(listed) > 1:
+        words += f" ({told(worst)})"
+    if len(finite) < len(listed):
+        words += f", {len(finite)} of {len(listed)}"
+    return words
+
+
+def seconds(value: float) -> str:
+    return f"{value:.2f}" if value < 10 else f"{value:.0f}"
+
+
+def number(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else "none"
+
+
+def times(value: float) -> str:
+    return f"{value:.1f} ×" if value < 10 else f"{value:.0f} ×"
+
+
+def passed(good: bool) -> str:
+    return "met" if good else "MISSED"
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,0 +1,196 @@
+"""Meshes read for a try in a process of their own, before this one reads them.
+
+The library that reads meshes (assimp) can be led by a damaged file to end its process, to fill
+memory or to run on; nothing in this process can hold it then. `try_meshes` starts a process with
+limits of time and memory that reads the files as `coal` does, once for each content. The process is
+this module itself: `python -m excite_cli.robot.mesh_trial`, asked by lines on stdin.
+"""
+
+import atexit
+import contextlib
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+from excite_cli.errors import RobotError
+
+SUFFIXES = (".stl", ".dae", ".obj", ".ply")
+MAX_BYTES = 100 * 2**20  # of a mesh
+MAX_TRIANGLES = 1_000_000
+_MAX_MEMORY = 2**30  # bytes that the reading of one robot's meshes may take
+_SECONDS, _BYTES_PER_SECOND = 1.0, 2**20  # processor time allowed: a base, and by size
+_SLOWEST = 20  # times the processor time, on a machine with much else to do
+_HARM = "reading it"  # so begins what is said of a file that ended the process
+_IDLE = 10.0  # s without a question after which the process ends
+_known: dict[str, str] = {}  # content -> what is wrong with it
+
+
+def try_meshes(paths: Sequence[Path], any_format: bool = False) -> None:
+    """See that every file can be read as a mesh without harm to the process.
+
+    any_format: it may be of any format, and hold anything, as long as reading it does no harm.
+
+    Raises
+    ------
+    RobotError
+        A file is of no known format or too large, or reading it fails in whatever way.
+    """
+    contents = {path: _content(path, any_format) for path in dict.fromkeys(paths)}
+    for path, content in contents.items():
+        if content not in _known:
+            _known[content] = _trial.said(path)
+    for path, content in contents.items():
+        if _known[content] and (not any_format or _known[content].startswith(_HARM)):
+            raise RobotError(
+                f"the mesh {path} cannot be loaded: {_known[content]}. Repair it, or convert it to "
+                "STL with another program."
+            )
+
+
+def _content(path: Path, any_format: bool) -> str:
+    """Format and hash of a file's bytes."""
+    suffix = path.suffix.lower()
+    if not any_format and suffix not in SUFFIXES:
+        raise RobotError(f"the mesh {path} is of no known format; read are {', '.join(SUFFIXES)}.")
+    size = path.stat().st_size
+    if size > MAX_BYTES:
+        raise RobotError(
+            f"the mesh {path} has {size / 2**20:.0f} MiB; up to {MAX_BYTES / 2**20:.0f} MiB are "
+            "read. Take a coarser one for collisions."
+        )
+    with path.open("rb") as file:
+        return suffix + hashlib.file_digest(file, "blake2b").hexdigest()
+
+
+class _Trial:
+    """The process that reads meshes; it ends by itself when nothing is asked for a while."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def said(self, path: Path) -> str:
+        """What is wrong with a mesh; empty where it is good."""
+        seconds = _SECONDS + path.stat().st_size / _BYTES_PER_SECOND
+        line = json.dumps([str(path), seconds]).encode() + b"\n"
+        while True:
+            answer, status = self._asked(line, _SLOWEST * seconds)
+            if answer:
+                return str(json.loads(answer))
+            if status != 0:  # else it was idle and has just ended
+                return f"{_HARM} {'takes too long' if status in _OUT_OF_TIME else 'fails'}"
+
+    def _asked(self, line: bytes, longest: float) -> tuple[bytes, int]:
+        """The answer, or how the process ended; it is ended if it takes longer [s]."""
+        if self._process is None:
+            command = [sys.executable, "-m", "excite_cli.robot.mesh_trial"]
+            pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
+            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing)
+        process = self._process
+        assert process.stdin is not None
+        assert process.stdout is not None
+        clock = threading.Timer(longest, process.kill)
+        clock.start()
+        try:
+            process.stdin.write(line)
+            process.stdin.flush()
+            answer = process.stdout.readline()
+        except BrokenPipeError:
+            answer = b""
+        finally:
+            clock.cancel()
+        if answer:
+            return answer, 0
+        return b"", self.close()
+
+    def close(self) -> int:
+        """End the process; how it ended."""
+        process, self._process = self._process, None
+        if process is None:
+            return 0
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):
+                    pipe.close()
+        return process.wait()
+
+
+_trial = _Trial()
+atexit.register(_trial.close)
+# Ended by the alarm of its processor time, or by the clock.
+_OUT_OF_TIME = (-27, -9)
+
+
+def _limit() -> None:
+    """Of the memory that this process may take; where the system has no such limit, none."""
+    try:
+        import resource
+    except ImportError:
+        return
+    for kind, most in ((resource.RLIMIT_AS, 2 * _MAX_MEMORY), (resource.RLIMIT_CORE, 0)):
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(kind, (most, most))
+
+
+def _peak() -> int:
+    try:
+        import resource
+    except ImportError:
+        return 0
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak
+
+
+def _set_alarm(seconds: float) -> None:
+    """End this process once it has computed for so long; 0: not."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+
+
+def _main() -> None:
+    """In the process: for each line [path, seconds] of stdin a line, empty for a good mesh."""
+    import coal
+
+    _limit()
+    loader = coal.MeshLoader(coal.NODE_TYPE.BV_OBBRSS)
+    idle = threading.Timer(_IDLE, os._exit, (0,))
+    idle.daemon = True
+    idle.start()
+    for line in sys.stdin.buffer:
+        idle.cancel()
+        path, seconds = json.loads(line)
+        _set_alarm(seconds)
+        said = _said(loader, path)
+        _set_alarm(0)
+        print(json.dumps(said), flush=True)
+        if _peak() > _MAX_MEMORY:
+            return  # the next begins with a peak of its own
+        idle = threading.Timer(_IDLE, os._exit, (0,))
+        idle.daemon = True
+        idle.start()
+
+
+def _said(loader: object, path: str) -> str:
+    import numpy as np
+
+    try:
+        mesh = loader.load(path, np.ones(3))  # type: ignore[attr-defined]
+    except Exception as error:
+        said = str(error).partition("message: ")[2] or str(error)  # coal begins with its own files
+        return (said.strip().splitlines() or ["no reason given"])[0].rstrip(".")[:200]
+    if not mesh.num_vertices or not mesh.num_tris:
+        return "it has no triangles"
+    if mesh.num_tris > MAX_TRIANGLES or _peak() > _MAX_MEMORY:
+        return f"it is too large ({mesh.num_tris:,} triangles)"
+    if not np.isfinite(np.asarray(mesh.vertices())).all():
+        return "it has corners that are not finite"
+    return ""
+
+
+if __name__ == "__main__":
+    _main()

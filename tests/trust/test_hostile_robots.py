@@ -1,0 +1,167 @@
+"""URDFs and meshes made to read other files, to fill memory, to take for ever or to crash."""
+
+import struct
+from pathlib import Path
+
+import pytest
+
+from benchmarks.trust.fuzz_meshes import VALID, binary_stl
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.errors import RobotError
+from excite_cli.robot import mesh_trial
+from excite_cli.robot.description import check_mesh_paths, load_description
+from excite_cli.robot.link_meshes import link_meshes
+from excite_cli.robot.mesh_trial import try_meshes
+from excite_cli.robot.model import build_robot
+from excite_cli.robot.urdf_check import MAX_DEPTH, MAX_LINKS, MAX_MOVABLE
+from tests.robot.test_messages import joint, link, mesh, urdf
+from tests.trust.refusals import refused
+
+BOMB = '<!ENTITY a "aaaaaaaaaa">' + "".join(
+    f'<!ENTITY {chr(98 + k)} "{f"&{chr(97 + k)};" * 10}">' for k in range(9)
+)
+# Faces that name a corner that there is not: what reads them in this process takes it down.
+CRASHING = VALID["ply"].replace(b"3 0 2 1", b"3 0 1000000000000000000000000000000 1")
+
+
+def built(path: Path) -> None:
+    link_meshes(build_robot(RobotSpec(urdf=str(path)), path.parent))
+
+
+def hostile(folder: Path, text: str) -> Path:
+    path = folder / "arm.urdf"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def chain(links: int, kind: str) -> str:
+    parts = "".join(link(f"l{k}") for k in range(links))
+    joints = "".join(joint(f"j{k}", f"l{k}", f"l{k + 1}", kind) for k in range(links - 1))
+    return f'<robot name="c">{parts}{joints}</robot>'
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        (f"<!DOCTYPE robot [{BOMB}]><robot>&j;</robot>", "entities"),
+        ('<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]><robot>&e;</robot>', "entities"),
+        ("<robot>" + "<link name='a'>" * 5000 + "</link>" * 5000 + "</robot>", f"{MAX_DEPTH} lev"),
+        ("<robot>" + "<link/>" * 250_000 + "</robot>", "too large"),
+        (chain(MAX_LINKS + 1, "fixed"), f"up to {MAX_LINKS:,} links"),
+        (chain(MAX_MOVABLE + 2, "revolute"), f"{MAX_MOVABLE} movable joints"),
+        (urdf().replace("</robot>", joint("back", "hand", "base") + "</robot>"), "no first link"),
+        (urdf().replace("</robot>", joint("twin", "base", "hand") + "</robot>"), "two joints lead"),
+        (urdf().replace('name="wrist"', 'name="elbow"'), "two joints are called 'elbow'"),
+        (urdf().replace('xyz="0 0 0.5"', 'xyz="0 0 1e300"', 1), "not three numbers"),
+        (urdf().replace('xyz="0 0 0.5"', 'xyz="0 nan 0"', 1), "not three numbers"),
+        (urdf().replace('xyz="0 1 0"', 'xyz="1e308 1e308 0"', 1), "has the axis"),
+        (urdf().replace("<origin ", '<origin rpy="inf 0 0" ', 1), "<origin rpy"),
+        (urdf().replace('mass value="1"', 'mass value="-1"', 1), "a mass not negative"),
+        (urdf().replace('ixx="0.1"', 'ixx="nan"', 1), "finite numbers"),
+        (urdf().replace('radius="0.05"', 'radius="-1"', 1), "not a number"),
+    ],
+    ids=[
+        "billion laughs",
+        "external entity",
+        "depth",
+        "elements",
+        "links",
+        "joints",
+        "cycle",
+        "loop",
+        "twin joints",
+        "far",
+        "nan",
+        "axis",
+        "turn",
+        "mass",
+        "inertia",
+        "radius",
+    ],
+)
+def test_urdf(text: str, word: str, tmp_path: Path) -> None:
+    assert word in refused(built, hostile(tmp_path, text))
+
+
+def test_islands_that_go_round_in_a_circle(tmp_path: Path) -> None:
+    island = link("x") + link("y") + joint("a", "x", "y") + joint("b", "y", "x")
+    text = urdf().replace("</robot>", island + "</robot>")
+    assert "go round in a circle" in refused(built, hostile(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../../../../../../etc/passwd",
+        "/etc/passwd",
+        "file:///etc/passwd",
+        "package://../../../../../../../etc/passwd",
+    ],
+)
+def test_paths_that_leave_the_folder(name: str, tmp_path: Path) -> None:
+    text = urdf(collision=mesh(name))
+    message = refused(built, hostile(tmp_path, text))
+    assert "leaves the robot's own folders" in message or "was not found" in message
+
+
+@pytest.mark.parametrize("target", ["/etc/passwd", "/dev/zero", "hand.stl", "none"])
+def test_symbolic_links(target: str, tmp_path: Path) -> None:
+    (tmp_path / "hand.stl").symlink_to(target)
+    message = refused(built, hostile(tmp_path, urdf(collision=mesh("hand.stl"))))
+    assert "leaves the robot's own folders" in message or "was not found" in message
+
+
+@pytest.mark.parametrize("name", ["a" * 5000 + ".stl", "a\t.stl", ".", ""])
+def test_names_that_no_file_has(name: str, tmp_path: Path) -> None:
+    message = refused(built, hostile(tmp_path, urdf(collision=mesh(name))))
+    assert "was not found" in message
+    assert len(message) < 1000
+
+
+@pytest.mark.parametrize(
+    ("suffix", "data", "word"),
+    [
+        ("stl", binary_stl(2**32 - 1), "cannot be loaded"),
+        ("stl", binary_stl()[:100], "cannot be loaded"),
+        ("stl", b"", "cannot be loaded"),
+        ("ply", CRASHING, "reading it fails"),
+        ("dae", VALID["dae"].replace(b'count="4"', b'count="99999999999"'), "cannot be loaded"),
+        ("blend", VALID["stl"], "of no known format"),
+        (
+            "stl",
+            binary_stl()[:84] + struct.pack("<12fH", *[float("nan")] * 12, 0) * 4,
+            "not finite",
+        ),
+    ],
+    ids=["4e9 triangles", "cut", "empty", "crash", "claims", "format", "nan"],
+)
+def test_meshes(suffix: str, data: bytes, word: str, tmp_path: Path) -> None:
+    (tmp_path / f"hand.{suffix}").write_bytes(data)
+    path = hostile(tmp_path, urdf(collision=mesh(f"hand.{suffix}")))
+    message = refused(built, path)
+    assert word in message
+    assert f"hand.{suffix}" in message
+
+
+def test_a_crashing_mesh_that_is_only_seen_is_refused_too(tmp_path: Path) -> None:
+    (tmp_path / "hand.ply").write_bytes(CRASHING)
+    shape = mesh("hand.ply").replace("collision", "visual")
+    path = hostile(tmp_path, urdf().replace(link("hand"), link("hand", shape)))
+    with pytest.raises(RobotError, match="reading it fails"):
+        check_mesh_paths(load_description(str(path)), "visual")
+
+
+def test_good_meshes_are_read(tmp_path: Path) -> None:
+    for suffix, data in VALID.items():
+        (tmp_path / f"hand.{suffix}").write_bytes(data)
+        built(hostile(tmp_path, urdf(collision=mesh(f"hand.{suffix}"))))
+
+
+def test_a_slow_mesh_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With no time at all, the process is ended, and says so."""
+    path = tmp_path / "hand.stl"
+    path.write_bytes(binary_stl() + b" slow")
+    mesh_trial._trial.close()
+    monkeypatch.setattr(mesh_trial, "_SLOWEST", 1e-6)
+    with pytest.raises(RobotError, match="takes too long"):
+        try_meshes([path])
