@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from excite_cli.atomic import write_atomically
+from excite_cli.atomic import write_text_atomically
 from excite_cli.config.load import load_spec, parse_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose as diagnose_dataset
@@ -396,8 +396,4 @@ def save_config(path: str | Path, problem: Problem | Case, found: Diagnosis) -> 
         It cannot be written.
     """
     text = found_config(problem.spec, problem.folder, found, Path(path))
-    write_atomically(Path(path), lambda temporary: _write_text(temporary, text))
-
-
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+    write_text_atomically(Path(path), text)

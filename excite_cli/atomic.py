@@ -47,6 +47,15 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
             temporary.unlink(missing_ok=True)
 
 
+def write_text_atomically(path: Path, text: str) -> None:
+    """Put `text` in place as UTF-8; raises as `write_atomically` does."""
+    write_atomically(path, lambda temporary: _write_text(temporary, text))
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
 def write_folder_atomically(path: Path, write: Callable[[Path], None]) -> None:
     """Let `write` make the folder it is given, then put that in the place of `path`.
 

@@ -20,6 +20,7 @@ from threading import Lock
 from excite_cli.errors import FileError, refusal
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL, errno.EBADF)
+_TRIES = 100  # to open the lock file that is there, while others remove theirs
 _PATIENCE, _POLL = 5.0, 0.02  # s, for those who only put a finished file in place
 
 
@@ -93,16 +94,18 @@ def _take(target: Path, path: Path) -> bool:
             return True
         try:
             folders = _made(target.parent)
-            handle = _locked(_lock_file(target))
+            found = _locked(_lock_file(target))
         except OSError as error:
             raise FileError(f"{path} cannot be written: {refusal(error)}") from error
-        if handle is None:
+        if found is None:
             return False
+        handle, alone = found
         _held[target] = _Held(handle, 1, folders)
         with suppress(OSError):  # only for the message of another run
             os.ftruncate(handle, 0)
             os.write(handle, f"{os.getpid()} {os.uname().nodename}".encode())
-        _sweep(target)
+        if alone:  # without a lock another run may be writing it
+            _sweep(target)
         return True
 
 
@@ -123,13 +126,14 @@ def _leave(target: Path) -> None:
                 folder.rmdir()
 
 
-def _locked(path: Path) -> int | None:
-    """The open and locked file `path`, or None if another process has locked it.
+def _locked(path: Path) -> tuple[int, bool] | None:
+    """The open file `path` and whether it is locked; None if another process has locked it.
 
     A file that its owner removed between our opening and locking it is not the one that the next
-    run will open, so that it is opened again.
+    run will open, so that it is opened again. Where locks are not known, or what is opened never is
+    what is found under its name, it is not locked.
     """
-    while True:
+    for left in reversed(range(_TRIES)):
         handle = _opened(path)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -138,13 +142,15 @@ def _locked(path: Path) -> int | None:
             return None
         except OSError as error:
             if error.errno in _NO_LOCKS:
-                return handle
+                return handle, False
             os.close(handle)
             raise
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(handle), os.stat(path)):
-                return handle
-        os.close(handle)
+                return handle, True
+        if left:
+            os.close(handle)
+    return handle, False
 
 
 def _opened(path: Path) -> int:

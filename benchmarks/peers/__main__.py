@@ -21,7 +21,7 @@ from benchmarks.peers.judge import Judge
 from benchmarks.peers.race import Race
 from benchmarks.peers.table import Comparison, Entry, markdown, placed
 from benchmarks.problems import CONFIGS
-from excite_cli.atomic import write_atomically
+from excite_cli.atomic import write_text_atomically
 
 CONFIG = CONFIGS / "ur10_figaroh.yaml"
 _FOUND = "condition number {:.2f} after {:.1f} s"
@@ -50,9 +50,9 @@ def main() -> None:
     print(text)
     if arguments.readme is not None:
         page = placed(arguments.readme.read_text(encoding="utf-8"), comparison)
-        write_atomically(arguments.readme, lambda path: _write(path, page))
+        write_text_atomically(arguments.readme, page)
     if arguments.markdown is not None:
-        write_atomically(arguments.markdown, lambda path: _write(path, text))
+        write_text_atomically(arguments.markdown, text)
 
 
 def one_seed(
@@ -92,10 +92,6 @@ def setting(judge: Judge, races: list[Race]) -> str:
         f"{free}. Times are processor times from the start of the search (seconds); a number in "
         "brackets is the worst over the seeds."
     )
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     Progress,
     ProgressColumn,
@@ -26,6 +26,7 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.segment import Segment
 from rich.table import Column, Table
 from rich.text import Text
 
@@ -37,6 +38,8 @@ from excite_cli.errors import REFUSALS, ExciteError, refusal
 BUG, INTERRUPTED = 70, 130
 # Off a terminal rows stay whole, so that they can be searched and cut.
 _WHOLE_ROWS = 10_000
+# Names in files may hold what a terminal obeys: C0 and C1, but for the tab and the end of a line.
+_OBEYED = dict.fromkeys({*range(0x20), *range(0x7F, 0xA0)} - {ord("\t"), ord("\n")})
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,21 @@ class Terminal:
             yield show
 
 
+class _Console(Console):
+    """Prints no characters of control but its own."""
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterator[Segment]:
+        """Segments whose text a terminal only shows; none grows, so that columns stay."""
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else _harmless(text), style, control)
+
+
+def _harmless(text: str) -> str:
+    return text.translate(_OBEYED)
+
+
 class _Remaining(TimeRemainingColumn):
     """The time that all steps need; the time that has passed until that is known."""
 
@@ -148,7 +166,7 @@ def _console(file: TextIO) -> Console:
     if width is None and not file.isatty():
         width = _WHOLE_ROWS
     plain = bool(os.environ.get("NO_COLOR")) or not _is_terminal(file)
-    return Console(
+    return _Console(
         file=file,
         highlight=False,
         markup=False,
@@ -168,7 +186,7 @@ def _sparse(title: str) -> Callable[[str, int], None]:
         nonlocal last
         if time.monotonic() - last >= 5.0:
             last = time.monotonic()
-            print(f"{title}  {text}".strip(), file=sys.stderr, flush=True)
+            print(_harmless(f"{title}  {text}".strip()), file=sys.stderr, flush=True)
 
     return tell
 
@@ -237,7 +255,7 @@ def _print_nowhere() -> None:
 def _bug(error: Exception) -> int:
     """One message on what to report; the traceback with --verbose."""
     if {"--verbose", "-v"} & set(sys.argv):
-        traceback.print_exc()
+        sys.stderr.write(_harmless(traceback.format_exc()))
         ask = "Please report it: the command, and all that is printed above."
     else:
         ask = "Please run the command again with --verbose, and report it with what that prints."

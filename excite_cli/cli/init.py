@@ -1,6 +1,5 @@
 """`excite init`: a config that works, for a robot of which only the URDF is known."""
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -43,7 +42,7 @@ def init(
     """
     import sys
 
-    from excite_cli.atomic import write_atomically
+    from excite_cli.atomic import write_text_atomically
     from excite_cli.cli.init_questions import ask
     from excite_cli.cli.outputs import check_outputs
     from excite_cli.cli.setup import single_threaded
@@ -80,7 +79,7 @@ def init(
     asked = Request(source, folder, chosen, "floating" if base == "floating" else "fixed")
     with single_threaded():
         proposal = propose(asked)
-    write_atomically(path, partial(_write, text=proposal.text))
+    write_text_atomically(path, proposal.text)
     problem = proposal.settled.problem
     lines = [
         f"{problem.robot.name}: moves {len(proposal.joints)} joints, "
@@ -101,10 +100,6 @@ def init(
             "notes": list(proposal.notes),
         },
     )
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def _from(urdf: Path, folder: Path) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from excite_cli.export.exported import Exported
@@ -18,7 +18,7 @@ def write_models(
     parameters: Path | None = None,
 ) -> list[str]:
     """Write what was asked for; return what must be said about it."""
-    from excite_cli.atomic import write_atomically
+    from excite_cli.atomic import write_text_atomically
     from excite_cli.export.exported import IdentifiedModel
     from excite_cli.export.mjcf import mjcf as as_mjcf
     from excite_cli.export.parameters import parameters_yaml
@@ -35,12 +35,8 @@ def write_models(
     for path, writer in writers:
         if path is not None:
             exported = writer(robot, model)
-            write_atomically(path, _text_writer(exported.text))
+            write_text_atomically(path, exported.text)
             notes += [f"{path}: {note}" for note in exported.notes]
     if parameters is not None:
-        write_atomically(parameters, _text_writer(parameters_yaml(robot, fit)))
+        write_text_atomically(parameters, parameters_yaml(robot, fit))
     return notes
-
-
-def _text_writer(text: str) -> Any:
-    return lambda path: path.write_text(text, encoding="utf-8")

@@ -87,7 +87,7 @@ def optimize(
         motion_table,
         outlook_table,
     )
-    from excite_cli.cli.working import working
+    from excite_cli.cli.working import tell_idle, working
     from excite_cli.errors import ConfigError
     from excite_cli.excitation.result import Result
     from excite_cli.excitation.run import continue_run, new_result, resumed_result
@@ -113,6 +113,7 @@ def optimize(
         else:
             problem = load_problem(terminal, config, overrides, extra)
             earlier = prior or []
+        tell_idle(terminal, workers, problem.spec.optimizer.restarts)
         if resume and path.exists():
             result = resumed_result(problem, read_result(path), path, earlier)
             terminal.say(f"resuming after motion {len(result.motions)} of {path}")

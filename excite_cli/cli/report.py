@@ -1,7 +1,6 @@
 """`excite report`: one page about motions, fits and diagnoses; figures of motions as files."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -75,7 +74,7 @@ def report(
       excite report ur10.h5 more.h5 -o compared.html
       excite report ur10.h5 --figures ur10-figures --format svg
     """
-    from excite_cli.atomic import write_atomically
+    from excite_cli.atomic import write_text_atomically
     from excite_cli.cli.rebuilt import rebuilt_problem
     from excite_cli.cli.report_files import read_files
     from excite_cli.cli.setup import single_threaded
@@ -102,15 +101,11 @@ def report(
             written = write_figures(terminal, told, problems, (figures, kind, overwrite))
         if page is not None:
             text = _page_text(terminal, told, problems, picture)
-            write_atomically(page, partial(_write_text, text=text))
+            write_text_atomically(page, text)
     terminal.answer(
         [*([str(page)] if page is not None else []), *written],
         {"output": None if page is None else str(page), "figures": written},
     )
-
-
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def _check_page(page: Path, overwrite: bool) -> None:

@@ -8,7 +8,10 @@ import signal
 from collections.abc import Sequence
 from types import FrameType
 
-_RESUMED = "optimize"
+_RESUMED = {
+    "optimize": "interrupted; every finished motion is in the file: see --resume.",
+    "study": "interrupted; every finished case is in the folder: see --resume.",
+}
 _last = signal.SIGINT
 
 
@@ -22,9 +25,7 @@ def heed_signals() -> None:
 def stopped(arguments: Sequence[str]) -> tuple[int, str]:
     """Exit status, and one message for the command line `arguments`."""
     command = next((each for each in arguments if not each.startswith("-")), "")
-    if command == _RESUMED:
-        return 128 + _last, "interrupted; every finished motion is in the file: see --resume."
-    return 128 + _last, "interrupted; no file is half-written."
+    return 128 + _last, _RESUMED.get(command, "interrupted; no file is half-written.")
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

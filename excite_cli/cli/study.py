@@ -42,6 +42,7 @@ def study(
         bool,
         typer.Option("--resume", help="Skip cases that are there; failed ones are done again."),
     ] = False,
+    overwrite: options.Overwrite = False,
     overrides: options.Set = None,
     threads: options.Threads = 1,
     workers: options.Workers = 1,
@@ -67,6 +68,7 @@ def study(
     from excite_cli.cli.setup import single_threaded
     from excite_cli.cli.study_tables import answer_of, study_table
     from excite_cli.cli.working import working
+    from excite_cli.errors import ConfigError
     from excite_cli.study.case import StudyTask
     from excite_cli.study.plan import planned_cases
     from excite_cli.study.records import TABLE
@@ -74,9 +76,11 @@ def study(
     from excite_cli.study.vary import parse_vary
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    if resume and overwrite:
+        raise ConfigError("--resume goes on with the folder, --overwrite replaces it: give one.")
     varied = [parse_vary(text) for text in vary or []]
     task = StudyTask(config.resolve(), tuple(overrides or []), not identify_only)
-    cases = planned_cases(task, [log.resolve() for log in logs or []], varied)
+    cases = planned_cases(task, logs or [], varied)
     folder = output or Path(f"{config.stem}_study")
     with (
         working(terminal, workers, scheduler, threads) as place,
@@ -92,7 +96,7 @@ def study(
                 news.done,
             )
 
-        records = run_study(task, cases, folder, place, resume, report)
+        records = run_study(task, cases, folder, place, resume, report, overwrite)
     failed = sum(record.failed for record in records)
     words = f"{len(records)} cases" + (f", {failed} failed" if failed else "")
     terminal.answer(

@@ -16,7 +16,7 @@ def working(terminal: Terminal, workers: int, scheduler: str | None, threads: in
         See `open_workers`.
     """
     place = open_workers(workers, scheduler, threads, terminal.say)
-    there = len(os.sched_getaffinity(0))
+    there = _processors()
     if scheduler is not None:
         terminal.say(f"{scheduler}: {place.count} tasks at once")
     elif workers > there:
@@ -25,3 +25,17 @@ def working(terminal: Terminal, workers: int, scheduler: str | None, threads: in
             "with more of them, starts may end at optimizer.max_seconds"
         )
     return place
+
+
+def tell_idle(terminal: Terminal, workers: int, starts: int) -> None:
+    """A hint where a motion has fewer starts than there are workers."""
+    if workers > starts:
+        busy = "one start: one worker has" if starts == 1 else f"{starts} starts: {starts} have"
+        terminal.say(f"hint: {busy} something to do, of {workers} workers; see --starts")
+
+
+def _processors() -> int:
+    """Those that this process may use; where the system does not tell, all."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

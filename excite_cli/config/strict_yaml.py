@@ -1,9 +1,9 @@
 """YAML of configs: plain values within limits, so that a foreign file can neither run code nor
 fill memory nor take for ever.
 
-Aliases are refused (they make small files huge), and so are tags beyond the safe ones, keys given
-twice, deep nesting and numbers of more digits than any number has: Python turns long digits into a
-number in quadratic time. Parsed by libyaml where it is there.
+Aliases are refused (they make small files huge), and so are merge keys (<<), tags beyond the safe
+ones, keys given twice, deep nesting and numbers of more digits than any number has: Python turns
+long digits into a number in quadratic time. Parsed by libyaml where it is there.
 """
 
 from functools import lru_cache
@@ -18,6 +18,7 @@ MAX_VALUES = 50_000  # words and numbers; a large config has a thousand
 LONGEST_NUMBER = 100  # characters
 _PARSER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+_MERGE = "tag:yaml.org,2002:merge"
 _LONGEST_PROBLEM = 200
 _SHORT = 20_000  # characters that PyYAML's own parser takes well under a second for
 
@@ -94,6 +95,8 @@ def _check(node: yaml.Node | None) -> None:
                     raise _wrong("a key must be a plain word", key)
                 if key.value in seen:
                     raise _wrong(f"key '{key.value[:60]}' is given twice", key)
+                if key.tag == _MERGE:  # without aliases of no use; they would change the tree
+                    raise _wrong("merge keys (<<) are not allowed; write the values out", key)
                 seen.add(key.value)
                 todo += [key, value]
         elif at.tag in _NUMBERS and len(at.value) > LONGEST_NUMBER:

@@ -19,6 +19,8 @@ class SmoothConditionNumber(Criterion):
 
     def value(self, sigma: Array) -> float:
         """Computed in logarithms, so that no power overflows."""
+        if sigma[-1] <= 0:  # a parameter that does not show at all
+            return float("inf")
         logs = np.log(sigma)
         sums = (high + np.log(np.exp(each - high).sum()) for each, high in self._powers(logs))
         return float(sum(sums)) / self.p

@@ -113,7 +113,7 @@ def _best_of_starts(
     found = [each for each in ended if isinstance(each, FoundMotion)]
     if not found:
         raise ended[-1]
-    best = min(found, key=lambda each: each.value).outcome
+    best = min(found, key=_rank).outcome
     cut = sum(each.outcome.status == "time limit" for each in found)
     told = ""
     if cut and best.status != "time limit":
@@ -129,6 +129,11 @@ def _best_of_starts(
         ),
         told,
     )
+
+
+def _rank(found: FoundMotion) -> float:
+    """The criterion; what is not a number comes last, instead of being lower than nothing."""
+    return np.inf if np.isnan(found.value) else found.value
 
 
 def is_improvement(task: MotionTask, value: float) -> bool:

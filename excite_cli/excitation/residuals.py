@@ -142,7 +142,7 @@ def squared_per_instant(rows: Rows, weights: Array, samples: int) -> dict[tuple[
         return _squared_at_once(rows, weights, samples)
     found = {}
     parts = {i: np.ascontiguousarray(p) for i, p in enumerate(rows.parts) if p is not None}
-    times, weights = np.ascontiguousarray(rows.times), np.ascontiguousarray(weights)
+    times, weights = np.ascontiguousarray(rows.times, dtype=np.int64), np.ascontiguousarray(weights)
     for i, left in parts.items():
         for j, right in parts.items():
             if j >= i:

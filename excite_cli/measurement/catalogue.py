@@ -14,6 +14,7 @@ from excite_cli.measurement.bag_reader import BagReader
 from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.hdf5_reader import Hdf5Reader
+from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.quality import checked
 from excite_cli.measurement.reader import RawRun, Reader, ReadOptions
 from excite_cli.measurement.torque import SECONDS, check_joints, declared, to_joints
@@ -131,9 +132,9 @@ def _seconds(raw: RawRun, spec: MeasurementSpec) -> Array:
     """Stamps in seconds; those counted from 1970 start at 0, to keep their digits."""
     t = np.asarray(raw.t, dtype=float)
     factor = 1.0 if raw.seconds else SECONDS[spec.time]
-    finite = t[np.isfinite(t)]
-    if len(finite) and finite[0] * factor > _EPOCH:
-        t = t - finite[0]
+    known = t[known_stamps(t)]
+    if len(known) and known[0] * factor > _EPOCH:
+        t = t - known[0]
     return t * factor
 
 

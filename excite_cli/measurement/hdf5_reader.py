@@ -13,7 +13,7 @@ import numpy as np
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.dataset import Array, Finding
-from excite_cli.measurement.memory_limit import limited_memory
+from excite_cli.measurement.memory_limit import is_shortage, limited_memory
 from excite_cli.measurement.reader import (
     RawRun,
     Reader,
@@ -41,16 +41,28 @@ class Hdf5Reader(Reader):
         try:
             with limited_memory(path), h5py.File(path, "r") as file:
                 return _runs(path, file, wanted)
+        except ExciteError:
+            raise
         except OSError as error:
+            if is_shortage(error):
+                raise _short_of_memory(path) from error
             raise FileError(
                 f"{path} is not a readable HDF5 file ({error}). If it was being written when the "
                 "program ended, it is lost."
             ) from error
         # Damaged bytes lead the library to whatever error: also of indices, sizes and encodings.
-        except ExciteError:
-            raise
         except Exception as error:
+            if is_shortage(error):
+                raise _short_of_memory(path) from error
             raise FileError(f"{path} is damaged, or not measured data: {error}.") from error
+
+
+def _short_of_memory(path: Path) -> FileError:
+    return FileError(
+        f"{path} has {path.stat().st_size / 2**20:.3g} MiB, and there is not enough memory to read "
+        "it. Free memory, cut it into several runs, or lower its rate. If it is small for that, it "
+        "is damaged."
+    )
 
 
 def _runs(path: Path, file: Any, wanted: ReadOptions) -> list[RawRun]:
@@ -66,10 +78,7 @@ def _runs(path: Path, file: Any, wanted: ReadOptions) -> list[RawRun]:
             )
         if not found:
             raise FileError(f"{path}: /runs has no group with {_needed(wanted)}.")
-        budget = sum(_count(run) for _, run in found)
-        check_values(path, budget)
-        check_unpacked(path, 8 * budget)
-        return [_run(path, file, run, name, wanted) for name, run in found]
+        return _all(path, file, found, wanted)
     kind = str(file.attrs.get("kind", file.attrs.get("content", "")))
     if kind in ("fit", "diagnosis"):
         raise FileError(
@@ -80,9 +89,15 @@ def _runs(path: Path, file: Any, wanted: ReadOptions) -> list[RawRun]:
             f"{path} holds planned motions, not measured data. Play them on the robot, or with "
             "`excite simulate`."
         )
-    check_values(path, _count(file))
-    check_unpacked(path, 8 * _count(file))
-    return [_run(path, file, file, "", wanted)]
+    return _all(path, file, [("", file)], wanted)
+
+
+def _all(path: Path, file: Any, found: list[tuple[str, Any]], wanted: ReadOptions) -> list[RawRun]:
+    count = sum(_count(group) for _, group in found)
+    check_values(path, count)
+    check_unpacked(path, 8 * count)
+    with limited_memory(path, 8 * count):
+        return [_run(path, file, group, name, wanted) for name, group in found]
 
 
 def _needed(wanted: ReadOptions) -> str:

@@ -1,7 +1,8 @@
 """NaN and infinite values: taken out, filled and masked, and always said.
 
 What is larger than anything measured (`BEYOND`) counts as infinite: recorders write such numbers
-where they have none, and arithmetic with them overflows.
+where they have none, and arithmetic with them overflows. Stamps may be larger, so that a clock in
+another unit than declared is told by its steps and not lost here.
 """
 
 from dataclasses import replace
@@ -13,11 +14,17 @@ from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 
 BEYOND = 1e12  # s, rad, m, N·m, N
+_LATEST = 1e30  # of a stamp, in whatever unit: beyond any clock's count since the epoch
 
 
 def known_values(values: Array) -> Mask:
     """Where there is a number that can have been measured."""
     return np.asarray(np.abs(values) < BEYOND)  # false for NaN too
+
+
+def known_stamps(t: Array) -> Mask:
+    """Where there is a number that a clock can have given."""
+    return np.asarray(np.abs(t) < _LATEST)
 
 
 def without_missing(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]:
@@ -33,7 +40,7 @@ def without_missing(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Findin
         Nothing is left.
     """
     findings = []
-    stamped = known_values(run.t)
+    stamped = known_stamps(run.t)
     if not stamped.all():
         text = f"{np.count_nonzero(~stamped)} rows without a time stamp are left out"
         findings.append(Finding("nan", "warning", text, run.name))

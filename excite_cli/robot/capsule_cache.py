@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from excite_cli.atomic import write_atomically
+from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import FileError
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
@@ -68,13 +68,9 @@ def store_capsules(key: str, capsules: Iterable[Capsule]) -> None:
     ]
     text = json.dumps({"key": key, "capsules": records})
     try:
-        write_atomically(_path(key), lambda file: _write(file, text))
+        write_text_atomically(_path(key), text)
     except (FileError, RuntimeError):
         return
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def _path(key: str) -> Path:

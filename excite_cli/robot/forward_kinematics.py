@@ -41,12 +41,12 @@ class BatchKinematics:
         self.n_bodies = robot.n_bodies
         self.nv = int(model.nv)
         self._n = robot.n
-        self._columns_body = np.zeros(self.nv, dtype=np.intp)
+        self._columns_body = np.zeros(self.nv, dtype=np.int64)
         self.twists = np.zeros((self.nv, 6))
         self._rotation_basis = np.zeros((self.n_bodies, 3, 9))
         self._offset = np.zeros((self.n_bodies, 3))
         self._slide = np.zeros((self.n_bodies, 3))
-        self.variable = np.full(self.n_bodies, -1, dtype=np.intp)
+        self.variable = np.full(self.n_bodies, -1, dtype=np.int64)
         first_column = int(robot.moved[0])
         reference = model.createData()
         pin.forwardKinematics(model, reference, robot.reference)
@@ -63,7 +63,7 @@ class BatchKinematics:
                 self.variable[body] = joint.idx_v - first_column
         self._axes_split = self.twists.reshape(self.nv, 2, 3).swapaxes(1, 2).copy()
         self._moving = self.variable >= 0
-        self.parents = np.array([int(parent) - 1 for parent in model.parents[1:]], dtype=np.intp)
+        self.parents = np.array([int(parent) - 1 for parent in model.parents[1:]], dtype=np.int64)
         self._levels = _levels(self.parents.tolist())
 
     def _set_fixed(self, body: int, placement: pin.SE3) -> None:

@@ -3,7 +3,7 @@
 The library that reads meshes (assimp) can be led by a damaged file to end its process, to fill
 memory or to run on; nothing in this process can hold it then. `try_meshes` starts a process with
 limits of time and memory that reads the files as `coal` does, once for each content. The process is
-this module itself: `python -m excite_cli.robot.mesh_trial`, asked by lines on stdin.
+this module's `serve`, asked by lines on stdin.
 """
 
 import atexit
@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from excite_cli.errors import RobotError
+from excite_cli.measurement.memory_limit import address_space
 
 SUFFIXES = (".stl", ".dae", ".obj", ".ply")
 MAX_BYTES = 100 * 2**20  # of a mesh
@@ -27,6 +28,13 @@ _MAX_MEMORY = 2**30  # bytes that the reading of one robot's meshes may take
 _SECONDS, _BYTES_PER_SECOND = 1.0, 2**20  # processor time allowed: a base, and by size
 _SLOWEST = 20  # times the processor time, on a machine with much else to do
 _HARM = "reading it"  # so begins what is said of a file that ended the process
+# The parent's path of imports, so that a checkout finds itself; never (-P) the current folder,
+# where anything may lie.
+_BOOT = (
+    "import sys; sys.path[:] = sys.argv[1:]; from excite_cli.robot.mesh_trial import serve; serve()"
+)
+# Threads of linear algebra, of no use here, reserve much of the memory that there is.
+_ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
 _IDLE = 10.0  # s without a question after which the process ends
 _known: dict[str, str] = {}  # content -> what is wrong with it
 
@@ -88,9 +96,14 @@ class _Trial:
     def _asked(self, line: bytes, longest: float) -> tuple[bytes, int]:
         """The answer, or how the process ended; it is ended if it takes longer [s]."""
         if self._process is None:
-            command = [sys.executable, "-m", "excite_cli.robot.mesh_trial"]
-            pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
-            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing)
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-c", _BOOT, *sys.path],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env={**os.environ, **_ONE_THREAD},
+                process_group=0,  # Ctrl-C is for the parent
+            )
         process = self._process
         assert process.stdin is not None
         assert process.stdout is not None
@@ -102,6 +115,10 @@ class _Trial:
             answer = process.stdout.readline()
         except BrokenPipeError:
             answer = b""
+        except BaseException:  # the answer would be taken for that to the next question
+            process.kill()
+            self.close()
+            raise
         finally:
             clock.cancel()
         if answer:
@@ -132,8 +149,11 @@ def _limit() -> None:
         import resource
     except ImportError:
         return
-    for kind, most in ((resource.RLIMIT_AS, 2 * _MAX_MEMORY), (resource.RLIMIT_CORE, 0)):
-        with contextlib.suppress(ValueError, OSError):
+    limits = [(resource.RLIMIT_CORE, 0)]
+    if (taken := address_space()) is not None:
+        limits.append((resource.RLIMIT_AS, taken + 2 * _MAX_MEMORY))
+    for kind, most in limits:
+        with contextlib.suppress(ValueError, OSError):  # a lower one holds already
             resource.setrlimit(kind, (most, most))
 
 
@@ -152,7 +172,7 @@ def _set_alarm(seconds: float) -> None:
         signal.setitimer(signal.ITIMER_PROF, seconds)
 
 
-def _main() -> None:
+def serve() -> None:
     """In the process: for each line [path, seconds] of stdin a line, empty for a good mesh."""
     import coal
 
@@ -190,7 +210,3 @@ def _said(loader: object, path: str) -> str:
     if not np.isfinite(np.asarray(mesh.vertices())).all():
         return "it has corners that are not finite"
     return ""
-
-
-if __name__ == "__main__":
-    _main()

@@ -6,6 +6,7 @@ no error.
 
 import hashlib
 
+import coal
 import numpy as np
 
 from excite_cli.errors import RobotError
@@ -32,7 +33,7 @@ def choice_key(
         geometry = capsule_key(robot, collision_model(robot), ())
     except RobotError:
         return None
-    asked = (geometry, robot.fingerprint(), pairs, margin, samples, seed)
+    asked = (geometry, robot.fingerprint(), pairs, margin, samples, seed, coal.__version__)
     digest = hashlib.sha256(f"{_VERSION}|{asked}".encode())
     for part in (*robot.limits.ranges(), robot.posture):
         digest.update(part.tobytes())

@@ -37,18 +37,18 @@ class PairDistances:
         self, robot: Robot, capsules: Sequence[Capsule], pairs: Sequence[tuple[int, int]]
     ) -> None:
         self._robot = robot
-        checked = np.array(pairs, dtype=np.intp).reshape(-1, 2)
+        checked = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         used, place = np.unique(checked, return_inverse=True)
         self._first, self._second = np.ascontiguousarray(place.reshape(-1, 2).T)
         kept = [capsules[index] for index in used]
         self._axes = CapsuleAxes(robot, kept)
-        radius = np.array([capsule.radius for capsule in kept])
+        radius = np.array([capsule.radius for capsule in kept], dtype=float)
         self._radii = radius[self._first] + radius[self._second]
         ball = radius + 0.5 * np.linalg.norm(self._axes.along, axis=1)
         self._balls = ball[self._first] + ball[self._second]
         carried = carried_bodies(robot)[self._axes.joints]  # (C, n)
         self._sign = carried[self._second] - carried[self._first]
-        self._moved = np.array(robot.moved, dtype=np.intp)
+        self._moved = np.array(robot.moved, dtype=np.int64)
 
     @property
     def n_pairs(self) -> int:
@@ -124,8 +124,9 @@ class PairDistances:
         KERNELS.call(
             "gradients", len(rows), rotations.shape[1], columns.shape[1], len(self._moved),
             axes.joints, axes.start, axes.along, self._first, self._second, self._sign,
-            self._moved, rotations, translations, columns, np.ascontiguousarray(rows),
-            np.ascontiguousarray(cols), found,
+            self._moved, rotations, translations, columns,
+            np.ascontiguousarray(rows, dtype=np.int64), np.ascontiguousarray(cols, dtype=np.int64),
+            found,
         )  # fmt: skip
         crossed = np.flatnonzero(np.isnan(found[:, 0]))
         if len(crossed):

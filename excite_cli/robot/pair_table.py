@@ -56,7 +56,7 @@ class PairTable:
     def _value_and_slopes(self, q: Array) -> Array:
         assert KERNELS is not None
         first, second, coefficients = self._knots_and_coefficients
-        at = np.ascontiguousarray(self.positions(q))
+        at = np.ascontiguousarray(self.positions(q), dtype=float)
         found = np.empty((len(at), 3))
         KERNELS.call(
             "bicubic", len(at), len(first), len(second), first, second, coefficients, at, found

@@ -96,9 +96,9 @@ class SpatialAdjoint:
         carries = np.zeros((robot.n_bodies, robot.n_bodies))
         for body in range(1, model.njoints):
             carries[body - 1, [int(j) - 1 for j in model.supports[body] if j > 0]] = 1.0
-        self._dof_body = np.array(dof_body, dtype=np.intp)
-        self._moved = np.array(robot.moved, dtype=np.intp)
-        self._rows = np.array(robot.rows, dtype=np.intp)
+        self._dof_body = np.array(dof_body, dtype=np.int64)
+        self._moved = np.array(robot.moved, dtype=np.int64)
+        self._rows = np.array(robot.rows, dtype=np.int64)
         self._carried = np.ascontiguousarray(carries[:, self._dof_body])
         strict = self._carried[self._dof_body][:, :] - np.equal.outer(dof_body, dof_body)
         self._strict = strict[np.ix_(robot.moved, robot.rows)]
@@ -129,7 +129,7 @@ class SpatialAdjoint:
             return self._pull_back_by_passes(q, v, a, weights)
         robot, tree = self.robot, self._kinematics
         samples, n = len(q), robot.n
-        states = [np.ascontiguousarray(part) for part in (v, a, weights)]
+        states = [np.ascontiguousarray(part, dtype=float) for part in (v, a, weights)]
         found = np.empty((3, samples, n))
         work = np.empty(12 * tree.nv + 42 * robot.n_bodies)
         KERNELS.call(

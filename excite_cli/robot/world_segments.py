@@ -74,9 +74,9 @@ class CapsuleAxes:
     def __init__(self, robot: Robot, capsules: Sequence[Capsule]) -> None:
         self._n = robot.n
         self.kinematics = BatchKinematics(robot)
-        self.joints = np.array([capsule.joint for capsule in capsules], dtype=np.intp)
-        self.start = np.array([capsule.start for capsule in capsules]).reshape(-1, 3)
-        self.along = np.array([c.end - c.start for c in capsules]).reshape(-1, 3)
+        self.joints = np.array([capsule.joint for capsule in capsules], dtype=np.int64)
+        self.start = np.array([capsule.start for capsule in capsules], dtype=float).reshape(-1, 3)
+        self.along = np.array([c.end - c.start for c in capsules], dtype=float).reshape(-1, 3)
         self._last: tuple[Array, WorldSegments] | None = None
 
     def in_world(self, q: Array | States) -> WorldSegments:

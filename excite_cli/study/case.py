@@ -9,10 +9,14 @@ from typing import Any
 
 from excite_cli import api
 from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Progress
 from excite_cli.excitation.result import Result
+from excite_cli.study.request import request_of
 from excite_cli.workers.base import Tell
 
+# The files that a case may make are named after it, with these suffixes.
+SUFFIXES = ("motions.h5", "fit.h5", "diagnosis.h5")
 # Key figures of a case: a number or a few words each.
 Figures = Mapping[str, float | int | str | None]
 
@@ -62,17 +66,32 @@ def do_case(task: StudyTask, case: StudyCase, tell: Tell) -> DoneCase:
 
     Raises
     ------
+    FileError
+        A file that the case is made of is no longer what it was when the study was planned.
     ExciteError
         What the command for it would end with.
     """
     began = time.perf_counter()
+    _check_unchanged(task, case)
     with tempfile.TemporaryDirectory() as folder:
         if case.log is None:
             figures = _optimised(task, case, Path(folder), tell)
         else:
             figures = _traced(task, case, case.log, Path(folder), tell)
         files = {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
+    _check_unchanged(task, case)
     return DoneCase(figures, files, time.perf_counter() - began)
+
+
+def _check_unchanged(task: StudyTask, case: StudyCase) -> None:
+    """The files are read again, perhaps hours after the study was planned."""
+    found = request_of(task.config, overrides_of(task, case), case.log, task.diagnosed)
+    if found != case.request:
+        log = " or the log" if case.log is not None else ""
+        raise FileError(
+            f"{task.config}, a file that it names{log} was changed while the study ran, or is "
+            "another one on the machine of this worker. Begin another study."
+        )
 
 
 def _optimised(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Figures:

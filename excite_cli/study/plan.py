@@ -1,16 +1,16 @@
 """From a config, logs and varied keys to the cases of a study, all checked before any is done."""
 
-import hashlib
 import re
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
-from excite_cli.config.load import load_spec, spec_as_yaml
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.study.case import StudyCase, StudyTask
+from excite_cli.study.request import contents_of, request_of
 from excite_cli.study.vary import Varied, combinations
 
-_LONGEST = 100  # letters of a name, so that a file system takes it
+_LONGEST = 100  # bytes of a name: with digest, suffix and `.part` a file system still takes it
 
 
 def planned_cases(
@@ -21,7 +21,8 @@ def planned_cases(
     Raises
     ------
     ConfigError
-        Nothing is varied and there is no log; or the config does not allow a combination.
+        Nothing is varied and there is no log; the config does not allow a combination; or two
+        combinations are the same.
     FileError
         A log does not exist, or is given twice.
     """
@@ -33,18 +34,17 @@ def planned_cases(
     chosen = combinations(varied)
     short = _short_keys([each.key for each in varied])
     cases: list[StudyCase] = []
-    each: Sequence[Path | None] = logs or [None]
+    contents = cache(contents_of)
+    each: Sequence[Path | None] = [log.resolve() for log in logs] or [None]
     for log in each:
         for values in chosen:
             settings = [f"{key}={value}" for key, value in values.items()]
-            spec = load_spec(task.config, [*task.overrides, *settings])
             words = [f"{short[key]}={_plain(value)}" for key, value in values.items()]
             name = "_".join([*([_plain(log.stem)] if log is not None else []), *words])
-            asked = [spec_as_yaml(spec), str(task.config.resolve().parent)]
-            if log is not None:
-                asked += [str(log.resolve()), _size(log), str(task.diagnosed)]
-            request = hashlib.sha256("\n".join(asked).encode()).hexdigest()
-            cases.append(StudyCase(name[:_LONGEST], values, log, request))
+            overrides = [*task.overrides, *settings]
+            request = request_of(task.config, overrides, log, task.diagnosed, contents)
+            cases.append(StudyCase(_cut(name), values, log, request))
+    _check_different(cases)
     return _distinct(cases)
 
 
@@ -58,9 +58,20 @@ def _check_logs(logs: Sequence[Path]) -> None:
         seen.add(log.resolve())
 
 
-def _size(log: Path) -> str:
-    files = [log] if log.is_file() else sorted(each for each in log.rglob("*") if each.is_file())
-    return ",".join(str(each.stat().st_size) for each in files)
+def _check_different(cases: Sequence[StudyCase]) -> None:
+    seen: dict[str, StudyCase] = {}
+    for case in cases:
+        other = seen.setdefault(case.request, case)
+        if other is not case:
+            twice = " and ".join(
+                ", ".join(f"{key}={value}" for key, value in each.values.items())
+                for each in (other, case)
+            )
+            raise ConfigError(f"--vary: {twice} ask for the same. Give one of them.")
+
+
+def _cut(name: str) -> str:
+    return name.encode()[:_LONGEST].decode(errors="ignore")
 
 
 def _short_keys(keys: Sequence[str]) -> dict[str, str]:

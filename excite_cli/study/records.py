@@ -13,7 +13,7 @@ from typing import Any
 
 from excite_cli.atomic import write_atomically
 from excite_cli.errors import FileError
-from excite_cli.study.case import DoneCase, StudyCase, as_data
+from excite_cli.study.case import SUFFIXES, DoneCase, StudyCase, as_data
 
 TABLE = "study.csv"
 _SCHEMA = 1
@@ -72,30 +72,49 @@ def keep_case(folder: Path, case: StudyCase, outcome: DoneCase | Exception) -> C
     return record
 
 
+def files_of(folder: Path, case: StudyCase) -> list[Path]:
+    """The record of a case and all files that it may make."""
+    return [folder / f"{case.name}.{suffix}" for suffix in ("json", *SUFFIXES)]
+
+
 def kept_case(folder: Path, case: StudyCase) -> CaseRecord | None:
     """The stored record of a case that went well; None where it is still to be done.
+
+    A damaged one, as a disk may leave it, is as good as none.
 
     Raises
     ------
     FileError
-        There is one of another config or log, or it is damaged.
+        There is one of another config, robot or log.
     """
     path = folder / f"{case.name}.json"
     if not path.is_file():
         return None
     try:
-        stored = json.loads(path.read_text(encoding="utf-8"))
-        stored.pop("schema")
-        record = CaseRecord(**{**stored, "files": tuple(stored["files"])})
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise FileError(f"{path} is damaged, or not of a study. Delete it.") from error
+        record = _record(json.loads(path.read_text(encoding="utf-8")))
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return None
     if record.request != case.request:
         raise FileError(
-            f"--resume: {path} was made with another config or log. Give another folder with -o, "
-            "or delete it."
+            f"--resume: {path} was made with another config, robot or log. Give another folder "
+            "with -o, or delete it."
         )
     whole = all((folder / name).is_file() for name in record.files)
     return record if whole and not record.failed else None
+
+
+def _record(stored: dict[str, Any]) -> CaseRecord:
+    """The record of what was read; one of many errors where it is none."""
+    if stored.pop("schema") != _SCHEMA:
+        raise ValueError("schema")
+    record = CaseRecord(**{**stored, "files": tuple(stored["files"])})
+    words = (record.name, record.request, record.message, *record.files, *record.values.values())
+    figures = (record.seconds, *record.figures.values())
+    if not all(isinstance(each, str) for each in words):
+        raise TypeError("words")
+    if not all(each is None or isinstance(each, str | int | float) for each in figures):
+        raise TypeError("figures")
+    return record
 
 
 def write_table(folder: Path, records: Sequence[CaseRecord]) -> Path:

@@ -4,9 +4,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from excite_cli.errors import ExciteError, FileError
+from excite_cli.claim import claim
+from excite_cli.errors import ExciteError, FileError, refusal
 from excite_cli.study.case import DoneCase, StudyCase, StudyTask, do_case
-from excite_cli.study.records import TABLE, CaseRecord, keep_case, kept_case, write_table
+from excite_cli.study.records import (
+    TABLE,
+    CaseRecord,
+    files_of,
+    keep_case,
+    kept_case,
+    write_table,
+)
 from excite_cli.workers.base import News, Workers
 from excite_cli.workers.here import Here
 
@@ -35,30 +43,28 @@ def run_study(
     workers: Workers | None = None,
     resume: bool = False,
     report: Callable[[StudyNews], None] = lambda news: None,
+    overwrite: bool = False,
 ) -> list[CaseRecord]:
     """Do all cases, in `folder` a record and the files of each; a failure is a record too.
 
-    With `resume` cases that are there already are not done again, failed ones are. The table of all
-    is written at the end. Results do not depend on `workers`, but seconds do.
+    With `resume` cases that are there already are not done again, failed ones are; with `overwrite`
+    all are. The table of all is written at the end; the folder is claimed by its name. Results do
+    not depend on `workers`, but seconds do.
 
     Raises
     ------
     FileError
-        The folder holds a study and `resume` is not asked for, or of other cases; it cannot be
-        written to.
+        Files of a study are in the folder, and neither `resume` nor `overwrite` is asked for; or,
+        with `resume`, of other cases. Another run is writing it, or it cannot be written to.
     """
-    if not resume and (folder / TABLE).exists():
-        raise FileError(
-            f"{folder} holds a study already. Go on with --resume, or give another folder with -o."
-        )
+    claim(folder / TABLE)
+    if overwrite:
+        _forget(cases, folder)
+    elif not resume:
+        _check_free(cases, folder)
     records: dict[int, CaseRecord] = {}
-    for index, case in enumerate(cases):
+    for index, case in enumerate(cases if resume and not overwrite else ()):
         kept = kept_case(folder, case)
-        if kept is not None and not resume:
-            raise FileError(
-                f"{folder} holds cases of a study already. Go on with --resume, or give another "
-                "folder with -o."
-            )
         if kept is not None:
             records[index] = kept
     before = len(records)
@@ -79,6 +85,25 @@ def run_study(
     found = [records[index] for index in range(len(cases))]
     write_table(folder, found)
     return found
+
+
+def _check_free(cases: Sequence[StudyCase], folder: Path) -> None:
+    there = [folder / TABLE, *(path for case in cases for path in files_of(folder, case))]
+    found = next((path for path in there if path.exists()), None)
+    if found is not None:
+        raise FileError(
+            f"{found} exists already. Go on with --resume, give another folder with -o, or replace "
+            "it with --overwrite."
+        )
+
+
+def _forget(cases: Sequence[StudyCase], folder: Path) -> None:
+    """Remove table and records: what is interrupted from now on is not taken for complete."""
+    try:
+        for path in (folder / TABLE, *(files_of(folder, case)[0] for case in cases)):
+            path.unlink(missing_ok=True)
+    except OSError as error:
+        raise FileError(f"{path} cannot be replaced: {refusal(error)}") from error
 
 
 def figure_of(record: CaseRecord) -> float:

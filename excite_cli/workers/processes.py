@@ -27,7 +27,8 @@ from excite_cli.workers.base import (
     unwatched,
 )
 
-# The parent's path of imports comes first, so that a checkout finds itself.
+# The parent's path of imports comes first, so that a checkout finds itself; until it is set, `-P`
+# keeps the current folder out: a json.py that lies there is no part of us.
 _BOOT = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[3]); "
     "from excite_cli.workers.child import serve; serve(int(sys.argv[1]), int(sys.argv[2]))"
@@ -42,9 +43,9 @@ class _Worker:
     def __init__(self, threads: int) -> None:
         ours, theirs = socket.socketpair()
         with ours, theirs:
-            descriptor = theirs.fileno()
+            descriptor, path = theirs.fileno(), json.dumps(sys.path)
             self.process = subprocess.Popen(
-                [sys.executable, "-c", _BOOT, str(descriptor), str(threads), json.dumps(sys.path)],
+                [sys.executable, "-P", "-c", _BOOT, str(descriptor), str(threads), path],
                 pass_fds=[descriptor],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # stdout is the answer of the command
@@ -137,7 +138,7 @@ class Processes(Workers):
                 self._workers.append(_Worker(self._threads))
             for worker in list(self._workers):
                 self._hand_out(worker, round_)
-            while round_.running or round_.waiting:
+            while round_.waiting or self._awaited(round_):
                 for connection in wait([worker.connection for worker in self._workers]):
                     worker = next(w for w in self._workers if w.connection is connection)
                     self._listen(worker, round_)
@@ -145,17 +146,24 @@ class Processes(Workers):
             self.close()  # tasks may be running that nobody waits for any more
             raise
         if round_.failures:
+            self._drop_running()
             raise round_.failures[min(round_.failures)]
         return [round_.results[index] for index in range(len(tasks))]
 
     def close(self) -> None:
         """End all processes."""
-        for worker in self._workers:
-            with contextlib.suppress(OSError):
-                worker.connection.close()  # all of them at once, then wait
-        for worker in self._workers:
-            worker.end()
+        _end(self._workers)
         self._workers = []
+
+    def _awaited(self, round_: _Round) -> bool:
+        """Whether a task runs whose end matters: after a failure, only those before it do."""
+        first = min(round_.failures, default=len(round_.tasks))
+        return any(worker.task is not None and worker.task < first for worker in self._workers)
+
+    def _drop_running(self) -> None:
+        """End the processes that are at work; the idle ones stay."""
+        _end([worker for worker in self._workers if worker.task is not None])
+        self._workers = [worker for worker in self._workers if worker.task is None]
 
     def _hand_out(self, worker: _Worker, round_: _Round) -> None:
         """Send the next task to a worker that is ready and idle."""
@@ -226,6 +234,14 @@ class Processes(Workers):
                     "without --workers, or take fewer."
                 )
         self._workers[self._workers.index(worker)] = _Worker(self._threads)
+
+
+def _end(workers: Sequence[_Worker]) -> None:
+    for worker in workers:
+        with contextlib.suppress(OSError):
+            worker.connection.close()  # all of them at once, then wait
+    for worker in workers:
+        worker.end()
 
 
 def _words(status: int | None) -> str:

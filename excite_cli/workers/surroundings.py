@@ -10,7 +10,7 @@ import platform
 import struct
 from dataclasses import dataclass
 from functools import cache
-from importlib import metadata
+from importlib import import_module, metadata
 from pathlib import Path
 
 import excite_cli
@@ -20,7 +20,10 @@ _LIBRARIES = ("numpy", "scipy", "pin", "coal", "clarabel")
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Versions of the libraries, the digest of our own source, and how numbers are rounded."""
+    """Versions of the libraries, the digest of our own source, and how numbers are rounded.
+
+    Among the versions is whether the inner loops are the compiled ones.
+    """
 
     versions: tuple[tuple[str, str], ...]
     rounding: str
@@ -44,7 +47,14 @@ def surroundings() -> Surroundings:
             versions.append((name, metadata.version(name)))
         except metadata.PackageNotFoundError:
             versions.append((name, "none"))
+    versions.append(("kernels", _kernels()))
     return Surroundings(tuple(versions), _rounding())
+
+
+def _kernels() -> str:
+    """Which inner loops are in use; by name, since their room is above this one."""
+    found = import_module("excite_cli.robot.compiled.kernels").KERNELS
+    return "numpy" if found is None else "compiled"
 
 
 def _own_source() -> str:

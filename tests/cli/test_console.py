@@ -19,6 +19,7 @@ from excite_cli.cli.completion import (
 from excite_cli.cli.console import BUG, Terminal, run_guarded
 from excite_cli.cli.export import _MODELS
 from excite_cli.cli.layout import table
+from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Progress
 from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.robot.glance import known_robots
@@ -122,3 +123,27 @@ def test_the_best_so_far_keeps_all_limits() -> None:
     assert words("cond 12.00", 0.1) == "condition number 12.00 (best 12.00)"
     assert words("cond 5.00", -0.1) == "condition number 5.00 (best 12.00)"
     assert words("divergence 3", 0.1) == "divergence 3"
+
+
+def test_a_terminal_does_not_obey_names_of_files(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    name = "el\x1b[2J\x1b]0;title\x07bo\x9b1mw\x00"
+    made = table("Title", ("joint", "figure"), left=("joint",))
+    made.add_row(name, "1.5")
+    terminal = Terminal(verbose=True)
+    terminal.answer([made, f"of {name}"], {})
+    terminal.say(name)
+    terminal.detail(name)
+
+    def fails() -> None:
+        raise FileError(f"no joint {name}")
+
+    run_guarded(fails)
+    told = capsys.readouterr()
+    seen = told.out + told.err
+    assert seen.count("el[2J]0;titlebo1mw") == 5
+    assert not [c for c in seen if (ord(c) < 0x20 or 0x7F <= ord(c) < 0xA0) and c != "\n"]
+    Terminal(as_json=True).answer(made, {"joint": name})
+    assert json.loads(capsys.readouterr().out) == {"joint": name}

@@ -77,3 +77,7 @@ def test_scaling_the_regressor_leaves_the_condition_number() -> None:
     sigma = _spectrum(5, 9)
     for criterion in (ConditionNumber(), SmoothConditionNumber(16.0)):
         assert criterion.value(7.0 * sigma) == pytest.approx(criterion.value(sigma))
+
+
+def test_a_parameter_that_does_not_show_makes_the_smooth_criterion_infinite() -> None:
+    assert SmoothConditionNumber(4.0).value(np.array([2.0, 1.0, 0.0])) == np.inf

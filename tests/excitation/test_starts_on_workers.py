@@ -157,6 +157,16 @@ def test_of_equal_starts_the_first_is_taken_and_failures_are_passed_over(
         _best(problem, [failure] * STARTS, alone)
 
 
+def test_what_is_not_a_number_is_never_the_best(
+    problem: Problem, alone: tuple[Motion, ...]
+) -> None:
+    from excite_cli.excitation.task import MotionTask
+
+    x = MotionTask(problem).variables(alone[0].coefficients)
+    motion = _best(problem, [_found(np.nan, 0.5 * x), _found(9.0, x)], alone)
+    assert np.array_equal(motion.coefficients, MotionTask(problem).coefficients(x))
+
+
 def test_starts_cut_short_by_time_are_told(problem: Problem, alone: tuple[Motion, ...]) -> None:
     from excite_cli.excitation.task import MotionTask
 

@@ -273,3 +273,14 @@ def test_errors_are_raised_together(tmp_path: Path) -> None:
     assert sentence(warning) == "a gap."
     raise_for_errors(replace(data, findings=(warning,)))
     assert count_by_severity([*findings, warning]) == {"error": 2, "warning": 1, "note": 0}
+
+
+def test_stamps_in_another_unit_are_not_lost_as_missing() -> None:
+    """Nanoseconds declared as seconds pass 1e12 after 17 minutes: refused, not cut."""
+    run = recorded()
+    with pytest.raises(FileError, match=r"1\.599e\+12 s: no clock gives .* measurement\.time"):
+        check(replace(run, t=np.round(run.t * 2e11)))
+    t = run.t.copy()
+    t[7] = np.finfo(np.float32).max  # as recorders write where they have none
+    _, findings = check(replace(run, t=t))
+    assert "1 rows without a time stamp" in findings[0].text

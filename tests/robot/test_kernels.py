@@ -1,6 +1,7 @@
 """The compiled inner loops against the NumPy forms that stand in for them, and against scipy."""
 
 import os
+import shutil
 import subprocess
 import sys
 
@@ -14,6 +15,7 @@ from excite_cli.excitation import residuals
 from excite_cli.excitation.residuals import Rows, squared_per_instant
 from excite_cli.robot import forward_kinematics, pair_distances, spatial_adjoint
 from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.compiled import kernels
 from excite_cli.robot.compiled.kernels import KERNELS
 from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.pair_distances import PairDistances
@@ -24,7 +26,26 @@ from .random_robots import random_robot
 
 ROBOTS = st.tuples(st.integers(0, 10_000), st.integers(2, 9), st.booleans())
 
-pytestmark = pytest.mark.skipif(KERNELS is None, reason="no C compiler when this was installed")
+pytestmark = pytest.mark.skipif(
+    KERNELS is None and shutil.which("cc") is None, reason="no C compiler on this machine"
+)
+
+
+def test_they_were_compiled() -> None:
+    assert KERNELS is not None, "the package was installed without its C file: pip install -e ."
+
+
+def test_arrays_of_another_type_are_refused() -> None:
+    assert KERNELS is not None
+    floats, whole = np.zeros(4), np.zeros(4, dtype=np.int32)
+    for wrong in (whole, floats.astype(np.float32), np.zeros((4, 4))[:, 1]):
+        with pytest.raises(TypeError, match="cannot take"):
+            KERNELS.call("bicubic", 0, 8, 8, floats, floats, wrong, floats, floats)
+
+
+def test_a_library_of_another_version_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "_VERSION", -1)
+    assert kernels._loaded() is None
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)
@@ -66,7 +87,8 @@ def test_distances_and_their_gradients(chosen: tuple[int, int, bool]) -> None:
 
     def all_of() -> tuple[np.ndarray, ...]:
         near = measure.distances(q, exact_below=0.3)
-        return measure.distances(q), near, measure.gradients(q, rows, cols)
+        some = measure.gradients(q, rows.astype(np.int32), cols.astype(np.int32))
+        return measure.distances(q), near, some
 
     compiled = all_of()
     with pytest.MonkeyPatch.context() as patch:

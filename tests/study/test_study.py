@@ -1,6 +1,7 @@
 """A study over stand-ins of cases: failures, what is kept, what is done again."""
 
 import csv
+import fcntl
 import json
 from pathlib import Path
 from typing import Any
@@ -70,17 +71,57 @@ def test_resume_does_what_is_missing_or_failed(done: Done, tmp_path: Path) -> No
 
 def test_a_folder_is_not_written_over(done: Done, tmp_path: Path) -> None:
     run_study(TASK, CASES[:1], tmp_path)
-    with pytest.raises(FileError, match="holds a study already"):
-        run_study(TASK, CASES, tmp_path)
-    (tmp_path / "study.csv").unlink()  # as after an interruption
-    with pytest.raises(FileError, match="Go on with --resume"):
-        run_study(TASK, CASES, tmp_path)
     other = [StudyCase("seed-1", {"seed": "1"}, None, "another config")]
-    with pytest.raises(FileError, match="another config or log"):
-        run_study(TASK, other, tmp_path, resume=True)
-    (tmp_path / "seed-1.json").write_text("{")
-    with pytest.raises(FileError, match="damaged"):
-        run_study(TASK, CASES, tmp_path, resume=True)
+    for left in ("study.csv", "seed-1.json", "seed-1.motions.h5"):
+        for cases in (CASES, other):
+            with pytest.raises(FileError, match=rf"^\S+{left} exists already.*--resume"):
+                run_study(TASK, cases, tmp_path)
+        if left == "seed-1.json":
+            with pytest.raises(FileError, match=r"^--resume: .*another config, robot or log"):
+                run_study(TASK, other, tmp_path, resume=True)
+        (tmp_path / left).unlink()
+    run_study(TASK, CASES[:1], tmp_path)
+
+
+def test_with_overwrite_all_is_done_again(done: Done, tmp_path: Path) -> None:
+    run_study(TASK, CASES[:1], tmp_path)
+
+    def stop(news: StudyNews) -> None:
+        raise KeyboardInterrupt
+
+    other = [StudyCase(c.name, c.values, None, f"another {c.request}") for c in CASES]
+    with pytest.raises(KeyboardInterrupt):
+        run_study(TASK, other[2:], tmp_path, report=stop, overwrite=True)
+    assert not (tmp_path / "study.csv").exists()
+    done.names.clear()
+    run_study(TASK, other, tmp_path, overwrite=True)
+    assert done.names == ["seed-1", "seed-2", "seed-3"]
+
+
+@pytest.mark.parametrize(
+    "record",
+    ["{", "[]", '{"schema": 1}', "FIGURES", "FILES", "[" * 100_000],
+    ids=["cut", "list", "little", "figures", "files", "deep"],
+)
+def test_a_damaged_record_is_none(record: str, done: Done, tmp_path: Path) -> None:
+    run_study(TASK, CASES[:1], tmp_path)
+    path = tmp_path / "seed-1.json"
+    stored = json.loads(path.read_text())
+    if record in ("FIGURES", "FILES"):
+        record = json.dumps({**stored, record.lower(): [1]})
+    path.write_text(record)
+    done.names.clear()
+    run_study(TASK, CASES[:1], tmp_path, resume=True)
+    assert done.names == ["seed-1"]
+    assert json.loads(path.read_text()) == stored
+
+
+def test_two_studies_in_one_folder_are_refused(done: Done, tmp_path: Path) -> None:
+    with (tmp_path / ".study.csv.lock").open("w") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        with pytest.raises(FileError, match="another run"):
+            run_study(TASK, CASES, tmp_path)
+    assert done.names == []
 
 
 def test_an_interrupted_study_keeps_what_was_done(done: Done, tmp_path: Path) -> None:

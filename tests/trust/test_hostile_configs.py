@@ -32,6 +32,7 @@ BOMB = "a0: &a0 [x]\n" + "".join(
         (f"{ROBOT}seed: 1" + ":59" * 200_000, "a number of 600001 characters"),
         # More digits than Python prints.
         (f"{ROBOT}seed: 0x" + "f" * (LONGEST_NUMBER - 2), "allowed"),
+        ("robot: {<<: {urdf: a, mass: 1}, urdf: b}", "merge keys (<<)"),
         ("robot: !!python/object/apply:os.system [id]", "not valid YAML"),
         (ROBOT + "x: " + "y" * 900_000, "unknown key"),
         (ROBOT + "x" * 900_000 + ": 1", "not valid YAML"),
@@ -47,6 +48,7 @@ BOMB = "a0: &a0 [x]\n" + "".join(
         "digits",
         "sixty",
         "hexadecimal",
+        "merge",
         "code",
         "long value",
         "long key",

@@ -2,6 +2,7 @@
 
 import struct
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -165,3 +166,49 @@ def test_a_slow_mesh_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(mesh_trial, "_SLOWEST", 1e-6)
     with pytest.raises(RobotError, match="takes too long"):
         try_meshes([path])
+
+
+def test_what_lies_in_the_current_folder_is_not_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "json.py").write_text("open('ran', 'w')\nraise SystemExit(3)\n", encoding="utf-8")
+    (tmp_path / "hand.stl").write_bytes(b"here" + binary_stl()[4:])
+    mesh_trial._trial.close()
+    monkeypatch.chdir(tmp_path)
+    try_meshes([tmp_path / "hand.stl"])
+    assert not (tmp_path / "ran").exists()
+
+
+def test_after_an_interruption_the_next_answer_is_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good, bad = tmp_path / "good.stl", tmp_path / "bad.stl"
+    good.write_bytes(b"good" + binary_stl()[4:])
+    bad.write_bytes(binary_stl()[:100] + b"bad")
+    try_meshes([good])
+    process = mesh_trial._trial._process
+    assert process is not None
+    read = process.stdout
+
+    def interrupted() -> bytes:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(process, "stdout", SimpleNamespace(readline=interrupted, close=read.close))
+    with pytest.raises(KeyboardInterrupt):
+        mesh_trial._trial.said(bad)
+    monkeypatch.setattr(process, "stdout", read)
+    assert mesh_trial._trial.said(good) == ""
+    assert process.poll() is not None
+
+
+@pytest.mark.skipif(not Path("/proc/self/limits").exists(), reason="Linux tells the limits so")
+def test_what_is_loaded_already_does_not_count_to_the_memory_of_meshes(tmp_path: Path) -> None:
+    """Threads of linear algebra reserve tens of MiB each: as many as there are cores."""
+    (tmp_path / "hand.stl").write_bytes(b"room" + binary_stl()[4:])
+    try_meshes([tmp_path / "hand.stl"])
+    process = mesh_trial._trial._process
+    assert process is not None
+    limits = Path(f"/proc/{process.pid}/limits").read_text(encoding="ascii")
+    line = next(line for line in limits.splitlines() if line.startswith("Max address space"))
+    assert int(line.split()[3]) > 2 * mesh_trial._MAX_MEMORY + 2**26
+    assert b"OPENBLAS_NUM_THREADS=1\0" in Path(f"/proc/{process.pid}/environ").read_bytes()

@@ -124,5 +124,24 @@ def test_without_locks_of_the_file_system_files_are_written_all_the_same(
         raise OSError(module.errno.ENOLCK, "No locks available")
 
     monkeypatch.setattr(module.fcntl, "flock", refuse)
+    others = tmp_path / ".out.h5.abcdefgh.part"  # nobody can tell whether that run is alive
+    others.write_text("half")
     write_atomically(tmp_path / "out.h5", lambda file: file.write_text("1"))
-    assert [each.name for each in tmp_path.iterdir()] == ["out.h5"]
+    assert {each.name for each in tmp_path.iterdir()} == {"out.h5", others.name}
+
+
+def test_a_lock_file_that_never_is_what_its_name_says_is_no_lock(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[None] = []
+
+    def never(one: os.stat_result, other: os.stat_result) -> bool:
+        tried.append(None)
+        assert len(tried) < 10_000, "it is tried for ever"
+        return False
+
+    monkeypatch.setattr(os.path, "samestat", never)
+    (tmp_path / ".out.h5.abcdefgh.part").write_text("half")
+    with claimed(tmp_path / "out.h5"):
+        pass
+    assert [each.name for each in tmp_path.iterdir()] == [".out.h5.abcdefgh.part"]

@@ -74,6 +74,25 @@ def test_failures_can_be_kept(workers: Workers) -> None:
     assert str(third) == "a later one, sooner"
 
 
+def test_after_a_failure_nobody_waits_for_later_tasks(two: Processes) -> None:
+    began = time.monotonic()
+    with pytest.raises(ConfigError, match="the first is wrong"):
+        two.map(work.fails_beside_a_long_one, 0, [0, 1, 2])
+    assert time.monotonic() - began < 30.0
+    assert two.map(work.square, 0, [2, 3, 4]) == [4, 9, 16]
+
+
+def test_the_current_folder_is_no_part_of_a_worker(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("json", "sys", "pickle"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('code of the current folder')")
+    monkeypatch.syspath_prepend(str(tmp_path / "modules"))
+    monkeypatch.chdir(tmp_path)
+    with Processes(1) as one:
+        assert one.map(work.search_path, 0, [1]) == [sys.path]
+
+
 def test_errors_travel_as_the_nearest_that_can(two: Processes) -> None:
     with pytest.raises(NoAdmissibleMotionError, match="no way"):
         two.map(work.long_winded, 0, [1])

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,13 @@ def fails(shared: Any, task: int, tell: Tell) -> int:
     return task
 
 
+def fails_beside_a_long_one(shared: Any, task: int, tell: Tell) -> int:
+    if task:
+        time.sleep(60.0)
+    time.sleep(0.2)
+    raise ConfigError("the first is wrong")
+
+
 def long_winded(shared: Any, task: int, tell: Tell) -> int:
     raise LongWindedError("no way", task)
 
@@ -63,6 +71,10 @@ def always_dies(shared: Any, task: int, tell: Tell) -> int:
 def pid(shared: Any, task: float, tell: Tell) -> int:
     time.sleep(task)
     return os.getpid()
+
+
+def search_path(shared: Any, task: Any, tell: Tell) -> list[str]:
+    return sys.path
 
 
 def threads(shared: Any, task: int, tell: Tell) -> list[int]:

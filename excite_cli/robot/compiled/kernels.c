@@ -512,6 +512,9 @@ EXPORT void bicubic(index_t count, index_t first_knots, index_t second_knots, co
     }
 }
 
+/* Raised, here and in kernels.py, when a function takes other arguments. */
+EXPORT int version(void) { return 1; }
+
 /* setuptools asks for this name on some systems. The library is no module and is never imported: it
    needs no headers of Python, and one build serves all its versions. */
 EXPORT void *PyInit__kernels(void) { return 0; }

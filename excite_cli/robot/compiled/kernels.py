@@ -18,24 +18,34 @@ Indices = NDArray[np.intp]
 
 _NAMES = ("placements", "axes", "pull_back", "distances", "gradients", "squared", "bicubic")
 _ASKED = "EXCITE_KERNELS"
+_VERSION = 1  # that of kernels.c; raise both when a function takes other arguments
 
 
 class Kernels:
     """Functions of `kernels.c`; arrays must be C-contiguous float64 and int64."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
+        if library.version() != _VERSION:
+            raise OSError("compiled from another version of kernels.c")
         self._functions = {name: getattr(library, name) for name in _NAMES}
         for function in self._functions.values():
             function.restype = None
 
     def call(self, name: str, *arguments: int | float | Array | Indices) -> None:
-        """Run one function: integers as sizes, floats as doubles, arrays as their first entry."""
+        """Run one function: integers as sizes, floats as doubles, arrays as their first entry.
+
+        Raises
+        ------
+        TypeError
+            An array is not contiguous, or of another type than float64 and int64.
+        """
         self._functions[name](*[_passed(argument) for argument in arguments])
 
 
 def _passed(argument: int | float | Array | Indices) -> Any:
     if isinstance(argument, np.ndarray):
-        assert argument.flags.c_contiguous
+        if not argument.flags.c_contiguous or argument.dtype not in (np.float64, np.int64):
+            raise TypeError(f"a kernel cannot take an array of {argument.dtype} as it lies")
         return ctypes.c_void_p(argument.ctypes.data)
     if isinstance(argument, float):
         return ctypes.c_double(argument)
@@ -50,7 +60,7 @@ def _loaded() -> Kernels | None:
         return None
     try:
         return Kernels(ctypes.CDLL(found.origin))
-    except (OSError, AttributeError):  # of another machine, or of another version of the source
+    except (OSError, AttributeError):  # of another machine, or of another version
         return None
 
 

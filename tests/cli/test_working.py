@@ -1,0 +1,46 @@
+"""What is said about the number of workers, and about an interrupted command."""
+
+import os
+import signal
+
+import pytest
+
+from excite_cli.cli.console import Terminal
+from excite_cli.cli.stopping import stopped
+from excite_cli.cli.working import tell_idle, working
+
+
+def test_a_system_that_does_not_tell_its_affinity_has_all_processors(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    working(Terminal(), 4, None).close()
+    assert "4 workers share 3 processors" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("workers", "starts", "said"),
+    [
+        (2, 1, "hint: one start: one worker has something to do"),
+        (4, 3, "hint: 3 starts: 3 have something to do"),
+        (2, 2, ""),
+        (1, 1, ""),
+    ],
+)
+def test_idle_workers_are_told(
+    workers: int, starts: int, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tell_idle(Terminal(), workers, starts)
+    told = capsys.readouterr().err
+    assert said in told
+    assert bool(said) == bool(told)
+
+
+def test_what_can_be_gone_on_with_is_told_how() -> None:
+    assert stopped(["optimize", "a.yaml"])[1].endswith("motion is in the file: see --resume.")
+    assert stopped(["study", "a.yaml"])[1].endswith("case is in the folder: see --resume.")
+    assert stopped(["check", "a.h5"]) == (
+        128 + signal.SIGINT,
+        "interrupted; no file is half-written.",
+    )
