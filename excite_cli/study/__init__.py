@@ -1,0 +1,1 @@
+"""Many cases: settings and logs, a file each, and one table."""
