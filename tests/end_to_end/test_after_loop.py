@@ -10,7 +10,7 @@ SLOW = ("--set", "constraints.joint_limits.scale=0.15")
 SIZE = 0.12
 ROBOT = (
     "--effect", f"nonlinear_viscous_friction@elbow={SIZE},power:2",
-    "--torque-noise", "0.03", "--seed", "1",
+    "--torque-noise", "0.03", "--seed", "2",
 )  # fmt: skip
 TRUTH = ("nonlinear_viscous_friction", ["elbow"])
 
