@@ -88,7 +88,10 @@ class Objective:
         return None if self._effects is None else self._effects.evaluate(times, q, v, a)
 
     def _block(self, q: Array, v: Array, a: Array, seen: SeenColumns | None) -> Array:
-        y = self._regressor.evaluate(q, v, a)[:, :, self.base.selection]
+        if KERNELS is not None:
+            y = self._many.regressor(q, v, a, self.base.selection)
+        else:
+            y = self._regressor.evaluate(q, v, a)[:, :, self.base.selection]
         if not self._plain:
             y = y * self.weighting.rows[:, None] * self.weighting.columns
         if seen is not None:

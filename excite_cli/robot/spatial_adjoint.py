@@ -26,10 +26,13 @@ The cost does not depend on the number of pairs.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.robot.compiled.kernels import KERNELS
 from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Array, Robot
+
+Indices = NDArray[np.intp]
 
 # [ω•]: I ω = [ω•] (Ixx, Ixy, Iyy, Ixz, Iyz, Izz); _INERTIA[k] is the matrix for ω = e_k.
 _INERTIA = np.zeros((3, 3, 6))
@@ -103,6 +106,26 @@ class SpatialAdjoint:
         strict = self._carried[self._dof_body][:, :] - np.equal.outer(dof_body, dof_body)
         self._strict = strict[np.ix_(robot.moved, robot.rows)]
         self._gravity = np.concatenate([-np.asarray(model.gravity.linear), np.zeros(3)])
+
+    def regressor(self, q: Array, v: Array, a: Array, kept: Indices) -> Array:
+        """Columns `kept` (r,) of the regressor for the measured rows, (T, R, r); compiled only.
+
+        As `Regressor`, which goes through Pinocchio, by the recursion of the pull-back: row i of a
+        body that joint i carries is its column S_i, seen from the body, times Y_j.
+        """
+        assert KERNELS is not None
+        robot, tree = self.robot, self._kinematics
+        position = np.full(10 * robot.n_bodies, -1, dtype=np.int64)
+        position[kept] = np.arange(len(kept))
+        found = np.zeros((len(q), len(robot.rows), len(kept)))
+        KERNELS.call(
+            "regressor", len(q), robot.n_bodies, tree.nv, robot.n, len(robot.rows), tree.parents,
+            self._dof_body, tree.variable, self._moved, self._rows, self._carried, tree.twists,
+            self._gravity, *tree.placements(q), np.ascontiguousarray(v, dtype=float),
+            np.ascontiguousarray(a, dtype=float), position, len(kept),
+            np.empty(12 * tree.nv + 24 * robot.n_bodies), found,
+        )  # fmt: skip
+        return found
 
     def pull_back(
         self, q: Array, v: Array, a: Array, left: Array, right: Array

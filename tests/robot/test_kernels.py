@@ -20,6 +20,7 @@ from excite_cli.robot.compiled.kernels import KERNELS
 from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.pair_distances import PairDistances
 from excite_cli.robot.pair_table import PairTable
+from excite_cli.robot.regressor import Regressor
 from excite_cli.robot.spatial_adjoint import SpatialAdjoint
 
 from .random_robots import random_robot
@@ -65,6 +66,18 @@ def test_kinematics_and_pull_back(chosen: tuple[int, int, bool]) -> None:
         plain = (*placed, kinematics.axes(*placed), *adjoint.pull_back_dense(q, v, a, weights))
     for one, other in zip(compiled, plain, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-11 * (1 + np.abs(other).max()))
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(ROBOTS)
+def test_regressor_is_pinocchios(chosen: tuple[int, int, bool]) -> None:
+    seed, joints, floating = chosen
+    robot = random_robot(seed, joints, floating)
+    states = robot.draw_states(7, seed)
+    kept = np.random.default_rng(seed).permutation(10 * robot.n_bodies)[: 4 * robot.n_bodies]
+    found = SpatialAdjoint(robot).regressor(*states, kept)
+    known = Regressor(robot).evaluate(*states)[:, :, kept]
+    np.testing.assert_allclose(found, known, atol=1e-12 * (1 + np.abs(known).max()))
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)

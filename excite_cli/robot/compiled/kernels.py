@@ -1,7 +1,8 @@
-"""The compiled inner loops (`kernels.c`), called through ctypes, which lets other threads run.
+"""The compiled inner loops, called through ctypes, which lets other threads run.
 
-The C file is compiled when the package is built. Where it could not be, `KERNELS` is None and the
-NumPy forms beside each caller take over: the same figures to rounding, two to ten times slower.
+The C files beside this one are compiled when the package is built. Where that could not be done,
+`KERNELS` is None and the NumPy forms beside each caller take over: the same figures to rounding,
+two to ten times slower.
 `EXCITE_KERNELS=numpy` in the environment asks for them.
 """
 
@@ -16,17 +17,19 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_NAMES = ("placements", "axes", "pull_back", "distances", "gradients", "squared", "bicubic")
+_NAMES = (
+    "placements", "axes", "regressor", "pull_back", "distances", "gradients", "squared", "bicubic",
+)  # fmt: skip
 _ASKED = "EXCITE_KERNELS"
-_VERSION = 1  # that of kernels.c; raise both when a function takes other arguments
+_VERSION = 2  # that of the C files; raise both when a function takes other arguments
 
 
 class Kernels:
-    """Functions of `kernels.c`; arrays must be C-contiguous float64 and int64."""
+    """The compiled functions; arrays must be C-contiguous float64 and int64."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
         if library.version() != _VERSION:
-            raise OSError("compiled from another version of kernels.c")
+            raise OSError("compiled from another version of the C files")
         self._functions = {name: getattr(library, name) for name in _NAMES}
         for function in self._functions.values():
             function.restype = None
