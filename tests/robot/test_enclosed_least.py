@@ -36,16 +36,13 @@ def test_bound_holds_at_every_instant(seed: int, spread: float) -> None:
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6))
 def test_bound_is_tight_for_short_intervals(seed: int) -> None:
-    """Off by no more than the crossing of signs and the radius explain."""
+    """Off by no more than the crossing of signs and the radius explain: both go with the spread."""
     rng = np.random.default_rng(seed)
     known = uncertainty(rng, 6)
-    off = []
     for spread in (0.02, 0.002):
         y = functional(np.random.default_rng(seed), spread)
         at = np.min([known.least(y.at(s)) for s in np.linspace(-1, 1, 41)], axis=0)
-        off.append(float(np.max(at - least_of(y, known))))
-    assert off[0] < 0.05
-    assert off[1] < 0.5 * off[0] + 2e-4
+        assert float(np.max(at - least_of(y, known))) < 2.5 * spread
 
 
 def test_combinations_of_rows() -> None:
