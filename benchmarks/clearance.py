@@ -9,9 +9,9 @@ from threadpoolctl import threadpool_limits
 from benchmarks.problems import problem
 from benchmarks.timing import interleaved
 from excite_cli.constraints.self_collision import SelfCollision
-from excite_cli.robot.clearance import Clearance
-from excite_cli.robot.clearance_coal import CoalClearance
-from excite_cli.robot.collision_pairs import CollisionPairs
+from excite_cli.geometry.clearance import Clearance
+from excite_cli.geometry.clearance_coal import CoalClearance
+from excite_cli.geometry.collision_pairs import CollisionPairs
 
 
 def main() -> None:

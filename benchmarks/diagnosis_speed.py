@@ -22,10 +22,10 @@ from threadpoolctl import threadpool_limits
 from benchmarks.battery.motions import CONFIGS, ROBOTS, pool, trajectory
 from excite_cli.config.load import load_spec
 from excite_cli.diagnosis.diagnose import diagnose
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.catalogue import declared_effects
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import build_robot
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import parse_planted
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate

@@ -142,12 +142,12 @@ def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> floa
     """
     from excite_cli.config.load import load_spec
     from excite_cli.diagnosis.tracing import Model, trace
+    from excite_cli.dynamics.base_parameters import find_base_parameters
     from excite_cli.effects.catalogue import declared_effects
     from excite_cli.identification.prepare import PreparedRun, prepare
     from excite_cli.identification.processing import choose_processing
     from excite_cli.identification.split import split
     from excite_cli.measurement.catalogue import read_dataset
-    from excite_cli.robot.base_parameters import find_base_parameters
     from excite_cli.robot.model import build_robot
 
     config = ROOT / "configs" / case.config

@@ -24,7 +24,7 @@ from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.identification.identify import identify
 from excite_cli.robot.model import Array
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.store.fit_file import write_fit

@@ -19,14 +19,14 @@ from benchmarks.whole_plant import WholePlant
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.constraints.balance import Balance
-from excite_cli.constraints.contact import Contact, ZeroMomentPoint
+from excite_cli.constraints.ground_contact import Contact, ZeroMomentPoint
 from excite_cli.constraints.joint_torque import JointTorque
+from excite_cli.dynamics.states import States
+from excite_cli.dynamics.uncertain_inertias import box
+from excite_cli.dynamics.whole_robot import whole_parameters
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.robot.model import Array
-from excite_cli.robot.states import States
-from excite_cli.robot.uncertainty import box
-from excite_cli.robot.whole_robot import whole_parameters
 
 RATE = 500.0
 # A replay counts as broken beyond this share of the limit; margins end at zero, not above it.

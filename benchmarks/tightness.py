@@ -21,14 +21,18 @@ from threadpoolctl import threadpool_limits
 from benchmarks.problems import CONFIGS
 from excite_cli.cli.setup import fit_knowledge
 from excite_cli.config.load import load_spec
+from excite_cli.dynamics.regressor import Regressor
+from excite_cli.dynamics.uncertain_inertias import (
+    FitKnowledge,
+    InertiaUncertainty,
+    inertia_uncertainty,
+)
+from excite_cli.dynamics.whole_robot import GroundWrench, whole_parameters
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.identification.identify import identify
 from excite_cli.robot.model import Array
-from excite_cli.robot.regressor import Regressor
-from excite_cli.robot.uncertainty import FitKnowledge, InertiaUncertainty, inertia_uncertainty
-from excite_cli.robot.whole_robot import GroundWrench, whole_parameters
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.store.fit_file import write_fit

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from excite_cli.api import simulate as simulate
     from excite_cli.config.spec import Spec as Spec
     from excite_cli.diagnosis.next_motion import NextMotion as NextMotion
-    from excite_cli.diagnosis.result import Diagnosis as Diagnosis
+    from excite_cli.diagnosis.records import Diagnosis as Diagnosis
     from excite_cli.errors import ConfigError as ConfigError
     from excite_cli.errors import ExciteError as ExciteError
     from excite_cli.errors import FileError as FileError

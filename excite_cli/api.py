@@ -24,7 +24,8 @@ from excite_cli.diagnosis.measured_prior import measured_stack
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
 from excite_cli.diagnosis.plausibility import check_dataset
-from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import path_of
@@ -44,9 +45,8 @@ from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.quality import raise_for_errors
 from excite_cli.proposal.propose import Proposal, Request
 from excite_cli.proposal.propose import propose as propose_config
-from excite_cli.robot.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import parse_planted
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import Simulation, run_names

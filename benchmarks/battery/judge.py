@@ -15,7 +15,7 @@ from benchmarks.battery.scoring import Answer, Found, Name, Plant, Score, identi
 from benchmarks.battery.sizes import Sized
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.diagnosis.diagnose import diagnose
-from excite_cli.diagnosis.result import Diagnosis, EffectRecord
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Dataset

@@ -14,10 +14,10 @@ import numpy as np
 
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
-from excite_cli.robot.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.dynamics.regressor import Regressor
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.robot.regressor import Regressor
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.trajectory.fourier import FourierTrajectory
 
 CONFIGS = Path(__file__).parents[2] / "configs"

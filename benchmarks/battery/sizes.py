@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.rigid_body import RigidBody
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import Planted
 
 RATIOS = (0.03, 0.30)

@@ -11,11 +11,11 @@ from benchmarks.peers.figaroh_races import ACCELERATION, JOINTS, LIMITS
 from benchmarks.peers.race import Race, States
 from excite_cli.api import load_problem
 from excite_cli.constraints.base import Array
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import Regressor
 from excite_cli.excitation.admissible import smallest_margins
 from excite_cli.excitation.problem import Problem
-from excite_cli.robot.inverse_dynamics import InverseDynamics
-from excite_cli.robot.mesh_check import MeshCheck
-from excite_cli.robot.regressor import Regressor
+from excite_cli.geometry.mesh_check import MeshCheck
 
 RATE = 1000.0
 _SHARE_EVERY = 10  # share of samples in collision: at 100 Hz

@@ -20,14 +20,14 @@ from threadpoolctl import threadpool_limits
 from excite_cli.api import load_problem
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import Criterion
+from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.regressor import Regressor
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.objective import Objective, Spectrum
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.stack import Stack
-from excite_cli.robot.base_parameters import BaseParameters
-from excite_cli.robot.regressor import Regressor
 
 # The step of the paper, and of FIGAROH.
 STEP = 1e-6

@@ -8,7 +8,7 @@ from benchmarks.trust.fuzz_mutations import Rng, chance, pick
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Array, Dataset
-from excite_cli.measurement.motions import motion_reader_for, read_motion
+from excite_cli.measurement.motion_files import motion_reader_for, read_motion
 from excite_cli.measurement.quality import raise_for_errors
 
 JOINTS = ("shoulder", "elbow", "wrist")

@@ -17,9 +17,9 @@ _LEFT = re.compile(r"\.(capsules|meshes)-0+\.(json|npz)\.(lock|[a-z0-9_]{8}\.par
 
 def kill_caches(folder: Path, kills: int, seed: int) -> Tally:
     """Kill `kills` processes that write both caches in turn; what is read is whole or nothing."""
+    from excite_cli.geometry.capsule_cache import store_capsules, stored_capsules
+    from excite_cli.geometry.table_cache import store_arrays, stored_arrays
     from excite_cli.robot.capsule import Capsule
-    from excite_cli.robot.capsule_cache import store_capsules, stored_capsules
-    from excite_cli.robot.table_cache import store_arrays, stored_arrays
 
     rng, tally = np.random.default_rng(seed), Tally()
     ends = rng.normal(size=(300, 2, 3))

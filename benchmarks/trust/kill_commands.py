@@ -88,7 +88,7 @@ def _data(path: Path) -> Content:
 
 
 def _motion(path: Path) -> Content:
-    from excite_cli.measurement.motions import read_own_motion
+    from excite_cli.measurement.motion_files import read_own_motion
 
     motion = read_own_motion(path)
     states = (motion.t, motion.q, motion.v, motion.a)

@@ -9,9 +9,9 @@ from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 
 if TYPE_CHECKING:
-    from excite_cli.excitation.certificate import Path as MotionPath
     from excite_cli.excitation.inspection import Inspection
     from excite_cli.excitation.problem import Problem
+    from excite_cli.proof.certificate import Path as MotionPath
     from excite_cli.trajectory.chain import Segment
 
 # Stored samples may differ from the motion by rounding only.

@@ -12,7 +12,7 @@ from excite_cli.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
     from excite_cli.config.spec import Spec
-    from excite_cli.diagnosis.result import Diagnosis
+    from excite_cli.diagnosis.records import Diagnosis
 
 
 def diagnose(
@@ -61,7 +61,7 @@ def diagnose(
     from excite_cli.config.load import load_spec, spec_as_yaml
     from excite_cli.diagnosis.diagnose import diagnose as run_diagnosis
     from excite_cli.diagnosis.next_motion import next_experiment
-    from excite_cli.robot.base_parameters import find_base_parameters
+    from excite_cli.dynamics.base_parameters import find_base_parameters
     from excite_cli.robot.model import build_robot
     from excite_cli.store.diagnosis_file import write_diagnosis
     from excite_cli.store.versions import versions

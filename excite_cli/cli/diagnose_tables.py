@@ -7,7 +7,7 @@ from rich.table import Table
 
 from excite_cli.cli.layout import table as new_table
 from excite_cli.cli.noise_floor_words import floor_cells, floor_columns
-from excite_cli.diagnosis.result import Diagnosis, EffectRecord, NamedEffect, Round
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Round
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
     counted,

@@ -81,7 +81,7 @@ def chains_of(terminal: Terminal, file: Path, wanted: Wanted) -> list[ExportedCh
 def _motions(file: Path, motion: str) -> "tuple[Result | None, tuple[str, ...], list[Segment]]":
     """The result that `file` is, if it is one; joint names, and the motions asked for."""
     from excite_cli.cli.motions import is_motion, motions_of_result
-    from excite_cli.measurement.motions import read_own_motion
+    from excite_cli.measurement.motion_files import read_own_motion
     from excite_cli.store.result_file import read_result
     from excite_cli.trajectory.chain import Segment
     from excite_cli.trajectory.sampled import through_samples

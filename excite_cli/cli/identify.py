@@ -54,8 +54,8 @@ def identify(
     from excite_cli.cli.setup import load_dataset, single_threaded, tell_findings
     from excite_cli.config.load import load_spec, spec_as_yaml
     from excite_cli.diagnosis.plausibility import check_dataset
+    from excite_cli.dynamics.base_parameters import find_base_parameters
     from excite_cli.identification.identify import identify as run_identification
-    from excite_cli.robot.base_parameters import find_base_parameters
     from excite_cli.robot.model import build_robot
     from excite_cli.store.fit_file import write_fit
 

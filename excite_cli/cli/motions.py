@@ -117,14 +117,14 @@ def is_motion(path: Path, spec: "Spec | None" = None) -> bool:
     FileError
         There is no such file.
     """
-    from excite_cli.measurement.motions import motion_reader_for
+    from excite_cli.measurement.motion_files import motion_reader_for
 
     torque = spec.measurement.channels.get("tau") if spec is not None else None
     return motion_reader_for(path, torque or "tau") is not None
 
 
 def _motion(terminal: Terminal, path: Path, robot: "Robot") -> "Segment":
-    from excite_cli.measurement.motions import read_motion
+    from excite_cli.measurement.motion_files import read_motion
     from excite_cli.trajectory.chain import Segment
     from excite_cli.trajectory.sampled import through_samples
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from excite_cli.errors import FileError
 
 if TYPE_CHECKING:
-    from excite_cli.diagnosis.result import Diagnosis
+    from excite_cli.diagnosis.records import Diagnosis
     from excite_cli.excitation.result import Result
     from excite_cli.identification.stored_fit import StoredFit
 

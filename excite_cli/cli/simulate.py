@@ -163,7 +163,7 @@ def simulate(
     from excite_cli.measurement.hdf5_writer import write_dataset
     from excite_cli.robot.model import build_robot
     from excite_cli.simulation.engine import load_mujoco
-    from excite_cli.simulation.motion import Planned, PlannedMotion, PlannedProgram
+    from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
     from excite_cli.simulation.planted import parse_planted
     from excite_cli.simulation.settings import SimulationSettings
     from excite_cli.simulation.simulate import run_names

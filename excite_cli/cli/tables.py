@@ -6,10 +6,11 @@ from typing import Any
 from rich.table import Table
 
 from excite_cli.cli.layout import table as new_table
-from excite_cli.constraints.base import Constraint, Worst
+from excite_cli.constraints.base import Constraint
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
+from excite_cli.proof.worst_margin import Worst
 
 
 def motion_table(motions: Sequence[Motion]) -> Table:

@@ -5,12 +5,12 @@ from collections import Counter
 from excite_cli.cli.console import Terminal
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.mesh_clearance import MeshClearance
+from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
-from excite_cli.constraints.surroundings import Surroundings
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.excitation.problem import Problem
-from excite_cli.robot.collision_pairs import ALWAYS, UNGUARDED, CollisionPairs
-from excite_cli.robot.obstacle_pairs import ObstaclePairs
+from excite_cli.geometry.collision_pairs import ALWAYS, UNGUARDED, CollisionPairs
+from excite_cli.geometry.obstacle_pairs import ObstaclePairs
 
 
 def tell_problem(terminal: Terminal, problem: Problem) -> None:

@@ -12,15 +12,15 @@ import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.support_polygon import Support, support_polygon
-from excite_cli.robot.center_of_mass import CenterOfMass
-from excite_cli.robot.enclosed_least import least_of
-from excite_cli.robot.enclosed_motion import EnclosedMotion
-from excite_cli.robot.enclosed_rows import combined, mass_rows
-from excite_cli.robot.least_ratio import Ratios, least_ratios, worst_inertias
+from excite_cli.dynamics.center_of_mass import CenterOfMass
+from excite_cli.dynamics.least_ratio import Ratios, least_ratios, worst_inertias
+from excite_cli.dynamics.states import States
+from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
+from excite_cli.dynamics.whole_robot import drawn_states
+from excite_cli.proof.enclosed_least import least_of
+from excite_cli.proof.enclosed_motion import EnclosedMotion
+from excite_cli.proof.enclosed_rows import combined, mass_rows
 from excite_cli.robot.model import Robot
-from excite_cli.robot.states import States
-from excite_cli.robot.uncertainty import InertiaUncertainty
-from excite_cli.robot.whole_robot import drawn_states
 
 DISC_SIDES = 16
 # A robot that may weigh less than this share of its mass has no centre of mass to speak of.

@@ -6,38 +6,18 @@ Members neither know the optimiser nor the trajectory.
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.robot.enclosed_motion import EnclosedMotion
-from excite_cli.robot.states import States
+from excite_cli.dynamics.states import States
+from excite_cli.proof.enclosed_motion import EnclosedMotion
+from excite_cli.proof.worst_margin import Worst
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _ROUNDING = 1e-12
-
-
-@dataclass(frozen=True)
-class Worst:
-    """The smallest margin of a constraint over a motion, with where and when it occurs.
-
-    Smallest as a `share` of the scale of its column, so that joints of different size compare.
-    """
-
-    margin: float
-    unit: str
-    label: str
-    time: float
-    violations: int
-    share: float = 0.0
-
-    def with_later(self, later: "Worst") -> "Worst":
-        """The worse of two, by the share of the scale, with the violations of both."""
-        worse = later if later.share < self.share else self
-        return replace(worse, violations=self.violations + later.violations)
 
 
 class Constraint(ABC):

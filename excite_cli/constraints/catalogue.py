@@ -13,25 +13,25 @@ from excite_cli.config.constraints_spec import (
 )
 from excite_cli.constraints.balance import Balance
 from excite_cli.constraints.base import Array, Constraint
-from excite_cli.constraints.contact import Contact, Ground, ZeroMomentPoint
+from excite_cli.constraints.ground_contact import Contact, Ground, ZeroMomentPoint
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.constraints.keep_out import build_keep_out
 from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
+from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.constraints.support_polygon import support_polygon
-from excite_cli.constraints.surroundings import Surroundings
+from excite_cli.dynamics.center_of_mass import CenterOfMass
+from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.states import States
+from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.errors import ConfigError
-from excite_cli.robot.capsules import fit_capsules
-from excite_cli.robot.center_of_mass import CenterOfMass
-from excite_cli.robot.collision_pairs import choose_pairs
-from excite_cli.robot.forward_kinematics import BatchKinematics
+from excite_cli.geometry.capsules import fit_capsules
+from excite_cli.geometry.collision_pairs import choose_pairs
+from excite_cli.geometry.obstacle_pairs import choose_obstacle_pairs, ignored_pairs
+from excite_cli.geometry.obstacles import build_obstacles
+from excite_cli.geometry.pair_tables import mesh_tables, require_tabled
 from excite_cli.robot.model import Robot
-from excite_cli.robot.obstacle_pairs import choose_obstacle_pairs, ignored_pairs
-from excite_cli.robot.obstacles import build_obstacles
-from excite_cli.robot.pair_tables import mesh_tables, require_tabled
-from excite_cli.robot.states import States
-from excite_cli.robot.uncertainty import InertiaUncertainty
 
 
 def build_constraints(

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.robot.enclosed_motion import EnclosedMotion
+from excite_cli.dynamics.states import States
+from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.model import Robot
-from excite_cli.robot.states import States
 
 Mask = NDArray[np.bool_]
 

@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.robot.enclosed_least import least_of
-from excite_cli.robot.enclosed_motion import EnclosedMotion
-from excite_cli.robot.enclosed_rows import torque_rows
-from excite_cli.robot.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import Regressor
+from excite_cli.dynamics.row_adjoint import RowAdjoint
+from excite_cli.dynamics.states import States
+from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
+from excite_cli.dynamics.whole_robot import drawn_states
+from excite_cli.proof.enclosed_least import least_of
+from excite_cli.proof.enclosed_motion import EnclosedMotion
+from excite_cli.proof.enclosed_rows import torque_rows
 from excite_cli.robot.model import Robot
-from excite_cli.robot.regressor import Regressor
-from excite_cli.robot.row_adjoint import RowAdjoint
-from excite_cli.robot.states import States
-from excite_cli.robot.uncertainty import InertiaUncertainty
-from excite_cli.robot.whole_robot import drawn_states
 
 
 class JointTorque(Constraint):

@@ -3,11 +3,11 @@
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.enclosure.taylor import Taylor
-from excite_cli.robot.enclosed_motion import EnclosedMotion
-from excite_cli.robot.pair_table import PairTable
-from excite_cli.robot.pair_tables import FAR
-from excite_cli.robot.states import States
+from excite_cli.dynamics.states import States
+from excite_cli.geometry.pair_table import PairTable
+from excite_cli.geometry.pair_tables import FAR
+from excite_cli.proof.enclosed_motion import EnclosedMotion
+from excite_cli.proof.taylor import Taylor
 
 KEPT = 0.002
 """Distance kept [m]: meshes need less than capsules, and more would take too much of the range."""

@@ -3,13 +3,13 @@
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.dynamics.states import States
+from excite_cli.geometry.clearance import Clearance
+from excite_cli.geometry.collision_pairs import CollisionPairs
+from excite_cli.proof.enclosed_distances import EnclosedCapsules
+from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.clearance import Clearance
-from excite_cli.robot.collision_pairs import CollisionPairs
-from excite_cli.robot.enclosed_distances import EnclosedCapsules
-from excite_cli.robot.enclosed_motion import EnclosedMotion
 from excite_cli.robot.model import Robot
-from excite_cli.robot.states import States
 
 # Distances beyond this many metres above the margin do not concern the optimiser; less for a robot
 # of thin links (this many times their radius), so that a hand need not open as far as an arm.

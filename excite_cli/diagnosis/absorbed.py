@@ -8,7 +8,7 @@ from scipy.linalg import cho_solve
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import ABSORBED, Evidence
 from excite_cli.diagnosis.kinds import FIRST
-from excite_cli.diagnosis.result import Absorbed
+from excite_cli.diagnosis.records import Absorbed
 
 _NAMED = 4
 _WORTH_NAMING = 0.15

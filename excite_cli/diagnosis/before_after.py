@@ -5,18 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.diagnosis.model import Model, width_of
+from excite_cli.diagnosis.declared_model import Model, width_of
 from excite_cli.diagnosis.prediction import Prediction, errors_on, predicted
 from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.tracing import Traced
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.split import run_name
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody
 
 
 @dataclass(frozen=True)

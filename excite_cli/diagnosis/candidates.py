@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.config.data_spec import DiagnosisSpec
-from excite_cli.diagnosis.result import EffectRecord
+from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError

@@ -13,13 +13,14 @@ from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import Alias, aliases_of
 from excite_cli.diagnosis.before_after import both_models, on_sealed, training_traces
 from excite_cli.diagnosis.candidates import record_of
+from excite_cli.diagnosis.correlated_covariance import covariance_of
+from excite_cli.diagnosis.declared_model import KeptInertias, Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
 from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.friction_line import friction_lines
-from excite_cli.diagnosis.model import KeptInertias, Model
 from excite_cli.diagnosis.plausibility import check_plausibility
-from excite_cli.diagnosis.result import (
+from excite_cli.diagnosis.records import (
     Diagnosis,
     EffectRecord,
     Information,
@@ -29,8 +30,9 @@ from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.rounds import rounds_of
 from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.tracing import Traced, trace
-from excite_cli.diagnosis.uncertainty import covariance_of
 from excite_cli.diagnosis.unexplained import unexplained_structure
+from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
@@ -39,9 +41,7 @@ from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.split import Split, run_name, split
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding
-from excite_cli.robot.base_parameters import BaseParameters
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
 
 Progress = Callable[[str, int], None]
 

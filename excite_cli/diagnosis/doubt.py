@@ -11,7 +11,7 @@ size would explain. The effect is an approximation
 
 from collections.abc import Sequence
 
-from excite_cli.diagnosis.result import Unexplained
+from excite_cli.diagnosis.records import Unexplained
 from excite_cli.diagnosis.tracing import Traced
 
 _SAME_QUANTITY = 0.1

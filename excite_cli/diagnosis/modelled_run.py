@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.diagnosis.model import Model
+from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.training import TrainingData
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import effect_columns
 from excite_cli.identification.split import run_name
 from excite_cli.robot.model import Array
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody
 
 
 class ModelledRun:

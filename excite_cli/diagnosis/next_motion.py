@@ -14,8 +14,9 @@ import numpy as np
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.result import Diagnosis, EffectRecord
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.diagnosis.separation import DataColumns, separated
+from excite_cli.dynamics.uncertain_inertias import FitKnowledge
 from excite_cli.effects.base import Effect
 from excite_cli.errors import FileError
 from excite_cli.excitation.discrimination import (
@@ -27,7 +28,6 @@ from excite_cli.excitation.extension import in_words, why_not_planned
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.robot.uncertainty import FitKnowledge
 
 
 @dataclass(frozen=True)

@@ -24,15 +24,15 @@ from excite_cli.diagnosis.rearranged import (
     torques_changed,
 )
 from excite_cli.diagnosis.torque_shares import Samples, columns_of, samples_of, shares_left
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.errors import FileError
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import inertial_prior
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody
 
 _SAMPLES = 600
 _GOOD = 0.1  # data that leave less than this on every joint are what they say they are

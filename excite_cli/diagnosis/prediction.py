@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import effect_columns
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.rigid_body import RigidBody
 
 _SETTLED = 3
 

@@ -17,7 +17,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from excite_cli.diagnosis.torque_shares import Samples, columns_of, own_shares_left
-from excite_cli.robot.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array
 
 _SEARCH_SAMPLES = 100

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.result import Round, Suspect
+from excite_cli.diagnosis.records import Round, Suspect
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.robot.model import Array
 

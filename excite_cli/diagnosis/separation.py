@@ -9,7 +9,7 @@ from scipy.linalg import qr
 
 from excite_cli.criteria.sigma_min import SigmaMin
 from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.result import Diagnosis, EffectRecord
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.effects.base import Effect
 from excite_cli.errors import FileError
 from excite_cli.excitation.discrimination import Direction, Separation, divergences

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.measurement.dataset import Mask
-from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array
 
 _SWEEPS = 80

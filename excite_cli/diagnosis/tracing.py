@@ -13,10 +13,10 @@ import numpy as np
 
 from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis.candidates import Candidate, possible_effects, with_columns
+from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.kinds import LAST_TIER
-from excite_cli.diagnosis.model import Model
 from excite_cli.diagnosis.modelled_run import ModelledRun, training_data
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import inflation_of
@@ -24,10 +24,10 @@ from excite_cli.diagnosis.possible_sizes import possible_sizes
 from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.training import TrainingData
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
-from excite_cli.robot.regressor import standard_parameters
 
 _PASSES = 6
 _SETTLED = 1e-3  # change of the residual energy from pass to pass

@@ -18,7 +18,7 @@ from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.grams import JointGram
 from excite_cli.diagnosis.history import histories
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
-from excite_cli.diagnosis.result import Unexplained
+from excite_cli.diagnosis.records import Unexplained
 from excite_cli.diagnosis.traces import Dependence
 from excite_cli.diagnosis.training import Columns, TrainingData
 from excite_cli.effects.base import Signals

@@ -1,6 +1,6 @@
 """A diagnosis in words, the same ones wherever it is told."""
 
-from excite_cli.diagnosis.result import EffectRecord, NamedEffect
+from excite_cli.diagnosis.records import EffectRecord, NamedEffect
 from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
 

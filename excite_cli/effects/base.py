@@ -16,8 +16,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.rigid_body import RigidBody
 
 Scope = Literal["joint", "pair", "robot"]
 Quantity = Literal["position", "speed", "acceleration", "load", "time"]

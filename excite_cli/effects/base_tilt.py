@@ -12,9 +12,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.rigid_body import RigidBody
 
 
 class BaseTilt(Effect):

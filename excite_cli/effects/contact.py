@@ -10,9 +10,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Abscissa, Effect, Parameter, Scope, Signals
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.rigid_body import RigidBody
 
 _CELLS = 96  # per run, for the search of the window
 _LONGEST = 0.5  # of the run; what lasts longer is no touch

@@ -10,8 +10,8 @@ which is a central difference of exact first derivatives: two passes, about nine
 
 import numpy as np
 
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.robot.model import Array
-from excite_cli.robot.rigid_body import RigidBody
 
 _STEP = 1e-5  # rad
 

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.effects.base import (
     Cotangents,
     Effect,
@@ -19,7 +20,6 @@ from excite_cli.effects.base import (
     deviation,
 )
 from excite_cli.robot.model import Array
-from excite_cli.robot.regressor import PARAMETERS_PER_BODY
 
 _RADIUS = 0.05  # m, of the sphere that is planted
 

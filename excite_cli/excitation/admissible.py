@@ -4,10 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from excite_cli.constraints.base import Array, Worst
-from excite_cli.excitation.certificate import Path, Verdict, certify
+from excite_cli.constraints.base import Array
+from excite_cli.dynamics.states import States
 from excite_cli.excitation.problem import Problem
-from excite_cli.robot.states import States
+from excite_cli.proof.certificate import Path, Verdict, certify
+from excite_cli.proof.worst_margin import Worst
 from excite_cli.trajectory.base import Trajectory
 
 CONTROLLER_RATE = 1000.0

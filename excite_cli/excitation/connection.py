@@ -13,13 +13,13 @@ import numpy as np
 
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.dynamics.states import States
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import CONTROLLER_RATE, path_of
 from excite_cli.excitation.base_motion import disconnected, straight_block
-from excite_cli.excitation.certificate import certify
 from excite_cli.excitation.path_search import find_way
 from excite_cli.excitation.problem import Problem
-from excite_cli.robot.states import States
+from excite_cli.proof.certificate import certify
 from excite_cli.trajectory.base import Trajectory
 from excite_cli.trajectory.chain import Segment
 from excite_cli.trajectory.point_to_point import PointToPoint

@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody, robot_with
+from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
 from excite_cli.effects.base import Cotangents, Effect, Signals
 from excite_cli.effects.sign import sign_of_width
-from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody, robot_with
-from excite_cli.robot.spatial_adjoint import SpatialAdjoint
 
 # Width [rad/s] of the sign of a speed while planning: samples that cross zero are no steps.
 PLANNED_SIGN = 0.02

@@ -17,12 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lstsq
 
+from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.regressor import Regressor
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.excitation.effect_columns import PLANNED_SIGN, EffectColumns, column_names
 from excite_cli.excitation.weighting import Weighting
-from excite_cli.robot.base_parameters import BaseParameters
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import Regressor
 
 _STATES, _SEED = 300, 20210914
 # A column of which less than this share is new counts as absorbed.

@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from excite_cli.dynamics.block_form import block_pull_back
 from excite_cli.excitation.differences import (
     FOURTH_ORDER_STEP,
     forward_differences,
@@ -24,7 +25,6 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import random_direction
 from excite_cli.excitation.task import MotionTask
-from excite_cli.robot.block_form import block_pull_back
 from excite_cli.robot.model import Array
 
 ADJOINT_BLOCK_LIMIT = 1e-9

@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from excite_cli.constraints.base import Array, Worst
+from excite_cli.constraints.base import Array
 from excite_cli.excitation.admissible import CONTROLLER_RATE
-from excite_cli.excitation.certificate import Path, Verdict, certify
 from excite_cli.excitation.mesh_verdict import MeshVerdict, mesh_verdict
 from excite_cli.excitation.problem import Problem
-from excite_cli.robot.mesh_check import MeshCheck
+from excite_cli.geometry.mesh_check import MeshCheck
+from excite_cli.proof.certificate import Path, Verdict, certify
+from excite_cli.proof.worst_margin import Worst
 
 MESHES = "mesh_collision"
 _OF_PAIRS = ("self_collision", "mesh_clearance", "surroundings")

@@ -4,7 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
-from excite_cli.constraints.base import Array, Worst
+from excite_cli.constraints.base import Array
+from excite_cli.proof.worst_margin import Worst
 
 Status = Literal["converged", "iteration limit", "time limit", "stalled"]
 

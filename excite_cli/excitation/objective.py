@@ -13,16 +13,16 @@ import numpy as np
 from scipy.linalg import lapack, qr
 
 from excite_cli.criteria.base import Criterion, condition_number, singular_values
+from excite_cli.dynamics.adjoint import FictitiousInertiaAdjoint
+from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.regressor import Regressor
+from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
 from excite_cli.excitation.effect_columns import SeenColumns
 from excite_cli.excitation.extension import Extension
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting
-from excite_cli.robot.adjoint import FictitiousInertiaAdjoint
-from excite_cli.robot.base_parameters import BaseParameters
-from excite_cli.robot.compiled.kernels import KERNELS
+from excite_cli.kernels.library import KERNELS
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import Regressor
-from excite_cli.robot.spatial_adjoint import SpatialAdjoint
 from excite_cli.trajectory.base import Basis
 
 # Beyond this condition number the Gram matrix loses more than 1e-10 and QR + SVD take over.

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array
+from excite_cli.dynamics.states import States
 from excite_cli.excitation.problem import Problem
-from excite_cli.robot.states import States
 
 Mask = NDArray[np.bool_]
 

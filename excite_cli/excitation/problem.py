@@ -10,6 +10,14 @@ from excite_cli.constraints.base import Array, Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.criteria.base import Criterion
 from excite_cli.criteria.catalogue import build_criterion
+from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.states import States
+from excite_cli.dynamics.uncertain_inertias import (
+    FitKnowledge,
+    InertiaUncertainty,
+    inertia_uncertainty,
+)
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.boundary import Boundary, build_boundary
@@ -19,11 +27,7 @@ from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.sampling import instants, with_sampling
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting, build_weighting
-from excite_cli.robot.base_parameters import BaseParameters, find_base_parameters
-from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.robot.states import States
-from excite_cli.robot.uncertainty import FitKnowledge, InertiaUncertainty, inertia_uncertainty
 from excite_cli.trajectory.base import Basis, Trajectory
 from excite_cli.trajectory.catalogue import build_trajectory
 

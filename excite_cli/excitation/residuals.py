@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.joint_bound import JointBound
-from excite_cli.robot.compiled.kernels import KERNELS
-from excite_cli.robot.states import States
+from excite_cli.dynamics.states import States
+from excite_cli.kernels.library import KERNELS
 from excite_cli.trajectory.base import Basis
 
 Mask = NDArray[np.bool_]

@@ -7,8 +7,8 @@ from pathlib import Path
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.constraints.mesh_clearance import MeshClearance
+from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
-from excite_cli.constraints.surroundings import Surroundings
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import ProgressCallback
 from excite_cli.excitation.problem import Problem

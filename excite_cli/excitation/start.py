@@ -12,9 +12,9 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
 from excite_cli.constraints.base import Array, Constraint
+from excite_cli.dynamics.states import States
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.task import MotionTask
-from excite_cli.robot.states import States
 
 # Residuals a start must have: inside, so that a barrier is finite, yet little is given away.
 _CLEAR_POSTURE, _CLEAR_MOTION = 0.03, 0.02

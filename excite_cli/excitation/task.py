@@ -12,12 +12,12 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.criteria.base import Criterion
+from excite_cli.dynamics.states import States
 from excite_cli.excitation.motion import Progress
 from excite_cli.excitation.objective import Spectrum
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.residuals import Residuals
 from excite_cli.excitation.stack import Stack
-from excite_cli.robot.states import States
 
 # First guess of what happens between the instants of the grid, as a share of a constraint's scale.
 _FIRST_GUARD = 0.01

@@ -18,9 +18,9 @@ import numpy as np
 from excite_cli.constraints.base import Array, Constraint
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.errors import ConfigError
+from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
 from excite_cli.trajectory.base import Trajectory
 from excite_cli.trajectory.chain import Chain
-from excite_cli.trajectory.enclosed import Intervals, enclosed_states, intervals_of
 
 _INTERVALS = 2000  # in a motion, or one for each of its smooth pieces
 _CHUNK = 4000

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.config.spec import CriterionSpec
+from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.errors import ConfigError, nearest
-from excite_cli.robot.base_parameters import BaseParameters
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import Regressor, standard_parameters
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 from excite_cli.config.spec import Spec
 from excite_cli.config.write import yaml_text
 from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.export.parameters import effect_specs
 
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from excite_cli.dynamics.regressor import payload_parameters, standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.errors import RobotError
 from excite_cli.export.exported import (
@@ -25,7 +26,6 @@ from excite_cli.export.exported import (
 )
 from excite_cli.identification.pseudo_inertia import smallest_eigenvalues
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import payload_parameters, standard_parameters
 
 _INERTIA = (
     ("ixx", 0, 0),

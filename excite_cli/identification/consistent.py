@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.sparse import csc_matrix, eye
 
+from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.identification.factors import Mask, triangle_of
 from excite_cli.identification.prior import InertialPrior
 from excite_cli.identification.pseudo_inertia import scaled_basis, smallest_eigenvalues
-from excite_cli.robot.base_parameters import BaseParameters
 from excite_cli.robot.model import Array
 
 # Least eigenvalue asked for, as a share of the mean mass of a body.

@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from excite_cli.config.data_spec import IdentificationSpec
+from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect, Parameter, Signals, Value
 from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
 from excite_cli.identification.covariance import Rows
@@ -26,9 +28,7 @@ from excite_cli.identification.regression import (
     effect_columns,
     signals_of,
 )
-from excite_cli.robot.base_parameters import BaseParameters
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
 
 # A parameter is identifiable if the data fix it to this share of its value or usual size.
 _FIXED = 0.5

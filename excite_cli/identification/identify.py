@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from excite_cli.config.spec import Spec
+from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ExciteError
@@ -33,7 +34,6 @@ from excite_cli.identification.regression import Regression, build_regression
 from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
-from excite_cli.robot.base_parameters import BaseParameters
 from excite_cli.robot.model import Robot
 
 Tell = Callable[[str], None]

@@ -28,11 +28,11 @@ from excite_cli.excitation.start import (
     unclear,
 )
 from excite_cli.excitation.task import MotionTask
-from excite_cli.robot.collision_pairs import UNGUARDED
-from excite_cli.robot.mesh_distances import MeshDistances
-from excite_cli.robot.mesh_pairs import joined_links
-from excite_cli.robot.pair_distances import carried_bodies
-from excite_cli.robot.pair_tables import near_at_posture
+from excite_cli.geometry.collision_pairs import UNGUARDED
+from excite_cli.geometry.mesh_distances import MeshDistances
+from excite_cli.geometry.mesh_pairs import joined_links
+from excite_cli.geometry.pair_distances import carried_bodies
+from excite_cli.geometry.pair_tables import near_at_posture
 
 Array = NDArray[np.float64]
 Tree = dict[str, Any]

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.identification.stored_fit import StoredFit

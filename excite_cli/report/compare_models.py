@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.report.config_differences import differences
 from excite_cli.report.page import Block, Section, Table

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from excite_cli.diagnosis.result import Diagnosis, Unexplained
+from excite_cli.diagnosis.records import Diagnosis, Unexplained
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.report.chart import (
     BLUE,

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from excite_cli.diagnosis.result import Diagnosis, NamedEffect
+from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
     counted,

@@ -3,7 +3,7 @@
 from typing import Any
 
 from excite_cli.diagnosis.next_motion import next_experiment
-from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import counted, title_of
 from excite_cli.report.dependence_section import dependence_section
 from excite_cli.report.diagnosis_found_section import found_section

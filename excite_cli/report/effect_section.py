@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from excite_cli.diagnosis.friction_line import CURVED, STRAIGHT
-from excite_cli.diagnosis.result import Diagnosis, NamedEffect
+from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.traces import EffectTrace, Traces
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,

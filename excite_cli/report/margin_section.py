@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from excite_cli.constraints.base import Constraint, Worst
+from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.excitation.admissible import fine_margins
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
+from excite_cli.proof.worst_margin import Worst
 from excite_cli.report.campaign import Campaign, in_figures
 from excite_cli.report.chart import (
     BLUE,

@@ -7,6 +7,7 @@ import numpy as np
 
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.constraints.joint_torque import JointTorque
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.report.campaign import Campaign, in_figures
@@ -24,7 +25,6 @@ from excite_cli.report.chart import (
     time_axis,
 )
 from excite_cli.report.page import Block, Charts, Choice, Section, Table, Text
-from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array
 
 if TYPE_CHECKING:

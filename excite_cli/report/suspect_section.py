@@ -1,6 +1,6 @@
 """How the effects were found: round by round the suspects, and why the others were refused."""
 
-from excite_cli.diagnosis.result import Diagnosis, Round
+from excite_cli.diagnosis.records import Diagnosis, Round
 from excite_cli.diagnosis.words import counted, p_in_words, place_in_words, title_of
 from excite_cli.report.page import Block, Fold, Section, Table
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.report.campaign import Campaign, in_figures
 from excite_cli.report.page import Block, Section, Table, Text
 from excite_cli.robot.model import Array
-from excite_cli.robot.regressor import standard_parameters
 
 _SHOWN = 6
 _SINGULAR = 1e-14

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from excite_cli.config.robot_spec import JointLimits, RobotSpec
 from excite_cli.errors import ConfigError, RobotError, nearest
+from excite_cli.robot.carried_payload import Payload, add_payload, payload_on
 from excite_cli.robot.description import (
     UNBOUNDED,
     RobotDescription,
     load_description,
     require_limits,
 )
-from excite_cli.robot.payload import Payload, add_payload, payload_on
 
 Array = NDArray[np.float64]
 

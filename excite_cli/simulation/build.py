@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.errors import RobotError
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import PARAMETERS_PER_BODY
 from excite_cli.simulation.engine import load_mujoco
 from excite_cli.simulation.mujoco_model import Plant, build_plant, refresh
 from excite_cli.simulation.planted import Planted

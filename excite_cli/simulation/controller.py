@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigh
 
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Signals
-from excite_cli.robot.inverse_dynamics import InverseDynamics
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.rigid_body import RigidBody
 from excite_cli.simulation.build import Build, mass_matrices, sudden_inertias
-from excite_cli.simulation.motion import Planned
 from excite_cli.simulation.mujoco_model import Plant
+from excite_cli.simulation.planned_motion import Planned
 
 _MASS_EVERY = 10  # control steps
 _FASTEST = 0.4  # share of the control rate that the quickest motion may be damped at

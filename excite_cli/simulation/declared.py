@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody
 from excite_cli.simulation.planted import Planted
 
 _SHARE = (0.03, 0.10)  # of the joint's torque RMS, per parameter

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from excite_cli.dynamics.rigid_body import RigidBody, robot_with
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.rigid_body import RigidBody, robot_with
 from excite_cli.simulation.planted import Planted
 
 EDGE = 5e-3  # rad/s; the smoothed sign is ±1 to 1e-4 there

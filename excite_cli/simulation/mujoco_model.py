@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import PARAMETERS_PER_BODY
 from excite_cli.robot.tree import TreeJoint, tree_of
 from excite_cli.simulation.engine import load_mujoco
 

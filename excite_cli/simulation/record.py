@@ -4,10 +4,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Signals
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Array
-from excite_cli.robot.rigid_body import RigidBody
 from excite_cli.simulation.build import Build
 from excite_cli.simulation.play import Played
 from excite_cli.simulation.settings import SimulationSettings

@@ -21,7 +21,7 @@ from excite_cli.simulation.controller import (
 from excite_cli.simulation.declared import sized
 from excite_cli.simulation.engine import silent_engine
 from excite_cli.simulation.mechanisms import assemble
-from excite_cli.simulation.motion import Planned
+from excite_cli.simulation.planned_motion import Planned
 from excite_cli.simulation.planted import Planted
 from excite_cli.simulation.play import Played, play
 from excite_cli.simulation.record import record

@@ -7,8 +7,8 @@ mass gives: if P ⪰ 0, so is L P Lᵀ.
 
 import numpy as np
 
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import PARAMETERS_PER_BODY, standard_parameters
 
 _LEAST_MASS = 1e-9
 _SHAPE_SHARE, _LEVER_SHARE = 0.5, 0.5

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from excite_cli.atomic import write_atomically
-from excite_cli.diagnosis.result import (
+from excite_cli.diagnosis.records import (
     Absorbed,
     Diagnosis,
     EffectRecord,

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from excite_cli.config.load import parse_spec
 from excite_cli.config.spec import Spec
+from excite_cli.dynamics.uncertain_inertias import FitKnowledge
 from excite_cli.errors import FileError
-from excite_cli.robot.uncertainty import FitKnowledge
 
 
 def fit_knowledge(spec: Spec, folder: Path) -> FitKnowledge | None:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.atomic import write_atomically
-from excite_cli.constraints.base import Worst
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
@@ -23,6 +22,7 @@ from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
 from excite_cli.measurement.hdf5_file import new_hdf5
 from excite_cli.measurement.memory_limit import limited_memory
+from excite_cli.proof.worst_margin import Worst
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 
 Matrix = NDArray[np.float64]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli import api
-from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Progress
 from excite_cli.excitation.result import Result

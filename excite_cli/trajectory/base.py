@@ -56,11 +56,9 @@ class Trajectory(ABC):
         """q, v, a (T, n) at `times` (T,) [s]; families of many coefficients need no basis here."""
         return self.basis(times).states(coefficients)
 
+    @abstractmethod
     def slowed(self, factor: float) -> "Trajectory":
         """The same path at `factor` of its pace: q(factor·t), with the same coefficients."""
-        from excite_cli.trajectory.slowed import Slowed  # it is a trajectory itself
-
-        return Slowed(self, factor)
 
     @abstractmethod
     def constant(self, q: Array) -> Array:

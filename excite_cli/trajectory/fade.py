@@ -14,6 +14,7 @@ import numpy as np
 
 from excite_cli.trajectory.base import Array, Basis, Trajectory
 from excite_cli.trajectory.fourier import FourierTrajectory
+from excite_cli.trajectory.slowed import Slowed
 
 _WEIGHT = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 _DEGREE = 5
@@ -85,6 +86,10 @@ class Fade(Trajectory):
         rates = self.motion.base_frequency * np.arange(1, harmonics + 1)
         sines, cosines = coefficients[:harmonics], coefficients[harmonics:-1]
         return np.asarray(rates**order @ np.hypot(sines, cosines))
+
+    def slowed(self, factor: float) -> Slowed:
+        """The same at another pace."""
+        return Slowed(self, factor)
 
     def constant(self, q: Array) -> Array:
         """The motion standing at the posture itself."""

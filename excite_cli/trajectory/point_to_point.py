@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.trajectory.base import Array, Basis, Trajectory
+from excite_cli.trajectory.slowed import Slowed
 
 # Powers of s (rows, from 0 to 5) of each of the six polynomials (columns).
 _POWERS = np.array(
@@ -56,6 +57,10 @@ class PointToPoint(Trajectory):
         """The six polynomials."""
         times = np.asarray(times, dtype=float)
         return Basis(times, *(self.derivative(times, order) for order in range(3)))
+
+    def slowed(self, factor: float) -> Slowed:
+        """The same at another pace."""
+        return Slowed(self, factor)
 
     def constant(self, q: Array) -> Array:
         """At rest at the same posture at both ends."""

@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from excite_cli.errors import RobotError
+from excite_cli.geometry.link_shapes import collision_model
 from excite_cli.robot.description import check_mesh_paths
-from excite_cli.robot.link_shapes import collision_model
 from excite_cli.robot.model import Array, Robot
 from excite_cli.view.surface import (
     Surface,

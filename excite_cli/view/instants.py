@@ -5,17 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.constraints.base import Constraint
-from excite_cli.constraints.contact import ZeroMomentPoint
+from excite_cli.constraints.ground_contact import ZeroMomentPoint
+from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
-from excite_cli.constraints.surroundings import Surroundings
+from excite_cli.dynamics.center_of_mass import CenterOfMass
+from excite_cli.dynamics.states import States
+from excite_cli.dynamics.whole_robot import whole_parameters
 from excite_cli.excitation.problem import Problem
+from excite_cli.geometry.link_meshes import Poses
+from excite_cli.geometry.segments import nearest_points, normals
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.center_of_mass import CenterOfMass
-from excite_cli.robot.link_meshes import Poses
 from excite_cli.robot.model import Array
-from excite_cli.robot.segments import nearest_points, normals
-from excite_cli.robot.states import States
-from excite_cli.robot.whole_robot import whole_parameters
 from excite_cli.trajectory.chain import Segment
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.robot.model import Array
+from excite_cli.view.rays import Tracer
 from excite_cli.view.surface import turn_to
-from excite_cli.view.tracing import Tracer
 
 _LAMP, _SKY = 0.62, 0.38  # shares of the light on an open, level surface
 _LAMP_ASIDE, _LAMP_RISE = np.radians(-38.0), np.radians(52.0)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.excitation.problem import Problem
-from excite_cli.robot.link_meshes import Poses
+from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.chain import Segment
 from excite_cli.view.camera import fitted_camera
@@ -17,9 +17,9 @@ from excite_cli.view.geometry import Colour
 from excite_cli.view.ground import PAPER
 from excite_cli.view.instants import Instants, closest_time, instants_of
 from excite_cli.view.marks import Marks, caption_of, pillow_part
+from excite_cli.view.rays import embree_part
 from excite_cli.view.scene import Scene, build_scene, outermost
 from excite_cli.view.studio import FINE, QUICK, Studio
-from excite_cli.view.tracing import embree_part
 from excite_cli.view.translucent import CAPSULE, NEAREST, REGION
 
 Told = Callable[[str, int], None]

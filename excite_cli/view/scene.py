@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.constraints.balance import Balance
-from excite_cli.constraints.contact import ZeroMomentPoint
+from excite_cli.constraints.ground_contact import ZeroMomentPoint
+from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
-from excite_cli.constraints.surroundings import Surroundings
 from excite_cli.excitation.problem import Problem
+from excite_cli.geometry.link_meshes import Poses
+from excite_cli.geometry.obstacles import FLOOR, Box, Obstacle, Plane
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.link_meshes import Poses
 from excite_cli.robot.model import Array
-from excite_cli.robot.obstacles import FLOOR, Box, Obstacle, Plane
 from excite_cli.view.geometry import Body, Colour, robot_bodies
 from excite_cli.view.surface import Surface, box_triangles, capsule_triangles, smooth_surface
 

@@ -11,15 +11,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.robot.link_meshes import Poses
+from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
 from excite_cli.view.camera import Camera
 from excite_cli.view.geometry import Colour
 from excite_cli.view.ground import PAPER, Ground, Shade
 from excite_cli.view.lighting import Lights
+from excite_cli.view.rays import Hits, Tracer
 from excite_cli.view.scene import Scene
 from excite_cli.view.surface import Surface
-from excite_cli.view.tracing import Hits, Tracer
 from excite_cli.view.translucent import GHOST, Pane, region_pane, wall_panes
 
 BOX_COLOUR: Colour = (0.86, 0.80, 0.70)

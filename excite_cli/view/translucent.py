@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.geometry.obstacles import Plane
 from excite_cli.robot.model import Array
-from excite_cli.robot.obstacles import Plane
 from excite_cli.view.geometry import Colour
+from excite_cli.view.rays import Tracer
 from excite_cli.view.scene import Region, Scene
 from excite_cli.view.surface import Surface
-from excite_cli.view.tracing import Tracer
 
 # Okabe and Ito, as in the figures of reports.
 CAPSULE: Colour = (0.0, 0.447, 0.698)

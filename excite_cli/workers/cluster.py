@@ -25,7 +25,7 @@ from excite_cli.workers.base import (
     Workers,
     unwatched,
 )
-from excite_cli.workers.surroundings import Surroundings, surroundings
+from excite_cli.workers.environment import Surroundings, surroundings
 from excite_cli.workers.travel import able_to_travel
 
 _ANSWER, _FIRST_WORKER = 5.0, 10.0  # [s] to wait for the scheduler, and for a worker

@@ -18,7 +18,7 @@ from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate

@@ -13,11 +13,11 @@ import yaml
 from excite_cli.cli.app import app
 from excite_cli.cli.console import run_guarded
 from excite_cli.config.load import load_spec
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.measurement.hdf5_writer import write_dataset
-from excite_cli.measurement.motions import read_own_motion
+from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.robot.model import build_robot
-from excite_cli.robot.regressor import standard_parameters
 from excite_cli.store.result_file import read_result
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.cli.conftest import Run

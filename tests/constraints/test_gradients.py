@@ -14,12 +14,12 @@ from excite_cli.config.constraints_spec import (
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
+from excite_cli.dynamics.center_of_mass import CenterOfMass
+from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.states import States
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.differences import central_differences
-from excite_cli.robot.center_of_mass import CenterOfMass
-from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.robot.states import States
 from tests.robot.random_robots import random_robot
 
 

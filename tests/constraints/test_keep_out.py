@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from excite_cli.config.load import load_spec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.constraints.keep_out import KeepOut, build_keep_out
+from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.states import States
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.admissible import fine_times
 from excite_cli.excitation.differences import central_differences
@@ -19,9 +21,7 @@ from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture
 from excite_cli.excitation.task import MotionTask
-from excite_cli.robot.forward_kinematics import BatchKinematics
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.robot.states import States
 
 CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 ARM = RobotSpec(urdf=str(CONFIG.parents[1] / "data" / "smoke_arm.urdf"))

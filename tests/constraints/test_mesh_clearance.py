@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from excite_cli.constraints.mesh_clearance import MeshClearance
+from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.states import States
 from excite_cli.excitation.differences import central_differences, relative_error
-from excite_cli.robot.enclosed_motion import EnclosedMotion
-from excite_cli.robot.forward_kinematics import BatchKinematics
-from excite_cli.robot.pair_table import PairTable
-from excite_cli.robot.states import States
-from excite_cli.trajectory.enclosed import enclosed_states, intervals_of
+from excite_cli.geometry.pair_table import PairTable
+from excite_cli.proof.enclosed_motion import EnclosedMotion
+from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.robot.random_robots import random_robot
 

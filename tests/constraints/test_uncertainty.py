@@ -19,22 +19,22 @@ from excite_cli.config.load import load_spec
 from excite_cli.constraints.balance import Balance
 from excite_cli.constraints.base import Array, Constraint
 from excite_cli.constraints.catalogue import build_constraints
-from excite_cli.constraints.contact import ZeroMomentPoint
+from excite_cli.constraints.ground_contact import ZeroMomentPoint
 from excite_cli.constraints.joint_torque import JointTorque
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.dynamics.states import States
+from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, box, inertia_uncertainty
+from excite_cli.dynamics.whole_robot import drawn_states, whole_parameters
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.stack import Stack
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import Robot
-from excite_cli.robot.rigid_body import RigidBody
-from excite_cli.robot.states import States
-from excite_cli.robot.uncertainty import InertiaUncertainty, box, inertia_uncertainty
-from excite_cli.robot.whole_robot import drawn_states, whole_parameters
 from tests.constraints.test_gradients import _check as check_gradients
+from tests.dynamics.test_uncertain_inertias import SPEC, knowledge
 from tests.robot.random_robots import random_robot
-from tests.robot.test_uncertainty import SPEC, knowledge
 
 CORNERS = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
 ALL = ConstraintsSpec(

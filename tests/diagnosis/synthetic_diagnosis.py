@@ -10,7 +10,7 @@ from scipy.linalg import qr
 from excite_cli.config.load import load_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.result import (
+from excite_cli.diagnosis.records import (
     Absorbed,
     Diagnosis,
     EffectRecord,
@@ -21,6 +21,7 @@ from excite_cli.diagnosis.result import (
     Unexplained,
 )
 from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
+from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.base import Value
 from excite_cli.excitation.effect_columns import EffectColumns
 from excite_cli.excitation.problem import Problem, build_problem
@@ -28,7 +29,6 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace, single
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
-from excite_cli.robot.regressor import Regressor, standard_parameters
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"
 FAST = ("constraints.self_collision=null", "constraints.torque=null", "sequence.motions=1")

@@ -8,8 +8,9 @@ from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import ABSORBED
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.result import Absorbed
+from excite_cli.diagnosis.records import Absorbed
 from excite_cli.diagnosis.training import TrainingData
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.armature import Armature
 from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
@@ -19,7 +20,6 @@ from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.identification.regression import signals_of
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.robot.regressor import standard_parameters
 from tests.cli.program import SMOKE
 from tests.identification.synthetic import measured, regression_of
 

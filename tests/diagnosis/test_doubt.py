@@ -9,7 +9,7 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.result import Unexplained
+from excite_cli.diagnosis.records import Unexplained
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.next_motion import NextMotion, next_experiment, plan_after
-from excite_cli.diagnosis.result import EffectRecord
+from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import worst_margins
 from excite_cli.excitation.result import Result

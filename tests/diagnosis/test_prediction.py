@@ -8,6 +8,9 @@ from scipy.interpolate import CubicSpline
 
 from excite_cli.config.data_spec import FilterSpec
 from excite_cli.diagnosis.prediction import errors_on, predicted
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.load_dependent_friction import LoadDependentFriction
@@ -17,10 +20,7 @@ from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.regression import build_regression
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody
 from tests.identification.synthetic import measured
 from tests.robot.random_robots import random_robot
 

@@ -9,17 +9,17 @@ import pytest
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
-from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.split import split
 from excite_cli.measurement.dataset import Dataset, Run
-from excite_cli.robot.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.cli.program import SMOKE
 
 pytest.importorskip("mujoco")
 
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate

@@ -5,9 +5,9 @@ import pytest
 
 from excite_cli.config.load import load_spec
 from excite_cli.diagnosis.diagnose import diagnose
-from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.catalogue import kind_named
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import build_robot
 from tests.cli.program import SMOKE
 from tests.diagnosis.test_sealed import motion

@@ -5,13 +5,13 @@ import pytest
 from scipy.signal import lfilter
 
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
-from excite_cli.diagnosis.result import Unexplained
+from excite_cli.diagnosis.records import Unexplained
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.unexplained import unexplained_structure
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Signals
 from excite_cli.identification.regression import Regression, signals_of
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
 from tests.identification.synthetic import measured, regression_of
 from tests.robot.random_robots import random_robot
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Signals
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody
 
 
 def states(robot: Robot, samples: int, step: float, seed: int = 0) -> tuple[Array, ...]:

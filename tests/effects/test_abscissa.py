@@ -5,11 +5,11 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Parameter, Signals
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody
 from tests.robot.random_robots import random_robot
 
 

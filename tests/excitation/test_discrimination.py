@@ -5,6 +5,7 @@ import pytest
 
 from excite_cli.config.spec import CriterionSpec
 from excite_cli.criteria.sigma_min import SigmaMin, SmoothSigmaMin
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.excitation.differences import fourth_order_differences, relative_error
@@ -20,7 +21,6 @@ from excite_cli.excitation.discrimination import (
 from excite_cli.excitation.extension import extend
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import build_weighting
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.robot.random_robots import random_robot
 

@@ -12,6 +12,7 @@ from excite_cli.config.load import load_spec
 from excite_cli.config.spec import CriterionSpec
 from excite_cli.criteria.catalogue import build_criterion
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.coulomb_friction import CoulombFriction
@@ -26,7 +27,6 @@ from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import build_weighting
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.robot.random_robots import random_robot
@@ -156,7 +156,7 @@ def test_without_effects_in_the_yaml_the_raw_form_is_untouched() -> None:
     assert plain.columns == none.columns == plain.base.rank
     alpha = plain.still(plain.robot.posture) + 0.1
     q, v, a = plain.cost_basis.states(alpha)
-    from excite_cli.robot.regressor import Regressor
+    from excite_cli.dynamics.regressor import Regressor
 
     y = Regressor(plain.robot).evaluate(q, v, a)[:, :, plain.base.selection]
     block = plain.objective().block(alpha)

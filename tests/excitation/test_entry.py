@@ -8,6 +8,7 @@ import pytest
 
 from excite_cli.config.load import load_spec
 from excite_cli.config.trajectory_spec import BSplineSpec
+from excite_cli.dynamics.states import States
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation import path_search
 from excite_cli.excitation.connection import State, joined_states, judge_of
@@ -16,7 +17,6 @@ from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.stack import Stack
-from excite_cli.robot.states import States
 from excite_cli.trajectory.base import Array, Trajectory
 from excite_cli.trajectory.chain import Chain, Segment
 from excite_cli.trajectory.fade import Fade

@@ -10,7 +10,7 @@ from excite_cli.excitation.admissible import path_of
 from excite_cli.excitation.inspection import Look, inspect, mesh_check_of
 from excite_cli.excitation.mesh_verdict import mesh_verdict
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.robot.mesh_check import MeshCheck
+from excite_cli.geometry.mesh_check import MeshCheck
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CLEAR = np.array([0.0, 0.6, 0.8, 0.0, 0.05])

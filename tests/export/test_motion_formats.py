@@ -17,7 +17,7 @@ from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.export.timed import instants, repeated, timed_motion
 from excite_cli.measurement.csv_table import read_table
 from excite_cli.measurement.motion_bag import MESSAGE
-from excite_cli.measurement.motions import read_motion
+from excite_cli.measurement.motion_files import read_motion
 from excite_cli.trajectory.bspline import BSplineTrajectory
 from excite_cli.trajectory.chain import Segment
 from excite_cli.trajectory.sampled import through_samples

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from excite_cli.config.load import load_spec
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.start import random_start
 from excite_cli.excitation.task import MotionTask
 from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.export.timed import timed_motion
-from excite_cli.measurement.motions import read_motion
+from excite_cli.measurement.motion_files import read_motion
 from excite_cli.measurement.timed_motion import TimedMotion
-from excite_cli.robot.regressor import standard_parameters
 from excite_cli.simulation.mujoco_model import build_plant
 from excite_cli.trajectory.chain import Chain, Segment
 

@@ -4,10 +4,10 @@ import yaml
 
 from excite_cli.config.data_spec import EffectSpec, IdentificationSpec
 from excite_cli.config.load import parse_spec
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.export.parameters import effect_specs, parameters_yaml
 from excite_cli.identification.fit import fit
-from excite_cli.robot.regressor import standard_parameters
 from tests.identification.synthetic import measured, regression_of
 from tests.robot.random_robots import random_robot
 

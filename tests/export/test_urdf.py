@@ -5,12 +5,12 @@ import pytest
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import RobotError
 from excite_cli.export.exported import IdentifiedModel
 from excite_cli.export.urdf import updated_urdf
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.robot.regressor import standard_parameters
 from excite_cli.simulation.true_robot import true_inertias
 from tests.robot.random_robots import random_robot
 

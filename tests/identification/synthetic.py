@@ -6,6 +6,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from excite_cli.config.data_spec import FilterSpec
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import prepare
 from excite_cli.identification.processing import choose_processing
@@ -15,9 +17,7 @@ from excite_cli.identification.regression import (
     effect_columns,
 )
 from excite_cli.measurement.dataset import Dataset, Run
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.rigid_body import RigidBody
 
 RATE = 100.0
 

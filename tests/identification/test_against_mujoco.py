@@ -7,12 +7,12 @@ import pytest
 
 from excite_cli.config.load import parse_spec
 from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.identify import Identification, identify
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.fourier import FourierTrajectory

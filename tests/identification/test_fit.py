@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import EffectSpec, IdentificationSpec
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.fit import Fit, fit, follows_model, rebuilt, rows_of
 from excite_cli.identification.identify import errors_of
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.regressor import standard_parameters
 from excite_cli.simulation.true_robot import true_inertias
 from tests.identification.synthetic import measured, regression_of
 from tests.robot.random_robots import random_robot

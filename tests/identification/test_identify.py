@@ -7,12 +7,12 @@ import pytest
 
 from excite_cli.config.load import parse_spec
 from excite_cli.config.spec import Spec
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ConfigError
 from excite_cli.identification.identify import Identification, identify
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.true_robot import true_inertias
 from tests.identification.synthetic import measured

@@ -9,6 +9,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from excite_cli.config.data_spec import FilterSpec
 from excite_cli.config.load import load_spec, parse_spec
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.exact_period import exact_period
 from excite_cli.identification.identify import identify
@@ -16,9 +18,7 @@ from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.split import split
 from excite_cli.measurement.dataset import Dataset, Run
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.robot.regressor import standard_parameters
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.cli.program import SMOKE
 from tests.identification.synthetic import measured, torque
@@ -66,7 +66,7 @@ def simulated(
 ) -> Dataset:
     """Motions, four periods each, on an arm with an effect that the model knows nothing of."""
     pytest.importorskip("mujoco")
-    from excite_cli.simulation.motion import PlannedMotion
+    from excite_cli.simulation.planned_motion import PlannedMotion
     from excite_cli.simulation.planted import plant
     from excite_cli.simulation.settings import SimulationSettings
     from excite_cli.simulation.simulate import simulate

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.prior import inertial_prior, prior_rows
-from excite_cli.robot.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.robot.model import Robot
-from excite_cli.robot.regressor import standard_parameters
 from tests.robot.random_robots import random_robot
 
 

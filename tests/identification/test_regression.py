@@ -5,6 +5,8 @@ import pinocchio as pin
 import pytest
 
 from excite_cli.config.data_spec import FilterSpec
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.payload import Payload
@@ -16,9 +18,7 @@ from excite_cli.identification.regression import (
     effect_columns,
     signals_of,
 )
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.model import Robot
-from excite_cli.robot.regressor import standard_parameters
 from tests.identification.synthetic import measured
 from tests.robot.random_robots import random_robot
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import FilterSpec
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.torque_trace import MOST_SAMPLES, thinned, torque_trace
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody
 from tests.identification.synthetic import measured
 from tests.robot.random_robots import random_robot
 

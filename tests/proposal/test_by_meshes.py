@@ -12,9 +12,9 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.errors import ConfigError
+from excite_cli.geometry.pair_tables import mesh_tables
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.robot.pair_tables import mesh_tables
-from tests.robot.test_pair_tables import NONE, WRIST
+from tests.geometry.test_pair_tables import NONE, WRIST
 
 
 @pytest.fixture(autouse=True)
@@ -68,5 +68,5 @@ def test_another_posture_takes_the_same_tables(wrist: Robot, tmp_path: Path) -> 
     """Tables depend on two joints only: a posture that is changed must not cost minutes again."""
     mesh_tables(wrist, (), NONE)
     moved = build_robot(RobotSpec(urdf="wrist.urdf", posture={"twist": 0.3}), tmp_path)
-    with mock.patch("excite_cli.robot.pair_tables._table", side_effect=AssertionError):
+    with mock.patch("excite_cli.geometry.pair_tables._table", side_effect=AssertionError):
         assert [table.first for table in mesh_tables(moved, (), NONE)] == ["plate"]

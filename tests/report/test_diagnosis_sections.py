@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.result import Diagnosis, EffectRecord, NamedEffect, Unexplained
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Unexplained
 from excite_cli.effects.base import Value
 from excite_cli.report.chart import Chart
 from excite_cli.report.dependence_section import (

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from excite_cli.config.load import parse_spec
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.identify import identify
 from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.report.fit_parameter_chart import parameter_charts
@@ -18,8 +20,6 @@ from excite_cli.report.fit_sections import (
     time_section,
 )
 from excite_cli.report.page import Choice, Page, Table, Text, render
-from excite_cli.robot.base_parameters import find_base_parameters
-from excite_cli.robot.regressor import standard_parameters
 from excite_cli.store.fit_file import read_fit, write_fit
 from tests.identification.synthetic import measured
 from tests.report.structure import Structure

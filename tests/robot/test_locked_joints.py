@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.errors import RobotError
-from excite_cli.robot.base_parameters import find_base_parameters
 from excite_cli.robot.description import load_description
 from excite_cli.robot.model import build_robot, links_by_joint
 from tests.proposal.robots import GOOD, joint, link, written

@@ -6,11 +6,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.robot.rigid_body import RigidBody
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import Simulation, simulate

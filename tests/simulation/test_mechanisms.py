@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Parameter, Signals
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.rigid_body import RigidBody
-from excite_cli.simulation.motion import PlannedMotion
+from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.simulate import Simulation, simulate
 from tests.simulation.arms import (

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.robot.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.robot.regressor import standard_parameters
-from excite_cli.robot.rigid_body import RigidBody
 from excite_cli.simulation.mujoco_model import build_plant
 from excite_cli.simulation.true_robot import pseudo_inertia, ten_parameters, true_inertias
 from tests.robot.random_robots import random_robot

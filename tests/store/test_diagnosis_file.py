@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.result import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import FileError
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis, write_diagnosis
 from excite_cli.store.result_file import is_result, read_result

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from excite_cli.config.load import parse_spec
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.errors import FileError
 from excite_cli.identification.identify import Identification, identify
-from excite_cli.robot.base_parameters import find_base_parameters
-from excite_cli.robot.regressor import standard_parameters
 from excite_cli.store.fit_file import read_fit, write_fit
 from tests.identification.synthetic import measured
 from tests.robot.random_robots import random_robot

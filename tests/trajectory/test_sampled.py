@@ -152,7 +152,7 @@ def test_any_other_family_is_slowed_by_a_wrapper() -> None:
     alpha = np.random.default_rng(5).normal(size=(9, 2))
     times = np.linspace(0.0, series.duration / 0.5, 30)
     for one, other in zip(
-        Trajectory.slowed(series, 0.5).states(times, alpha),
+        Slowed(series, 0.5).states(times, alpha),
         series.slowed(0.5).states(times, alpha),
         strict=True,
     ):

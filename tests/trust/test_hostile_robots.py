@@ -9,9 +9,9 @@ import pytest
 from benchmarks.trust.fuzz_meshes import VALID, binary_stl
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import RobotError
+from excite_cli.geometry.link_meshes import link_meshes
 from excite_cli.robot import mesh_trial
 from excite_cli.robot.description import check_mesh_paths, load_description
-from excite_cli.robot.link_meshes import link_meshes
 from excite_cli.robot.mesh_trial import try_meshes
 from excite_cli.robot.model import build_robot
 from excite_cli.robot.urdf_check import MAX_DEPTH, MAX_LINKS, MAX_MOVABLE

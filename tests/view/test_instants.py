@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
+from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
-from excite_cli.constraints.surroundings import Surroundings
+from excite_cli.dynamics.center_of_mass import CenterOfMass
+from excite_cli.dynamics.states import States
 from excite_cli.excitation.problem import Problem
-from excite_cli.robot.center_of_mass import CenterOfMass
-from excite_cli.robot.clearance_coal import CoalClearance
+from excite_cli.geometry.clearance_coal import CoalClearance
 from excite_cli.robot.model import Array
-from excite_cli.robot.states import States
 from excite_cli.trajectory.chain import Segment
 from excite_cli.view.instants import Instants, closest_time, instants_of
 

@@ -9,7 +9,7 @@ import pytest
 from excite_cli.errors import ConfigError, MissingExtraError, NoAdmissibleMotionError
 from excite_cli.workers.base import News
 from excite_cli.workers.cluster import Cluster, ClusterError
-from excite_cli.workers.surroundings import Surroundings, surroundings
+from excite_cli.workers.environment import Surroundings, surroundings
 from tests.workers import work
 
 distributed = pytest.importorskip("distributed")

@@ -23,6 +23,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.criteria.base import Criterion
+from excite_cli.dynamics.states import States
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
 from excite_cli.excitation.objective import Spectrum
@@ -35,7 +36,6 @@ from excite_cli.excitation.residuals import (
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.solvers.quasi_newton import damped_update
 from excite_cli.excitation.task import MotionTask
-from excite_cli.robot.states import States
 
 # μ and the share of the criterion's continuation for each stage, and when a stage is done: the
 # merit fell by less than this over the last `_WINDOW` iterations (never less than the tolerance).

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.dynamics.states import States
 from excite_cli.excitation.residuals import REACH, Rows
 from excite_cli.excitation.task import MotionTask
-from excite_cli.robot.states import States
 
 Mask = NDArray[np.bool_]
 

@@ -17,13 +17,13 @@ from scipy.optimize import minimize
 
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import Criterion
+from excite_cli.dynamics.states import States
 from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
 from excite_cli.excitation.objective import Spectrum
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.solvers.linearised import Linearised, Mask, dips, gathered, lowest
 from excite_cli.excitation.solvers.restoration import BestAdmissible
 from excite_cli.excitation.task import MotionTask
-from excite_cli.robot.states import States
 
 # Residuals kept by the program, and below which a dip joins the working set.
 _AIM, _NEAR = 1e-4, 0.1

@@ -28,6 +28,7 @@ from scipy.linalg import cho_factor, cho_solve
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.criteria.base import Criterion
+from excite_cli.dynamics.states import States
 from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
 from excite_cli.excitation.objective import Spectrum
 from excite_cli.excitation.residuals import summed_per_instant
@@ -41,7 +42,6 @@ from excite_cli.excitation.solvers.quadratic_program import (
 from excite_cli.excitation.solvers.quasi_newton import damped_update
 from excite_cli.excitation.solvers.restoration import BestAdmissible
 from excite_cli.excitation.task import MotionTask
-from excite_cli.robot.states import States
 
 # What a stage may still gain over `_WINDOW` iterations when it counts as done, first to last.
 _CHANGES = (3e-2, 1e-2, 1e-3)

@@ -1,0 +1,91 @@
+"""Distances of the robot's capsules from what stands around it: floor, walls, boxes."""
+
+import numpy as np
+
+from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.dynamics.states import States
+from excite_cli.geometry.obstacle_distances import ObstacleDistances
+from excite_cli.geometry.obstacle_pairs import ObstaclePairs
+from excite_cli.geometry.obstacles import Box, Obstacle
+from excite_cli.proof.enclosed_distances import EnclosedCapsules
+from excite_cli.proof.enclosed_motion import EnclosedMotion
+from excite_cli.proof.enclosed_obstacles import least_clearances
+from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.model import Robot
+
+# Distances beyond this many metres above the margin do not concern the optimiser.
+_NEAR = 0.1
+_TOLD = 4
+
+
+class Surroundings(Constraint):
+    """One column per checked pair of a capsule and an obstacle.
+
+    `capsules`, `obstacles`: all there are; `pairs.checked` (capsule, obstacle) by their indices,
+    one per column, the distances `pairs.kept` (m,) [m] they keep, and `pairs.dropped` with reasons.
+    """
+
+    name = "surroundings"
+    unit = "m"
+
+    def __init__(
+        self,
+        robot: Robot,
+        capsules: tuple[Capsule, ...],
+        obstacles: tuple[Obstacle, ...],
+        pairs: ObstaclePairs,
+    ) -> None:
+        self.capsules, self.obstacles, self.pairs = capsules, obstacles, pairs
+        self._distances = ObstacleDistances(robot, capsules, obstacles, pairs.checked)
+        self.labels = tuple(f"{capsules[i].name} – {obstacles[j].name}" for i, j in pairs.checked)
+        self.scale = np.full(len(self.labels), _NEAR)
+
+    def margins(self, states: States) -> Array:
+        """Distance less what is kept (T, m) [m]."""
+        return self._distances.distances(states) - self.pairs.kept
+
+    def margins_within(self, states: States, reach: Array) -> Array:
+        """As `margins`; what is plainly farther away than `reach` gets a bound instead."""
+        farthest = float((self.pairs.kept + reach).max(initial=0.0))
+        return self._distances.distances(states, exact_below=farthest) - self.pairs.kept
+
+    def least(self, motion: EnclosedMotion) -> Array:
+        """Lower bounds on distance less what is kept (T, m) [m]."""
+        axes = EnclosedCapsules(self.capsules, motion)
+        capsule, thing = np.array(self.pairs.checked, dtype=np.intp).T
+        enough = float(self.pairs.kept.max())
+        least = np.empty((motion.count, len(self.labels)))
+        for index, obstacle in enumerate(self.obstacles):
+            columns = np.flatnonzero(thing == index)
+            least[:, columns] = least_clearances(axes, obstacle, capsule[columns], enough)
+        return least - self.pairs.kept
+
+    def gradients(
+        self, states: States, times: Indices, columns: Indices
+    ) -> tuple[Array | None, Array | None, Array | None]:
+        """Normal of the thing times the Jacobian of the witness point on the capsule's axis."""
+        return self._distances.gradients(states, times, columns), None, None
+
+    def why_not(self, states: States) -> str:
+        """Which capsules are inside a thing, and how deep, deepest first."""
+        distances = self._distances.distances(states)[0]
+        inside = [int(k) for k in np.argsort(distances) if distances[k] < 0]
+        if not inside:
+            return ""
+        words = []
+        for column in inside[:_TOLD]:
+            i, j = self.pairs.checked[column]
+            place = self.obstacles[j].in_words(-float(distances[column]))
+            words.append(f"{self.capsules[i].name} is {place}")
+        more = f" and {len(inside) - _TOLD} more pairs" if len(inside) > _TOLD else ""
+        things = {
+            self.pairs.checked[k][1]: self.obstacles[self.pairs.checked[k][1]] for k in inside
+        }
+        names = ", ".join(thing.name for thing in things.values())
+        boxes = any(isinstance(thing, Box) for thing in things.values())
+        hint = " (the position of a box is its centre)" if boxes else ""
+        return (
+            f"{', '.join(words)}{more}. Give another robot.posture, or correct {names} in "
+            f"constraints.surroundings{hint}; a pair that may touch goes into "
+            "constraints.surroundings.ignore"
+        )

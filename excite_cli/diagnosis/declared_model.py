@@ -1,0 +1,48 @@
+"""What a diagnosis knows before: the robot, the effects that are declared, a prior or none."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.effects.base import Effect
+from excite_cli.identification.prior import inertial_prior
+from excite_cli.robot.model import Array, Robot
+
+
+@dataclass(frozen=True)
+class KeptInertias:
+    """Inertias kept at the URDF's: mean φ₀ (P,) and precision (P,) of the standard parameters."""
+
+    mean: Array
+    precision: Array
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is known before: robot, declared effects, a prior on the inertias or none."""
+
+    robot: Robot
+    base: BaseParameters
+    declared: tuple[Effect, ...]
+    prior: KeptInertias | None
+
+    @property
+    def declared_width(self) -> int:
+        """Number of linear parameters of the declared effects."""
+        return width_of(self.declared)
+
+    def full_inertias(self, parameters: Array) -> Array:
+        """Full φ (P,) nearest to the URDF's that agrees with the fitted inertial parameters."""
+        cad = standard_parameters(self.robot)
+        if self.prior is not None:
+            return np.asarray(self.prior.mean + parameters[: len(cad)])
+        nearest = inertial_prior(self.robot, cad, 1.0)
+        return nearest.completed(self.base, parameters[: self.base.rank])
+
+
+def width_of(effects: Sequence[Effect]) -> int:
+    """Number of linear parameters of effects."""
+    return sum(len(effect.parameters) for effect in effects)

@@ -1,0 +1,133 @@
+"""Rigid-body torque and its parts at given standard parameters φ, for many samples.
+
+What effects are made of: the load of every joint, its derivatives, the columns of single bodies,
+the torque of gravity along each axis of the world, and the Jacobian of the last body. Everything is
+computed when first asked for, once.
+"""
+
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
+from excite_cli.robot.model import Array, Robot
+
+
+def robot_with(robot: Robot, phi: Array) -> pin.Model:
+    """A copy of the model whose inertias are φ (10·n_bodies,); φ need not be consistent."""
+    model = robot.model.copy()
+    for body in range(1, model.njoints):
+        ten = np.asarray(phi[PARAMETERS_PER_BODY * (body - 1) : PARAMETERS_PER_BODY * body])
+        model.inertias[body] = _inertia(ten)
+    return model
+
+
+def _inertia(ten: Array) -> pin.Inertia:
+    """An inertia from any ten numbers: a fit may leave the consistent ones."""
+    ten = np.array(ten, dtype=float)
+    if abs(ten[0]) < 1e-9:  # the lever is first moment over mass
+        ten[0] = 1e-9
+    return pin.Inertia.FromDynamicParameters(ten)
+
+
+class RigidBody:
+    """The rigid-body part of a motion q, v, a (T, n) at φ (10·n_bodies,); rows are moved joints.
+
+    `model`: that of `robot_with(robot, phi)`, for those who evaluate many motions at one φ.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        phi: Array,
+        q: Array,
+        v: Array,
+        a: Array,
+        model: pin.Model | None = None,
+    ) -> None:
+        self.robot, self.phi = robot, np.asarray(phi, dtype=float)
+        self.q, self.v, self.a = q, v, a
+        self._given = model
+
+    @cached_property
+    def _model(self) -> pin.Model:
+        return robot_with(self.robot, self.phi) if self._given is None else self._given
+
+    @cached_property
+    def regressor(self) -> Array:
+        """Y (T, n, 10·n_bodies) of the moved joints."""
+        robot, model = self.robot, self.robot.model
+        data = model.createData()
+        full = np.empty((len(self.q), robot.n, PARAMETERS_PER_BODY * robot.n_bodies))
+        states = zip(
+            robot.configurations(self.q),
+            robot.velocities(self.v),
+            robot.velocities(self.a),
+            strict=True,
+        )
+        for t, state in enumerate(states):
+            full[t] = pin.computeJointTorqueRegressor(model, data, *state).reshape(model.nv, -1)[
+                robot.moved
+            ]
+        return full
+
+    @cached_property
+    def load(self) -> Array:
+        """τ (T, n) = Y φ [N·m]."""
+        return self.regressor @ self.phi
+
+    @cached_property
+    def _derivatives(self) -> tuple[Array, Array, Array]:
+        return InverseDynamics(self.robot, self._model).derivatives(self.q, self.v, self.a)
+
+    @property
+    def by_position(self) -> Array:
+        """∂τ/∂q (T, n, n)."""
+        return self._derivatives[0]
+
+    @property
+    def by_velocity(self) -> Array:
+        """∂τ/∂v (T, n, n)."""
+        return self._derivatives[1]
+
+    @property
+    def mass(self) -> Array:
+        """∂τ/∂a, the joint-space inertia matrix (T, n, n)."""
+        return self._derivatives[2]
+
+    def pull_back(self, weights: Array) -> tuple[Array, Array, Array]:
+        """Derivatives by q, v, a, each (T, n), of Σ weights ∘ τ for weights (T, n)."""
+        row = weights[:, None, :]
+        by_q, by_v, mass = ((row @ part)[:, 0] for part in self._derivatives)
+        return by_q, by_v, mass
+
+    @cached_property
+    def gravity_axes(self) -> Array:
+        """Torque (T, n, 3) that one m/s² of gravity along world x, y, z asks for."""
+        robot, model = self.robot, self._model.copy()
+        data = model.createData()
+        columns = np.empty((len(self.q), robot.n, 3))
+        configurations = robot.configurations(self.q)
+        for axis in range(3):
+            model.gravity.linear = np.eye(3)[axis]
+            for t, q in enumerate(configurations):
+                columns[t, :, axis] = pin.computeGeneralizedGravity(model, data, q)[robot.moved]
+        return columns
+
+    def tip_jacobian(self) -> Array:
+        """Jacobian (T, 6, n) of the last moved joint's frame, aligned with the world."""
+        robot, model = self.robot, self.robot.model
+        data, last = model.createData(), model.njoints - 1
+        aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobians = np.empty((len(self.q), 6, robot.n))
+        for t, q in enumerate(robot.configurations(self.q)):
+            jacobians[t] = pin.computeFrameJacobian(
+                model, data, q, _frame_of(model, last), aligned
+            )[:, robot.moved]
+        return jacobians
+
+
+def _frame_of(model: pin.Model, joint: int) -> int:
+    return int(model.getFrameId(str(model.names[joint]), pin.FrameType.JOINT))

@@ -1,0 +1,76 @@
+"""The whole robot, what stands still included: its parameters, and the wrench the ground gives.
+
+Gravity and motion ask, for every body, for a force f_b = I_b A_b + V_b ×* (I_b V_b); the ground (or
+what the base is fixed to) must give their sum. About the world origin, in world axes, that wrench
+W = [force; moment] is linear in φ (10·(1 + n_bodies),), body 0 being what is fixed to the world.
+"""
+
+import numpy as np
+
+from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint, body_regressors, cross
+from excite_cli.dynamics.states import States
+from excite_cli.robot.model import Array, Robot, links_by_joint
+
+
+def whole_parameters(robot: Robot) -> Array:
+    """φ (10·(1 + n_bodies),) of the URDF; zeros first if nothing is fixed to the world."""
+    return np.concatenate([inertia.toDynamicParameters() for inertia in robot.model.inertias])
+
+
+def body_names(robot: Robot) -> tuple[tuple[str, ...], ...]:
+    """Names of every body from body 0 on: its joint, or `base`; then the links it consists of."""
+    links = links_by_joint(robot)
+    first = int(robot.model.njoints) - robot.n
+    base = ("base", *links.get("", []))
+    still = ((), base) if robot.floating else (base,)
+    moved = [str(name) for name in robot.model.names[first:]]
+    return (*still, *((name, *links.get(name, [])) for name in moved))
+
+
+def drawn_states(robot: Robot, count: int = 30, seed: int = 0) -> States:
+    """Random states within the limits, to see how functionals of φ look."""
+    return States(BatchKinematics(robot), *robot.draw_states(count, seed))
+
+
+class GroundWrench:
+    """Regressor of the wrench (T, 6, 10·(1 + n_bodies)) [N, N·m] about the world origin."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._adjoint = SpatialAdjoint(robot)
+        self._gravity = np.concatenate([-np.asarray(robot.model.gravity.linear), np.zeros(3)])
+        self._last: tuple[States, Array] | None = None
+
+    def regressor(self, states: States) -> Array:
+        """The regressor at `states`; those last asked for are kept."""
+        if self._last is None or self._last[0] is not states:
+            self._last = states, self._evaluated(states)
+        return self._last[1]
+
+    def _evaluated(self, states: States) -> Array:
+        motion = self._adjoint.body_motion(states.q, states.v, states.a)
+        samples = len(states.q)
+        shape = (samples, 1, 6)
+        velocity = np.concatenate([np.zeros(shape), motion.velocity], axis=1)
+        acceleration = np.concatenate(
+            [np.broadcast_to(self._gravity, shape), motion.acceleration], axis=1
+        )
+        upright = np.broadcast_to(np.eye(3), (samples, 1, 3, 3))
+        turn = np.concatenate([upright, motion.rotations], axis=1)
+        place = np.concatenate([np.zeros((samples, 1, 3)), motion.translations], axis=1)
+        back = turn.swapaxes(-1, -2)
+        velocity = _local(back, place, velocity)
+        acceleration = _local(back, place, acceleration)
+        acceleration[..., :3] += cross(velocity[..., 3:], velocity[..., :3])
+        local = body_regressors(velocity, acceleration)
+        force, moment = turn @ local[..., :3, :], turn @ local[..., 3:, :]
+        moment += cross(place[..., None, :], force.swapaxes(-1, -2)).swapaxes(-1, -2)
+        wrench = np.concatenate([force, moment], axis=-2)
+        return np.asarray(wrench.transpose(0, 2, 1, 3).reshape(samples, 6, -1))
+
+
+def _local(back: Array, place: Array, motion: Array) -> Array:
+    """Motions (T, B, 6) about the world origin, in the frames of their bodies."""
+    linear = motion[..., :3] + cross(motion[..., 3:], place)
+    turned = back @ np.stack([linear, motion[..., 3:]], axis=-1)
+    return np.concatenate([turned[..., 0], turned[..., 1]], axis=-1)

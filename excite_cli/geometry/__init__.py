@@ -1,0 +1,1 @@
+"""The robot: model, regressor, base parameters, distances, uncertain inertias."""

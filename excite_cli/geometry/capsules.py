@@ -1,0 +1,99 @@
+"""Capsules that contain the robot's collision geometry, or are given by hand.
+
+Each link gets its capsule of least volume. Links that stand still towards each other share one
+where that wastes little room (the many small parts of a gripper); a link that one capsule fits
+badly is cut across a main axis. Everything is in the frame of the joint that carries the link.
+"""
+
+from collections.abc import Collection
+
+import numpy as np
+import pinocchio as pin
+
+from excite_cli.config.constraints_spec import CapsuleSpec, SelfCollisionSpec
+from excite_cli.errors import ConfigError, RobotError, nearest
+from excite_cli.geometry.capsule_cache import capsule_key, store_capsules, stored_capsules
+from excite_cli.geometry.capsule_cover import cover
+from excite_cli.geometry.link_shapes import collision_model, link_shapes
+from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.model import Robot
+
+__all__ = ["Capsule", "fit_capsules", "link_joints"]
+
+
+def fit_capsules(
+    robot: Robot, spec: SelfCollisionSpec, apart: Collection[str] = ()
+) -> tuple[Capsule, ...]:
+    """Capsules of all links with collision geometry, ordered by joint; `spec` may replace some.
+
+    Links named in `spec` share their capsule with no other, so that what is said of one link is
+    not said of its neighbour. So do those in `apart`. The robot's payload comes with them.
+
+    Raises
+    ------
+    ConfigError
+        `spec` names a link that the robot does not have.
+    RobotError
+        A mesh cannot be used, or the robot has no collision geometry.
+    """
+    given: dict[str, CapsuleSpec] = {} if spec.capsules == "auto" else dict(spec.capsules)
+    joints = link_joints(robot)
+    for link in given:
+        _check_link(link, joints, f"constraints.self_collision.capsules.{link}")
+    for key, pairs in (("ignore", spec.ignore), ("by_meshes", spec.by_meshes)):
+        for pair in pairs:
+            for link in pair:
+                _check_link(link, link_names(robot), f"constraints.self_collision.{key}")
+    by_hand = [
+        Capsule(
+            link, joints[link], np.array(one.start), np.array(one.end), one.radius, (link,), True
+        )
+        for link, one in given.items()
+    ]
+    told = {link for pair in (*spec.ignore, *spec.by_meshes) for link in pair}
+    alone = told | set(given) | set(apart)
+    fitted = [c for c in _fitted(robot, alone & set(joints)) if c.links[0] not in given]
+    if not fitted and not by_hand:
+        raise RobotError(
+            f"{robot.description.path.name} has no collision geometry, so distances cannot be "
+            "checked. Give capsules by link under constraints.self_collision.capsules, use a URDF "
+            "with <collision> elements, or drop constraints.self_collision and "
+            "constraints.surroundings."
+        )
+    carried = [] if robot.payload is None else [robot.payload.capsule]
+    return tuple(sorted([*fitted, *by_hand, *carried], key=lambda capsule: capsule.joint))
+
+
+def link_joints(robot: Robot) -> dict[str, int]:
+    """Joint of `robot.model` that carries each link of the URDF (0: fixed to the world)."""
+    return {
+        str(frame.name): int(frame.parentJoint)
+        for frame in robot.model.frames
+        if frame.type == pin.FrameType.BODY
+    }
+
+
+def link_names(robot: Robot) -> list[str]:
+    """All that can be told apart by name: the links of the URDF, and the payload if there is one.
+
+    The payload goes by the name of its capsule.
+    """
+    return [*link_joints(robot), *([] if robot.payload is None else robot.payload.capsule.links)]
+
+
+def _check_link(link: str, known: Collection[str], where: str) -> None:
+    if link not in known:
+        raise ConfigError(
+            f"{where}: the robot has no link '{link}'.{nearest(link, known)} "
+            f"Its links: {', '.join(sorted(known))}."
+        )
+
+
+def _fitted(robot: Robot, apart: set[str]) -> list[Capsule]:
+    geometry = collision_model(robot)
+    key = capsule_key(robot, geometry, apart)
+    capsules = stored_capsules(key)
+    if capsules is None:
+        capsules = cover(link_shapes(robot, geometry), apart)
+        store_capsules(key, capsules)
+    return capsules

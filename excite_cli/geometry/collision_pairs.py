@@ -1,0 +1,257 @@
+"""Which pairs of capsules are worth checking, and why the others are not.
+
+A pair is dropped when no motion can part or join it. Whether two bodies ever meet is judged over a
+large random sample of the position limits, and, where the sample stays clear, by descending from
+its nearest postures towards contact; that is a search, not a proof, so a safe allowance is added.
+Neighbours but one (the base and the upper arm of an industrial robot) pass each other closer than
+capsules can tell: where their capsules touch, the meshes themselves decide whether they ever meet.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.config.constraints_spec import SelfCollisionSpec
+from excite_cli.geometry.mesh_distances import MeshDistances
+from excite_cli.geometry.mesh_pairs import joined_links
+from excite_cli.geometry.pair_choice_cache import choice_key, store_reasons, stored_reasons
+from excite_cli.geometry.pair_distances import PairDistances, carried_bodies
+from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.model import Robot
+
+Array = NDArray[np.float64]
+
+_ALWAYS = 0.99  # share of the sample in contact
+_CONTACT_SAMPLES = 200
+ALWAYS = "always in contact"
+NEVER = "never near"
+BY_MESHES = "kept apart by their meshes, as configured"
+UNGUARDED = "unguarded: capsules always overlap"
+_CONTACT = 0.01  # [m] a wider margin does not make a contact; it may make the problem infeasible
+_ALLOWANCE = 0.05  # [m] beyond the margin that the nearest posture found must keep
+_STARTS = 3
+_STEPS = 30
+_BLOCK = 500
+_DOUBTFUL = 0.02  # share of the sample in contact above which the meshes are asked
+_FEW_JOINTS = 3
+_MESH_SAMPLES = 200
+
+
+@dataclass(frozen=True)
+class DroppedPair:
+    """Names of two capsules that are not checked, and why."""
+
+    first: str
+    second: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class CollisionPairs:
+    """Pairs of capsules to check, as indices into the capsules, and the pairs left out."""
+
+    checked: tuple[tuple[int, int], ...]
+    dropped: tuple[DroppedPair, ...]
+
+
+def choose_pairs(
+    robot: Robot,
+    capsules: tuple[Capsule, ...],
+    spec: SelfCollisionSpec,
+    samples: int = 2000,
+    seed: int = 0,
+    bounded: bool = True,
+) -> CollisionPairs:
+    """Pairs that can be apart and can come near, in order of the capsules.
+
+    Dropped are pairs on the same body, of links joined by one moved joint, ignored in `spec`,
+    nearer than the margin in at least 99 % of `samples` random postures within the limits, and
+    never nearer than the margin and 5 cm in the sample or at the end of a descent from it. So are
+    capsules that touch although the meshes, at most three joints apart, never come as near as the
+    margin. What never comes near within the limits is kept unless positions are `bounded` by a
+    constraint.
+    """
+    dropped: dict[tuple[int, int], str] = {}
+    possible: list[tuple[int, int]] = []
+    known = _Known(robot, spec)
+    for pair in _all_pairs(len(capsules)):
+        reason = known.reason(capsules[pair[0]], capsules[pair[1]])
+        if reason:
+            dropped[pair] = reason
+        else:
+            possible.append(pair)
+    if possible:
+        asked = (robot, capsules, possible, spec.margin, samples, seed)
+        key = choice_key(*asked)
+        reasons = stored_reasons(key, len(possible))
+        if reasons is None:
+            reasons = _by_sampling(*asked)
+            store_reasons(key, reasons)
+        for pair, reason in zip(possible, reasons, strict=True):
+            if reason and (bounded or NEVER not in reason):
+                dropped[pair] = reason
+    return CollisionPairs(
+        checked=tuple(pair for pair in possible if pair not in dropped),
+        dropped=tuple(
+            DroppedPair(capsules[pair[0]].name, capsules[pair[1]].name, dropped[pair])
+            for pair in sorted(dropped)
+        ),
+    )
+
+
+def _all_pairs(count: int) -> Iterator[tuple[int, int]]:
+    return ((i, j) for i in range(count) for j in range(i + 1, count))
+
+
+class _Known:
+    """What the structure of the robot and the config say about a pair."""
+
+    def __init__(self, robot: Robot, spec: SelfCollisionSpec) -> None:
+        self._carried = carried_bodies(robot)
+        self._neighbours = joined_links(robot)
+        self._ignored = {frozenset(pair) for pair in spec.ignore}
+        self._by_meshes = {frozenset(pair) for pair in spec.by_meshes}
+
+    def reason(self, first: Capsule, second: Capsule) -> str:
+        between = int(np.abs(self._carried[first.joint] - self._carried[second.joint]).sum())
+        links = {frozenset((one, two)) for one in first.links for two in second.links}
+        if between == 0:
+            return "same body"
+        if links & self._ignored:
+            return "ignored in the config"
+        if links & self._by_meshes:
+            return BY_MESHES
+        if between == 1 and links & self._neighbours:
+            return "adjacent"
+        return ""
+
+
+def _by_sampling(
+    robot: Robot,
+    capsules: tuple[Capsule, ...],
+    pairs: list[tuple[int, int]],
+    margin: float,
+    samples: int,
+    seed: int,
+) -> list[str]:
+    """Why each pair is dropped; empty where it is kept."""
+    measure = PairDistances(robot, capsules, pairs)
+    q, _, _ = robot.draw_states(samples, seed)
+    distances = np.vstack([measure.distances(q[k : k + _BLOCK]) for k in range(0, len(q), _BLOCK)])
+    touching = (distances < margin).mean(axis=0)
+    always = (distances < min(margin, _CONTACT)).mean(axis=0) >= _ALWAYS
+    nearest = distances.min(axis=0)
+    clear = np.flatnonzero(nearest > margin + _ALLOWANCE)
+    if len(clear):
+        starts = np.argsort(distances[:, clear], axis=0)[:_STARTS]
+        target = margin + _ALLOWANCE
+        nearest[clear] = _descend(robot, measure, q[starts], clear, target)
+    reasons = [""] * len(pairs)
+    for k in np.flatnonzero(nearest > margin + _ALLOWANCE).tolist():
+        reasons[k] = f"{NEVER} (at least {nearest[k]:.2f} m found)"
+    start = measure.distances(robot.posture[None])[0]
+    doubtful = ~always & (nearest <= margin + _ALLOWANCE)
+    doubtful &= (touching > _DOUBTFUL) | (start < 2 * margin)
+    wanted = {k: pairs[k] for k in np.flatnonzero(doubtful).tolist()}
+    for k, reason in _by_meshes(robot, capsules, wanted, (q, distances), margin):
+        reasons[k] = reason
+    for k, reason in _contacts(
+        robot, capsules, {k: pairs[k] for k in np.flatnonzero(always).tolist()}, q
+    ):
+        reasons[k] = reason
+    return reasons
+
+
+def _by_meshes(
+    robot: Robot,
+    capsules: tuple[Capsule, ...],
+    doubtful: dict[int, tuple[int, int]],
+    sample: tuple[Array, Array],
+    margin: float,
+) -> Iterator[tuple[int, str]]:
+    """Those of the doubtful pairs, few joints apart, whose meshes never come near the margin.
+
+    doubtful: pair of capsules by column of the sample, which is positions and their distances.
+    """
+    carried = carried_bodies(robot)
+    meshes: MeshDistances | None = None
+    known: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = {}
+    q, distances = sample
+    for k, pair in doubtful.items():
+        first, second = (capsules[index] for index in pair)
+        moved = np.flatnonzero(carried[first.joint] != carried[second.joint])
+        if len(moved) > _FEW_JOINTS:
+            continue
+        meshes = meshes or MeshDistances(robot)
+        if first.by_hand or second.by_hand or not meshes.knows(first.links + second.links):
+            continue
+        links = (first.links, second.links)
+        if links not in known:
+            starts = np.vstack([robot.posture, q[np.argsort(distances[:, k])[:_MESH_SAMPLES]]])
+            known[links] = meshes.least_distance(*links, starts, moved, stop=margin)
+        if known[links] > margin:
+            yield k, f"meshes {NEVER} (at least {known[links]:.3f} m found)"
+
+
+def _contacts(
+    robot: Robot,
+    capsules: tuple[Capsule, ...],
+    always: dict[int, tuple[int, int]],
+    q: Array,
+) -> Iterator[tuple[int, str]]:
+    """Why each pair of capsules that overlap at all times is not checked.
+
+    No motion can part the capsules, so nothing can be asked of them. Where the meshes do part at
+    times, the pair is said to be unguarded, so that somebody looks at it.
+    """
+    meshes: MeshDistances | None = None
+    known: dict[tuple[str, str], float] = {}
+    some = q[:: max(1, len(q) // _CONTACT_SAMPLES)]
+    for k, pair in always.items():
+        first, second = (capsules[index] for index in pair)
+        meshes = meshes or MeshDistances(robot)
+        if first.by_hand or second.by_hand or not meshes.knows(first.links + second.links):
+            yield k, ALWAYS
+            continue
+        apart = {}
+        # Link by link: one that always touches must not excuse another in the same capsule.
+        for links in product(first.links, second.links):
+            if links not in known:
+                one, other = links
+                gaps = [meshes.distance([one], [other], at) for at in some]
+                known[links] = float(np.mean(np.array(gaps) > 0.0))
+            apart[links] = known[links]
+        loose = [f"{a} – {b} {share:.0%}" for (a, b), share in apart.items() if share > 1 - _ALWAYS]
+        yield k, f"{UNGUARDED} (meshes apart: {', '.join(loose)})" if loose else ALWAYS
+
+
+def _descend(
+    robot: Robot, measure: PairDistances, starts: Array, pairs: NDArray[np.intp], target: float
+) -> Array:
+    """Least distance (K,) [m] found for each pair on the way from its `starts` (S, K, n).
+
+    Steps go along the gradient to where the linearised distance is just below the target, at most
+    0.3 rad (or 0.3 m) far, shorter with time, and are kept within the limits.
+    """
+    lower, upper = robot.limits.ranges()
+    least = np.full(len(pairs), np.inf)
+    for q in starts:
+        going = np.arange(len(pairs))
+        for step in range(_STEPS + 1):
+            rows = np.arange(len(going))
+            distance = measure.distances_at(q, rows, pairs[going])
+            least[going] = np.minimum(least[going], distance)
+            keep = least[going] > target
+            if step == _STEPS or not keep.any():
+                break
+            slope = measure.gradients(q, rows, pairs[going])[keep]
+            going, q, excess = going[keep], q[keep], distance[keep] - target + 0.01
+            slope = np.where((q <= lower) & (slope > 0) | (q >= upper) & (slope < 0), 0.0, slope)
+            move = -slope * (excess / np.maximum((slope**2).sum(axis=1), 1e-6))[:, None]
+            reach = 0.3 * 0.93**step
+            move *= np.minimum(1.0, reach / np.maximum(np.abs(move).max(axis=1), 1e-12))[:, None]
+            q = np.clip(q + move, lower, upper)
+    return least

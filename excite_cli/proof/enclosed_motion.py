@@ -1,0 +1,198 @@
+"""Where all bodies of a robot can be, and how they can move, over whole intervals of time.
+
+The recursion of rigid-body kinematics in world axes, on enclosures (`enclosure.taylor`): with z the
+axis of joint i in the world, λ its parent, r the way from the parent's origin,
+
+    R = R_λ P (1 + sin q [w] + (1 − cos q) [w]²)                      revolute
+    p = p_λ + R_λ p₀ (+ z q)                                          (prismatic)
+    ω = ω_λ + z v,           α = α_λ + z a + ω_λ × z v
+    p̈ = p̈_λ + α_λ × r + ω_λ × (ω_λ × r)  (+ z a + 2 ω_λ × z v)
+
+Written apart from `forward_kinematics`, so that a certificate and the optimiser do not share a
+mistake. The base stands still; gravity is taken as an upward acceleration of it.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from excite_cli.proof.enclosed_trajectory import EnclosedStates
+from excite_cli.proof.taylor import (
+    Array,
+    Taylor,
+    applied,
+    cross,
+    matmul,
+    sine_and_cosine,
+    transposed,
+)
+from excite_cli.robot.model import Robot
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """What is fixed of a joint: its parent, placement (R, p) and axis, and which q moves it."""
+
+    parent: int
+    turn: Array
+    shift: Array
+    axis: Array
+    sliding: bool
+    variable: int
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Angular velocity, angular acceleration, and acceleration of the origin less gravity."""
+
+    spin: Taylor
+    spin_rate: Taylor
+    acceleration: Taylor
+
+
+class EnclosedMotion:
+    """Bodies of `robot` over T intervals; index b is joint b of `robot.model`, 0 the world."""
+
+    def __init__(self, robot: Robot, states: EnclosedStates) -> None:
+        self.robot, self.states = robot, states
+        self.count = states.q.shape[0]
+        self._joints = _joints_of(robot)
+
+    @cached_property
+    def placements(self) -> tuple[tuple[Taylor, Taylor], ...]:
+        """Rotation (T, 3, 3) and origin (T, 3) [m] of every body in the world."""
+        sine, cosine = sine_and_cosine(self.states.q)
+        world = (
+            Taylor.constant(np.tile(np.eye(3), (self.count, 1, 1))),
+            Taylor.constant(np.zeros((self.count, 3))),
+        )
+        found = [world]
+        for joint in self._joints:
+            turn, origin = found[joint.parent]
+            origin = origin + _moved(turn, joint.shift)
+            placed = _times_fixed(turn, joint.turn)
+            if joint.variable < 0:
+                found.append((placed, origin))
+                continue
+            if joint.sliding:
+                way = self.states.q[:, joint.variable, None]
+                axis = _moved(placed, joint.axis)
+                found.append((placed, origin + way.times(axis)))
+                continue
+            found.append(
+                (
+                    matmul(
+                        placed,
+                        _rotation(joint.axis, sine[:, joint.variable], cosine[:, joint.variable]),
+                    ),
+                    origin,
+                )
+            )
+        return tuple(found)
+
+    @cached_property
+    def axes(self) -> tuple[Taylor | None, ...]:
+        """World axis (T, 3) of every joint; None for the world and what stands still."""
+        found: list[Taylor | None] = [None]
+        for index, joint in enumerate(self._joints, start=1):
+            turn = self.placements[index][0]
+            found.append(_moved(turn, joint.axis) if joint.variable >= 0 else None)
+        return tuple(found)
+
+    @cached_property
+    def rates(self) -> tuple[Rates, ...]:
+        """Velocities and accelerations of every body."""
+        still = Taylor.constant(np.zeros((self.count, 3)))
+        lifted = still - np.asarray(self.robot.model.gravity.linear)
+        found = [Rates(still, still, lifted)]
+        for index, joint in enumerate(self._joints, start=1):
+            before = found[joint.parent]
+            way = self.placements[index][1] - self.placements[joint.parent][1]
+            acceleration = before.acceleration + _carried(before, way)
+            axis = self.axes[index]
+            if axis is None:
+                found.append(Rates(before.spin, before.spin_rate, acceleration))
+                continue
+            speed = self.states.v[:, joint.variable, None].times(axis)
+            change = self.states.a[:, joint.variable, None].times(axis)
+            turned = cross(before.spin, speed)
+            if joint.sliding:
+                acceleration = acceleration + change + turned.scaled(2.0)
+                found.append(Rates(before.spin, before.spin_rate, acceleration))
+                continue
+            found.append(
+                Rates(before.spin + speed, before.spin_rate + change + turned, acceleration)
+            )
+        return tuple(found)
+
+    def points(self, body: int, local: Array) -> Taylor:
+        """World positions (T, K, 3) of points (K, 3) that are fixed in a body."""
+        turn, origin = self.placements[body]
+        spread = Taylor(
+            np.einsum("otij,kj->otki", turn.terms, local),
+            np.einsum("tij,kj->tki", turn.radius, np.abs(local)),
+        )
+        return spread + origin[:, None]
+
+    def column(self, joint: int) -> tuple[Taylor, Taylor, bool]:
+        """Axis (T, 3), origin (T, 3) of a moved joint of the model, and whether it slides."""
+        axis = self.axes[joint]
+        assert axis is not None, "a joint that stands still has no axis"
+        return axis, self.placements[joint][1], self._joints[joint - 1].sliding
+
+
+def _joints_of(robot: Robot) -> tuple[_Joint, ...]:
+    model = robot.model
+    first = int(robot.moved[0])
+    reference = model.createData()
+    pin.forwardKinematics(model, reference, robot.reference)
+    found = []
+    for index in range(1, model.njoints):
+        joint = model.joints[index]
+        moved = joint.idx_v >= first
+        place = model.jointPlacements[index] if moved else reference.liMi[index]
+        twist = np.array(joint.createData().S, dtype=float).reshape(6, joint.nv)[:, 0]
+        sliding = bool(np.any(twist[:3]))
+        found.append(
+            _Joint(
+                parent=int(model.parents[index]),
+                turn=np.array(place.rotation),
+                shift=np.array(place.translation),
+                axis=twist[:3] if sliding else twist[3:],
+                sliding=sliding,
+                variable=int(joint.idx_v) - first if moved else -1,
+            )
+        )
+    return tuple(found)
+
+
+def _rotation(axis: Array, sine: Taylor, cosine: Taylor) -> Taylor:
+    """1 + sin q [w] + (1 − cos q) [w]² (T, 3, 3)."""
+    skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    square = skew @ skew
+    one = sine[:, None, None].scaled(skew) - cosine[:, None, None].scaled(square)
+    return one + (np.eye(3) + square)
+
+
+def _times_fixed(turn: Taylor, fixed: Array) -> Taylor:
+    return Taylor(turn.terms @ fixed, turn.radius @ np.abs(fixed))
+
+
+def _moved(turn: Taylor, local: Array) -> Taylor:
+    """A vector fixed in a body, in world axes (T, 3)."""
+    return Taylor(turn.terms @ local, turn.radius @ np.abs(local))
+
+
+def _carried(rates: Rates, way: Taylor) -> Taylor:
+    """Acceleration that turning gives to a point `way` from the origin."""
+    return cross(rates.spin_rate, way) + cross(rates.spin, cross(rates.spin, way))
+
+
+def turned_back(turn: Taylor, vectors: Taylor) -> Taylor:
+    """Rᵀ x: world vectors (T, 3) or (T, K, 3) in the axes of a body."""
+    back = transposed(turn)
+    if len(vectors.shape) == 2:
+        return applied(back, vectors)
+    return transposed(matmul(back, transposed(vectors)))

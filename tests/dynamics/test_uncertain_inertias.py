@@ -1,0 +1,255 @@
+"""Bounds on functionals of uncertain inertias against vertices and exact programs."""
+
+from dataclasses import replace
+from itertools import product
+
+import clarabel
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse import csc_matrix
+
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.config.uncertainty_spec import BodyUncertaintySpec, UncertaintySpec
+from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.dynamics.least_ratio import least_ratios
+from excite_cli.dynamics.regressor import Regressor
+from excite_cli.dynamics.uncertain_inertias import (
+    FitKnowledge,
+    InertiaUncertainty,
+    Piece,
+    box,
+    half_widths,
+    inertia_uncertainty,
+)
+from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states, whole_parameters
+from excite_cli.errors import ConfigError, FileError
+from excite_cli.excitation.differences import central_differences
+from excite_cli.robot.model import Array, Robot, build_robot
+from tests.robot.random_robots import random_robot
+
+SPEC = UncertaintySpec(mass=0.2, center_of_mass=0.02, inertia=0.3)
+
+
+def knowledge(robot: Robot, base: BaseParameters, seed: int, precision: float) -> FitKnowledge:
+    """A fit near the URDF, its covariance `precision`² of the box's spread, correlated."""
+    rng = np.random.default_rng(seed)
+    reach = box(SPEC, robot)[10:]
+    usual = np.sqrt(np.square(base.mapping) @ np.square(reach))
+    root = precision * usual[:, None] * (np.eye(base.rank) + 0.3 * rng.normal(size=[base.rank] * 2))
+    values = base.mapping @ (whole_parameters(robot)[10:] + 0.3 * rng.uniform(-reach, reach))
+    names = tuple(base.names[index] for index in base.selection)
+    return FitKnowledge(values, root @ root.T, names, robot.fingerprint(), "fit.h5")
+
+
+def exact_least(
+    y: Array, phi: Array, reach: Array, mapping: Array, fit: FitKnowledge, sigmas: float
+) -> float:
+    """min y·φ over box and ellipsoid, as a second-order cone program."""
+    size, rank = len(y), len(fit.values)
+    whiten = np.linalg.inv(np.linalg.cholesky(fit.covariance))
+    rows = np.vstack(
+        [np.eye(size), -np.eye(size), np.zeros((1, size)), -whiten @ (mapping * reach)]
+    )
+    gap = whiten @ (mapping @ phi - fit.values)
+    right = np.concatenate([np.ones(2 * size), [sigmas], gap])
+    cones = [clarabel.NonnegativeConeT(2 * size), clarabel.SecondOrderConeT(rank + 1)]
+    quiet = clarabel.DefaultSettings()
+    quiet.verbose = False
+    solver = clarabel.DefaultSolver(
+        csc_matrix((size, size)), y * reach, csc_matrix(rows), right, cones, quiet
+    )
+    return float(y @ phi + solver.solve().obj_val)
+
+
+def test_half_widths_are_those_of_the_documentation() -> None:
+    ten = np.array([2.0, 0.2, -0.4, 0.0, 0.5, 0.01, 0.7, -0.02, 0.0, 0.9])
+    bound = BodyUncertaintySpec(mass=0.1, center_of_mass=0.01, inertia=0.2)
+    expected = [0.2, 0.04, 0.06, 0.02, 0.1, 0.12, 0.14, 0.14, 0.16, 0.18]
+    assert np.allclose(half_widths(ten, bound), expected)
+
+
+@settings(max_examples=20, derandomize=True, deadline=None)
+@given(seed=st.integers(0, 9999))
+def test_a_box_is_least_at_one_of_its_vertices(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    center, reach = rng.normal(size=6), rng.uniform(0, 1, 6)
+    admitted = InertiaUncertainty((Piece(center, reach, np.zeros((0, 6))),))
+    vertices = center + np.array(list(product((-1.0, 1.0), repeat=6))) * reach
+    y = rng.normal(size=(5, 6))
+    assert np.allclose(admitted.least(y), (vertices @ y.T).min(axis=0))
+    worst = admitted.worst(y)
+    assert np.allclose(np.abs(worst - center), reach)
+    assert np.allclose(np.einsum("kp,kp->k", y, worst), admitted.least(y))
+    below, above = admitted.least_both(y)
+    assert np.allclose(below, admitted.least(y))
+    assert np.allclose(above, admitted.least(-y))
+
+
+@settings(max_examples=15, derandomize=True, deadline=None)
+@given(seed=st.integers(0, 9999), heavy=st.floats(0.0, 0.6))
+def test_quotients_are_least_at_a_vertex(seed: int, heavy: float) -> None:
+    rng = np.random.default_rng(seed)
+    center, reach = np.append(rng.normal(size=5), 1.0), np.append(rng.uniform(0, 1, 5), heavy)
+    admitted = InertiaUncertainty((Piece(center, reach, np.zeros((0, 6))),))
+    rows = np.zeros((1, 3, 6))
+    rows[0, :2, :5], rows[0, 2, 5] = rng.normal(size=(2, 5)), 1.0
+    rows[0, 2, :5] = 0.02 * rng.normal(size=5)
+    above = rng.normal(size=(4, 3))
+    vertices = center + np.array(list(product((-1.0, 1.0), repeat=6))) * reach
+    values = vertices @ rows[0].T
+    expected = ((values @ above.T) / values[:, 2:]).min(axis=0)
+    found = least_ratios(admitted, rows, above, np.array([0.0, 0.0, 1.0]), 0.05)
+    assert found.proper.all()
+    assert np.allclose(found.values[0], expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("seed", "precision"), [(0, 0.02), (1, 0.2), (2, 1.0)])
+def test_bounds_after_a_fit_are_sound_and_near_the_exact_program(
+    seed: int, precision: float
+) -> None:
+    robot = random_robot(seed, joints=4, floating=seed == 1, rows=("joints",))
+    base = find_base_parameters(robot)
+    fit = knowledge(robot, base, seed, precision)
+    admitted = inertia_uncertainty(SPEC, robot, base, fit)
+    phi, reach = whole_parameters(robot), admitted.pieces[0].corners
+    mapping = np.hstack([np.zeros((base.rank, 10)), base.mapping])
+    states = drawn_states(robot, 4, seed)
+    torques = Regressor(replace(robot, rows=robot.moved)).evaluate(states.q, states.v, states.a)
+    torques = np.pad(torques, ((0, 0), (0, 0), (10, 0)))
+    for rows, loosest in ((torques, 0.2), (GroundWrench(robot).regressor(states), 0.3)):
+        y = rows.reshape(-1, len(phi))[:: 2 if rows is torques else 3]
+        low, high = admitted.least_both(y)
+        exact = [exact_least(row, phi, reach, mapping, fit, SPEC.sigmas) for row in y]
+        above = [exact_least(-row, phi, reach, mapping, fit, SPEC.sigmas) for row in y]
+        width = -np.array(above) - exact
+        assert np.all(low <= exact + 1e-5 * width)
+        assert np.all(high <= above + 1e-5 * width)
+        lost = (-high - low) / width - 1.0
+        assert np.median(lost) < loosest
+        sharp = admitted.sharpest(y)
+        assert np.all(sharp.least(y) <= low + 1e-12 * np.abs(low))
+        assert np.median((sharp.least(y) - low) / width) > -0.05
+
+
+def test_a_good_fit_opens_the_set_and_a_bad_one_leaves_the_box() -> None:
+    robot = random_robot(3, joints=4)
+    base = find_base_parameters(robot)
+    states = drawn_states(robot, 10)
+    y = Regressor(robot).evaluate(states.q, states.v, states.a).reshape(-1, 40)
+    prior = inertia_uncertainty(SPEC, robot, base).of_moving_bodies()
+
+    def width(admitted: InertiaUncertainty) -> float:
+        below, above = admitted.least_both(y)
+        return float(np.mean(-above - below))
+
+    good, poor = (
+        inertia_uncertainty(SPEC, robot, base, knowledge(robot, base, 0, precision))
+        for precision in (0.01, 100.0)
+    )
+    assert width(good.of_moving_bodies()) < 0.1 * width(prior)
+    assert np.isclose(width(poor.of_moving_bodies()), width(prior), rtol=1e-3)
+
+
+def test_the_derivative_of_a_bound_is_its_worst_inertia() -> None:
+    robot = random_robot(4, joints=3)
+    base = find_base_parameters(robot)
+    admitted = inertia_uncertainty(SPEC, robot, base, knowledge(robot, base, 4, 0.1))
+    for y in np.random.default_rng(0).normal(size=(4, 40)):
+        expected = central_differences(lambda x: float(admitted.least(x)), y, 1e-7)
+        assert np.allclose(admitted.worst(y[None])[0], expected, atol=1e-5)
+        assert np.isclose(admitted.worst(y[None])[0] @ y, admitted.least(y))
+
+
+def test_what_the_data_did_not_show_is_left_to_the_box() -> None:
+    robot = random_robot(5, joints=3)
+    base = find_base_parameters(robot)
+    fit = knowledge(robot, base, 5, 0.05)
+    covariance = fit.covariance.copy()
+    covariance[2] = covariance[:, 2] = 0.0
+    covariance[2, 2] = np.inf
+    unseen = inertia_uncertainty(SPEC, robot, base, replace(fit, covariance=covariance))
+    seen = inertia_uncertainty(SPEC, robot, base, fit)
+    y = np.hstack([np.zeros((base.rank, 10)), base.mapping])
+    below, above = unseen.least_both(y)
+    assert np.all(np.isfinite(below))
+    width, known = -above - below, -np.add(*seen.least_both(y))
+    assert width[2] > 3 * known[2]
+    assert width[0] < 1.5 * known[0]
+
+
+def test_a_fit_outside_the_box_widens_it() -> None:
+    robot = random_robot(6, joints=3)
+    base = find_base_parameters(robot)
+    fit = knowledge(robot, base, 6, 0.01)
+    truth = 1.6 * whole_parameters(robot)
+    values = base.mapping @ truth[10:]
+    admitted = inertia_uncertainty(SPEC, robot, base, replace(fit, values=values))
+    y = np.hstack([np.zeros((base.rank, 10)), base.mapping])
+    below, above = admitted.least_both(y)
+    assert np.all(below <= y @ truth + 1e-9)
+    assert np.all(y @ truth <= -above + 1e-9)
+    assert np.all(-above - below < 0.2 * np.abs(y @ truth) + 1e-2)
+
+
+@pytest.mark.parametrize("precision", [0.003, 0.1])
+@pytest.mark.parametrize("off", [1.15, 1.6, 3.0])
+def test_a_fit_that_contradicts_the_box_leaves_something_admitted(
+    precision: float, off: float
+) -> None:
+    """Otherwise bounds would be bounds over an empty set: the least above the largest."""
+    robot = random_robot(8, joints=4)
+    base = find_base_parameters(robot)
+    fit = knowledge(robot, base, 8, precision)
+    values = base.mapping @ (off * whole_parameters(robot)[10:])
+    admitted = inertia_uncertainty(SPEC, robot, base, replace(fit, values=values))
+    states = drawn_states(robot, 10)
+    y = np.pad(Regressor(robot).evaluate(states.q, states.v, states.a), ((0, 0), (0, 0), (10, 0)))
+    below, above = admitted.least_both(y.reshape(-1, y.shape[-1]))
+    assert np.all(below <= -above)
+    mapping = np.hstack([np.zeros((base.rank, 10)), base.mapping])
+    phi, reach = whole_parameters(robot), admitted.pieces[0].corners
+    row = y.reshape(-1, y.shape[-1])[0]
+    exact = exact_least(row, phi, reach, mapping, replace(fit, values=values), SPEC.sigmas)
+    assert np.isfinite(exact)
+
+
+def test_a_fit_that_bounds_of_zero_cannot_follow_is_refused() -> None:
+    """Nothing would be admitted, and bounds over nothing would prove anything."""
+    robot = random_robot(9, joints=3)
+    base = find_base_parameters(robot)
+    fit = knowledge(robot, base, 9, 0.01)
+    heavier = replace(fit, values=base.mapping @ (1.5 * whole_parameters(robot)[10:]))
+    stiff = UncertaintySpec(mass=0.0, center_of_mass=0.0, inertia=0.0)
+    with pytest.raises(ConfigError, match="some bounds are zero"):
+        inertia_uncertainty(stiff, robot, base, heavier)
+    assert len(inertia_uncertainty(SPEC, robot, base, heavier).pieces) > 1
+
+
+def test_bodies_are_named_by_joint_link_or_base() -> None:
+    robot = random_robot(7, joints=3)
+    exact = BodyUncertaintySpec(mass=0.0, center_of_mass=0.0, inertia=0.0)
+    for names in (("base", "joint_2"), ("link_0", "link_2")):
+        reach = box(UncertaintySpec(bodies=dict.fromkeys(names, exact)), robot).reshape(-1, 10)
+        assert np.flatnonzero(reach.sum(axis=1)).tolist() == [1, 3]
+    floating = random_robot(7, joints=3, floating=True)
+    reach = box(UncertaintySpec(bodies={"base": exact}), floating).reshape(-1, 10)
+    assert np.flatnonzero(reach.sum(axis=1)).tolist() == [2, 3, 4]
+
+
+def test_unknown_and_locked_bodies_are_told() -> None:
+    robot = build_robot(
+        RobotSpec(urdf="example-robot-data:ur10", joints=("elbow_joint", "wrist_1_joint"))
+    )
+    with pytest.raises(ConfigError, match=r"no moved joint 'elbow_join'. Did you mean 'elbow_joi"):
+        box(UncertaintySpec(bodies={"elbow_join": BodyUncertaintySpec()}), robot)
+    with pytest.raises(ConfigError, match=r"'wrist_2_joint'. It is locked.* Bodies: base, elbow"):
+        box(UncertaintySpec(bodies={"wrist_2_joint": BodyUncertaintySpec()}), robot)
+
+
+def test_a_fit_of_another_robot_is_refused() -> None:
+    robot, other = random_robot(8, joints=3), random_robot(9, joints=3)
+    base = find_base_parameters(other)
+    with pytest.raises(FileError, match=r"fit.h5 was made for another robot"):
+        inertia_uncertainty(SPEC, other, base, knowledge(robot, find_base_parameters(robot), 0, 1))

@@ -1,0 +1,175 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.config.constraints_spec import CapsuleSpec, SelfCollisionSpec
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.errors import ConfigError, RobotError
+from excite_cli.geometry import capsules as module
+from excite_cli.geometry.capsules import fit_capsules, link_joints
+from excite_cli.geometry.link_shapes import collision_model, link_shapes
+from excite_cli.robot.model import build_robot
+
+from .fitted_robots import capsules_of, robot_of
+
+BOX = """<robot name="box"><link name="base"/>
+<link name="arm">{collision}<inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+def box_robot(tmp_path: Path, collision: str):
+    path = tmp_path / "box.urdf"
+    path.write_text(BOX.format(collision=collision))
+    return build_robot(RobotSpec(urdf=str(path)))
+
+
+def gaps(points: np.ndarray, capsule: module.Capsule) -> np.ndarray:
+    along = capsule.end - capsule.start
+    share = np.clip((points - capsule.start) @ along / max(along @ along, 1e-30), 0, 1)
+    nearest = capsule.start + share[:, None] * along
+    return np.linalg.norm(points - nearest, axis=1) - capsule.radius
+
+
+@pytest.mark.parametrize("name", ["talos", "ur10", "panda"])
+def test_every_mesh_lies_inside_the_capsules_of_its_link(name: str) -> None:
+    robot, capsules = robot_of(name), capsules_of(name)
+    rng = np.random.default_rng(0)
+    for shape in link_shapes(robot, collision_model(robot)):
+        own = [c for c in capsules if shape.links[0] in c.links]
+        assert own, shape.links
+        assert {c.joint for c in own} == {shape.joint}
+        share = rng.uniform(size=(len(shape.edges), 1))  # edges must not leave between the capsules
+        first, second = shape.points[shape.edges[:, 0]], shape.points[shape.edges[:, 1]]
+        points = np.vstack([shape.points, share * first + (1 - share) * second])
+        outside = np.min([gaps(points, c) for c in own], axis=0)
+        assert outside.max() < 1e-9, shape.links
+
+
+@pytest.mark.parametrize(("name", "most"), [("talos", 45), ("ur10", 15), ("panda", 16)])
+def test_few_capsules(name: str, most: int) -> None:
+    assert len(capsules_of(name)) <= most
+
+
+def test_small_parts_of_a_gripper_share_a_capsule() -> None:
+    gripper = [c for c in capsules_of("talos") if "gripper_left_fingertip_1_link" in c.links]
+    assert len(gripper) <= 2
+    assert len(gripper[0].links) >= 6
+
+
+def test_names_are_unique() -> None:
+    names = [capsule.name for capsule in capsules_of("talos")]
+    assert len(set(names)) == len(names)
+    assert "torso_2_link#2" in names
+
+
+def test_mesh_scale_is_respected() -> None:
+    """TALOS' right arm is the left arm's mesh with a negative scale: its capsules are mirrored."""
+    by_name = {c.name: c for c in capsules_of("talos")}
+    left, right = by_name["arm_left_3_link"], by_name["arm_right_3_link"]
+    assert right.radius == pytest.approx(left.radius, abs=2e-3)
+    mirrored = (left.start + left.end) / 2 * [1, -1, 1]
+    np.testing.assert_allclose((right.start + right.end) / 2, mirrored, atol=5e-3)
+    assert abs(mirrored[1]) > 0.01
+
+
+def test_turned_base_turns_fixed_capsules() -> None:
+    plain = build_robot(RobotSpec(urdf="example-robot-data:ur10"))
+    turned = robot_of("ur10")
+    one = next(s for s in link_shapes(plain, collision_model(plain)) if s.joint == 0)
+    two = next(s for s in link_shapes(turned, collision_model(turned)) if s.joint == 0)
+    cos, sin = np.cos(0.5), np.sin(0.5)
+    turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+    np.testing.assert_allclose(two.points, one.points @ turn.T, atol=1e-12)
+
+
+def test_capsule_by_hand_replaces_the_fitted_one() -> None:
+    by_hand = CapsuleSpec(start=(0, 0, 0), end=(0, 0, 0.3), radius=0.123)
+    spec = SelfCollisionSpec(capsules={"wrist_3_link": by_hand})
+    found = [c for c in fit_capsules(robot_of("ur10"), spec) if "wrist_3_link" in c.links]
+    assert [(c.name, c.joint, c.radius, c.by_hand) for c in found] == [
+        ("wrist_3_link", 6, 0.123, True)
+    ]
+    assert any(c.links == ("ee_link",) for c in fit_capsules(robot_of("ur10"), spec))
+
+
+def test_unknown_link_is_refused_with_the_nearest_name() -> None:
+    by_hand = CapsuleSpec(start=(0, 0, 0), end=(0, 0, 0.3), radius=0.1)
+    with pytest.raises(ConfigError, match=r"no link 'wrist_3_lnk'. Did you mean 'wrist_3_link'"):
+        fit_capsules(robot_of("ur10"), SelfCollisionSpec(capsules={"wrist_3_lnk": by_hand}))
+    with pytest.raises(ConfigError, match=r"ignore: the robot has no link 'nothing'"):
+        fit_capsules(robot_of("ur10"), SelfCollisionSpec(ignore=(("nothing", "base_link"),)))
+
+
+def test_no_collision_geometry(tmp_path: Path) -> None:
+    robot = box_robot(tmp_path, "")
+    with pytest.raises(RobotError, match=r"no collision geometry.*drop constraints"):
+        fit_capsules(robot, SelfCollisionSpec())
+    by_hand = CapsuleSpec(start=(0, 0, 0), end=(0, 0, 0.3), radius=0.1)
+    assert len(fit_capsules(robot, SelfCollisionSpec(capsules={"arm": by_hand}))) == 1
+
+
+@pytest.mark.parametrize(
+    ("geometry", "radius", "length"),
+    [
+        ('<sphere radius="0.1"/>', 0.1, 0.0),
+        ('<cylinder radius="0.02" length="1"/>', 0.02, 1.0),
+        ('<box size="0.02 0.02 1"/>', 0.0141, 1.0),
+    ],
+)
+def test_primitives(tmp_path: Path, geometry: str, radius: float, length: float) -> None:
+    collision = f'<collision><origin xyz="0.3 0 0"/><geometry>{geometry}</geometry></collision>'
+    (capsule,) = fit_capsules(box_robot(tmp_path, collision), SelfCollisionSpec())
+    assert radius <= capsule.radius + 1e-4
+    assert capsule.radius == pytest.approx(radius, rel=0.06)
+    assert np.linalg.norm(capsule.end - capsule.start) == pytest.approx(length, abs=0.03)
+    np.testing.assert_allclose((capsule.start + capsule.end) / 2, [0.3, 0, 0], atol=2e-3)
+
+
+def test_cache_is_used_and_foreign_content_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    collision = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
+    robot = box_robot(tmp_path, collision)
+    first = fit_capsules(robot, SelfCollisionSpec())
+    (stored,) = (tmp_path / "excite").glob("capsules-*.json")
+    whole = stored.read_text()
+
+    calls = []
+    real = module.cover
+    monkeypatch.setattr(module, "cover", lambda *a: calls.append(1) or real(*a))
+    again = fit_capsules(robot, SelfCollisionSpec())
+    assert not calls
+    np.testing.assert_array_equal(again[0].start, first[0].start)
+
+    other_key = json.dumps({**json.loads(whole), "key": "other"})
+    for content in ("", "[]", "{", '{"key": 1}', whole.replace("radius", "r"), other_key):
+        stored.write_text(content)
+        calls.clear()
+        repaired = fit_capsules(robot, SelfCollisionSpec())
+        assert calls, content
+        assert repaired[0].radius == first[0].radius
+    assert not list((tmp_path / "excite").glob(".capsules-*"))
+
+
+def test_cache_that_cannot_be_written_is_no_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    collision = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    assert len(fit_capsules(box_robot(tmp_path, collision), SelfCollisionSpec())) == 1
+
+
+def test_links_know_their_joint() -> None:
+    joints = link_joints(robot_of("panda"))
+    assert joints["panda_link0"] == 0
+    assert joints["panda_hand"] == joints["panda_link7"] == 7

@@ -1,0 +1,146 @@
+"""Distances of capsules from planes and boxes against coal, gradients against differences."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.states import States
+from excite_cli.excitation.differences import central_differences
+from excite_cli.geometry.obstacle_distances import ObstacleDistances
+from excite_cli.geometry.obstacles import Box
+from excite_cli.geometry.segment_box import point_distances, segment_contacts, segment_distances
+from excite_cli.robot.capsule import Capsule
+from tests.robot.random_robots import random_robot
+
+from .obstacle_worlds import coal_distance, coal_distances, random_capsules, random_obstacles
+
+KINDS = ("free", "short", "level", "edge", "point", "inside", "pierces")
+
+
+def _segment(rng: np.random.Generator, kind: str, half: np.ndarray) -> tuple[np.ndarray, ...]:
+    start, along = rng.normal(size=3) * 0.6, rng.normal(size=3) * 0.6
+    if kind == "short":
+        along *= 0.05
+    elif kind == "level":  # parallel to a face
+        along[rng.integers(3)] = 0.0
+    elif kind == "edge":  # parallel to an edge
+        along *= np.eye(3)[rng.integers(3)]
+    elif kind == "point":
+        along[:] = 0.0
+    elif kind == "inside":
+        start, along = 0.8 * half * rng.uniform(-1, 1, 3), 0.1 * half * rng.normal(size=3)
+    elif kind == "pierces":
+        start = rng.normal(size=3) * 0.6
+        along = 2 * (half * rng.uniform(-0.9, 0.9, 3) - start)
+    return start, along
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(KINDS))
+def test_segment_and_box_against_coal(seed: int, kind: str) -> None:
+    rng = np.random.default_rng(seed)
+    half = rng.uniform(0.02, 0.6, 3)
+    start, along = _segment(rng, kind, half)
+    distance = float(segment_distances(start[:, None], along[:, None], half)[0])
+    box = Box("box", np.eye(3), np.zeros(3), half)
+    capsule = Capsule("capsule", 0, start, start + along, 0.05, ("capsule",))
+    expected = coal_distance(capsule, pin.SE3.Identity(), box)
+    assert distance - 0.05 == pytest.approx(expected, abs=1e-6)
+    contact = segment_contacts(start[:, None], along[:, None], half)
+    assert contact.distance[0] == distance
+    assert 0 <= contact.share[0] <= 1
+    assert np.linalg.norm(contact.normal[:, 0]) == pytest.approx(1.0)
+    # Moved back along the normal by the distance, the witness touches the box (or leaves it).
+    moved = start[:, None] - (distance - 1e-9) * contact.normal
+    assert float(segment_distances(moved, along[:, None], half)[0]) == pytest.approx(0, abs=1e-7)
+
+
+def test_continuous_through_contact_and_falling_beyond() -> None:
+    """A level rod sinks into a table: as deep as it has sunk, until the underside is nearer."""
+    half = np.array([0.5, 0.5, 0.1])
+    heights = np.linspace(0.3, 0.02, 29)
+    start = np.array([np.full(29, -0.2), np.zeros(29), heights])
+    along = np.repeat([[0.4], [0.0], [0.0]], 29, axis=1)
+    np.testing.assert_allclose(segment_distances(start, along, half), heights - 0.1, atol=1e-12)
+    contacts = segment_contacts(start, along, half)
+    np.testing.assert_allclose(contacts.normal, np.repeat([[0.0], [0.0], [1.0]], 29, axis=1))
+
+
+def test_level_segments_have_their_witness_in_the_middle() -> None:
+    half = np.array([0.5, 0.5, 0.1])
+    start, along = np.array([[-0.9], [0.0], [0.3]]), np.array([[0.8], [0.0], [0.0]])
+    # Level with the top from x = -0.5, half way along, to its end.
+    assert segment_contacts(start, along, half).share[0] == pytest.approx(0.75)
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1))
+def test_points(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    half, points = rng.uniform(0.1, 0.6, 3), rng.normal(size=(3, 50)) * 0.5
+    np.testing.assert_allclose(
+        point_distances(points, half), segment_distances(points, 0 * points, half), atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_distances_on_random_robots_equal_coal(seed: int) -> None:
+    robot = random_robot(seed, joints=5, floating=seed % 2 == 1)
+    rng = np.random.default_rng(seed)
+    capsules, obstacles = random_capsules(rng, robot), random_obstacles(rng)
+    pairs = [(i, j) for i in range(len(capsules)) for j in range(len(obstacles))]
+    rng.shuffle(pairs)
+    pairs = [tuple(pair) for pair in pairs]
+    measure = ObstacleDistances(robot, capsules, obstacles, pairs)
+    q = robot.draw_states(30, seed)[0]
+    found = measure.distances(q)
+    assert found.shape == (30, measure.n_pairs)
+    assert (found < 0).any()
+    np.testing.assert_allclose(found, coal_distances(robot, capsules, obstacles, pairs, q),
+                               atol=1e-6)  # fmt: skip
+    for reach in (0.0, 0.1, 0.4):
+        quick = measure.distances(q, exact_below=reach)
+        near = found < reach
+        np.testing.assert_allclose(quick[near], found[near], atol=1e-12)
+        assert np.all(quick[~near] >= reach - 1e-12)
+        assert np.all(quick <= found + 1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_gradients_on_random_robots_equal_differences(seed: int) -> None:
+    robot = random_robot(seed, joints=5, floating=seed % 2 == 1)
+    rng = np.random.default_rng(seed)
+    capsules, obstacles = random_capsules(rng, robot), random_obstacles(rng)
+    pairs = [(i, j) for i in range(len(capsules)) for j in range(len(obstacles))]
+    measure = ObstacleDistances(robot, capsules, obstacles, pairs)
+    q, v, a = robot.draw_states(8, seed)
+    states = States(BatchKinematics(robot), q, v, a)
+    inside = np.argwhere(measure.distances(q) < -0.02)
+    both = [rng.integers(0, (8, len(pairs)), (16, 2)), rng.permutation(inside)[:8]]
+    rows, cols = np.vstack(both).T
+    gradients = measure.gradients(states, rows, cols)
+    np.testing.assert_array_equal(gradients, measure.gradients(q, rows, cols))
+    wrong = 0
+    for k, (t, column) in enumerate(zip(rows, cols, strict=True)):
+
+        def distance(x: np.ndarray, c: int = column) -> float:
+            return float(measure.distances(x[None])[0, c])
+
+        steps = [central_differences(distance, q[t], step) for step in (1e-6, 1e-7)]
+        if np.abs(steps[0] - steps[1]).max() > 1e-4:  # a bend of the distance lies between
+            wrong += 1
+            continue
+        np.testing.assert_allclose(gradients[k], steps[0], atol=2e-6)
+    assert wrong <= 2
+
+
+def test_no_pairs() -> None:
+    robot = random_robot(1, joints=3)
+    rng = np.random.default_rng(0)
+    empty = ObstacleDistances(robot, random_capsules(rng, robot), random_obstacles(rng), [])
+    assert empty.distances(np.zeros((4, 3))).shape == (4, 0)
+    none = np.zeros(0, dtype=np.intp)
+    assert empty.gradients(np.zeros((4, 3)), none, none).shape == (0, 3)

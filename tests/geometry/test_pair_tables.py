@@ -1,0 +1,182 @@
+"""Tabled distances of meshes that capsules cannot tell apart, and the constraint on them."""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+import pytest
+
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
+from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.states import States
+from excite_cli.excitation.differences import central_differences
+from excite_cli.geometry.collision_pairs import CollisionPairs
+from excite_cli.geometry.mesh_distances import MeshDistances
+from excite_cli.geometry.pair_table import PairTable
+from excite_cli.geometry.pair_tables import FAR, mesh_tables, near_at_posture
+from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.model import Robot, build_robot
+
+# A bar on two crossed hinges above a plate: it strikes the plate when it tilts.
+WRIST = """
+<robot name="wrist">
+  <link name="plate">
+    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><box size="0.2 0.2 0.05"/></geometry></collision>
+  </link>
+  <joint name="roll" type="revolute">
+    <parent link="plate"/><child link="cross"/><origin xyz="0 0 0.06"/><axis xyz="1 0 0"/>
+    <limit lower="-0.9" upper="0.8" velocity="2" effort="5"/>
+  </joint>
+  <link name="cross">
+    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><box size="0.01 0.01 0.01"/></geometry></collision>
+  </link>
+  <joint name="pitch" type="revolute">
+    <parent link="cross"/><child link="bar"/><origin xyz="0 0 0.02"/><axis xyz="0 1 0"/>
+    <limit lower="-0.9" upper="0.9" velocity="2" effort="5"/>
+  </joint>
+  <link name="bar">
+    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0.01 0 0"/><geometry><box size="0.16 0.06 0.02"/></geometry></collision>
+  </link>
+  <joint name="twist" type="revolute">
+    <parent link="bar"/><child link="far"/><origin xyz="0 0 0.5"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" velocity="2" effort="5"/>
+  </joint>
+  <link name="far">
+    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><sphere radius="0.02"/></geometry></collision>
+  </link>
+</robot>"""
+
+NONE = CollisionPairs((), ())
+
+
+@pytest.fixture(autouse=True)
+def own_cache() -> Iterator[None]:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        mock.patch.dict(os.environ, {"XDG_CACHE_HOME": folder}),
+    ):
+        yield
+
+
+@pytest.fixture
+def wrist(tmp_path: Path) -> Robot:
+    (tmp_path / "wrist.urdf").write_text(WRIST, encoding="utf-8")
+    return build_robot(RobotSpec(urdf="wrist.urdf"), relative_to=tmp_path)
+
+
+def only(tables: tuple[PairTable, ...]) -> PairTable:
+    assert [(table.first, table.second) for table in tables] == [("plate", "bar")]
+    return tables[0]
+
+
+def test_a_table_gives_the_distance_of_the_meshes(wrist: Robot) -> None:
+    table = only(mesh_tables(wrist, (), NONE))
+    assert table.joints == (0, 1)
+    q = wrist.draw_states(400, 3)[0]
+    brute = MeshDistances(wrist)
+    true = np.minimum([brute.distance(["plate"], ["bar"], at) for at in q], FAR)
+    found = table.distances(q)
+    apart = true > 0.0
+    assert 0.1 < np.mean(~apart) < 0.9
+    assert table.touching == pytest.approx(np.mean(~apart), abs=0.1)
+    assert table.error < 1e-3
+    assert np.abs(found - true)[apart].max() < 1.5e-3
+    # What is kept above the error of the table is clear, and nothing in contact passes.
+    assert true[found > KEPT + table.error].min() > 0.5 * KEPT
+    assert found[~apart].max() < KEPT
+
+
+def test_slopes_lead_out_of_contact(wrist: Robot) -> None:
+    table = only(mesh_tables(wrist, (), NONE))
+    brute = MeshDistances(wrist)
+    q = wrist.draw_states(200, 5)[0]
+    q = q[table.distances(q) < 0]
+    assert len(q) > 20
+    for _ in range(400):
+        slope = table.slopes(q)
+        size = np.linalg.norm(slope, axis=1, keepdims=True)
+        q[:, :2] += 0.01 * slope / np.maximum(size, 1e-9) * (table.distances(q) < 0.004)[:, None]
+    assert np.mean([brute.distance(["plate"], ["bar"], at) > 0 for at in q]) > 0.95
+
+
+def test_gradients_against_differences(wrist: Robot) -> None:
+    constraint = MeshClearance(mesh_tables(wrist, (), NONE))
+    kinematics = BatchKinematics(wrist)
+    q, v, a = wrist.draw_states(30, 11)
+    states = States(kinematics, q, v, a)
+    margins = constraint.margins(states)
+    assert margins.shape == (30, len(constraint.labels)) == (30, len(constraint.scale))
+    times = np.arange(30)
+    found, by_v, by_a = constraint.gradients(states, times, np.zeros(30, dtype=np.intp))
+    assert found is not None
+    assert by_v is None
+    assert by_a is None
+    for t in times:
+
+        def margin(x: np.ndarray, t: int = t) -> float:
+            at = States(kinematics, x[None], v[t : t + 1], a[t : t + 1])
+            return float(constraint.margins(at)[0, 0])
+
+        expected = central_differences(margin, q[t], 1e-6)
+        assert np.abs(found[t] - expected).max() < 1e-6 * (1 + np.abs(expected).max())
+    assert np.abs(found[:, 2]).max() == 0.0  # the third joint is not between them
+
+
+def test_the_constraint_keeps_meshes_apart(wrist: Robot) -> None:
+    constraint = MeshClearance(mesh_tables(wrist, (), NONE))
+    q, v, a = wrist.draw_states(600, 21)
+    margins = constraint.margins(States(BatchKinematics(wrist), q, v, a))[:, 0]
+    brute = MeshDistances(wrist)
+    true = np.array([brute.distance(["plate"], ["bar"], at) for at in q])
+    assert 0.2 < np.mean(margins >= 0) < 0.95
+    assert true[margins >= 0].min() > 0
+    assert np.all(margins[true <= 0] < 0)
+
+
+def test_pairs_that_need_no_table(wrist: Robot) -> None:
+    def capsule(name: str, joint: int, by_hand: bool = False) -> Capsule:
+        return Capsule(name, joint, np.zeros(3), np.ones(3), 0.1, (name,), by_hand)
+
+    both = (capsule("plate", 0), capsule("bar", 2))
+    assert not mesh_tables(wrist, both, CollisionPairs(((0, 1),), ()))
+    assert mesh_tables(wrist, both, NONE)
+    assert not mesh_tables(wrist, (both[0], capsule("bar", 2, by_hand=True)), NONE)
+    assert not mesh_tables(wrist, (), NONE, ignore=(("bar", "plate"),))
+
+
+def test_tables_come_back_from_disk(wrist: Robot) -> None:
+    first = only(mesh_tables(wrist, (), NONE))
+    with mock.patch("excite_cli.geometry.pair_tables.link_meshes", side_effect=AssertionError):
+        again = only(mesh_tables(wrist, (), NONE))
+    assert again.error == first.error
+    assert again.touching == first.touching
+    q = wrist.draw_states(50, 1)[0]
+    assert np.array_equal(again.distances(q), first.distances(q))
+    for path in Path(os.environ["XDG_CACHE_HOME"]).glob("excite/meshes-*"):
+        path.write_bytes(b"damaged")
+    assert np.array_equal(only(mesh_tables(wrist, (), NONE)).distances(q), first.distances(q))
+
+
+def test_pairs_near_at_the_posture_are_named_and_get_no_table(wrist: Robot) -> None:
+    """Tilted, the bar comes near the plate; tilted more, it strikes it."""
+    meshes, near = MeshDistances(wrist), None
+    for pitch in np.linspace(0.0, 0.9, 200):
+        q = np.array([0.0, pitch, 0.0])
+        if 0.003 < meshes.distance(["plate"], ["bar"], q) < 0.012:
+            near = replace(wrist, posture=q)
+    assert near is not None
+    assert near_at_posture(near, (), NONE, kept=0.012) == (("plate", "bar"),)
+    assert near_at_posture(near, (), NONE, kept=0.003) == ()
+    assert near_at_posture(near, (), NONE, (("bar", "plate"),), kept=0.012) == ()
+    assert mesh_tables(near, (), NONE, kept=0.012) == ()
+    tilted = replace(wrist, posture=np.array([0.0, 0.9, 0.0]))
+    assert near_at_posture(tilted, (), NONE, kept=0.012) == ()  # in contact: told, not judged

@@ -1,0 +1,119 @@
+"""Enclosed kinematics and regressor rows against Pinocchio at instants within the intervals."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from excite_cli.dynamics.whole_robot import whole_parameters
+from excite_cli.proof.enclosed_motion import EnclosedMotion
+from excite_cli.proof.enclosed_rows import ground_rows, mass_rows, torque_rows
+from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
+from excite_cli.robot.model import Robot
+from excite_cli.trajectory.fourier import FourierTrajectory
+from tests.robot.random_robots import random_robot
+
+ROUNDING = 1e-9
+AT = (-1.0, -0.4, 0.0, 0.7, 1.0)
+
+
+def motion_of(robot: Robot, seed: int, width: float) -> tuple[EnclosedMotion, list]:
+    """An enclosed random motion, with (states, s) at instants of its intervals."""
+    rng = np.random.default_rng(seed)
+    family = FourierTrajectory(3, 1.5)
+    coefficients = rng.normal(size=(family.n_coefficients, robot.n)) * 0.4
+    intervals = intervals_of(family, width).only(slice(0, 40, 7))
+    motion = EnclosedMotion(robot, enclosed_states(family, coefficients, intervals))
+    instants = [
+        (family.basis(intervals.middles + s * intervals.halves).states(coefficients), s) for s in AT
+    ]
+    return motion, instants
+
+
+def full(robot: Robot, states: tuple) -> zip:
+    q, v, a = states
+    return zip(robot.configurations(q), robot.velocities(v), robot.velocities(a), strict=True)
+
+
+def off(model, value: np.ndarray, s: float) -> float:
+    """By how much a value leaves its enclosure."""
+    return float((np.abs(value - model.at(s)) - model.radius).max())
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.integers(0, 10**5), st.booleans(), st.sampled_from([0.05, 0.005]))
+def test_bodies_lie_within(seed: int, floating: bool, width: float) -> None:
+    robot = random_robot(seed, 5, floating)
+    motion, instants = motion_of(robot, seed, width)
+    data = robot.model.createData()
+    local = np.array([[0.1, -0.2, 0.3], [0.0, 0.0, 0.0]])
+    for states, s in instants:
+        for t, (q, v, a) in enumerate(full(robot, states)):
+            pin.forwardKinematics(robot.model, data, q, v, a)
+            for body in range(1, robot.model.njoints):
+                place = data.oMi[body]
+                turn, origin = motion.placements[body]
+                assert off(turn[t], place.rotation, s) < ROUNDING
+                assert off(origin[t], place.translation, s) < ROUNDING
+                points = local @ place.rotation.T + place.translation
+                assert off(motion.points(body, local)[t], points, s) < ROUNDING
+                aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+                speed = pin.getVelocity(robot.model, data, body, aligned)
+                classical = pin.getClassicalAcceleration(robot.model, data, body, aligned)
+                rates = motion.rates[body]
+                assert off(rates.spin[t], speed.angular, s) < ROUNDING
+                assert off(rates.spin_rate[t], classical.angular, s) < 1e-8
+                lifted = classical.linear - robot.model.gravity.linear
+                assert off(rates.acceleration[t], lifted, s) < 1e-8
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.integers(0, 10**5), st.booleans())
+def test_torques_and_mass_lie_within(seed: int, floating: bool) -> None:
+    robot = random_robot(seed, 5, floating, rows=("joints",) if floating else None)
+    motion, instants = motion_of(robot, seed, 0.02)
+    model, data = robot.model, robot.model.createData()
+    rows, first = torque_rows(motion), mass_rows(motion)
+    phi = whole_parameters(robot)
+    torque = rows.through(phi[None, 10:])[..., 0]
+    moment = first.through(phi[None])[..., 0]
+    for states, s in instants:
+        for t, (q, v, a) in enumerate(full(robot, states)):
+            regressor = pin.computeJointTorqueRegressor(model, data, q, v, a)[robot.moved]
+            assert off(rows[t], regressor, s) < 1e-8
+            assert off(torque[t], pin.rnea(model, data, q, v, a)[robot.moved], s) < 1e-8
+            center = pin.centerOfMass(model, data, q)
+            total = sum(inertia.mass for inertia in model.inertias[1:])
+            still = model.inertias[0]
+            expected = total * center + still.mass * still.lever
+            weighed = np.array([total + still.mass, *expected[:2]])
+            assert off(moment[t], weighed, s) < 1e-8
+    assert torque.radius.max() < 0.1 * np.abs(torque.center).max()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_ground_carries_what_the_base_needs(seed: int) -> None:
+    """The wrench at a floating base, moved to the point that is asked about."""
+    robot = random_robot(seed, 5, floating=True, rows=("base", "joints"))
+    motion, instants = motion_of(robot, seed, 0.02)
+    about = np.array([0.3, -0.2, -0.5])
+    model, data = robot.model, robot.model.createData()
+    wrench = ground_rows(motion, about).through(whole_parameters(robot)[None])[..., 0]
+    for states, s in instants:
+        for t, (q, v, a) in enumerate(full(robot, states)):
+            local = pin.Force(pin.rnea(model, data, q, v, a)[:6])
+            pin.forwardKinematics(model, data, q)
+            world = data.oMi[1].act(local)
+            moment = world.angular - np.cross(about, world.linear)
+            expected = np.concatenate([world.linear, moment])
+            assert off(wrench[t], expected, s) < 1e-8
+
+
+def test_enclosures_of_torque_shrink_with_the_third_power() -> None:
+    robot = random_robot(3, 5)
+    phi = whole_parameters(robot)[None, 10:]
+    radii = [
+        torque_rows(motion_of(robot, 3, width)[0]).through(phi).radius for width in (0.02, 0.01)
+    ]
+    assert radii[0].max() / radii[1].max() > 6.0
