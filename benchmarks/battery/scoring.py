@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from excite_cli.effects.catalogue import catalogue
+
 Verdict = Literal["true", "alias", "identity", "companion", "extra", "approximation", "wrong"]
 
 MOST_ALIASES = 3
@@ -124,10 +126,9 @@ def _is_right(plant: Plant, answer: Answer, friction: bool, joints: int) -> bool
 
 def identity(planted: Name, friction: bool) -> tuple[Name, ...]:
     """Other names that together are the same columns as what was planted."""
-    if planted.kind != "asymmetric_friction":
-        return ()
-    offset = Name("torque_offset", planted.joints)
-    return (offset,) if friction else (Name("coulomb_friction", planted.joints), offset)
+    kind = catalogue().get(planted.kind)
+    others = () if kind is None else kind.same_as
+    return tuple(Name(o, planted.joints) for o in others if not (friction and o in PLAIN))
 
 
 def _means(found: Found, planted: Name, joints: int) -> bool:

@@ -7,7 +7,6 @@ from scipy.linalg import cho_solve
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import ABSORBED, Evidence
-from excite_cli.diagnosis.kinds import FIRST
 from excite_cli.diagnosis.records import Absorbed
 
 _NAMED = 4
@@ -25,8 +24,8 @@ def absorbed_effects(
 
     The model is the declared one with the chosen effects. `names` are those of the declared model's
     columns; effects that were found are named by their own parameters. What does not show in these
-    data at all is not absorbed by anything. Only the first parameter counts (a spring whose
-    stiffness is absorbed is absorbed, though its preload may show as an offset).
+    data at all is not absorbed by anything. Only the first parameter counts (where a
+    stiffness is absorbed, so is its effect, though the preload may show as an offset).
     """
     at = evidence.columns(chosen)
     factor = evidence.factor(chosen)
@@ -34,7 +33,7 @@ def absorbed_effects(
     taken = {candidates[i].place for i in chosen}
     names = [*names, *_found_names([candidates[i] for i in chosen], joint_names)]
     for i, c in enumerate(candidates):
-        if c.place in taken or c.place in found or c.effect.runs or c.effect.kind in FIRST:
+        if c.place in taken or c.place in found or c.effect.runs or c.effect.refines:
             continue
         block = evidence.blocks[i]
         main, others = block[0], block[1:]

@@ -15,7 +15,10 @@ from excite_cli.identification.processing import DEFAULT_MOVING
 from excite_cli.robot.model import Array, Robot
 
 _TOGETHER = 16  # effects that are filtered at once
-_TOUCH = 0.1  # s: what is shorter is a blow or a fault of the record, and no contact
+
+
+# Kind, joints and runs: candidates that differ in shape only share it.
+Place = tuple[str, tuple[int, ...], tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -33,8 +36,8 @@ class Candidate:
     tests: int = 1
 
     @property
-    def place(self) -> tuple[str, tuple[int, ...], tuple[str, ...]]:
-        """Kind, joints and runs: candidates that differ in shape only share it."""
+    def place(self) -> Place:
+        """Kind, joints and runs."""
         return self.effect.kind, self.effect.joints, self.effect.runs
 
     @property
@@ -50,7 +53,7 @@ def possible_effects(
     signals: Sequence[Signals],
     residuals: Sequence[Array],
     runs: Sequence[str],
-    around: Mapping[tuple[str, tuple[int, ...], tuple[str, ...]], list[dict]],
+    around: Mapping[Place, list[dict]],
 ) -> list[tuple[Effect, int]]:
     """All effects to be tested but those declared, and how many tests each stands for.
 
@@ -94,7 +97,7 @@ def possible_effects(
             (effect, count)
             for effect in effects
             # Below the speed at which a joint counts as moving, samples are left out.
-            if effect.shape.get("stribeck_speed", np.inf) >= slowest
+            if effect.shows_above(slowest)
         ]
     if not found:
         raise ConfigError("diagnosis: every effect to be looked for is declared or excluded.")
@@ -111,7 +114,7 @@ def _in_runs(
 ) -> list[Effect]:
     """A kind that is present in some runs only, looked for in each on its own.
 
-    One without a shape of its own (a payload) also in all runs from some run on; in all of them it
+    One without a shape of its own also in all runs from some run on; in all of them it
     would be part of the robot.
     """
     found: list[Effect] = []
@@ -120,8 +123,7 @@ def _in_runs(
         own = [i for i, s in enumerate(signals) if s.run == run]
         shapes = kind.tuned(robot, place, [signals[i] for i in own], [residuals[i] for i in own])
         if kind.shapes or len(runs) > 1:
-            long = [s for s in shapes if s.get("end", np.inf) - s.get("start", 0.0) > _TOUCH]
-            found += [kind(place, shape, (run,)) for shape in long]
+            found += [kind(place, shape, (run,)) for shape in shapes]
     if not kind.shapes:
         later = [tuple(runs[i:]) for i in range(1, len(runs) - 1)]
         some = [

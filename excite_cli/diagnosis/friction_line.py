@@ -14,11 +14,6 @@ import numpy as np
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.robot.model import Array
 
-STRAIGHT = ("viscous_friction", "coulomb_friction")
-CURVED = (
-    "nonlinear_viscous_friction", "stribeck_friction", "load_dependent_friction", "friction_drift",
-)  # fmt: skip
-
 
 def friction_lines(traced: Traced, start: int) -> Array:
     """T (k, k): parameters as reported = T @ parameters as fitted; effects begin at `start`."""
@@ -29,9 +24,7 @@ def friction_lines(traced: Traced, start: int) -> Array:
     transform = np.eye(at)
     for i in traced.chosen:
         effect = traced.candidates[i].effect
-        if effect.kind not in CURVED:
-            continue
-        lines = [_find(traced, kind, effect.joints) for kind in STRAIGHT]
+        lines = [_find(traced, kind, effect.joints) for kind in effect.deviates_from]
         present = [k for k in lines if k is not None]
         if not present:
             continue

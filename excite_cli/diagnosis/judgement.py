@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi2
 
-from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.candidates import Candidate, Place
 from excite_cli.diagnosis.evidence import SHARED, Evidence, Gain, Schur
-from excite_cli.diagnosis.kinds import EXCLUDES, FIRST, left_beside, unusual
 from excite_cli.robot.model import Array
 
 # It stays in beside its refinement unless it is useless there (χ² units).
@@ -48,17 +47,32 @@ class Judgement:
     _thresholds: dict[tuple[int, int], float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Look up who refines whom."""
+        """Look up who refines whom, and which kinds exclude each other."""
         at = {(c.effect.kind, c.effect.joints): i for i, c in enumerate(self.candidates)}
         self.parents = [
             tuple(
                 at[kind, (joint,)]
-                for kind in FIRST.get(c.effect.kind, ())
+                for kind in c.effect.refines
                 for joint in c.effect.joints
                 if (kind, (joint,)) in at
             )
             for c in self.candidates
         ]
+        kinds = {type(c.effect) for c in self.candidates}
+        self._exclusive = {
+            kind.kind: [other.kind for other in kinds if kind.exclusive_with(other)]
+            for kind in kinds
+        }
+
+    def excluded(self, candidate: int) -> list[Place]:
+        """Places that must stay empty while it is in."""
+        effect = self.candidates[candidate].effect
+        return [(kind, effect.joints, effect.runs) for kind in self._exclusive[effect.kind]]
+
+    def together(self, one: int, other: int) -> bool:
+        """Whether both kinds may be named for one joint."""
+        a, b = (self.candidates[i].effect for i in (one, other))
+        return a.kind != b.kind and b.kind not in self._exclusive[a.kind]
 
     def price(self, candidate: int, dof: int) -> float:
         """χ² that `candidate` must save."""
@@ -66,7 +80,7 @@ class Judgement:
         key = (max(dof, 1), c.tests)
         if key not in self._thresholds:
             self._thresholds[key] = float(chi2.isf(self.rules.significance / c.tests, key[0]))
-        return self.rules.inflation * self._thresholds[key] + unusual(c.effect.kind)
+        return self.rules.inflation * self._thresholds[key] + c.effect.surprise
 
     def price_beside(self, candidate: int, chosen: Sequence[int], dof: int) -> float:
         """As `price`; first-order friction is cheap beside what refines it."""
@@ -79,10 +93,9 @@ class Judgement:
         return sum(self.price_beside(i, chosen, self.candidates[i].width) for i in chosen)
 
     def bound(self, candidate: int, chosen: Sequence[int]) -> bool:
-        """Whether it must stay: √|v| beside no Coulomb and viscous friction is no physics."""
+        """Whether it must stay, since what refines it would take its place."""
         return any(
-            candidate in self.parents[k] and self.candidates[k].effect.shape.get("power") == 0.5
-            for k in chosen
+            candidate in self.parents[k] and self.candidates[k].effect.imitates for k in chosen
         )
 
     def cost(self, chosen: Sequence[int]) -> float:
@@ -152,14 +165,10 @@ class Judgement:
     def _less_than_twin(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
         """Whether `added` saves less than the twin of a chosen effect, or nothing beside it.
 
-        Play and elasticity exclude each other, and neither is exact: what one leaves, the other
-        explains, and so does many another effect.
+        Of two that exclude each other neither is exact: what one leaves, the other explains, and
+        so does many another effect.
         """
-        twins = [
-            (EXCLUDES[effect.kind], effect.joints, effect.runs)
-            for effect in (self.candidates[k].effect for k in chosen)
-            if effect.kind in EXCLUDES
-        ]
+        twins = {place for k in chosen for place in self.excluded(k)}
         if not twins:
             return False
         own = self.white.schur(chosen)
@@ -193,7 +202,7 @@ class Judgement:
         found = {}
         for i in chosen:
             width = self.candidates[i].width
-            share = left_beside(self.candidates[i].effect.kind, values[at : at + width])
+            share = self.candidates[i].effect.leftover(values[at : at + width])
             if share > 0.0:
                 found[i] = share
             at += width

@@ -10,10 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import SHARED, Schur
 from excite_cli.diagnosis.judgement import Judgement
-from excite_cli.diagnosis.kinds import EXCLUDES, tier, together
+from excite_cli.effects.base import Tier
 
 _MOST_STEPS = 80
 _TRIED = 12  # best candidates whose gain on runs left out is looked at in a step
@@ -33,7 +32,7 @@ class Search:
         chosen: list[int] = []
         for _ in range(_MOST_STEPS):
             before = set(chosen)
-            for latest in (1, 2, 3):
+            for latest in Tier:
                 chosen = self._forward(chosen, latest)
             chosen = self._polish(chosen)
             if set(chosen) == before:
@@ -41,14 +40,14 @@ class Search:
         return self._completed(self._pruned(chosen))
 
     def _completed(self, chosen: list[int]) -> list[int]:
-        """With both straight friction terms of a joint, where one is in and either is refined.
+        """With all that an effect refines on a joint, where some is in and it completes the rest.
 
-        Small Coulomb friction may not pass on its own; without it √|v| or the friction of coupled
-        gears would stand for it, and have wrong sizes.
+        A small one may not pass on its own; without it the refinement would stand for it, and have
+        a wrong size.
         """
         for i in chosen:
             effect = self.candidates[i].effect
-            if effect.shape.get("power") != 0.5 and effect.kind != "coupled_friction":
+            if not effect.completes:
                 continue
             for joint in effect.joints:
                 own = [p for p in self.judge.parents[i] if self.candidates[p].rows == (joint,)]
@@ -63,7 +62,7 @@ class Search:
                     chosen = more
         return chosen
 
-    def _forward(self, chosen: list[int], latest: int) -> list[int]:
+    def _forward(self, chosen: list[int], latest: Tier) -> list[int]:
         """Add candidates up to tier `latest` while one (or two of a joint) passes."""
         while len(chosen) < self._most:
             added = self._best_one(chosen, latest) or self._best_two(chosen, latest)
@@ -72,17 +71,17 @@ class Search:
             chosen = [*chosen, *added]
         return chosen
 
-    def _free(self, chosen: Sequence[int], latest: int = 3) -> list[int]:
+    def _free(self, chosen: Sequence[int], latest: Tier = Tier.LAST) -> list[int]:
         """Candidates up to tier `latest` whose place is free, and so is that of what excludes."""
         taken = {self.candidates[i].place for i in chosen}
-        shut = {(EXCLUDES[kind], joints, runs) for kind, joints, runs in taken if kind in EXCLUDES}
+        shut = {place for i in chosen for place in self.judge.excluded(i)}
         return [
             i
             for i, c in enumerate(self.candidates)
-            if c.place not in taken and c.place not in shut and tier(c.effect.kind) <= latest
+            if c.place not in taken and c.place not in shut and c.effect.tier <= latest
         ]
 
-    def _best_one(self, chosen: list[int], latest: int) -> tuple[int, ...]:
+    def _best_one(self, chosen: list[int], latest: Tier) -> tuple[int, ...]:
         """The candidate that saves most of those that pass."""
         schur = self.white.schur(chosen)
         free = [i for i in self._free(chosen, latest) if schur.singles[i].dof]
@@ -103,7 +102,7 @@ class Search:
                 best = i
         return () if best is None else (best,)
 
-    def _best_two(self, chosen: list[int], latest: int) -> tuple[int, ...]:
+    def _best_two(self, chosen: list[int], latest: Tier) -> tuple[int, ...]:
         """Two of one joint at once, where none passes alone."""
         schur = self.white.schur(chosen)
         ranked = sorted(self._pairs(schur, self._free(chosen, latest)), key=lambda found: -found[0])
@@ -128,10 +127,7 @@ class Search:
             own.sort(key=lambda i: -schur.singles[i].chi2)
             own = own[:_PAIRED]
             pairs = [
-                (a, b)
-                for k, a in enumerate(own)
-                for b in own[k + 1 :]
-                if together(self.candidates[a].effect.kind, self.candidates[b].effect.kind)
+                (a, b) for k, a in enumerate(own) for b in own[k + 1 :] if self.judge.together(a, b)
             ]
             if not pairs:
                 continue
@@ -185,7 +181,7 @@ class Search:
                 if (
                     cost < best
                     and (
-                        (refined and not _root(self.candidates[move[0]]))
+                        (refined and not self.candidates[move[0]].effect.imitates)
                         or self.judge.in_order(schur, rest, move)
                     )
                     and self.judge.allowed(self.plain.solve(trial), trial, move)
@@ -205,8 +201,3 @@ class Search:
             if weakest is None:
                 return chosen
             chosen = weakest[1]
-
-
-def _root(candidate: Candidate) -> bool:
-    """√|v|, which comes near any friction and so replaces none."""
-    return candidate.effect.shape.get("power") == 0.5

@@ -16,7 +16,6 @@ from excite_cli.diagnosis.candidates import Candidate, possible_effects, with_co
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.judgement import Judgement, Rules
-from excite_cli.diagnosis.kinds import LAST_TIER
 from excite_cli.diagnosis.modelled_run import ModelledRun, training_data
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import inflation_of
@@ -25,20 +24,12 @@ from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.regressor import standard_parameters
-from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.base import Effect, Signals, Tier
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
 _PASSES = 6
 _SETTLED = 1e-3  # change of the residual energy from pass to pass
-# Noise is what is left with all of these in, needed or not: many robots have them, and none of
-# them must be taken for noise with a long memory.
-_USUAL = (
-    "viscous_friction", "coulomb_friction", "nonlinear_viscous_friction", "torque_offset",
-    "armature", "load_dependent_friction", "spring", "coupled_friction", "torque_gain",
-    "base_tilt", "encoder_offset", "payload",
-)  # fmt: skip
-
 _OBVIOUS, _PLAIN_TO_SEE = 8, 0.2
 Progress = Callable[[str, int], None]
 
@@ -171,7 +162,7 @@ def _one_pass(
     if spec.rounds:
         # Kinds that are searched on the residual must see what the last search gave to one of them.
         plain_kinds = np.repeat(
-            [effect.kind not in LAST_TIER for effect in effects],
+            [effect.tier != Tier.LAST for effect in effects],
             [len(effect.parameters) for effect in effects],
         )
         steady = [body.signals(fit.phi, effects, fit.values * plain_kinds) for body in bodies]
@@ -222,11 +213,14 @@ def _distance(a: Mapping[str, float], b: Mapping[str, float]) -> float:
 
 
 def _usual(candidates: Sequence[Candidate], found: Sequence[int]) -> list[int]:
-    """The usual effects on all joints, one shape of each, and those found."""
+    """The usual effects on all joints, one shape of each, and those found.
+
+    Noise is what is left with all of these in, needed or not.
+    """
     taken = {candidates[i].place for i in found}
     usual = list(found)
     for i, c in enumerate(candidates):
-        if c.effect.kind in _USUAL and c.place not in taken and len(c.effect.runs) < 2:
+        if c.effect.usual and c.place not in taken and len(c.effect.runs) < 2:
             usual.append(i)
             taken.add(c.place)
     return usual
@@ -257,8 +251,4 @@ def _with_the_obvious(
 
 def _coupled(effects: Sequence[Effect]) -> list[tuple[int, int, float]]:
     """Joints j, k whose gears rub on v_j + s v_k."""
-    return sorted(
-        (e.joints[0], e.joints[1], float(e.shape["direction"]))
-        for e in effects
-        if e.kind == "coupled_friction"
-    )
+    return sorted(shaft for effect in effects for shaft in effect.coupled_speeds())

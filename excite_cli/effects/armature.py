@@ -17,6 +17,8 @@ class Armature(Effect):
     signature: ClassVar = "the residual is a straight line through zero over the acceleration"
     function_of: ClassVar = ("acceleration",)
     parameters: ClassVar = (Parameter("inertia", "kg·m²", 0.01, 30.0, nonnegative=True),)
+    surprise: ClassVar = 1.0
+    usual: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
         """a_j, (T, 1, 1)."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 
@@ -24,6 +24,9 @@ class AsymmetricFriction(Effect):
         Parameter("forward", "N·m", 0.05, 300.0, nonnegative=True),
         Parameter("backward", "N·m", 0.05, 300.0, nonnegative=True),
     )
+    tier: ClassVar = Tier.LAST
+    refines: ClassVar = ("coulomb_friction", "torque_offset")
+    same_as: ClassVar = refines
 
     def columns(self, signals: Signals) -> Array:
         """(1 + sgn v_j)/2 and −(1 − sgn v_j)/2, (T, 1, 2)."""

@@ -19,7 +19,7 @@ The blow lasts a moment here; it is the parallel filter that gives it the width 
 data. The rotor does not enter: its own motion is measured.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -27,10 +27,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from excite_cli.effects.base import Effect, Parameter, Signals
+from excite_cli.effects.base import Effect, Parameter, Signals, Tier, steps_by_ratio
+from excite_cli.effects.parameter import whole_share
+from excite_cli.effects.simulated_robot import SimulatedRobot, Transmission, rotor_inertia
 from excite_cli.robot.model import Array, Robot
 
 _GAPS = 1e-3, 3e-2  # rad
+_FINER = (1.15, 1.06, 1.02, 1.007)
 _WIDTH = 0.01  # s, of a blow in the search, about that of a filter of 20 Hz
 _FINE = 2e-3  # s, the step in which flights are followed
 _CHUNK = 256  # samples that are looked at first for the end of a flight
@@ -43,8 +46,12 @@ class Backlash(Effect):
     kind: ClassVar = "backlash"
     title: ClassVar = "play in the gear (backlash)"
     signature: ClassVar = "when the load changes sign it is missing for a while, then comes a blow"
-    parameters: ClassVar = (Parameter("share", "1", 0.3, 1.5, nonnegative=True),)
+    parameters: ClassVar = (whole_share("share"),)
     shapes: ClassVar = (Parameter("gap", "rad", *_GAPS),)
+    tier: ClassVar = Tier.LAST
+    excludes: ClassVar = ("elasticity",)  # which it is, with a dead zone
+    known_by: ClassVar = "gap"
+    settings: ClassVar[Mapping[str, float]] = {"rotor_inertia": 0.0}
     excitable: ClassVar = False
     why_not_excitable: ClassVar = "samples enter and leave the gap by jumps; there is no gradient"
 
@@ -78,6 +85,23 @@ class Backlash(Effect):
             return float(gaps[int(np.argmax(fitted**2 / (square + 1e-300)))])
 
         return [{"gap": best(best(np.geomspace(*_GAPS, 48)) * np.geomspace(0.93, 1.07, 21))}]
+
+    def leftover(self, values: Array) -> float:
+        """How flanks meet is not known exactly."""
+        return 1e-2
+
+    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
+        """Small ones: a flight more or less changes much."""
+        return steps_by_ratio(self.shape[name], _FINER)
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """A rotor and a link that is free between two stops."""
+        given = numbers["rotor_inertia"]
+        for j in self.joints:
+            rotor = rotor_inertia(robot, j, given)
+            robot.soft[j] = Transmission(rotor, given > 0.0, play=numbers["gap"])
 
     def rows(self, n: int) -> tuple[int, ...]:
         """All joints."""

@@ -7,100 +7,39 @@ Its columns may depend on time, on q, v, a and, for friction that grows with loa
 on the torque of the model found so far; its non-linear parameters (`shape`) are numbers chosen from
 a grid. The same class serves planning (columns and their pull-back), identification, diagnosis and
 simulation (torque for given values).
+
+Beside its columns, an effect states what is known of it: by which rules a diagnosis names it, how
+it gets into a simulated robot, and how it is drawn. No other part of the program asks for a kind by
+its name.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.effects.parameter import Parameter, Value, deviation
+from excite_cli.effects.signals import Cotangents, Signals
+from excite_cli.effects.simulated_robot import JOINT_PARTS, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 Scope = Literal["joint", "pair", "robot"]
 Quantity = Literal["position", "speed", "acceleration", "load", "time"]
+Picture = Literal["cloud", "window"]
+
+# By how much a shape parameter is changed, up and down, once its effect is found.
+_FINER = (1.35, 1.15, 1.06, 1.02)
 
 
-@dataclass(frozen=True)
-class Signals:
-    """What an effect may look at: one run, or one planned motion, at equidistant instants.
+class Tier(IntEnum):
+    """When a diagnosis asks for a kind; a later one may still replace an earlier one."""
 
-    `t` (T,) from the start of the run [s]; `q, v, a` (T, n); `load` (T, n) rigid-body torque of
-    the model so far, `torque` (T, n) all of it with the effects found; `body` gives the derivatives
-    of the rigid-body torque.
-    """
-
-    t: Array
-    q: Array
-    v: Array
-    a: Array
-    load: Array
-    torque: Array
-    body: RigidBody
-    run: str = ""
-
-    def rate(self, x: Array) -> Array:
-        """dx/dt by central differences along the first axis."""
-        if len(self.t) < 3:
-            return np.zeros_like(x)
-        return np.gradient(x, float(self.t[1] - self.t[0]), axis=0)
-
-    def rate_back(self, w: Array) -> Array:
-        """The transpose of `rate`: the cotangent of x for a cotangent w of dx/dt."""
-        if len(self.t) < 3:
-            return np.zeros_like(w)
-        h = float(self.t[1] - self.t[0])
-        back = np.zeros_like(w)
-        back[2:] += w[1:-1] / (2 * h)
-        back[:-2] -= w[1:-1] / (2 * h)
-        back[1] += w[0] / h
-        back[0] -= w[0] / h
-        back[-1] += w[-1] / h
-        back[-2] -= w[-1] / h
-        return back
-
-    def only(self, joint: int, x: Array) -> Array:
-        """Zeros (T, n) with x (T,) in the column of `joint`."""
-        full = np.zeros_like(self.q)
-        full[:, joint] = x
-        return full
-
-
-@dataclass
-class Cotangents:
-    """Derivatives of a scalar with respect to what columns depend on, each (T, n) or None.
-
-    `regressor` is (T, n, 10·n_bodies), for effects whose columns are entries of Y.
-    """
-
-    q: Array | None = None
-    v: Array | None = None
-    a: Array | None = None
-    load: Array | None = None
-    torque: Array | None = None
-    regressor: Array | None = None
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A parameter: name, unit, and the range of sizes that is usual for a robot arm."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    nonnegative: bool = False
-
-
-@dataclass(frozen=True)
-class Value:
-    """A parameter's value with its standard deviation and unit."""
-
-    value: float
-    std: float
-    unit: str
+    EVERY_ROBOT = 1
+    MANY_ROBOTS = 2
+    LAST = 3
 
 
 @dataclass(frozen=True)
@@ -145,12 +84,31 @@ class Effect(ABC):
     # What of its own joints the torque is a function of: with a free function of it beside, nothing
     # of the effect would be left.
     function_of: ClassVar[tuple[Quantity, ...]] = ()
-    simpler_than: ClassVar[tuple[str, ...]] = ()  # kinds that contain this one
     defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
     excitable: ClassVar[bool] = True  # has columns for a planned motion, with a pull-back
     why_not_excitable: ClassVar[str] = ""
+
+    # How a diagnosis judges it. Surprise: χ² that it must save beyond what chance makes of all
+    # tests, where two kinds explain the data about as well.
+    surprise: ClassVar[float] = 4.0
+    tier: ClassVar[Tier] = Tier.MANY_ROBOTS
+    refines: ClassVar[tuple[str, ...]] = ()  # kinds of one joint that must be in before it
+    excludes: ClassVar[tuple[str, ...]] = ()  # other forms of its cause: a place has one of them
+    same_as: ClassVar[tuple[str, ...]] = ()  # kinds that together are the same columns
+    # Kinds of which the straight line through both is reported, and of this one what deviates.
+    deviates_from: ClassVar[tuple[str, ...]] = ()
+    # Many robots have it: it is in the model while the noise is measured, lest it be taken for it.
+    usual: ClassVar[bool] = False
+
+    # In the simulated robot: the number that people know it by, if that is not the first linear
+    # parameter; and settings of its mechanism that nobody identifies.
+    known_by: ClassVar[str] = ""
+    settings: ClassVar[Mapping[str, float]] = {}
+
+    # How it is drawn: samples over `abscissa`, or the seconds in which it shows most.
+    picture: ClassVar[Picture] = "cloud"
 
     @classmethod
     def places(cls, robot: Robot) -> list[tuple[int, ...]]:
@@ -211,6 +169,57 @@ class Effect(ABC):
             tau[:, list(self.rows(signals.q.shape[1]))] = self.columns(signals) @ values
         return tau
 
+    @classmethod
+    def exclusive_with(cls, other: type["Effect"]) -> bool:
+        """Whether a place has one of the two at most; either of them may say so."""
+        return other.kind in cls.excludes or cls.kind in other.excludes
+
+    @property
+    def imitates(self) -> bool:
+        """Whether it comes near all that it refines, which then stays in whatever it explains.
+
+        Nor may it replace any of that.
+        """
+        return False
+
+    @property
+    def completes(self) -> bool:
+        """Whether, with one of the kinds that it refines in, the others are put in as well.
+
+        A small one may not pass on its own, and this effect would stand for it.
+        """
+        return self.imitates
+
+    def possible(self, values: Array, early: bool) -> bool:
+        """Whether fitted `values` have signs and sizes that physics allows.
+
+        `early`: in the first passes of a diagnosis, which do not know the torque well.
+        """
+        given = zip(self.parameters, values, strict=True)
+        return all(parameter.allows(float(value), early) for parameter, value in given)
+
+    def leftover(self, values: Array) -> float:
+        """Share of its energy that its columns may leave or add: what is no more is no effect.
+
+        Above zero where columns are first order or their form is not known exactly.
+        """
+        return 0.0
+
+    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
+        """By how much shape parameter `name` is changed, up and down, once the effect is found.
+
+        A grid names an effect, it does not measure it. Empty: the grid is all there is.
+        """
+        return steps_by_ratio(self.shape[name], _FINER)
+
+    def shows_above(self, speed: float) -> bool:
+        """Whether it shows at speeds above `speed`: slower samples are left out."""
+        return True
+
+    def coupled_speeds(self) -> tuple[tuple[int, int, float], ...]:
+        """Joints j, k and s of which v_j + s v_k must not stand still: columns are wrong there."""
+        return ()
+
     def abscissa(self, signals: Signals) -> Abscissa | None:
         """The quantity over which a person sees the effect; None: the torque it predicts.
 
@@ -249,6 +258,25 @@ class Effect(ABC):
         }
         return shape, values
 
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """Put the effect into a simulated robot.
+
+        By default what MuJoCo's joint has a part for becomes that part, a defect of the data
+        changes what is recorded, and all else acts through its own formula. `numbers` are all by
+        name: linear parameters, shape and `settings`.
+        """
+        if self.data_defect:
+            robot.falsify(self, values)
+            return
+        parts = self.mjcf(values)
+        if parts and JOINT_PARTS.issuperset(parts) and len(self.joints) == 1:
+            robot.add_to_joint(self.joints[0], parts)
+        else:
+            robot.apply(self, values)
+        robot.tell_controller(self, values)
+
     def urdf(self, values: Array) -> dict[str, float]:
         """Attributes of the URDF's <dynamics> that hold this effect; empty if none can."""
         return {}
@@ -265,6 +293,6 @@ def neighbours(robot: Robot) -> list[tuple[int, ...]]:
     return [(parent, k) for k, parent in enumerate(parents) if parent >= 0]
 
 
-def deviation(slope: Array, covariance: Array) -> float:
-    """Standard deviation of a function of the parameters with this derivative, to first order."""
-    return float(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))
+def steps_by_ratio(value: float, ratios: Sequence[float]) -> list[float]:
+    """Changes of `value` by these ratios, all above one."""
+    return [(ratio - 1.0) * value for ratio in ratios]

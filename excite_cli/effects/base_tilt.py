@@ -7,13 +7,17 @@ are two angles: roll about x and pitch about y where gravity is along z. On a ro
 lies along another axis, roll and pitch are about the other two, in the order x, y, z.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.effects.directional import left_by_angles
+from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 
@@ -25,9 +29,21 @@ class BaseTilt(Effect):
     signature: ClassVar = "residuals on many joints that depend on the posture like gravity does"
     scope: ClassVar[Scope] = "robot"
     parameters: ClassVar = (
-        Parameter("roll", "rad", 1e-3, 0.2),
-        Parameter("pitch", "rad", 1e-3, 0.2),
+        Parameter("roll", "rad", 1e-3, 0.2, believed=(-0.2, 0.2)),
+        Parameter("pitch", "rad", 1e-3, 0.2, believed=(-0.2, 0.2)),
     )
+    usual: ClassVar = True
+
+    def leftover(self, values: Array) -> float:
+        """A tilt also shows moments of the first links that a level base hides."""
+        return left_by_angles(values, 1e-2)
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """Gravity as the turned base sees it, R(δ)ᵀ g."""
+        turned = Rotation.from_rotvec(values @ _axes(robot.robot)).inv()
+        robot.gravity = turned.apply(robot.gravity)
 
     def columns(self, signals: Signals) -> Array:
         """G (−axis × g) for both axes, (T, n, 2)."""
@@ -49,6 +65,10 @@ class BaseTilt(Effect):
 
 def _changes(robot: Robot) -> Array:
     """Change of gravity (2, 3) per radian of roll and of pitch."""
-    gravity = np.array(robot.model.gravity.linear, dtype=float)
-    axes = np.delete(np.eye(3), int(np.argmax(np.abs(gravity))), axis=0)
-    return -np.cross(axes, gravity)
+    return -np.cross(_axes(robot), np.array(robot.model.gravity.linear, dtype=float))
+
+
+def _axes(robot: Robot) -> Array:
+    """The two axes of the world (2, 3) that gravity is least along."""
+    along = int(np.argmax(np.abs(robot.model.gravity.linear)))
+    return np.delete(np.eye(3), along, axis=0)

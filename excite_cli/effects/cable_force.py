@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals, Tier
 from excite_cli.robot.model import Array
 
 
@@ -25,6 +25,8 @@ class CableForce(Effect):
         Parameter("first_squared", "N·m/rad²", 0.1, 100.0),
         Parameter("second_squared", "N·m/rad²", 0.1, 100.0),
     )
+    surprise: ClassVar = 25.0  # three functions of two angles come near an offset or a spring
+    tier: ClassVar = Tier.LAST
 
     def columns(self, signals: Signals) -> Array:
         """Gradients of q_j q_k, q_j² q_k and q_j q_k², (T, 2, 3)."""

@@ -11,10 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.effects.base import Abscissa, Effect, Parameter, Scope, Signals
+from excite_cli.effects.base import (
+    Abscissa,
+    Effect,
+    Parameter,
+    Scope,
+    Signals,
+    Tier,
+    steps_by_ratio,
+)
+from excite_cli.effects.simulated_robot import Push, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 _CELLS = 96  # per run, for the search of the window
+_SHORTEST = 0.1  # s: what is shorter is a blow or a fault of the record
+_FINER = (1.35, 1.15, 1.06, 1.02)
 _LONGEST = 0.5  # of the run; what lasts longer is no touch
 
 
@@ -33,6 +44,9 @@ class Contact(Effect):
     shapes: ClassVar = (Parameter("start", "s", 0.0, 1e4), Parameter("end", "s", 0.0, 1e4))
     defaults: ClassVar[Mapping[str, float]] = {"start": 1.0, "end": 2.0}
     per_run: ClassVar = True
+    surprise: ClassVar = 60.0  # three forces in a window of one's choice explain any event a little
+    tier: ClassVar = Tier.LAST
+    picture: ClassVar = "window"
     excitable: ClassVar = False
     why_not_excitable: ClassVar = "a touch happens in one run; the next motion does not repeat it"
 
@@ -59,7 +73,17 @@ class Contact(Effect):
         """The window of each run in which a constant force explains most of the residual."""
         found = [_window(s, np.asarray(r)) for s, r in zip(signals, residuals, strict=True)]
         best = sorted((each for each in found if each is not None), key=lambda each: -each[0])
-        return [{"start": start, "end": end} for _, start, end in best]
+        return [{"start": start, "end": end} for _, start, end in best if end - start > _SHORTEST]
+
+    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
+        """Parts of the window's length."""
+        return steps_by_ratio(max(abs(self.shape["end"] - self.shape["start"]), 0.05), _FINER)
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """A force on the last joint's frame while it lasts."""
+        robot.pushes.append(Push(np.array(values), numbers["start"], numbers["end"]))
 
     def columns(self, signals: Signals) -> Array:
         """−Jᵀ within the window, else zero, (T, n, 3)."""

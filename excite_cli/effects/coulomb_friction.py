@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 
@@ -15,10 +15,9 @@ class CoulombFriction(Effect):
     signature: ClassVar = "the residual jumps when the joint reverses and is flat in between"
     function_of: ClassVar = ("speed",)
     parameters: ClassVar = (Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True),)
-    simpler_than: ClassVar = (
-        "asymmetric_friction", "stribeck_friction", "load_dependent_friction",
-        "friction_drift", "coupled_friction",
-    )  # fmt: skip
+    surprise: ClassVar = 0.0  # every joint has it
+    tier: ClassVar = Tier.EVERY_ROBOT
+    usual: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
         """sgn v_j, (T, 1, 1)."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
+from excite_cli.effects.simulated_robot import Coupling, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 
@@ -34,11 +35,41 @@ class CoupledFriction(Effect):
     )
     shapes: ClassVar = (Parameter("direction", "1", -1.0, 1.0),)
     defaults: ClassVar[Mapping[str, float]] = {"direction": 1.0}
+    surprise: ClassVar = 3.0
+    refines: ClassVar = ("viscous_friction", "coulomb_friction")
+    usual: ClassVar = True
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
         """The joints turn the shaft the same way, or against each other."""
         return [{"direction": 1.0}, {"direction": -1.0}]
+
+    @property
+    def completes(self) -> bool:
+        """Small friction of a joint of its own would be told as that of the shaft."""
+        return True
+
+    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
+        """None: a direction is 1 or −1."""
+        return ()
+
+    def coupled_speeds(self) -> tuple[tuple[int, int, float], ...]:
+        """The shaft's: while it sticks, so does its friction."""
+        first, second = self.joints
+        return ((first, second, float(self.shape["direction"])),)
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """The dry part is a tendon's friction; the viscous one has no such part in MuJoCo."""
+        robot.tell_controller(self, values)
+        first, second = self.joints
+        if numbers["coulomb"] > 0.0:
+            direction = 1.0 if numbers["direction"] > 0 else -1.0
+            robot.couplings.append(Coupling(first, second, direction, numbers["coulomb"]))
+        viscous = values * np.array([1.0, 0.0])
+        if viscous.any():
+            robot.apply(self, viscous)
 
     def columns(self, signals: Signals) -> Array:
         """(T, 2, 2): rows j and k, parameters viscous and coulomb."""

@@ -8,12 +8,14 @@ of all joints changes by
 With an encoder at the link nothing of this shows.
 """
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Value
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier, Value
 from excite_cli.effects.directional import slope_of_gradient
+from excite_cli.effects.simulated_robot import SimulatedRobot, Transmission, rotor_inertia
 from excite_cli.robot.model import Array
 
 
@@ -24,6 +26,25 @@ class Elasticity(Effect):
     title: ClassVar = "elastic gear"
     signature: ClassVar = "the residual follows the fourth derivative of the motion, on many joints"
     parameters: ClassVar = (Parameter("compliance", "rad/(N·m)", 1e-6, 1e-3, nonnegative=True),)
+    tier: ClassVar = Tier.LAST
+    excludes: ClassVar = ("backlash",)
+    settings: ClassVar[Mapping[str, float]] = {"rotor_inertia": 0.0, "damping_ratio": 0.02}
+
+    def leftover(self, values: Array) -> float:
+        """Of a compliance the columns are the first order only."""
+        return 2e-2
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """A rotor and a link with a spring and a damper between them."""
+        given = numbers["rotor_inertia"]
+        for j in self.joints:
+            stiffness = 1.0 / max(numbers["compliance"], 1e-9)
+            rotor = rotor_inertia(robot, j, given)
+            inertia = robot.link_inertia(j)
+            damping = 2.0 * numbers["damping_ratio"] * np.sqrt(stiffness * inertia)
+            robot.soft[j] = Transmission(rotor, given > 0.0, stiffness, float(damping))
 
     def rows(self, n: int) -> tuple[int, ...]:
         """All joints."""

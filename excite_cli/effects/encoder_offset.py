@@ -3,12 +3,14 @@
 To first order the torque of all joints changes by offset · ∂τ/∂q_j at the measured position.
 """
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
-from excite_cli.effects.directional import slope_of_gradient
+from excite_cli.effects.directional import left_by_angles, slope_of_gradient
+from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
 
 
@@ -18,7 +20,18 @@ class EncoderOffset(Effect):
     kind: ClassVar = "encoder_offset"
     title: ClassVar = "wrong zero of an encoder"
     signature: ClassVar = "residuals on many joints as if one of them stood elsewhere"
-    parameters: ClassVar = (Parameter("offset", "rad", 1e-3, 0.2),)
+    parameters: ClassVar = (Parameter("offset", "rad", 1e-3, 0.2, believed=(-0.2, 0.2)),)
+    usual: ClassVar = True
+
+    def leftover(self, values: Array) -> float:
+        """Of an angle the columns are the first order only."""
+        return left_by_angles(values, 2e-3)
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """What is recorded is the true angle less the offset."""
+        robot.position_offset[list(self.joints)] -= values[0]
 
     def rows(self, n: int) -> tuple[int, ...]:
         """All joints."""

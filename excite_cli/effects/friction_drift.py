@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals, Tier
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 
@@ -23,6 +23,10 @@ class FrictionDrift(Effect):
         Parameter("coulomb_rate", "N·m/s", 1e-3, 1.0),
         Parameter("viscous_rate", "N·m/rad", 1e-3, 1.0),
     )
+    surprise: ClassVar = 15.0  # within the seconds of a run, friction hardly warms up
+    tier: ClassVar = Tier.LAST
+    refines: ClassVar = ("viscous_friction", "coulomb_friction")
+    deviates_from: ClassVar = refines
 
     def columns(self, signals: Signals) -> Array:
         """t sgn v_j and t v_j, (T, 1, 2)."""

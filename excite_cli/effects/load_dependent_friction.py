@@ -20,6 +20,10 @@ class LoadDependentFriction(Effect):
     signature: ClassVar = "the jump at a reversal is the larger the more torque the joint carries"
     function_of: ClassVar = ("speed", "load")
     parameters: ClassVar = (Parameter("ratio", "N·m/N·m", 0.005, 0.3, nonnegative=True),)
+    surprise: ClassVar = 1.0
+    refines: ClassVar = ("coulomb_friction",)
+    deviates_from: ClassVar = ("viscous_friction", "coulomb_friction")
+    usual: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
         """|load_j| sgn v_j, (T, 1, 1)."""

@@ -25,6 +25,10 @@ class NonlinearViscousFriction(Effect):
     )
     shapes: ClassVar = (Parameter("power", "1", 0.5, 3.0),)
     defaults: ClassVar = {"power": 2.0}
+    surprise: ClassVar = 2.0
+    refines: ClassVar = ("viscous_friction", "coulomb_friction")
+    deviates_from: ClassVar = refines
+    usual: ClassVar = True
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
@@ -42,6 +46,15 @@ class NonlinearViscousFriction(Effect):
         square, width = signals.v[:, j] ** 2, sign_width() ** 2
         slope = (square + width) ** ((p - 3.0) / 2.0) * (p * square + width)
         return Cotangents(v=signals.only(j, weights[:, 0, 0] * slope))
+
+    @property
+    def imitates(self) -> bool:
+        """√|v| comes near any friction; beside no Coulomb and viscous friction it is no physics."""
+        return self.shape.get("power") == 0.5
+
+    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
+        """None: the powers of the grid are all there are."""
+        return ()
 
     def report(self, values: Array, covariance: Array) -> dict[str, Value]:
         """The coefficient in the unit that belongs to its power."""

@@ -19,6 +19,7 @@ from excite_cli.effects.base import (
     Value,
     deviation,
 )
+from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
 
 _RADIUS = 0.05  # m, of the sphere that is planted
@@ -41,6 +42,13 @@ class Payload(Effect):
     )
     defaults: ClassVar[Mapping[str, float]] = {"cx": 0.0, "cy": 0.0, "cz": 0.05, "radius": _RADIUS}
     per_run: ClassVar = True
+    usual: ClassVar = True
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """The body that the last joint carries has more inertia."""
+        robot.phi[-PARAMETERS_PER_BODY:] += values
 
     def rows(self, n: int) -> tuple[int, ...]:
         """All joints."""

@@ -24,6 +24,7 @@ from excite_cli.effects.base import (
     Effect,
     Parameter,
     Signals,
+    Tier,
     Value,
     deviation,
 )
@@ -33,6 +34,7 @@ _CYCLES = 2.0  # least number of periods within the travelled range
 _SAMPLES = 4.0  # least number of samples per period at the typical speed
 _MOST = 1000.0  # periods per turn
 _OVERSAMPLING = 4
+_FINER = (0.35, 0.15, 0.06, 0.02, 0.006)  # cycles
 _FOUND = 3  # candidates that a search returns
 
 
@@ -49,6 +51,7 @@ class Ripple(Effect):
     )
     shapes: ClassVar = (Parameter("periods", "1/turn", 1.0, _MOST),)
     defaults: ClassVar[Mapping[str, float]] = {"periods": 20.0}
+    tier: ClassVar = Tier.LAST
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
@@ -86,6 +89,13 @@ class Ripple(Effect):
             if len(chosen) < _FOUND and all(abs(n - other) > step for other in chosen):
                 chosen.append(n)
         return [{"periods": _refined(q, r, n, step)} for n in chosen]
+
+    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
+        """Parts of a cycle more or less over the travelled range."""
+        j = self.joints[0]
+        low = min(float(s.q[:, j].min()) for s in signals)
+        high = max(float(s.q[:, j].max()) for s in signals)
+        return [2 * np.pi * cycles / max(high - low, 1e-6) for cycles in _FINER]
 
     def columns(self, signals: Signals) -> Array:
         """cos(N q_j) and sin(N q_j), (T, 1, 2)."""

@@ -20,6 +20,10 @@ class Spring(Effect):
         Parameter("stiffness", "N·m/rad", 0.5, 2000.0, nonnegative=True),
         Parameter("preload", "N·m", 0.1, 2000.0),
     )
+    surprise: ClassVar = (
+        12.0  # else a constant is called a preloaded spring as soon as noise bends it
+    )
+    usual: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
         """q_j and 1, (T, 1, 2)."""

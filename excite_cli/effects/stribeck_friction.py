@@ -23,6 +23,9 @@ class StribeckFriction(Effect):
     parameters: ClassVar = (Parameter("excess", "N·m", 0.05, 100.0, nonnegative=True),)
     shapes: ClassVar = (Parameter("stribeck_speed", "rad/s", _LEAST_SPEED, 1.0),)
     defaults: ClassVar = {"stribeck_speed": 0.1}
+    surprise: ClassVar = 2.0
+    refines: ClassVar = ("viscous_friction", "coulomb_friction")
+    deviates_from: ClassVar = refines
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
@@ -31,6 +34,14 @@ class StribeckFriction(Effect):
         fastest = max((float(np.abs(s.v[:, j]).max()) for s in signals if len(s.v)), default=1.0)
         speeds = np.unique(np.maximum(_SHARES * fastest, _LEAST_SPEED))
         return [{"stribeck_speed": float(speed)} for speed in speeds]
+
+    def shows_above(self, speed: float) -> bool:
+        """Whether its peak reaches beyond the samples in which the joint hardly moves."""
+        return self.shape.get("stribeck_speed", np.inf) >= speed
+
+    def leftover(self, values: Array) -> float:
+        """How friction falls with speed is not known exactly."""
+        return 2e-2
 
     def columns(self, signals: Signals) -> Array:
         """exp(−(v_j/v_s)²) sgn v_j, (T, 1, 1)."""

@@ -4,12 +4,16 @@ One delay for all joints of the effect, of all terms of the torque: a lag of fri
 a delay. It is looked for on all joints together first, then on single ones.
 """
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
+
+_SHORTEST_ALONE = 1.5e-3  # s
 
 
 class TorqueDelay(Effect):
@@ -20,7 +24,7 @@ class TorqueDelay(Effect):
     signature: ClassVar = "the residual is the torque's rate of change, on all joints alike"
     function_of: ClassVar = ("load",)
     scope: ClassVar[Scope] = "robot"
-    parameters: ClassVar = (Parameter("delay", "s", 5e-4, 0.1),)
+    parameters: ClassVar = (Parameter("delay", "s", 5e-4, 0.1, believed=(-0.1, 0.1)),)
     data_defect: ClassVar = True
 
     @classmethod
@@ -28,6 +32,15 @@ class TorqueDelay(Effect):
         """All joints together, then each on its own."""
         every = tuple(range(robot.n))
         return [every, *((j,) for j in every if robot.n > 1)]
+
+    def possible(self, values: Array, early: bool) -> bool:
+        """Of one joint alone, less than a moment is friction that lags a little."""
+        alone = len(self.joints) == 1
+        return super().possible(values, early) and not (alone and values[0] < _SHORTEST_ALONE)
+
+    def leftover(self, values: Array) -> float:
+        """Of a delay the columns are the first order only."""
+        return 1e-2
 
     def columns(self, signals: Signals) -> Array:
         """−d(torque)/dt, (T, len(joints), 1)."""
@@ -39,6 +52,12 @@ class TorqueDelay(Effect):
             return None
         rate = signals.rate(signals.torque[:, self.joints[0]])
         return Abscissa("rate of the torque", "N·m/s", rate)
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """Torque is recorded as it was that long ago."""
+        robot.delay[list(self.joints)] += values[0]
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂torque = −(transpose of the rate) weight."""

@@ -5,9 +5,11 @@ inertial parameters, which then are all wrong by it. The gain of the joint's fri
 its friction parameters in the same way; what shows is the gain of the rigid-body torque alone.
 """
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
 
 
@@ -18,12 +20,19 @@ class TorqueGain(Effect):
     title: ClassVar = "wrong scale of the measured torque"
     signature: ClassVar = "the residual has the shape of the torque itself"
     function_of: ClassVar = ("load",)
-    parameters: ClassVar = (Parameter("gain", "1", 0.005, 0.5),)
+    parameters: ClassVar = (Parameter("gain", "1", 0.005, 0.5, believed=(-0.5, 0.5)),)
     data_defect: ClassVar = True
+    usual: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
         """load_j, (T, 1, 1)."""
         return signals.load[:, list(self.joints), None]
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """A factor on all that is recorded, friction too."""
+        robot.gain[list(self.joints)] += values[0]
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂load_j = weight."""

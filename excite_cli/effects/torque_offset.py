@@ -1,10 +1,12 @@
 """A constant in the measured torque: τ_j = b."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
 
 
@@ -15,8 +17,9 @@ class TorqueOffset(Effect):
     title: ClassVar = "offset of the measured torque"
     signature: ClassVar = "the residual is the same wherever the joint is and however it moves"
     parameters: ClassVar = (Parameter("offset", "N·m", 0.05, 50.0),)
-    simpler_than: ClassVar = ("asymmetric_friction", "spring")
     data_defect: ClassVar = True
+    surprise: ClassVar = 1.0
+    usual: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
         """Ones, (T, 1, 1)."""
@@ -25,6 +28,12 @@ class TorqueOffset(Effect):
     def abscissa(self, signals: Signals) -> Abscissa:
         """Time: a constant stays where it is."""
         return Abscissa("time", "s", signals.t)
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """A constant in what is recorded."""
+        robot.offset[list(self.joints)] += values[0]
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """Nothing: a constant does not depend on the motion."""

@@ -3,15 +3,26 @@
 s = 1 is a clean cut. The model's torque passes L where the measured one stays there.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.base import (
+    Abscissa,
+    Cotangents,
+    Effect,
+    Parameter,
+    Signals,
+    Tier,
+    steps_by_ratio,
+)
+from excite_cli.effects.parameter import whole_share
+from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 _MEASURED = (0.8, 0.9, 0.95, 0.97, 0.985, 0.995)  # of a cut torque, the last ones are the level
+_FINER = (1.05, 1.02, 1.008, 1.003, 1.001)
 _QUANTILES = (0.7, 0.8, 0.9, 0.95, 0.98)
 
 
@@ -22,9 +33,12 @@ class TorqueSaturation(Effect):
     title: ClassVar = "saturation of the measured torque"
     signature: ClassVar = "the residual is zero up to a level of torque and grows from there"
     function_of: ClassVar = ("load",)
-    parameters: ClassVar = (Parameter("sharpness", "1", 0.3, 1.5, nonnegative=True),)
+    parameters: ClassVar = (whole_share("sharpness"),)
     shapes: ClassVar = (Parameter("level", "N·m", 0.1, 1000.0),)
     data_defect: ClassVar = True
+    tier: ClassVar = Tier.LAST
+    known_by: ClassVar = "level"
+    settings: ClassVar[Mapping[str, float]] = {"actuator": 0.0}
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
@@ -54,6 +68,24 @@ class TorqueSaturation(Effect):
             return []
         levels = np.unique(np.quantile(np.concatenate(measured), _MEASURED))
         return [{"level": float(level)} for level in levels if level > 0]
+
+    def leftover(self, values: Array) -> float:
+        """The form of a cut-off is not known exactly."""
+        return 4e-3
+
+    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
+        """Small ones: a level is seen directly."""
+        return steps_by_ratio(self.shape[name], _FINER)
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """The reading saturates; with `actuator` 1 the motor itself does, and tracking suffers."""
+        joints = list(self.joints)
+        if numbers["actuator"] > 0.0:
+            robot.clip[joints] = np.minimum(robot.clip[joints], numbers["level"])
+        else:
+            robot.reading[joints] = [numbers["sharpness"], numbers["level"]]
 
     def columns(self, signals: Signals) -> Array:
         """−(|torque_j| − L)₊ sgn(torque_j), (T, 1, 1)."""

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier
 from excite_cli.robot.model import Array
 
 
@@ -14,7 +14,9 @@ class ViscousFriction(Effect):
     signature: ClassVar = "the residual is a straight line through zero over the joint's speed"
     function_of: ClassVar = ("speed",)
     parameters: ClassVar = (Parameter("viscous", "N·m·s/rad", 0.1, 100.0, nonnegative=True),)
-    simpler_than: ClassVar = ("nonlinear_viscous_friction", "friction_drift", "coupled_friction")
+    surprise: ClassVar = 0.0  # every joint has it
+    tier: ClassVar = Tier.EVERY_ROBOT
+    usual: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
         """v_j, (T, 1, 1)."""

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.friction_line import CURVED, STRAIGHT
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.traces import EffectTrace, Traces
 from excite_cli.diagnosis.words import (
@@ -16,6 +15,8 @@ from excite_cli.diagnosis.words import (
     title_of,
     value_in_words,
 )
+from excite_cli.effects.base import Effect, Picture
+from excite_cli.effects.catalogue import catalogue
 from excite_cli.report.chart import Chart
 from excite_cli.report.dependence_section import in_plain_words
 from excite_cli.report.effect_chart import Cloud, cloud_of, draw_cloud, draw_window, together
@@ -74,7 +75,7 @@ def _cards(found: Diagnosis, traces: Traces, effects: Sequence[NamedEffect]) -> 
             )
             caption = _caption(found, named) if not row else ""
             chart = None
-            if trace.quantity == "time" and np.ptp(cloud.law) > 0:
+            if _picture(trace) == "window" and np.ptp(cloud.law) > 0:
                 chart = draw_window(shown, trace, row, units[joint], caption)
             charts.append(draw_cloud(shown, cloud, caption) if chart is None else chart)
         if not trace.quantity:
@@ -100,8 +101,9 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
         f"{values}. p {p_in_words(named.p_value)}; explains {named.share_of_residual:.2%} of the "
         f"residual; lowers the error on runs left out by {named.gain:.1%}."
     )
-    if named.effect.kind in CURVED and _has_a_line(found, named):
-        text += " Drawn is what deviates from the straight line of viscous and Coulomb friction."
+    if _has_a_line(found, named):
+        line = " and ".join(map(title_of, _deviates_from(named)))
+        text += f" Drawn is what deviates from the straight line of {line}."
     everything = len(found.joint_names)
     if named.aliases:
         others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]
@@ -112,11 +114,29 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
 
 
 def _has_a_line(found: Diagnosis, named: NamedEffect) -> bool:
-    """Whether viscous or Coulomb friction was found on the same joint."""
+    """Whether something was found on the same joint of which this is the deviation."""
+    straight = _deviates_from(named)
     return any(
-        each.effect.kind in STRAIGHT and each.effect.joints == named.effect.joints
+        each.effect.kind in straight and each.effect.joints == named.effect.joints
         for each in found.effects
     )
+
+
+def _deviates_from(named: NamedEffect) -> tuple[str, ...]:
+    kind = catalogue().get(named.effect.kind)
+    return () if kind is None else kind.deviates_from
+
+
+def _picture(trace: EffectTrace) -> Picture:
+    kind = catalogue().get(trace.kind)
+    return "cloud" if kind is None else kind.picture
+
+
+def _over_speed(trace: EffectTrace) -> bool:
+    kind = catalogue().get(trace.kind)
+    if kind is None or kind.abscissa is not Effect.abscissa:
+        return False
+    return kind.function_of == ("speed",) and kind.scope == "joint"
 
 
 def _combined(found: Diagnosis, traces: Traces) -> tuple[Chart, ...]:
@@ -127,7 +147,7 @@ def _combined(found: Diagnosis, traces: Traces) -> tuple[Chart, ...]:
         parts = [
             trace
             for trace in traces.effects
-            if trace.quantity == "speed" and trace.rows == (joint,) and not trace.runs
+            if _over_speed(trace) and trace.rows == (joint,) and not trace.runs
         ]
         if len(parts) < 2 or not _same_samples(parts):
             continue

@@ -1,11 +1,13 @@
 """What the robot of one run is made of, and its making: inertias, joints, drives, instruments."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
+from excite_cli.effects.base import Effect
+from excite_cli.effects.simulated_robot import Coupling, Push, Transmission
 from excite_cli.errors import RobotError
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.engine import load_mujoco
@@ -17,43 +19,9 @@ _MOST_STEPS = 200
 _HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)  # flanks of a gear
 
 
-@dataclass(frozen=True)
-class Transmission:
-    """Between a motor and its link: rotor [kg·m²], stiffness [N·m/rad], damping, play [rad].
-
-    `sensed_before`: the recorded torque is that of the motor, which also turns the rotor; otherwise
-    that which enters the gear.
-    """
-
-    rotor: float
-    sensed_before: bool
-    stiffness: float = 0.0
-    damping: float = 0.0
-    play: float = 0.0
-
-
-@dataclass(frozen=True)
-class Coupling:
-    """Dry friction `force` on v_first + direction · v_second."""
-
-    first: int
-    second: int
-    direction: float
-    force: float
-
-
-@dataclass(frozen=True)
-class Push:
-    """A force (3,) [N] on the last joint's frame, in axes of the world, from `start` to `end`."""
-
-    force: Array
-    start: float
-    end: float
-
-
 @dataclass
 class Build:
-    """One run's robot while mechanisms add to it; arrays are (n,) per moved joint.
+    """One run's robot while effects are built into it; arrays are (n,) per moved joint.
 
     `springs` are k and c of k q + c. `looped` effects act through their own formula at every step;
     `compensated` ones are known to the controller;
@@ -107,6 +75,35 @@ class Build:
         """What `joint` turns at the reference posture with all others held [kg·m²]."""
         plant = build_plant(self.robot, self.phi)
         return float(mass_matrix(plant, self.robot.posture)[joint, joint])
+
+    def add_to_joint(self, joint: int, parts: Mapping[str, float]) -> None:
+        """Attributes of MuJoCo's joint; several springs on a joint are one."""
+        self.damping[joint] += parts.get("damping", 0.0)
+        self.friction[joint] += parts.get("frictionloss", 0.0)
+        self.armature[joint] += parts.get("armature", 0.0)
+        stiffness = parts.get("stiffness", 0.0)
+        self.springs[joint] += [stiffness, -stiffness * parts.get("springref", 0.0)]
+
+    def apply(self, effect: Effect, values: Array) -> None:
+        """Through the effect's own formula, at every step."""
+        self.looped.append(Planted(effect, values))
+
+    def tell_controller(self, effect: Effect, values: Array) -> None:
+        """For the controller to compensate."""
+        self.compensated.append(Planted(effect, values))
+
+    def falsify(self, effect: Effect, values: Array) -> None:
+        """By the effect's own formula, what is recorded."""
+        self.recorded.append(Planted(effect, values))
+
+
+def assemble(robot: Robot, phi: Array, run: str, planted: Iterable[Planted]) -> Build:
+    """The robot of one run with the effects that are active in it."""
+    build = Build.bare(robot, phi, run)
+    for each in planted:
+        if each.effect.active(run):
+            each.effect.build_into(build, each.values, each.named())
+    return build
 
 
 def make(build: Build, step: float) -> Plant:
@@ -220,8 +217,3 @@ def _shorten(plant: Plant, step: float) -> None:
     model.dof_solref[:, 0] = 2 * model.opt.timestep
     if model.ntendon:
         model.tendon_solref_fri[:, 0] = 2 * model.opt.timestep
-
-
-def last_body(build: Build) -> slice:
-    """Where φ holds the body that the last joint carries."""
-    return slice(len(build.phi) - PARAMETERS_PER_BODY, len(build.phi))

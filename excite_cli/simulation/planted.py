@@ -17,16 +17,6 @@ from excite_cli.robot.model import Array, Robot
 
 FORM = "kind@joint[,joint…]=value[,name:value…][;runs:name|name]"
 
-# Of these, the number people know is not the first linear parameter.
-_KNOWN_BY: Mapping[str, str] = {"torque_saturation": "level", "backlash": "gap"}
-
-# What only the simulated robot has: how its parts are built, not what is identified.
-EXTRA: Mapping[str, Mapping[str, float]] = {
-    "elasticity": {"rotor_inertia": 0.0, "damping_ratio": 0.02},
-    "backlash": {"rotor_inertia": 0.0},
-    "torque_saturation": {"actuator": 0.0},
-}
-
 
 @dataclass(frozen=True)
 class Planted:
@@ -43,7 +33,7 @@ class Planted:
             p.name: float(value)
             for p, value in zip(self.effect.parameters, self.values, strict=False)
         }
-        return {**EXTRA.get(self.effect.kind, {}), **self.extra, **self.effect.shape, **linear}
+        return {**self.effect.settings, **self.extra, **self.effect.shape, **linear}
 
     def record(self, robot: Robot) -> dict[str, object]:
         """As plain data, for files and answers."""
@@ -72,15 +62,13 @@ def plant(
 ) -> Planted:
     """One effect of `kind` on `joints`, with `value` and named `others`.
 
-    `value` is that of the first parameter; of a saturation it is the level, of backlash the gap.
+    `value` is that of the number the kind is known by, usually the first parameter.
     """
     others = dict(others or {})
-    if kind.kind in _KNOWN_BY:
-        value, others = (
-            others.pop(kind.parameters[0].name, 1.0),
-            {_KNOWN_BY[kind.kind]: value, **others},
-        )
-    extra = {name: others.pop(name) for name in EXTRA.get(kind.kind, {}) if name in others}
+    if kind.known_by:
+        first = others.pop(kind.parameters[0].name, 1.0)
+        value, others = first, {kind.known_by: value, **others}
+    extra = {name: others.pop(name) for name in kind.settings if name in others}
     shape, values = kind.planted(value, others)
     return Planted(kind(joints, shape, runs), values, extra)
 
@@ -132,12 +120,9 @@ def _numbers(text: str, kind: type[Effect], where: str) -> tuple[float, dict[str
 def allowed_names(kind: type[Effect]) -> tuple[str, ...]:
     """Names of what may be given besides the first parameter."""
     every = (*(p.name for p in kind.parameters), *(p.name for p in kind.shapes))
-    own = tuple(name for name in every if name != _first(kind))
-    return (*own, *EXTRA.get(kind.kind, {}))
-
-
-def _first(kind: type[Effect]) -> str:
-    return _KNOWN_BY.get(kind.kind, kind.parameters[0].name)
+    known_by = kind.known_by or kind.parameters[0].name
+    own = tuple(name for name in every if name != known_by)
+    return (*own, *kind.settings)
 
 
 def _understood(kind: type[Effect], value: float, name: str) -> bool:

@@ -10,7 +10,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.build import make
+from excite_cli.simulation.build import assemble, make
 from excite_cli.simulation.controller import (
     Reference,
     compensated,
@@ -20,7 +20,6 @@ from excite_cli.simulation.controller import (
 )
 from excite_cli.simulation.declared import sized
 from excite_cli.simulation.engine import silent_engine
-from excite_cli.simulation.mechanisms import assemble
 from excite_cli.simulation.planned_motion import Planned
 from excite_cli.simulation.planted import Planted
 from excite_cli.simulation.play import Played, play

@@ -1,0 +1,57 @@
+"""A parameter of an effect, and a value of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.robot.model import Array
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter: name, unit, and the range of sizes that is usual for a robot arm.
+
+    `believed`: outside of it no fit is believed, however good; for sizes that do not depend on how
+    large the robot is. `believed_early` takes its place in the first passes of a diagnosis.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    nonnegative: bool = False
+    believed: Range | None = None
+    believed_early: Range | None = None
+
+    def allows(self, value: float, early: bool) -> bool:
+        """Whether a fitted value can be so, in an `early` pass or a later one."""
+        if self.nonnegative and value < 0:
+            return False
+        limits = self.believed_early if early and self.believed_early else self.believed
+        return limits is None or limits[0] <= value <= limits[1]
+
+
+def whole_share(name: str) -> Parameter:
+    """A share of something that is either taken away or not: one by nature.
+
+    In early passes torque that is cut or missing takes part in the fit of what it is a share of.
+    """
+    return Parameter(
+        name, "1", 0.3, 1.5, nonnegative=True, believed=(0.6, 1.5), believed_early=(0.18, 6.0)
+    )
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter's value with its standard deviation and unit."""
+
+    value: float
+    std: float
+    unit: str
+
+
+def deviation(slope: Array, covariance: Array) -> float:
+    """Standard deviation of a function of the parameters with this derivative, to first order."""
+    return float(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))

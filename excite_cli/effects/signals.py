@@ -1,0 +1,68 @@
+"""What an effect sees of a motion, and how its derivative is handed back."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.robot.model import Array
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What an effect may look at: one run, or one planned motion, at equidistant instants.
+
+    `t` (T,) from the start of the run [s]; `q, v, a` (T, n); `load` (T, n) rigid-body torque of
+    the model so far, `torque` (T, n) all of it with the effects found; `body` gives the derivatives
+    of the rigid-body torque.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    load: Array
+    torque: Array
+    body: RigidBody
+    run: str = ""
+
+    def rate(self, x: Array) -> Array:
+        """dx/dt by central differences along the first axis."""
+        if len(self.t) < 3:
+            return np.zeros_like(x)
+        return np.gradient(x, float(self.t[1] - self.t[0]), axis=0)
+
+    def rate_back(self, w: Array) -> Array:
+        """The transpose of `rate`: the cotangent of x for a cotangent w of dx/dt."""
+        if len(self.t) < 3:
+            return np.zeros_like(w)
+        h = float(self.t[1] - self.t[0])
+        back = np.zeros_like(w)
+        back[2:] += w[1:-1] / (2 * h)
+        back[:-2] -= w[1:-1] / (2 * h)
+        back[1] += w[0] / h
+        back[0] -= w[0] / h
+        back[-1] += w[-1] / h
+        back[-2] -= w[-1] / h
+        return back
+
+    def only(self, joint: int, x: Array) -> Array:
+        """Zeros (T, n) with x (T,) in the column of `joint`."""
+        full = np.zeros_like(self.q)
+        full[:, joint] = x
+        return full
+
+
+@dataclass
+class Cotangents:
+    """Derivatives of a scalar with respect to what columns depend on, each (T, n) or None.
+
+    `regressor` is (T, n, 10·n_bodies), for effects whose columns are entries of Y.
+    """
+
+    q: Array | None = None
+    v: Array | None = None
+    a: Array | None = None
+    load: Array | None = None
+    torque: Array | None = None
+    regressor: Array | None = None
