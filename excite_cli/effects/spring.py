@@ -20,9 +20,8 @@ class Spring(Effect):
         Parameter("stiffness", "N·m/rad", 0.5, 2000.0, nonnegative=True),
         Parameter("preload", "N·m", 0.1, 2000.0),
     )
-    surprise: ClassVar = (
-        12.0  # else a constant is called a preloaded spring as soon as noise bends it
-    )
+    # With less, a constant is called a preloaded spring as soon as noise bends it.
+    surprise: ClassVar = 12.0
     usual: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:

@@ -10,7 +10,6 @@ from scipy.stats import chi2
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Gain
 from excite_cli.diagnosis.judgement import Judgement, Rules
-from excite_cli.diagnosis.kinds import UNUSUAL
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import possible_sizes
 from excite_cli.diagnosis.training import TrainingData
@@ -122,7 +121,7 @@ def test_the_price_is_what_chance_makes_of_all_tests(
     one = effect(kind)
     data, [candidate] = planted([one], np.ones((1, len(one.parameters))), np.zeros((1, 2)))
     judge = judge_of(data, [replace(candidate, tests=tests)], Rules(0.03, 0.01, inflation))
-    threshold = (judge.price(0, dof) - UNUSUAL.get(kind, 4.0)) / inflation
+    threshold = (judge.price(0, dof) - one.surprise) / inflation
     assert tests * chi2.sf(threshold, dof) == pytest.approx(0.03)
     assert judge.price(0, 0) == judge.price(0, 1)
 

@@ -10,7 +10,6 @@ from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.judgement import Judgement, Rules
-from excite_cli.diagnosis.kinds import FIRST, UNUSUAL
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import possible_sizes
 from excite_cli.diagnosis.search import Search
@@ -74,11 +73,11 @@ def cost(rows: Rows, candidates: Sequence[Candidate], chosen: Sequence[int]) -> 
     for i in chosen:
         own = candidates[i].effect
         children = [candidates[k].effect for k in chosen if k != i]
-        if any(own.kind in FIRST.get(child.kind, ()) for child in children):
+        if any(own.kind in child.refines for child in children):
             price += 4.5
         else:
             family = chi2.isf(0.01 / candidates[i].tests, candidates[i].width)
-            price += family + UNUSUAL.get(own.kind, 4.0)
+            price += family + own.surprise
     return rows.energy(chosen) + price
 
 

@@ -101,14 +101,6 @@ def test_standing_still_leaves_no_nan(name: str, robot: Robot) -> None:
             assert all(np.isfinite(part).all() for part in parts if part is not None)
 
 
-def test_simpler_kinds_are_known_and_not_simpler_than_themselves() -> None:
-    kinds = catalogue()
-    for name, kind in kinds.items():
-        for other in kind.simpler_than:
-            assert name not in kinds[other].simpler_than
-            assert other != name
-
-
 def test_an_effect_is_silent_in_the_runs_it_does_not_name(robot: Robot) -> None:
     kind = kind_named("torque_offset")
     effect = kind((1,), {}, ("second",))

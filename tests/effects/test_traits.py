@@ -1,0 +1,151 @@
+"""What kinds state of themselves agrees with the catalogue and with each other."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import excite_cli
+from excite_cli.effects.base import Effect, Tier
+from excite_cli.effects.catalogue import catalogue
+from excite_cli.robot.model import Robot
+from tests.effects.motions import signals_of
+from tests.robot.random_robots import random_robot
+
+KINDS = catalogue()
+NAMES = sorted(KINDS)
+STRAIGHT = ("viscous_friction", "coulomb_friction")
+ANGLES = ("encoder_offset", "base_tilt")
+PACKAGE = Path(excite_cli.__file__).parent
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return random_robot(9, joints=3, branches=False)
+
+
+def smallest(kind: type[Effect]) -> Effect:
+    """On as few joints as the kind takes, with its usual shape."""
+    joints = (0, 1) if kind.scope == "pair" else (0,)
+    return kind(joints, kind.planted(1.0, {})[0])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_traits_name_only_kinds_of_the_catalogue(name: str) -> None:
+    kind = KINDS[name]
+    named = {*kind.refines, *kind.excludes, *kind.same_as, *kind.deviates_from}
+    assert named <= set(NAMES) - {name}
+    assert kind.surprise >= 0.0
+    assert not set(kind.settings) & {p.name for p in (*kind.parameters, *kind.shapes)}
+    assert not kind.known_by or kind.known_by in {p.name for p in kind.shapes}
+
+
+def test_what_every_robot_has_is_free_and_asked_for_first() -> None:
+    for name, kind in KINDS.items():
+        assert (kind.tier == Tier.EVERY_ROBOT) == (name in STRAIGHT)
+        assert (kind.surprise == 0.0) == (name in STRAIGHT)
+
+
+def test_kinds_that_come_near_anything_are_asked_for_last_and_dear() -> None:
+    dearest = max(kind.surprise for kind in KINDS.values() if kind.tier < Tier.LAST)
+    for name in ("contact", "cable_force", "friction_drift"):
+        assert KINDS[name].tier == Tier.LAST
+        assert KINDS[name].surprise >= dearest
+
+
+def test_what_is_refined_is_asked_for_before_or_with_its_refinement() -> None:
+    """And is looked up by its kind and one joint: one of one joint, without shape, no parent."""
+    for kind in KINDS.values():
+        for parent in (KINDS[name] for name in kind.refines):
+            assert parent.tier <= kind.tier
+            assert parent.scope == "joint"
+            assert not parent.shapes
+            assert not parent.refines
+
+
+@pytest.mark.parametrize("one", NAMES)
+def test_exclusion_holds_both_ways(one: str) -> None:
+    for other in NAMES:
+        apart = {one, other} == {"backlash", "elasticity"}
+        assert KINDS[one].exclusive_with(KINDS[other]) == apart
+
+
+def test_exclusion_holds_both_ways_if_one_says_so() -> None:
+    class Alone(KINDS["spring"]):  # type: ignore[misc, name-defined]
+        kind = "alone"
+        excludes = ("armature",)
+
+    assert Alone.exclusive_with(KINDS["armature"])
+    assert KINDS["armature"].exclusive_with(Alone)
+    assert not Alone.exclusive_with(KINDS["spring"])
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if KINDS[name].same_as])
+def test_the_other_name_of_a_kind_is_the_same_columns(name: str, robot: Robot) -> None:
+    signals = signals_of(robot, 300)
+    own, others = (
+        np.concatenate([KINDS[k]((1,)).columns(signals)[:, 0] for k in kinds], axis=1)
+        for kinds in ((name,), KINDS[name].same_as)
+    )
+    both = np.concatenate([own, others], axis=1)
+    ranks = {int(np.linalg.matrix_rank(x)) for x in (own, others, both)}
+    assert ranks == {own.shape[1]}
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "expected"),
+    [
+        ("viscous_friction", [50.0], 0.0),
+        ("spring", [1e3, -1e3], 0.0),
+        ("elasticity", [1e-4], 2e-2),
+        ("elasticity", [1e3], 2e-2),  # of no angle: the size does not matter
+        ("encoder_offset", [0.01], 2e-3),  # (1.5 · 0.01)² is less
+        ("encoder_offset", [-0.1], 0.0225),
+        ("base_tilt", [0.06, -0.08], 0.0225),
+    ],
+)
+def test_what_a_first_order_column_leaves(kind: str, values: list[float], expected: float) -> None:
+    assert smallest(KINDS[kind]).leftover(np.array(values)) == pytest.approx(expected)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(angle=st.floats(-0.5, 0.5), name=st.sampled_from(NAMES))
+def test_a_larger_angle_never_leaves_less(angle: float, name: str) -> None:
+    effect = smallest(KINDS[name])
+    least, some, more = (effect.leftover(np.array([k * angle])) for k in (0.0, 1.0, 1.5))
+    assert 0.0 <= least <= some <= more
+    if name not in ANGLES:
+        assert least == more
+
+
+def _texts(tree: ast.AST) -> list[str]:
+    return [
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+
+
+def _imports(tree: ast.AST) -> list[str]:
+    return [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+
+
+@pytest.mark.parametrize("room", ["diagnosis", "simulation", "report", "identification", "export"])
+def test_rooms_above_know_no_kind_by_name(room: str) -> None:
+    """A kind of a package is judged, simulated and drawn as one of ours is."""
+    own = {f"excite_cli.effects.{path.stem}" for path in (PACKAGE / "effects").glob("*.py")}
+    shared = {"base", "catalogue", "simulated_robot", "parameter", "signals", "sign"}
+    of_kinds = own - {f"excite_cli.effects.{name}" for name in shared}
+    names = {n for n in NAMES if "_" in n} if room == "diagnosis" else set()
+    files = sorted((PACKAGE / room).rglob("*.py"))
+    assert files
+    for path in files:
+        source = path.read_text(encoding="utf-8")
+        tree = ast.parse(source)
+        assert not set(_imports(tree)) & of_kinds, path.name
+        assert not [name for name in names if name in source], path.name
+        if room in ("diagnosis", "simulation"):
+            assert not set(_texts(tree)) & (set(NAMES) - {"armature"}), path.name
