@@ -1,7 +1,6 @@
 """The page on effects says what the catalogue has, and its example works as it stands."""
 
 import re
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,23 +9,17 @@ import pytest
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import GROUP, catalogue, declared_effects
+from excite_cli.effects.catalogue import catalogue, declared_effects
 from excite_cli.effects.sign import sign_of_width
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.differences import central_differences, relative_error
 from excite_cli.robot.model import Array
+from tests.effects import own_package
 from tests.effects.motions import signals_at, signals_of, states
 from tests.robot.random_robots import random_robot
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "effects.md").read_text(encoding="utf-8")
-OWN_EFFECT = (DOCS / "how-to" / "effect.md").read_text(encoding="utf-8")
-
-
-def _block(language: str) -> str:
-    found = re.search(rf"```{language}\n(.*?)```", OWN_EFFECT, re.DOTALL)
-    assert found is not None
-    return found.group(1)
 
 
 @pytest.fixture(autouse=True)
@@ -34,16 +27,6 @@ def _catalogue_read_anew() -> Iterator[None]:
     catalogue.cache_clear()
     yield
     catalogue.cache_clear()
-
-
-def _install(folder: Path, code: str, points: dict[str, str], module: str) -> None:
-    """What an installer leaves of a package with one module."""
-    (folder / f"{module}.py").write_text(code, encoding="utf-8")
-    info = folder / f"{module}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
-    lines = [f"[{GROUP}]", *(f"{name} = {value}" for name, value in points.items())]
-    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
 
 
 @pytest.mark.parametrize("name", list(catalogue()))
@@ -70,11 +53,11 @@ def test_page_has_no_section_on_what_there_is_not() -> None:
 def test_example_is_a_kind_of_the_catalogue_once_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    code = _block("python")
-    assert len([line for line in code.splitlines() if line.strip()]) <= 30
-    points = tomllib.loads(_block("toml"))["project"]["entry-points"][GROUP]
-    _install(tmp_path, code, points, "my_effects")
+    columns = own_package.blocks("python")[0]
+    assert len([line for line in columns.splitlines() if line.strip()]) <= 30
+    own_package.install(tmp_path, columns, own_package.points())
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(__import__("sys").modules, own_package.MODULE, raising=False)
     robot = random_robot(4, joints=3, branches=False, prismatic=False)
     spec = EffectSpec(kind="eccentric_friction", joints=("joint_2",))
     (effect,) = declared_effects((spec,), robot)
@@ -114,7 +97,7 @@ def test_example_is_a_kind_of_the_catalogue_once_installed(
 def test_effect_that_cannot_be_used_is_named(
     code: str, point: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _install(tmp_path, code, {"mine": point}, "broken_effects")
+    own_package.install(tmp_path, code, {"mine": point}, "broken_effects")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(__import__("sys").modules, "broken_effects", raising=False)
     with pytest.raises(ConfigError, match=message):
