@@ -10,6 +10,7 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from excite_cli.effects.viscous_friction import ViscousFriction
@@ -73,6 +74,32 @@ def test_beside_coulomb_friction_alone_its_share_is_added() -> None:
     v = speeds[:, 1]
     shown = friction_lines(traced, 0) @ np.array([1.0, 2.0])  # type: ignore[arg-type]
     assert shown == pytest.approx([1.0 + 2.0 * np.mean(np.sqrt(np.abs(v))), 2.0])
+
+
+@pytest.mark.parametrize(
+    ("kind", "curved"),
+    [
+        ("nonlinear_viscous_friction", True),
+        ("stribeck_friction", True),
+        ("load_dependent_friction", True),
+        ("friction_drift", True),
+        ("spring", False),
+        ("asymmetric_friction", False),  # its levels are what data sheets name
+        ("armature", False),
+    ],
+)
+def test_a_line_takes_in_what_curves_beside_it_and_nothing_else(kind: str, curved: bool) -> None:
+    traced, speeds = outcome([ViscousFriction((0,)), CoulombFriction((0,))])
+    v = speeds[:, 0].reshape(PARTS, SAMPLES)
+    other = catalogue()[kind]((0,))
+    width = len(other.parameters)
+    columns = tuple(np.repeat((3.0 * x + np.sign(x))[:, None, None], width, axis=2) for x in v)
+    traced = Outcome(traced.data, (*traced.candidates, Candidate(other, (0,), columns)), (0, 1, 2))
+    shown = friction_lines(traced, FIXED)  # type: ignore[arg-type]
+    expected = np.eye(FIXED + 2 + width)
+    if curved:
+        expected[FIXED, FIXED + 2 :], expected[FIXED + 1, FIXED + 2 :] = 3.0, 1.0
+    assert shown == pytest.approx(expected, abs=1e-9)
 
 
 def test_friction_of_other_joints_and_curves_alone_stay_as_they_are() -> None:

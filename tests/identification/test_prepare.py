@@ -172,6 +172,22 @@ def test_a_standstill_is_not_usable_and_a_reversal_hardly() -> None:
     assert not found.moving[:, 1].all()  # it does pass through zero
 
 
+@pytest.mark.parametrize(("seconds", "seen"), [(0.016, False), (0.03, True)])
+def test_what_a_joint_does_while_it_sticks_takes_no_part_in_fits(
+    seconds: float, seen: bool
+) -> None:
+    """A torque so long before and after every reversal, whatever the speed; no filter smears it."""
+    run = recorded(encoder=0.0)
+    _, v, _ = fourier(run.t)
+    turns = [run.t[1:][np.signbit(x[1:]) != np.signbit(x[:-1])] for x in v.T]
+    near = [np.abs(run.t[:, None] - at).min(axis=1) < seconds for at in turns]
+    run = replace(run, tau=np.stack(near, axis=1).astype(float))
+    found = prepare(run, choose_processing([run], FilterSpec(position="none"), 1e-3))
+    assert found.tau.max() > 0.1
+    for j in range(2):
+        assert found.tau_fit[found.usable[:, j], j].any() == seen
+
+
 def test_measured_speeds_are_used_when_asked_for() -> None:
     run = recorded(encoder=0.0)
     assert run.dq is not None

@@ -1,0 +1,234 @@
+"""What every kind states of itself is what a diagnosis does with it, kind by kind.
+
+Columns are made up: only the traits of a kind and the energy that it explains matter here.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from excite_cli.config.data_spec import DiagnosisSpec
+from excite_cli.diagnosis.candidates import Candidate, possible_effects
+from excite_cli.diagnosis.judgement import Judgement, Rules
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.refinement import shapes_around
+from excite_cli.diagnosis.search import Search
+from excite_cli.diagnosis.tracing import _coupled, _usual
+from excite_cli.effects.base import Effect, Signals, Tier
+from excite_cli.effects.catalogue import catalogue
+from excite_cli.robot.model import Array
+from tests.diagnosis.explicit_data import anything, effect
+from tests.diagnosis.test_judgement import TOTAL, on_joint_0, planted
+from tests.effects.motions import signals_of
+from tests.robot.random_robots import random_robot
+
+ALPHA = 0.01
+NO_VETO = Rules(ALPHA, -1.0)
+STRAIGHT = ("viscous_friction", "coulomb_friction")
+# χ² beyond chance, when it is asked for, and whether noise is measured with it in the model.
+STATED: Mapping[str, tuple[float, int, bool]] = {
+    "viscous_friction": (0.0, 1, True),
+    "nonlinear_viscous_friction": (2.0, 2, True),
+    "coulomb_friction": (0.0, 1, True),
+    "asymmetric_friction": (4.0, 3, False),
+    "stribeck_friction": (2.0, 2, False),
+    "load_dependent_friction": (1.0, 2, True),
+    "friction_drift": (15.0, 3, False),
+    "coupled_friction": (3.0, 2, True),
+    "armature": (1.0, 2, True),
+    "spring": (12.0, 2, True),
+    "torque_offset": (1.0, 2, True),
+    "torque_gain": (4.0, 2, True),
+    "torque_delay": (4.0, 2, False),
+    "torque_saturation": (4.0, 3, False),
+    "ripple": (4.0, 3, False),
+    "cable_force": (25.0, 3, False),
+    "elasticity": (4.0, 3, False),
+    "backlash": (4.0, 3, False),
+    "base_tilt": (4.0, 2, True),
+    "payload": (4.0, 2, True),
+    "encoder_offset": (4.0, 2, True),
+    "contact": (60.0, 3, False),
+}
+REFINED: Mapping[str, tuple[str, ...]] = {
+    "nonlinear_viscous_friction": STRAIGHT,
+    "stribeck_friction": STRAIGHT,
+    "friction_drift": STRAIGHT,
+    "coupled_friction": STRAIGHT,
+    "asymmetric_friction": ("coulomb_friction", "torque_offset"),
+    "load_dependent_friction": ("coulomb_friction",),
+}
+# Share of its energy for values of 0.1, and whether its twin is another kind.
+LEAVES = {
+    "base_tilt": 0.045, "encoder_offset": 0.0225, "torque_saturation": 4e-3, "elasticity": 2e-2,
+    "backlash": 1e-2, "torque_delay": 1e-2, "stribeck_friction": 2e-2,
+}  # fmt: skip
+
+
+def a_search(effects: Sequence[Effect], mix: Array, torque: Sequence[float]) -> Search:
+    """On columns of joint 0 that are orthogonal directions times `mix`; noise is of RMS one."""
+    data, candidates = planted(effects, mix, on_joint_0(torque))
+    plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
+    return Search(Judgement(plain, plain, candidates, NO_VETO, anything))
+
+
+def of(kind: str) -> Effect:
+    """With the usual shape."""
+    found = catalogue()[kind]
+    return found((0,), found.planted(1.0, {})[0])
+
+
+def test_every_kind_is_stated() -> None:
+    assert set(STATED) == set(catalogue())
+
+
+@pytest.mark.parametrize("kind", list(STATED))
+def test_it_is_named_where_it_saves_its_price_and_not_before(kind: str) -> None:
+    one = of(kind)
+    width = len(one.parameters)
+    price = chi2.isf(ALPHA, width) + STATED[kind][0]
+    for saved, found in ((price - 0.5, []), (price + 0.5, [0])):
+        torque = np.zeros(width)
+        torque[0] = np.sqrt(saved / TOTAL)
+        assert a_search([one], np.eye(width), torque).run() == found
+
+
+@pytest.mark.parametrize("kind", list(STATED))
+def test_it_is_asked_for_in_its_turn(kind: str) -> None:
+    one = of(kind)
+    width = len(one.parameters)
+    search = a_search([one], np.eye(width), np.ones(width))
+    turns = [int(tier) for tier in Tier if search._forward([], tier)]
+    assert turns == [turn for turn in (1, 2, 3) if turn >= STATED[kind][1]]
+
+
+def test_a_constant_that_noise_bends_a_little_is_no_spring() -> None:
+    """Its stiffness would have to save 14 of χ² more than the offset alone."""
+    effects = [effect("torque_offset"), effect("spring")]
+    mix = np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])  # a constant; angle, and the constant
+    for saved, found in ((10.0, {0}), (13.0, {0}), (14.5, {1})):
+        assert set(a_search(effects, mix, [3.0, np.sqrt(saved / TOTAL)]).run()) == found
+
+
+def test_noise_is_measured_with_all_usual_effects_in() -> None:
+    effects = [of(kind) for kind in STATED]
+    candidates = [Candidate(one, (0,), ()) for one in effects]
+    kinds = {candidates[i].effect.kind for i in _usual(candidates, [])}
+    assert kinds == {kind for kind, (_, _, usual) in STATED.items() if usual}
+
+
+@pytest.mark.parametrize("kind", list(STATED))
+def test_it_waits_for_what_it_refines(kind: str) -> None:
+    """Everything that is worth its price is there: only what it refines is in its way."""
+    others = [name for name, one in catalogue().items() if len(one.parameters) == 1]
+    effects = [of(kind), *(of(name) for name in others if name != kind)]
+    width = len(effects[0].parameters) + len(effects) - 1
+    search = a_search(effects, np.eye(width), np.ones(width))
+    schur = search.white.schur([])
+    ahead = set(REFINED.get(kind, ()))
+    assert search.judge.in_order(schur, [], [0]) == (not ahead)
+    for k, one in enumerate(effects[1:], start=1):
+        rest = [i for i in range(1, len(effects)) if i != k]
+        assert search.judge.in_order(search.white.schur(rest), rest, [0]) == (one.kind not in ahead)
+
+
+@pytest.mark.parametrize("kind", list(STATED))
+def test_what_its_form_leaves_is_no_other_effect(kind: str) -> None:
+    """It has RMS 100 with values of 0.1; an armature explains a little more, or less, beside it."""
+    one, share = of(kind), LEAVES.get(kind, 0.0)
+    width = len(one.parameters)
+    mix = np.eye(width + 1)
+    mix[:width] *= 100.0 / 0.1 / np.sqrt(width)
+    for factor, left in ((0.98, share > 0.0), (1.02, False)):
+        size = 100.0 * np.sqrt(share * factor) if share else 1.0
+        torque = [*(100.0 / np.sqrt(width) * np.ones(width)), size]
+        data, candidates = planted([one, effect("armature")], mix, on_joint_0(torque), noise=0.1)
+        plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
+        judge = Judgement(plain, plain, candidates, Rules(ALPHA, 0.01), anything)
+        assert (judge.verdict([0], [1]) == "what another effect leaves") == left
+
+
+@pytest.mark.parametrize("kind", ["nonlinear_viscous_friction", "coupled_friction", "armature"])
+def test_what_stands_for_straight_friction_has_all_of_it_beside_it(kind: str) -> None:
+    """Viscous friction is too weak to pass; the square of the speed does not stand for it."""
+    shape = {"power": 0.5} if kind == "nonlinear_viscous_friction" else {}
+    effects = [*(effect(name) for name in STRAIGHT), effect(kind, **shape)]
+    width = 2 + len(effects[2].parameters)
+    torque = [0.05, *np.ones(width - 1)]
+    found = set(a_search(effects, np.eye(width), torque).run())
+    assert found == ({1, 2} if kind == "armature" else {0, 1, 2})
+
+
+def signals() -> list[Signals]:
+    robot = random_robot(4, joints=3, branches=False, prismatic=False)
+    return [signals_of(robot, 300)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "shape", "steps"),
+    [
+        ("stribeck_friction", {"stribeck_speed": 0.2}, [0.07, 0.03, 0.012, 0.004]),
+        ("torque_saturation", {"level": 10.0}, [0.5, 0.2, 0.08, 0.03, 0.01]),
+        ("backlash", {"gap": 0.01}, [1.5e-3, 6e-4, 2e-4, 7e-5]),
+        ("nonlinear_viscous_friction", {"power": 2.0}, []),
+        ("coupled_friction", {"direction": 1.0}, []),
+    ],
+)
+def test_shapes_are_refined_as_finely_as_they_are_seen(
+    kind: str, shape: Mapping[str, float], steps: Sequence[float]
+) -> None:
+    ((name, value),) = shape.items()
+    first, *others = shapes_around(effect(kind, **shape), signals())
+    assert first == dict(shape)
+    expected = [value + sign * step for step in steps for sign in (-1, 1)]
+    assert [each[name] for each in others] == pytest.approx(expected)
+
+
+def test_ripple_is_refined_by_parts_of_a_cycle_and_a_touch_by_parts_of_its_length() -> None:
+    runs = signals()
+    travelled = np.ptp(runs[0].q[:, 0])
+    _, *others = shapes_around(effect("ripple", periods=30.0), runs)
+    cycles = [(each["periods"] - 30.0) * travelled / (2 * np.pi) for each in others]
+    assert cycles == pytest.approx(
+        [s * c for c in (0.35, 0.15, 0.06, 0.02, 0.006) for s in (-1, 1)]
+    )
+    _, *others = shapes_around(effect("contact", start=1.0, end=3.0), runs)
+    starts = [each["start"] for each in others if each["end"] == 3.0]
+    ends = [each["end"] for each in others if each["start"] == 1.0]
+    changes = [s * c for c in (0.7, 0.3, 0.12, 0.04) for s in (-1, 1)]
+    assert starts == pytest.approx([1.0 + change for change in changes])
+    assert ends == pytest.approx([3.0 + change for change in changes])
+    assert len(others) == len(starts) + len(ends)
+
+
+def test_a_shaft_of_two_joints_must_not_stand_still() -> None:
+    effects = [of("viscous_friction"), effect("coupled_friction", 1, 2, direction=-1.0)]
+    assert _coupled(effects) == [(1, 2, -1.0)]
+    assert _coupled([of(kind) for kind in STATED if kind != "coupled_friction"]) == []
+
+
+@pytest.mark.parametrize(("slowest", "left"), [(0.001, 5), (0.03, 3), (10.0, 0)])
+def test_peaks_of_friction_below_the_speeds_that_count_are_not_looked_for(
+    slowest: float, left: int
+) -> None:
+    robot = random_robot(4, joints=1, branches=False, prismatic=False)
+    run = signals_of(robot, 300)
+    spec = DiagnosisSpec(kinds=("stribeck_friction", "armature"), moving_speed=slowest)
+    found = possible_effects(spec, robot, (), [run], [run.load], ["run"], {})
+    speeds = [e.shape["stribeck_speed"] for e, _ in found if e.kind == "stribeck_friction"]
+    assert len(speeds) == left
+    assert all(speed >= slowest for speed in speeds)
+    assert len(found) == left + 1
+
+
+def test_a_touch_of_a_moment_is_none() -> None:
+    """A blow of 60 ms is a fault of the record; 200 ms are a touch."""
+    robot = random_robot(4, joints=3, branches=False, prismatic=False)
+    run = signals_of(robot, 800, step=0.01)
+    kind = catalogue()["contact"]
+    for seconds, count in ((0.06, 0), (0.2, 1)):
+        touch = kind((0, 1, 2), {"start": 3.0, "end": 3.0 + seconds})
+        residual = touch.torque(run, np.array([30.0, -40.0, 20.0]))
+        assert len(kind.tuned(robot, (0, 1, 2), [run], [residual])) == count
