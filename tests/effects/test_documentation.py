@@ -50,6 +50,28 @@ def test_page_has_no_section_on_what_there_is_not() -> None:
     assert set(re.findall(r"^### (\w+)$", PAGE, re.MULTILINE)) == set(catalogue())
 
 
+def test_page_says_how_every_kind_is_judged() -> None:
+    """Row by row: surprise, when it is asked for, after what, never beside what."""
+    table = PAGE.split("## How a diagnosis judges them")[1].split("\n## ")[0]
+    row = r"^\| `(\w+)` \| (\d+) \| (\w+) \| (.*?) ?\| (.*?) ?\|$"
+    rows = re.findall(row, table, re.MULTILINE)
+    assert [name for name, *_ in rows] == list(catalogue())
+    for name, surprise, when, *others in rows:
+        kind = catalogue()[name]
+        assert float(surprise) == kind.surprise
+        assert when == ("first", "then", "last")[kind.tier - 1]
+        assert [tuple(re.findall(r"\w+", each)) for each in others] == [kind.refines, kind.excludes]
+
+
+def test_how_to_names_every_trait_with_its_default() -> None:
+    page = own_package.PAGE.read_text(encoding="utf-8")
+    follows = {"joints", "runs", "kind", "active", "exclusive_with", "torque"}
+    stated = {name for name in vars(Effect) if not name.startswith("_")} - follows
+    assert sorted(name for name in stated if name not in page) == []
+    assert f"| {Effect.surprise:g} |" in page
+    assert f"`{Effect.tier.name}` |" in page
+
+
 def test_example_is_a_kind_of_the_catalogue_once_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
