@@ -1,6 +1,6 @@
 """Names that do not hold: effects that only come near something which is no effect we know.
 
-A line through a curve explains most of it and is no spring. So for each effect that was found, E is
+A line through a curve explains most of it, not its form. So for each effect that was found, E is
 the energy it explains on the joint where it matters most, and U what is left there with structure:
 the part that depends on some quantity (`unexplained`), or what an effect of an impossible sign or
 size would explain. The effect is an approximation

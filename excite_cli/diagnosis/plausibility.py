@@ -139,8 +139,8 @@ def _message(names: Sequence[str], straight: Verdict, best: Verdict, rivals: lis
     before, after = _rms(straight.left[shown]), _rms(best.left[shown])
     text = (
         f"the measured data contradict the robot: {'; and '.join(parts)}. As they are, "
-        f"{before:.0%} of these torques do not fit the URDF with any friction or spring; that way "
-        f"{after:.0%}."
+        f"{before:.0%} of these torques do not fit the URDF with any friction or stiffness; that "
+        f"way {after:.0%}."
     )
     others = dict.fromkeys("; and ".join(_sentences(names, rival.change)) for rival in rivals)
     others.pop("; and ".join(parts), None)
@@ -154,9 +154,9 @@ def _foreign(names: Sequence[str], straight: Verdict) -> str:
     wrong = ", ".join(names[j] for j in np.flatnonzero(straight.left > _FITS).tolist())
     return (
         f"the measured data contradict the robot: the torques of {wrong} do not fit their motion "
-        "with any friction or spring, and no single exchange or sign explains it. Check the order "
-        "and the signs of all columns (measurement.names, sign, position_sign), what the torque "
-        "is (measurement.torque), and whether this is the robot's URDF."
+        "with any friction or stiffness, and no single exchange or sign explains it. Check the "
+        "order and the signs of all columns (measurement.names, sign, position_sign), what the "
+        "torque is (measurement.torque), and whether this is the robot's URDF."
     )
 
 

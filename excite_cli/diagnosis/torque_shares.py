@@ -6,7 +6,7 @@ The torque of a joint is taken as a sum, with coefficients that must not be nega
 
 and an offset of any sign. What is left, as a share of the torque's standard deviation, is small if
 torque and motion belong together: however wrong the inertias and however large the friction, mass
-is positive, friction takes energy, and springs pull back. It is near 1 if they do not.
+is positive, friction takes energy, and what is elastic pulls back. It is near 1 if they do not.
 """
 
 from collections.abc import Sequence

@@ -26,7 +26,7 @@ from tests.effects import own_package
 pytest.importorskip("mujoco")
 
 from excite_cli.simulation.build import assemble
-from excite_cli.simulation.planted import Planted, parse_planted
+from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 
@@ -55,10 +55,11 @@ def robot() -> Robot:
 
 
 @pytest.fixture(scope="module")
-def planted(own: type[Effect], robot: Robot) -> tuple[Planted, ...]:
-    """An eccentric gear beside viscous and Coulomb friction, as the command line says it."""
-    texts = ("viscous_friction@elbow=1", "coulomb_friction@elbow=2", f"{OWN}@elbow=3,sin:-1.5")
-    return tuple(each for text in texts for each in parse_planted(text, robot, ()))
+def planted(own: type[Effect]) -> tuple[Planted, ...]:
+    """An eccentric gear beside viscous and Coulomb friction."""
+    friction = {"viscous_friction": 1.0, "coulomb_friction": 2.0}
+    plain = (plant(kind_named(kind), (ELBOW,), size) for kind, size in friction.items())
+    return (*plain, plant(own, (ELBOW,), 3.0, {"sin": -1.5}))
 
 
 @pytest.fixture(scope="module")
