@@ -1,0 +1,71 @@
+"""How an effect is drawn is what its kind states; the names of quantities decide nothing."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.effects.catalogue import catalogue
+from excite_cli.report.chart import Chart
+from excite_cli.report.effect_section import effect_section
+from excite_cli.report.page import Charts
+from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
+
+DEVIATES = "what deviates from the straight line of viscous friction and Coulomb friction"
+
+
+@pytest.fixture(scope="module")
+def plain() -> Diagnosis:
+    """Viscous friction of the elbow, with its trace."""
+    found = make_diagnosis()
+    traces, _ = make_traces(found.joint_names)
+    return replace(found, traces=traces)
+
+
+def charts(plain: Diagnosis, kinds: Sequence[str], quantity: str = "speed") -> list[Chart]:
+    """The same samples, as effects of these kinds over this quantity."""
+    assert plain.traces is not None
+    (named,), (trace,) = plain.effects, plain.traces.effects
+    effects = tuple(replace(named, effect=replace(named.effect, kind=kind)) for kind in kinds)
+    drawn = tuple(replace(trace, kind=kind, quantity=quantity) for kind in kinds)
+    section = effect_section(
+        replace(plain, effects=effects, traces=replace(plain.traces, effects=drawn))
+    )
+    assert section is not None
+    return [c for block in section.blocks if isinstance(block, Charts) for c in block.charts]
+
+
+@pytest.mark.parametrize("kind", ["contact", "torque_offset", "payload", "of_another_installation"])
+def test_a_touch_is_shown_while_it_lasts_all_else_as_samples(plain: Diagnosis, kind: str) -> None:
+    (chart,) = charts(plain, [kind])
+    assert ("s everything else leaves torque" in chart.alternative) == (kind == "contact")
+
+
+def test_any_kind_may_ask_for_the_seconds_in_which_it_shows(
+    plain: Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(catalogue()["spring"], "picture", "window")
+    (chart,) = charts(plain, ["spring"])
+    assert "s everything else leaves torque" in chart.alternative
+
+
+@pytest.mark.parametrize(("kind", "curved"), [("stribeck_friction", True), ("spring", False)])
+def test_a_curve_beside_straight_friction_says_what_is_drawn(
+    plain: Diagnosis, kind: str, curved: bool
+) -> None:
+    assert DEVIATES not in charts(plain, [kind])[0].caption
+    own, straight = charts(plain, [kind, "coulomb_friction"])[-2:]
+    assert (DEVIATES in own.caption) == curved
+    assert DEVIATES not in straight.caption
+
+
+@pytest.mark.parametrize("quantity", ["speed", "velocity"])
+def test_functions_of_the_speed_are_also_drawn_together(plain: Diagnosis, quantity: str) -> None:
+    def together(*kinds: str) -> list[str]:
+        return [c.title for c in charts(plain, kinds, quantity) if c.title == "Friction of elbow"]
+
+    assert together("viscous_friction", "coulomb_friction") == ["Friction of elbow"]
+    assert together("viscous_friction", "spring") == []
+    assert together("viscous_friction", "friction_drift") == []
+    assert together("viscous_friction", "of_another_installation") == []
