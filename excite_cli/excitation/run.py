@@ -14,7 +14,7 @@ from excite_cli.excitation.motion import ProgressCallback
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result, matches
 from excite_cli.excitation.sequence import Step, generate_sequence
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.trajectory.chain import Segment
 from excite_cli.workers.base import Workers
@@ -117,7 +117,7 @@ def continue_run(
     Where `problem` separates effects, `model` is the problem that the result is kept for: the same
     without the rivals. Stack and condition numbers are then its own.
     """
-    solver, seed = build_solver(problem.spec.optimizer), problem.spec.seed
+    solver, seed = InteriorPoint(), problem.spec.seed
     remaining = range(len(result.motions) + 1, problem.spec.sequence.motions + 1)
     stack = _running(problem, result)
     for step in generate_sequence(problem, solver, stack, remaining, seed, report, starts, workers):
