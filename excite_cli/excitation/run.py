@@ -6,9 +6,6 @@ from pathlib import Path
 
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
-from excite_cli.constraints.mesh_clearance import MeshClearance
-from excite_cli.constraints.obstacle_clearance import Surroundings
-from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import ProgressCallback
 from excite_cli.excitation.problem import Problem
@@ -166,10 +163,8 @@ def _pairs(problem: Problem) -> tuple[tuple[str, ...], tuple[str, ...]]:
     checked: list[str] = []
     dropped: list[str] = []
     for constraint in problem.constraints:
-        if isinstance(constraint, SelfCollision | Surroundings | MeshClearance):
+        left_out = constraint.left_out
+        if left_out is not None:
             checked += constraint.labels
-        if isinstance(constraint, SelfCollision | Surroundings):
-            dropped += [
-                f"{pair.first} – {pair.second}: {pair.reason}" for pair in constraint.pairs.dropped
-            ]
+            dropped += [f"{pair.first} – {pair.second}: {pair.reason}" for pair in left_out]
     return tuple(checked), tuple(dropped)
