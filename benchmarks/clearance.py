@@ -6,11 +6,11 @@ Run: python -m benchmarks.clearance
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from benchmarks.coal_gradients import CoalGradients
 from benchmarks.problems import problem
 from benchmarks.timing import interleaved
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.geometry.clearance import Clearance
-from excite_cli.geometry.clearance_coal import CoalClearance
 from excite_cli.geometry.collision_pairs import CollisionPairs
 
 
@@ -23,7 +23,7 @@ def main() -> None:
         constraint = next(c for c in of.constraints if isinstance(c, SelfCollision))
         pairs = CollisionPairs(constraint.pairs.checked[:40], ())
         ours = Clearance(of.robot, constraint.capsules, pairs)
-        coal = CoalClearance(of.robot, constraint.capsules, pairs)
+        coal = CoalGradients(of.robot, constraint.capsules, pairs.checked)
         q, _, _ = of.robot.draw_states(400, 1)
         rng = np.random.default_rng(0)
         rows = rng.integers(0, 400, 1000)

@@ -1,6 +1,6 @@
-"""Compare the solvers on the same problem from the same start.
+"""Compare the solver with SciPy's SLSQP on the same problem from the same start.
 
-    python benchmarks/compare_solvers.py [problem.yaml ...] --seconds 5 15 30 --seeds 1 2
+    python -m benchmarks.compare_solvers [problem.yaml ...] --seconds 5 15 30 --seeds 1 2
 
 Every time limit is a run of its own, so a figure is what a user gets who sets `max_seconds` to it;
 a run that converged before a limit is not repeated for a longer one. One core is used. Without a
@@ -15,23 +15,22 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from benchmarks.slsqp import ScipySlsqp
 from excite_cli.config.constraints_spec import ConstraintsSpec, DiscSpec, JointLimitsSpec
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.config.spec import OptimizerSpec, Spec
+from excite_cli.config.spec import Spec
 from excite_cli.config.trajectory_spec import FourierSpec
 from excite_cli.errors import ExciteError
 from excite_cli.excitation.motion import Progress
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.solvers.base import Effort, Solver
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.start import clear_posture, random_start
 from excite_cli.excitation.task import MotionTask
 
 SOLVERS: dict[str, Callable[[], Solver]] = {
-    "interior_point": lambda: build_solver(OptimizerSpec(method="interior_point")),
-    "sqp+daqp": lambda: build_solver(OptimizerSpec(method="sqp", qp_solver="daqp")),
-    "sqp+piqp": lambda: build_solver(OptimizerSpec(method="sqp", qp_solver="piqp")),
-    "slsqp": lambda: build_solver(OptimizerSpec(method="slsqp")),
+    "interior_point": InteriorPoint,
+    "slsqp": ScipySlsqp,
 }
 
 

@@ -23,7 +23,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.solvers.base import Effort
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import random_start
 from excite_cli.excitation.task import MotionTask
@@ -49,7 +49,7 @@ def on_the_grid(name: str, seed: int) -> tuple[Problem, list[Array], list[float]
     """Motions that nothing is asked of between the instants of the grid."""
     of = problem(name, f"seed={seed}", "optimizer.max_seconds=1000")
     spec = of.spec.optimizer
-    solver, stack = build_solver(spec), Stack.empty(of.columns)
+    solver, stack = InteriorPoint(), Stack.empty(of.columns)
     effort = Effort(spec.max_iterations, spec.max_seconds, spec.tolerance)
     found, numbers = [], []
     began = time.perf_counter()

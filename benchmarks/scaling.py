@@ -31,7 +31,7 @@ from excite_cli.excitation.one_start import FoundMotion, Search
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.workers.base import Function, News, Watch, Workers, unwatched
 from excite_cli.workers.here import Here
 from excite_cli.workers.processes import Processes
@@ -124,7 +124,7 @@ def start_up(of: Problem) -> tuple[float, float, int]:
     """Seconds until a worker has done a first task, of one task more, bytes that it was sent."""
     from benchmarks.scaling import nothing  # workers import it by this name, not from __main__
 
-    shared = Search(of, build_solver(of.spec.optimizer))
+    shared = Search(of, InteriorPoint())
     stack = np.zeros((of.columns, of.columns))
     began = time.perf_counter()
     with Processes(1) as workers:

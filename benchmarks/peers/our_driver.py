@@ -26,7 +26,7 @@ from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.objective import Objective, Spectrum
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 
 # The step of the paper, and of FIGAROH.
@@ -138,7 +138,7 @@ def solve(request: dict[str, Any]) -> dict[str, Any]:
     status, proved, final = "", False, None
     try:
         motion = generate_motion(
-            run, build_solver(run.spec.optimizer), Stack.empty(run.columns), 1,
+            run, InteriorPoint(), Stack.empty(run.columns), 1,
             request["seed"], lambda progress: None,
         )  # fmt: skip
         status, final = motion.status, motion.coefficients

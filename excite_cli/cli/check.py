@@ -44,9 +44,10 @@ def check(
 ) -> None:
     """Judge motions before a robot plays them: results, CSV, ROS 2, MoveIt, NumPy, measured data.
 
-    Margins are taken at controller rate (and at random instants); between them every constraint is
-    proved with bounds that share nothing with the optimiser's kinematics; the collision meshes are
-    looked at by Pinocchio and coal. A verdict is `proved` (at every instant), `sampled` (no
+    Margins are taken at controller rate (and at random instants); distances of capsules are
+    measured a second time by Pinocchio and coal. Between the instants every constraint is proved
+    with bounds that share nothing with the optimiser's kinematics; the collision meshes are looked
+    at by Pinocchio and coal, too. A verdict is `proved` (at every instant), `sampled` (no
     violation seen, with the reason why it is not proved) or `BROKEN`. Exit status 1: something is
     broken.
 
@@ -82,10 +83,11 @@ def check(
     broken = sum(motion["violations"] for motion in data)
     title = f"margins at {rate:g} Hz" + (f" and {random} random instants" if random else "")
     notes = [note for name, inspection, off in found for note in _notes(name, inspection, off)]
+    alarms = [words for name, inspection, _ in found for words in _alarms(name, inspection)]
     summary = f"{broken} violations" if broken else "No violation."
     caption = "A margin is what is left beyond what the config asks to keep."
     terminal.answer(
-        [*_tables(found, title), caption, *notes, summary],
+        [*alarms, *_tables(found, title), caption, *notes, *_agreement(found), summary],
         {"file": str(file), "ok": not broken, "motions": data, "rate": rate, "random": random,
          "slow": slow},
     )  # fmt: skip
@@ -153,6 +155,18 @@ def _data(
         },
         "samples_differ": {"share": off[0], "time": off[1]},
     }
+    data["second_path"] = {
+        each.name: {
+            "instants": each.instants,
+            "of": each.of,
+            "difference": each.difference,
+            "unit": each.unit,
+            "where": each.label,
+            "time": each.time,
+            "agrees": each.agrees,
+        }
+        for each in inspection.second
+    }
     if inspection.meshes is not None:
         gaps, times = inspection.meshes.gaps, inspection.meshes.times
         data["meshes"] = {
@@ -189,6 +203,31 @@ def _tables(found: "list[tuple[str, Inspection, tuple[float, float]]]", title: s
             table.add_row(key, *row, "BROKEN" if state == "broken" else state)
         tables.append(table)
     return tables
+
+
+def _alarms(name: str, inspection: "Inspection") -> list[str]:
+    """Constraints of which two computations differ."""
+    return [
+        f"{name}: BROKEN: {each.name} of {each.label} at {each.time:.4f} s: the program's own "
+        f"margin and that of Pinocchio and coal differ by {each.difference:.2g} {each.unit}. One "
+        "of them is wrong: trust neither, play nothing, and report this with the config."
+        for each in inspection.disagreeing
+    ]
+
+
+def _agreement(found: "list[tuple[str, Inspection, tuple[float, float]]]") -> list[str]:
+    """By how much the two computations of distances differ at most, over all motions."""
+    paths = [each for _, inspection, _ in found for each in inspection.second]
+    lines = []
+    for name in dict.fromkeys(each.name for each in paths):
+        of = [each for each in paths if each.name == name]
+        most = max(of, key=lambda each: each.difference)
+        lines.append(
+            f"{name}: margin by Pinocchio and coal at {sum(each.instants for each in of)} of "
+            f"{sum(each.of for each in of)} instants, the lowest among them; the program's own "
+            f"differs by at most {most.difference:.1g} {most.unit}."
+        )
+    return lines
 
 
 def _notes(name: str, inspection: "Inspection", off: tuple[float, float]) -> list[str]:

@@ -233,7 +233,7 @@ def _converts(spec: "Spec") -> bool:
     """Whether reading with this config changes positions or torques."""
     from excite_cli.config.data_spec import MeasurementSpec
 
-    kept = {"filter", "encoder_step", "topic", "rate"}
+    kept = {"filter", "topic", "rate"}
     plain, given = MeasurementSpec(), spec.measurement
     return any(
         getattr(given, name) != getattr(plain, name)

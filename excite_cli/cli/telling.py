@@ -4,13 +4,8 @@ from collections import Counter
 
 from excite_cli.cli.console import Terminal
 from excite_cli.constraints.base import Constraint
-from excite_cli.constraints.mesh_clearance import MeshClearance
-from excite_cli.constraints.obstacle_clearance import Surroundings
-from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.excitation.problem import Problem
-from excite_cli.geometry.collision_pairs import ALWAYS, UNGUARDED, CollisionPairs
-from excite_cli.geometry.obstacle_pairs import ObstaclePairs
 
 
 def tell_problem(terminal: Terminal, problem: Problem) -> None:
@@ -33,12 +28,9 @@ def tell_problem(terminal: Terminal, problem: Problem) -> None:
     _tell_effects(terminal, problem)
     _tell_uncertainty(terminal, problem)
     for constraint in problem.constraints:
-        if isinstance(constraint, SelfCollision):
-            _tell_self_collision(terminal, constraint, _tabled(problem))
-        elif isinstance(constraint, Surroundings):
-            _tell_surroundings(terminal, constraint)
+        _tell_constraint(terminal, constraint)
     around = problem.spec.constraints.surroundings
-    if around is not None and not any(isinstance(c, Surroundings) for c in problem.constraints):
+    if around is not None and not any(c.drawing.obstacles for c in problem.constraints):
         terminal.say("surroundings: no link can come near any of them, so nothing is checked")
     if robot.payload is not None:
         terminal.detail(f"payload: {robot.payload.in_words}, part of the predicted torque")
@@ -48,18 +40,16 @@ def tell_problem(terminal: Terminal, problem: Problem) -> None:
 
 def _counted_name(constraint: Constraint) -> str:
     """The name of a constraint, with the pairs that it keeps apart."""
-    if isinstance(constraint, SelfCollision | Surroundings):
-        return f"{constraint.name} ({len(constraint.pairs.checked)} pairs)"
-    if isinstance(constraint, MeshClearance):
-        return f"{constraint.name} ({len(constraint.labels)} pairs)"
-    return constraint.name
+    if constraint.left_out is None:
+        return constraint.name
+    return f"{constraint.name} ({len(constraint.labels)} pairs)"
 
 
 def _tell_uncertainty(terminal: Terminal, problem: Problem) -> None:
     spec = problem.spec.uncertainty
     if spec is None:
         return
-    held = [c.name for c in problem.constraints if getattr(c, "uncertainty", None) is not None]
+    held = [c.name for c in problem.constraints if c.uncertainty is not None]
     if not held:
         terminal.say(
             "warning: uncertainty bounds nothing: it concerns constraints.torque, balance and "
@@ -98,83 +88,15 @@ def _tell_effects(terminal: Terminal, problem: Problem) -> None:
         terminal.detail(f"  effect column {name}")
 
 
-def _tabled(problem: Problem) -> tuple[str, ...]:
-    """Pairs of links that are kept apart by tables of their meshes' distances."""
-    return next((c.labels for c in problem.constraints if isinstance(c, MeshClearance)), ())
-
-
-def _tell_self_collision(
-    terminal: Terminal, constraint: SelfCollision, tabled: tuple[str, ...]
-) -> None:
-    pairs = constraint.pairs
-    terminal.detail(
-        f"self-collision: {len(constraint.capsules)} capsules, {len(pairs.checked)} pairs "
-        f"checked; not checked: {_reasons(pairs)}"
-    )
-    if tabled:
-        terminal.detail(
-            "kept apart by their meshes, since their capsules overlap whatever the posture: "
-            f"{'; '.join(tabled)}"
-        )
-    loose = {
-        words
-        for pair in pairs.dropped
-        if pair.reason.startswith(UNGUARDED)
-        for words in pair.reason.partition("apart: ")[2][:-1].split(", ")
-        if not words.endswith("100%") and not any(words.startswith(label) for label in tabled)
-    }
-    if loose:
-        terminal.say(
-            "warning: not guarded, since their capsules overlap whatever the posture "
-            "(links and the share of postures in which their meshes are apart): "
-            f"{'; '.join(sorted(loose))}. Look at these with `excite check`, or give slimmer "
-            "capsules under constraints.self_collision.capsules."
-        )
-    _tell_each(terminal, constraint)
-
-
-def _tell_surroundings(terminal: Terminal, constraint: Surroundings) -> None:
-    pairs = constraint.pairs
-    things = ", ".join(obstacle.name for obstacle in constraint.obstacles)
-    terminal.detail(
-        f"surroundings: {things}; {len(pairs.checked)} pairs of a capsule and a thing checked; not "
-        f"checked: {_reasons(pairs)}"
-    )
-    most = float(pairs.kept.max())
-    closer = [
-        f"{label} {kept:.3f} m"
-        for label, kept in zip(constraint.labels, pairs.kept, strict=True)
-        if kept < most
-    ]
-    if closer:
-        terminal.say(
-            "these never get far from each other, so half of the farthest is kept instead of "
-            f"{most:g} m: {'; '.join(closer)}"
-        )
-    touching = [
-        f"{pair.first} – {pair.second} {pair.reason}"
-        for pair in pairs.dropped
-        if pair.reason.startswith(ALWAYS)
-    ]
-    if touching:
-        terminal.say(
-            f"warning: not guarded, since no motion parts them: {'; '.join(touching)}. Right for a "
-            "robot that stands there; else correct constraints.surroundings."
-        )
-    _tell_each(terminal, constraint)
-
-
-def _tell_each(terminal: Terminal, constraint: SelfCollision | Surroundings) -> None:
+def _tell_constraint(terminal: Terminal, constraint: Constraint) -> None:
+    for remark in constraint.remarks:
+        (terminal.say if remark.important else terminal.detail)(remark.words)
+    if constraint.left_out is None:
+        return
     for label in constraint.labels:
         terminal.detail(f"  checked  {label}")
-    for pair in constraint.pairs.dropped:
+    for pair in constraint.left_out:
         terminal.detail(f"  dropped  {pair.first} – {pair.second}: {pair.reason}")
-
-
-def _reasons(pairs: CollisionPairs | ObstaclePairs) -> str:
-    """How many pairs were dropped for each reason, figures in the reasons left aside."""
-    counts = Counter(pair.reason.split(" (")[0] for pair in pairs.dropped)
-    return ", ".join(f"{count} {reason}" for reason, count in counts.most_common()) or "none"
 
 
 def _symbols(problem: Problem) -> list[str]:

@@ -171,6 +171,10 @@ class ConstraintsSpec(Section):
         description="regions of joint space to stay out of: name, then joint: [from, to] of every "
         "joint that bounds it [rad or m]",
     )
+    own: dict[str, dict[str, Finite]] = Field(
+        default_factory=dict,
+        description="constraints that were added to the catalogue, by name, with their settings",
+    )
 
     @field_validator("keep_out")
     @classmethod

@@ -1,6 +1,6 @@
 """What a YAML file may say about measured data: torque, filters, declared effects, diagnosis."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, field_validator
 
@@ -55,6 +55,14 @@ class FilterSpec(Section):
 class MeasurementSpec(Section):
     """What the recorded columns are."""
 
+    gone: ClassVar = {
+        "encoder_step": (
+            (None,),
+            "nothing ever used the resolution of the encoders: the noise is taken from the data; "
+            "leave this key out",
+        )
+    }
+
     torque: Literal["link", "motor", "current"] = Field(
         "link",
         description="link: at the joint; motor: before the gear; current: before motor and gear",
@@ -97,7 +105,6 @@ class MeasurementSpec(Section):
     )
     topic: str | None = Field(None, description="topic of a bag; default: the only JointState")
     filter: FilterSpec = FilterSpec()
-    encoder_step: NonNegative | None = Field(None, description="[rad] resolution of the encoders")
 
 
 class IdentificationSpec(Section):

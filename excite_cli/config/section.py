@@ -1,9 +1,16 @@
 """What all sections of a problem share: numbers with their limits, and a strict base class."""
 
 from collections.abc import Callable
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, ClassVar, get_args
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    model_validator,
+)
 
 
 def _not_a_truth_value(value: Any) -> Any:
@@ -45,6 +52,20 @@ class Section(BaseModel):
     """Base of all sections: frozen, unknown keys refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", str_strip_whitespace=True)
+
+    gone: ClassVar[dict[str, tuple[tuple[Any, ...], str]]] = {}
+    """Keys of earlier versions: values that change nothing, as stored results have them, and what
+    to do about any other."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_what_is_gone(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        for key, (idle, advice) in cls.gone.items():
+            if key in value and value[key] not in idle:
+                raise ValueError(f"{key}: {advice} (given: {value[key]!r:.40})")
+        return {key: each for key, each in value.items() if key not in cls.gone}
 
     @classmethod
     def child(cls, key: str, value: Any) -> "type[Section] | None":

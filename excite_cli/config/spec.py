@@ -4,7 +4,7 @@ Every model is frozen and refuses unknown keys. Units: rad (m for prismatic join
 kg, m. The JSON Schema that `excite schema` prints is made from these classes.
 """
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, StrictBool
 
@@ -50,10 +50,15 @@ class CriterionSpec(Section):
 class OptimizerSpec(Section):
     """How the motion is sought."""
 
-    method: Literal["interior_point", "sqp", "slsqp"] = Field(
-        "interior_point", description="the way to the best motion; see docs/decisions.md"
-    )
-    qp_solver: Literal["daqp", "piqp"] = Field("daqp", description="used by method: sqp")
+    gone: ClassVar = {
+        "method": (
+            ("interior_point",),
+            "there is one method now, the interior point, which was the best of them; leave this "
+            "key out",
+        ),
+        "qp_solver": (("daqp", "piqp"), "no quadratic program is solved any more; leave it out"),
+    }
+
     max_seconds: Positive = Field(30.0, description="per start of a motion")
     max_iterations: Integer = Field(400, ge=1, le=100_000, description="per start of a motion")
     restarts: Integer = Field(

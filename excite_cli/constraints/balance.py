@@ -11,6 +11,7 @@ numerator and mass are linear in φ (`robot.least_ratio`).
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.drawing import Drawing, GroundRegion
 from excite_cli.constraints.support_polygon import Support, support_polygon
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.least_ratio import Ratios, least_ratios, worst_inertias
@@ -35,6 +36,7 @@ class Balance(Constraint):
     """
 
     name = "balance"
+    title = "Centre of mass to the edge of its region"
     unit = "m"
 
     def __init__(
@@ -93,6 +95,11 @@ class Balance(Constraint):
         """
         support = support_polygon(vertices, margin, "constraints.balance")
         return cls(robot, support.normals, support.offsets, support.center, uncertainty)
+
+    @property
+    def drawing(self) -> Drawing:
+        """The region that the centre of mass is kept in."""
+        return Drawing(region=GroundRegion(self.normals, self.offsets))
 
     def margins(self, states: States) -> Array:
         """Distance of the centre of mass to each edge, inwards (T, m) [m]."""

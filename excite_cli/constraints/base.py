@@ -2,7 +2,9 @@
 
 Every member has columns (a joint side, a capsule pair, an edge of the support) and gives, for each
 instant and column, the margin in its own unit, and derivatives for those the optimiser asks for.
-Members neither know the optimiser nor the trajectory.
+Members neither know the optimiser nor the trajectory, and nobody asks which member one is: what
+the solver, the search for postures, `check`, reports and views can make use of, a member states by
+what it overrides.
 """
 
 from abc import ABC, abstractmethod
@@ -10,9 +12,16 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.constraints.drawing import Drawing, Nearest
+from excite_cli.constraints.joint_columns import JointColumns
+from excite_cli.constraints.remark import Remark
 from excite_cli.dynamics.states import States
+from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
+from excite_cli.geometry.collision_pairs import DroppedPair
+from excite_cli.geometry.link_meshes import Poses
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.worst_margin import Worst
+from excite_cli.robot.capsule import Capsule
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -28,6 +37,36 @@ class Constraint(ABC):
     labels: tuple[str, ...]
     scale: Array
     """Size (m,) by which the optimiser divides each column's margin."""
+    uncertainty: InertiaUncertainty | None = None
+    """Inertias for all of which the margins hold; None where those of the URDF are taken."""
+
+    @property
+    def title(self) -> str:
+        """What the margin is, as the heading of a picture."""
+        return self.name.replace("_", " ").capitalize()
+
+    @property
+    def of_joints(self) -> JointColumns | None:
+        """Which joint each column bounds, and how; None where a column is about more than one."""
+        return None
+
+    @property
+    def linear(self) -> JointColumns | None:
+        """`of_joints` where the margins are linear in the coefficients of a motion, else None."""
+        columns = self.of_joints
+        return columns if columns is not None and columns.linear else None
+
+    @property
+    def left_out(self) -> tuple[DroppedPair, ...] | None:
+        """Pairs that are not kept apart, with reasons; None where columns are not pairs.
+
+        Pairs are chosen among those that can come near within the position limits.
+        """
+        return None
+
+    def capsules_of(self, column: int) -> tuple[Capsule, ...]:
+        """The robot's capsules, one or two, whose distance the column is; () for other margins."""
+        return ()
 
     @abstractmethod
     def margins(self, states: States) -> Array:
@@ -65,6 +104,31 @@ class Constraint(ABC):
         For members whose margin is broken by more than what a nudge should mend.
         """
         return ""
+
+    def independent_margins(self, states: States) -> Array | None:
+        """Margins (T, m) by a computation that shares nothing with `margins` but the description.
+
+        For `check`, which compares the two. None where there is no second way.
+        """
+        return None
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is worth saying about it before work begins."""
+        return ()
+
+    @property
+    def drawing(self) -> Drawing:
+        """What of it can be drawn, at rest."""
+        return Drawing()
+
+    def nearest(self, poses: Poses, margins: Array) -> Nearest | None:
+        """The nearest two bodies at poses with these margins (T, m); None without `drawing`s."""
+        return None
+
+    def ground_point(self, states: States) -> Array | None:
+        """World x, y (T, 2) [m] of what the region drawn is for, if not for the centre of mass."""
+        return None
 
     def unit_of(self, column: int) -> str:
         """Unit of one column; prismatic joints differ from the others."""

@@ -1,4 +1,10 @@
-"""From the YAML section to the constraints of a robot."""
+"""All constraints by their key in the YAML file, and how each is built from what stands there."""
+
+import inspect
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +16,8 @@ from excite_cli.config.constraints_spec import (
     KeepOutSpec,
     PolygonSpec,
     SelfCollisionSpec,
+    SurroundingsSpec,
+    TorqueSpec,
 )
 from excite_cli.constraints.balance import Balance
 from excite_cli.constraints.base import Array, Constraint
@@ -25,13 +33,38 @@ from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics
 from excite_cli.dynamics.states import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
-from excite_cli.errors import ConfigError
+from excite_cli.errors import ConfigError, nearest
 from excite_cli.geometry.capsules import fit_capsules
 from excite_cli.geometry.collision_pairs import choose_pairs
 from excite_cli.geometry.obstacle_pairs import choose_obstacle_pairs, ignored_pairs
 from excite_cli.geometry.obstacles import build_obstacles
 from excite_cli.geometry.pair_tables import mesh_tables, require_tabled
+from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What every constraint of a problem is built for."""
+
+    spec: ConstraintsSpec
+    robot: Robot
+    uncertainty: InertiaUncertainty | None = None
+
+    @property
+    def bounded(self) -> bool:
+        """Whether positions are kept: only then what they never bring near may be left out."""
+        return self.spec.joint_limits is not None and self.spec.joint_limits.position
+
+    @cached_property
+    def capsules(self) -> tuple[Capsule, ...]:
+        """Those of self-collision and of surroundings.
+
+        A link that is told from its neighbours in one of the two has one of its own in both.
+        """
+        around, own = self.spec.surroundings, self.spec.self_collision
+        apart = {link for link, _ in ignored_pairs(self.robot, around)} if around else ()
+        return fit_capsules(self.robot, own or SelfCollisionSpec(), apart)
 
 
 def build_constraints(
@@ -45,58 +78,60 @@ def build_constraints(
     Raises
     ------
     ConfigError
-        A limit is asked for that the robot does not have and the file does not give.
+        A limit is asked for that the robot does not have and the file does not give, or one of
+        `own` is not in the catalogue, or has settings that do not fit.
     """
+    setting = Setting(spec, robot, uncertainty)
     found: list[Constraint] = []
-    if spec.joint_limits is not None:
-        found += _joint_bounds(spec.joint_limits, robot)
-    if spec.torque is not None:
-        found.append(_torque(spec.torque.scale, robot, uncertainty))
-    if spec.balance is not None:
-        found.append(_balance(spec.balance, robot, uncertainty))
-    if spec.contact is not None:
-        found += _contact(spec.contact, robot, uncertainty)
-    found += _distances(spec, robot)
-    if spec.keep_out:
-        found += _keep_out(spec.keep_out, robot)
-    return tuple(found)
+    for key, build in CONSTRAINTS.items():
+        given = getattr(spec, key)
+        if given is not None:
+            found += build(given, setting)
+    return (*found, *(_own(name, given, robot) for name, given in spec.own.items()))
 
 
-def _distances(spec: ConstraintsSpec, robot: Robot) -> list[Constraint]:
-    """Capsules against each other and against what stands around the robot."""
-    found: list[Constraint] = []
-    around, own = spec.surroundings, spec.self_collision
-    if around is None and own is None:
-        return found
-    # What no position within the limits brings near is left out only if the limits are kept.
-    bounded = spec.joint_limits is not None and spec.joint_limits.position
-    # A link that is told from its neighbours in one of the two has a capsule of its own in both.
-    apart = {link for link, _ in ignored_pairs(robot, around)} if around is not None else ()
-    capsules = fit_capsules(robot, own or SelfCollisionSpec(), apart)
-    if own is not None:
-        pairs = choose_pairs(robot, capsules, own, bounded=bounded)
-        if pairs.checked:
-            found.append(SelfCollision(robot, capsules, pairs, own.margin))
-        require_tabled(robot, capsules, own.by_meshes)
-        tables = mesh_tables(robot, capsules, pairs, own.ignore)
-        if tables:
-            found.append(MeshClearance(tables, min(KEPT, own.margin)))
-    if around is not None:
-        obstacles = build_obstacles(around)
-        beside = choose_obstacle_pairs(robot, capsules, obstacles, around, bounded)
-        if beside.checked:
-            found.append(Surroundings(robot, capsules, obstacles, beside))
-    return found
+def _own(name: str, given: dict[str, float], robot: Robot) -> Constraint:
+    where = f"constraints.own.{name}"
+    if name not in OWN:
+        known = ", ".join(OWN) or "none; a line in excite_cli/constraints/catalogue.py adds one"
+        raise ConfigError(
+            f"{where}: there is no constraint of this name.{nearest(name, OWN)} Known: {known}."
+        )
+    build = OWN[name]
+    try:
+        settings = inspect.signature(build).bind(robot, **given)
+    except TypeError as error:
+        _, *allowed = inspect.signature(build).parameters
+        raise ConfigError(f"{where}: {error}. Settings: {', '.join(allowed)}.") from error
+    return build(*settings.args, **settings.kwargs)
 
 
-def _keep_out(spec: dict[str, KeepOutSpec], robot: Robot) -> list[Constraint]:
-    constraint = build_keep_out(spec, robot)
+def _self_collision(spec: SelfCollisionSpec, setting: Setting) -> Iterable[Constraint]:
+    robot, capsules = setting.robot, setting.capsules
+    pairs = choose_pairs(robot, capsules, spec, bounded=setting.bounded)
+    require_tabled(robot, capsules, spec.by_meshes)
+    tables = mesh_tables(robot, capsules, pairs, spec.ignore)
+    meshes = [MeshClearance(tables, min(KEPT, spec.margin))] if tables else []
+    if not pairs.checked:
+        return meshes
+    tabled = tuple(label for each in meshes for label in each.labels)
+    return [SelfCollision(robot, capsules, pairs, spec.margin, tabled), *meshes]
+
+
+def _surroundings(spec: SurroundingsSpec, setting: Setting) -> Iterable[Constraint]:
+    robot, capsules, obstacles = setting.robot, setting.capsules, build_obstacles(spec)
+    pairs = choose_obstacle_pairs(robot, capsules, obstacles, spec, setting.bounded)
+    return [Surroundings(robot, capsules, obstacles, pairs)] if pairs.checked else []
+
+
+def _keep_out(spec: dict[str, KeepOutSpec], setting: Setting) -> Iterable[Constraint]:
+    constraint = build_keep_out(spec, setting.robot)
     return [] if constraint is None else [constraint]
 
 
-def _joint_bounds(spec: JointLimitsSpec, robot: Robot) -> list[Constraint]:
+def _joint_bounds(spec: JointLimitsSpec, setting: Setting) -> Iterable[Constraint]:
+    robot, found = setting.robot, []
     limits, names = robot.limits, robot.joint_names
-    found: list[Constraint] = []
     if spec.position:
         lower = limits.lower + spec.position_margin
         upper = limits.upper - spec.position_margin
@@ -119,30 +154,29 @@ def _joint_bounds(spec: JointLimitsSpec, robot: Robot) -> list[Constraint]:
     return [bound for bound in found if bound.labels]
 
 
-def _torque(scale: float, robot: Robot, uncertainty: InertiaUncertainty | None) -> Constraint:
+def _torque(spec: TorqueSpec, setting: Setting) -> Iterable[Constraint]:
+    robot = setting.robot
     if not np.isfinite(robot.limits.effort).any():
         raise ConfigError(
             "constraints.torque: the URDF gives no effort limits; give robot.limits.<joint>.effort."
         )
-    return JointTorque(robot, scale * robot.limits.effort, uncertainty)
+    return [JointTorque(robot, spec.scale * robot.limits.effort, setting.uncertainty)]
 
 
-def _balance(
-    spec: DiscSpec | PolygonSpec, robot: Robot, uncertainty: InertiaUncertainty | None
-) -> Constraint:
+def _balance(spec: DiscSpec | PolygonSpec, setting: Setting) -> Iterable[Constraint]:
+    robot, uncertainty = setting.robot, setting.uncertainty
     if isinstance(spec, PolygonSpec):
-        return Balance.polygon(robot, np.array(spec.vertices), spec.margin, uncertainty)
+        return [Balance.polygon(robot, np.array(spec.vertices), spec.margin, uncertainty)]
     if spec.center == "posture":
         center = posture_center_of_mass(robot)
     else:
         center = np.array(spec.center, dtype=float)
-    return Balance.disc(robot, center, spec.radius, uncertainty)
+    return [Balance.disc(robot, center, spec.radius, uncertainty)]
 
 
-def _contact(
-    spec: ContactSpec, robot: Robot, uncertainty: InertiaUncertainty | None
-) -> list[Constraint]:
-    ground = Ground.under(robot, uncertainty)
+def _contact(spec: ContactSpec, setting: Setting) -> Iterable[Constraint]:
+    robot = setting.robot
+    ground = Ground.under(robot, setting.uncertainty)
     if ground.weight <= 0:
         raise ConfigError(
             "constraints.contact: gravity does not press this robot on the ground. It needs a mass "
@@ -151,8 +185,9 @@ def _contact(
     found: list[Constraint] = []
     center = None
     if spec.vertices is not None:
-        support = support_polygon(np.array(spec.vertices), spec.margin, "constraints.contact")
-        found.append(ZeroMomentPoint(ground, support, spec.height))
+        feet = np.array(spec.vertices, dtype=float)
+        support = support_polygon(feet, spec.margin, "constraints.contact")
+        found.append(ZeroMomentPoint(ground, support, spec.height, feet))
         center = support.center
     if center is None:
         center = posture_center_of_mass(robot)
@@ -165,3 +200,17 @@ def posture_center_of_mass(robot: Robot) -> Array:
     still = np.zeros((1, robot.n))
     states = States(BatchKinematics(robot), robot.posture[None], still, still)
     return CenterOfMass(robot).position(states)[0, :2]
+
+
+# By key of `ConstraintsSpec`, in the order in which a problem has them.
+CONSTRAINTS: dict[str, Callable[[Any, Setting], Iterable[Constraint]]] = {
+    "joint_limits": _joint_bounds,
+    "torque": _torque,
+    "balance": _balance,
+    "contact": _contact,
+    "self_collision": _self_collision,
+    "surroundings": _surroundings,
+    "keep_out": _keep_out,
+}
+# One's own by name, called with the robot and the numbers under `constraints.own.<name>`.
+OWN: dict[str, Callable[..., Constraint]] = {}

@@ -18,12 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.drawing import Drawing, GroundRegion
 from excite_cli.constraints.support_polygon import Support
 from excite_cli.dynamics.least_ratio import Ratios, least_ratios, least_values, worst_inertias
 from excite_cli.dynamics.row_adjoint import RowAdjoint
 from excite_cli.dynamics.states import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
-from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states
+from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states, whole_parameters
 from excite_cli.proof.enclosed_least import least_of
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_rows import combined, ground_rows
@@ -71,13 +72,18 @@ class Ground:
 
 
 class ZeroMomentPoint(Constraint):
-    """normal·p ≤ offset for every edge of the support; margins in metres."""
+    """normal·p ≤ offset for every edge of the support; margins in metres.
 
+    `contacts` (k, 2) [m]: the points of which the support is the hull.
+    """
+
+    uncertainty: InertiaUncertainty
     name = "zmp"
+    title = "Zero-moment point to the edge of the support"
     unit = "m"
 
-    def __init__(self, ground: Ground, support: Support, height: float) -> None:
-        self.ground, self.support, self.height = ground, support, height
+    def __init__(self, ground: Ground, support: Support, height: float, contacts: Array) -> None:
+        self.ground, self.support, self.height, self.contacts = ground, support, height, contacts
         self.labels, self.scale = support.labels, support.scale
         x, y = support.normals.T
         zero = np.zeros_like(x)
@@ -85,6 +91,20 @@ class ZeroMomentPoint(Constraint):
         self._floor = _LEAST_LOAD * ground.weight
         self._last: tuple[States, Ratios] | None = None
         self.uncertainty = ground.admitted(self.functionals)
+
+    @property
+    def drawing(self) -> Drawing:
+        """The support, at the height of the ground."""
+        edges = self.support.normals, self.support.offsets
+        return Drawing(region=GroundRegion(*edges, self.height, self.contacts))
+
+    def ground_point(self, states: States) -> Array:
+        """The zero-moment point with the inertias of the URDF."""
+        wrench = self.ground.wrench.regressor(states) @ whole_parameters(self.ground.robot)
+        load = np.where(np.abs(wrench[:, 2]) > 1e-9, wrench[:, 2], np.nan)
+        x = -(wrench[:, 4] - self.height * wrench[:, 0]) / load
+        y = (wrench[:, 3] + self.height * wrench[:, 1]) / load
+        return np.column_stack([x, y])
 
     def margins(self, states: States) -> Array:
         """Distance of the zero-moment point to each edge, inwards (T, m) [m]."""
@@ -124,7 +144,9 @@ class ZeroMomentPoint(Constraint):
 class Contact(Constraint):
     """Friction, torsion and load: functionals·W ≥ `least_values`, (m, 6) on [f; n] and (m,)."""
 
+    uncertainty: InertiaUncertainty
     name = "contact"
+    title = "What is left of friction, torsion and load"
     unit = "N"
 
     def __init__(

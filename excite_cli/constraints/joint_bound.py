@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.joint_columns import JointColumns, Quantity
 from excite_cli.dynamics.states import States
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.model import Robot
@@ -13,6 +14,8 @@ from excite_cli.robot.model import Robot
 Mask = NDArray[np.bool_]
 
 _ORDERS = ("position", "velocity", "acceleration")
+_TITLES = ("Joint position to its limit", "Joint speed to its limit",
+           "Joint acceleration to its limit")  # fmt: skip
 _UNITS = ("rad", "rad/s", "rad/s²")
 _SLIDING_UNITS = ("m", "m/s", "m/s²")
 
@@ -36,6 +39,16 @@ class JointBound(Constraint):
     def name(self) -> str:  # type: ignore[override]
         """`joint_position`, `joint_velocity` or `joint_acceleration`."""
         return f"joint_{_ORDERS[self.order]}"
+
+    @property
+    def title(self) -> str:
+        """Says which quantity."""
+        return _TITLES[self.order]
+
+    @property
+    def of_joints(self) -> JointColumns:
+        """One joint a column."""
+        return JointColumns(Quantity(self.order), self.joints, self.signs, self.bounds)
 
     @property
     def unit(self) -> str:  # type: ignore[override]

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.joint_columns import JointColumns, Quantity
 from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.row_adjoint import RowAdjoint
@@ -29,6 +30,7 @@ class JointTorque(Constraint):
     """
 
     name = "joint_torque"
+    title = "Joint torque left"
     unit = "N·m"
 
     def __init__(
@@ -52,6 +54,11 @@ class JointTorque(Constraint):
             rows = self._regressor.evaluate(drawn.q, drawn.v, drawn.a)[:, bounded]
             self._admitted = self._admitted.sharpest(rows.reshape(-1, rows.shape[-1]))
             self._adjoint = RowAdjoint(robot)
+
+    @property
+    def of_joints(self) -> JointColumns:
+        """Both sides of every bounded joint."""
+        return JointColumns(Quantity.TORQUE, self._joints, self._signs, self._limits)
 
     def unit_of(self, column: int) -> str:
         """Newtons for a prismatic joint."""

@@ -32,6 +32,7 @@ class KeepOut(Constraint):
     """One column per region."""
 
     name = "keep_out"
+    title = "Outside the regions of joint space"
     unit = "rad"
 
     def __init__(self, robot: Robot, regions: tuple[Region, ...]) -> None:

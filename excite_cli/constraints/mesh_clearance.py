@@ -3,7 +3,9 @@
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.remark import Remark
 from excite_cli.dynamics.states import States
+from excite_cli.geometry.collision_pairs import DroppedPair
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.geometry.pair_tables import FAR
 from excite_cli.proof.enclosed_motion import EnclosedMotion
@@ -17,6 +19,7 @@ class MeshClearance(Constraint):
     """One column per tabled pair of links: distance less `margin` and the error of the table."""
 
     name = "mesh_clearance"
+    title = "Nearest pair of meshes, less the margin"
     unit = "m"
 
     def __init__(self, tables: tuple[PairTable, ...], margin: float = KEPT) -> None:
@@ -24,6 +27,17 @@ class MeshClearance(Constraint):
         self.labels = tuple(f"{table.first} – {table.second}" for table in tables)
         self._kept = np.array([margin + table.error for table in tables])
         self.scale = np.full(len(tables), FAR)
+
+    @property
+    def left_out(self) -> tuple[DroppedPair, ...]:
+        """None: capsules are asked first, and say why."""
+        return ()
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Why there are such pairs."""
+        count = f"mesh clearance: {len(self.labels)} pairs kept apart by their meshes"
+        return (Remark(f"{count}, since their capsules overlap whatever the posture"),)
 
     def margins(self, states: States) -> Array:
         """Distance less what is kept (T, m) [m], exact up to some centimetres."""

@@ -3,7 +3,13 @@
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.drawing import Drawing, Nearest
+from excite_cli.constraints.nearest_bodies import nearest_obstacles
+from excite_cli.constraints.remark import Remark, counted_reasons
 from excite_cli.dynamics.states import States
+from excite_cli.geometry.coal_distances import CoalDistances
+from excite_cli.geometry.collision_pairs import ALWAYS, DroppedPair
+from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs
 from excite_cli.geometry.obstacles import Box, Obstacle
@@ -26,6 +32,7 @@ class Surroundings(Constraint):
     """
 
     name = "surroundings"
+    title = "Nearest link and thing around, less the margin"
     unit = "m"
 
     def __init__(
@@ -35,10 +42,67 @@ class Surroundings(Constraint):
         obstacles: tuple[Obstacle, ...],
         pairs: ObstaclePairs,
     ) -> None:
+        self._robot = robot
         self.capsules, self.obstacles, self.pairs = capsules, obstacles, pairs
         self._distances = ObstacleDistances(robot, capsules, obstacles, pairs.checked)
         self.labels = tuple(f"{capsules[i].name} – {obstacles[j].name}" for i, j in pairs.checked)
         self.scale = np.full(len(self.labels), _NEAR)
+
+    @property
+    def left_out(self) -> tuple[DroppedPair, ...]:
+        """Pairs of a capsule and a thing."""
+        return self.pairs.dropped
+
+    def capsules_of(self, column: int) -> tuple[Capsule, ...]:
+        """The one that keeps away from a thing."""
+        return (self.capsules[self.pairs.checked[column][0]],)
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is checked, what keeps less than the margin, and what touches at all times."""
+        things = ", ".join(obstacle.name for obstacle in self.obstacles)
+        said = [
+            Remark(
+                f"surroundings: {things}; {len(self.labels)} pairs of a capsule and a thing "
+                f"checked; not checked: {counted_reasons(self.pairs.dropped)}"
+            )
+        ]
+        most = float(self.pairs.kept.max())
+        closer = [
+            f"{label} {kept:.3f} m"
+            for label, kept in zip(self.labels, self.pairs.kept, strict=True)
+            if kept < most
+        ]
+        if closer:
+            words = "these never get far from each other, so half of the farthest is kept instead"
+            said.append(Remark(f"{words} of {most:g} m: {'; '.join(closer)}", important=True))
+        touching = [
+            f"{pair.first} – {pair.second} {pair.reason}"
+            for pair in self.pairs.dropped
+            if pair.reason.startswith(ALWAYS)
+        ]
+        if touching:
+            warning = (
+                f"warning: not guarded, since no motion parts them: {'; '.join(touching)}. Right "
+                "for a robot that stands there; else correct constraints.surroundings."
+            )
+            said.append(Remark(warning, important=True))
+        return tuple(said)
+
+    @property
+    def drawing(self) -> Drawing:
+        """All capsules and all things."""
+        return Drawing(self.capsules, self.obstacles)
+
+    def nearest(self, poses: Poses, margins: Array) -> Nearest:
+        """The nearest capsule and thing."""
+        distances, bodies = margins + self.pairs.kept, (self.capsules, self.obstacles)
+        return nearest_obstacles(poses, distances, self.labels, *bodies, self.pairs.checked)
+
+    def independent_margins(self, states: States) -> Array:
+        """By Pinocchio and coal."""
+        coal = CoalDistances(self._robot, self.capsules, self.pairs.checked, self.obstacles)
+        return coal.distances(states.q) - self.pairs.kept
 
     def margins(self, states: States) -> Array:
         """Distance less what is kept (T, m) [m]."""

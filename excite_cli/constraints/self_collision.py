@@ -3,9 +3,14 @@
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.drawing import Drawing, Nearest
+from excite_cli.constraints.nearest_bodies import nearest_capsules
+from excite_cli.constraints.remark import Remark, counted_reasons
 from excite_cli.dynamics.states import States
 from excite_cli.geometry.clearance import Clearance
-from excite_cli.geometry.collision_pairs import CollisionPairs
+from excite_cli.geometry.coal_distances import CoalDistances
+from excite_cli.geometry.collision_pairs import UNGUARDED, CollisionPairs, DroppedPair
+from excite_cli.geometry.link_meshes import Poses
 from excite_cli.proof.enclosed_distances import EnclosedCapsules
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.capsule import Capsule
@@ -17,19 +22,77 @@ _NEAR, _LEAST_NEAR, _RADII = 0.1, 0.02, 2.5
 
 
 class SelfCollision(Constraint):
-    """One column per checked pair of capsules."""
+    """One column per checked pair of capsules.
+
+    `tabled`: pairs of links whose meshes are kept apart instead, as `MeshClearance` labels them.
+    """
 
     name = "self_collision"
+    title = "Nearest pair of links, less the margin"
     unit = "m"
 
     def __init__(
-        self, robot: Robot, capsules: tuple[Capsule, ...], pairs: CollisionPairs, margin: float
+        self,
+        robot: Robot,
+        capsules: tuple[Capsule, ...],
+        pairs: CollisionPairs,
+        margin: float,
+        tabled: tuple[str, ...] = (),
     ) -> None:
-        self.capsules, self.pairs, self.margin = capsules, pairs, margin
+        self._robot = robot
+        self.capsules, self.pairs, self.margin, self.tabled = capsules, pairs, margin, tabled
         self._clearance = Clearance(robot, capsules, pairs)
         self.labels = tuple(f"{capsules[i].name} – {capsules[j].name}" for i, j in pairs.checked)
         usual = float(np.median([capsule.radius for capsule in capsules]))
         self.scale = np.full(len(self.labels), np.clip(_RADII * usual, _LEAST_NEAR, _NEAR))
+
+    @property
+    def left_out(self) -> tuple[DroppedPair, ...]:
+        """Pairs of capsules."""
+        return self.pairs.dropped
+
+    def capsules_of(self, column: int) -> tuple[Capsule, ...]:
+        """Both."""
+        return tuple(self.capsules[index] for index in self.pairs.checked[column])
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """How many pairs are checked, and which are not that might meet."""
+        count = Remark(
+            f"self-collision: {len(self.capsules)} capsules, {len(self.labels)} pairs checked; not "
+            f"checked: {counted_reasons(self.pairs.dropped)}"
+        )
+        loose = {
+            words
+            for pair in self.pairs.dropped
+            if pair.reason.startswith(UNGUARDED)
+            for words in pair.reason.partition("apart: ")[2][:-1].split(", ")
+            if not words.endswith("100%") and not words.startswith(self.tabled)
+        }
+        if not loose:
+            return (count,)
+        warning = (
+            "warning: not guarded, since their capsules overlap whatever the posture "
+            "(links and the share of postures in which their meshes are apart): "
+            f"{'; '.join(sorted(loose))}. Look at these with `excite check`, or give slimmer "
+            "capsules under constraints.self_collision.capsules."
+        )
+        return count, Remark(warning, important=True)
+
+    @property
+    def drawing(self) -> Drawing:
+        """All capsules."""
+        return Drawing(self.capsules)
+
+    def nearest(self, poses: Poses, margins: Array) -> Nearest:
+        """The nearest pair of capsules."""
+        checked, distances = self.pairs.checked, margins + self.margin
+        return nearest_capsules(poses, distances, self.labels, self.capsules, checked)
+
+    def independent_margins(self, states: States) -> Array:
+        """By Pinocchio and coal."""
+        coal = CoalDistances(self._robot, self.capsules, self.pairs.checked)
+        return coal.distances(states.q) - self.margin
 
     def margins(self, states: States) -> Array:
         """Distance less the margin (T, m) [m]."""

@@ -14,10 +14,9 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.boundary import straight_motion
+from excite_cli.excitation.correction import corrected, lowest
 from excite_cli.excitation.path_search import at_length, find_way, lengths, standing_margins
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.solvers.linearised import lowest
-from excite_cli.excitation.solvers.restoration import corrected
 from excite_cli.excitation.start import Start, blocking, clear_posture
 from excite_cli.excitation.task import MotionTask
 

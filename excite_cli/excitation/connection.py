@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from excite_cli.constraints.base import Array
-from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.constraints.joint_columns import Quantity
 from excite_cli.dynamics.states import States
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import CONTROLLER_RATE, path_of
@@ -150,9 +150,11 @@ def _durations(problem: Problem, start: State, end: State) -> Iterator[float]:
     away, shortest = np.abs(end.q - start.q), _SHORTEST
     if start.at_rest and end.at_rest:
         for constraint in problem.constraints:
-            if isinstance(constraint, JointBound) and constraint.order > 0:
-                way = away[constraint.joints] / constraint.bounds
-                needed = way * _SPEED if constraint.order == 1 else np.sqrt(way * _ACCELERATION)
+            columns = constraint.linear
+            if columns is not None and columns.quantity != Quantity.POSITION:
+                way = away[columns.joints] / columns.bounds
+                at_speed = columns.quantity == Quantity.VELOCITY
+                needed = way * _SPEED if at_speed else np.sqrt(way * _ACCELERATION)
                 shortest = max(shortest, float(needed.max(initial=0.0)) * (1 + 1e-9))
     for power in range(_DURATIONS):
         yield shortest * _GROWTH**power

@@ -41,8 +41,7 @@ def generate_motion(
     """Motion `index` on top of `stack`, the best of `optimizer.restarts` starts.
 
     The first start is made of the motion `given`, if there is one. Starts are spread over
-    `workers` (default: done here), whose solver is that of the problem's config; the motion is the
-    same wherever they are done.
+    `workers` (default: done here); the motion is the same wherever they are done.
 
     Raises
     ------

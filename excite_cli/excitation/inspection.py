@@ -1,8 +1,9 @@
 """A second look at a finished motion: at instants of its own choice, between them, and by meshes.
 
-Margins are taken at a rate and at random instants, as the optimiser computes them. The verdicts
-come from enclosures that share nothing with that computation but the description of the robot, and
-from the collision meshes by Pinocchio and coal.
+Margins are taken at a rate and at random instants, as the optimiser computes them; where there is
+a second way to compute them, that is held against the first. The verdicts come from enclosures that
+share nothing with that computation but the description of the robot, and from the collision meshes
+by Pinocchio and coal.
 """
 
 from collections.abc import Sequence
@@ -10,16 +11,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from excite_cli.constraints.base import Array
+from excite_cli.constraints.base import Array, Constraint
+from excite_cli.constraints.joint_columns import Quantity
 from excite_cli.excitation.admissible import CONTROLLER_RATE
 from excite_cli.excitation.mesh_verdict import MeshVerdict, mesh_verdict
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.second_path import SecondPath, second_paths
 from excite_cli.geometry.mesh_check import MeshCheck
 from excite_cli.proof.certificate import Path, Verdict, certify
 from excite_cli.proof.worst_margin import Worst
 
 MESHES = "mesh_collision"
-_OF_PAIRS = ("self_collision", "mesh_clearance", "surroundings")
 _CHUNK = 2000
 
 
@@ -36,18 +38,24 @@ class Look:
 class Inspection:
     """What was seen of one motion.
 
-    `worst`, `verdicts`: by constraint, in their order. `meshes`: None where self-collision is no
-    constraint of the problem.
+    `worst`, `verdicts`: by constraint, in their order. `second`: of those constraints that can be
+    computed in a second way. `meshes`: None where self-collision is no constraint of the problem.
     """
 
     worst: dict[str, Worst]
     verdicts: tuple[Verdict, ...]
+    second: tuple[SecondPath, ...]
     meshes: MeshVerdict | None
 
     @property
+    def disagreeing(self) -> tuple[SecondPath, ...]:
+        """Constraints of which two computations differ, so that neither can be trusted."""
+        return tuple(each for each in self.second if not each.agrees)
+
+    @property
     def violations(self) -> int:
-        """Broken margins at the instants, and constraints broken only between them."""
-        count = sum(worst.violations for worst in self.worst.values())
+        """Broken margins at the instants, constraints broken only between them, disagreements."""
+        count = sum(worst.violations for worst in self.worst.values()) + len(self.disagreeing)
         for verdict in self.verdicts:
             if verdict.state == "broken" and not self.worst[verdict.name].violations:
                 count += 1
@@ -98,27 +106,39 @@ def mesh_check_of(problem: Problem) -> MeshCheck | None:
 def inspect(problem: Problem, path: Path, meshes: MeshCheck | None, look: Look) -> Inspection:
     """Margins, verdicts and meshes of one motion of the problem's robot."""
     regular, times = instants_of(path, look)
-    worst = _worst(problem, path, times)
-    verdicts = _within_limits(certify(path, problem.constraints))
+    worst, least = _worst(problem, path, times)
+    second = second_paths(problem.constraints, path, times, least)
+    for each in second:
+        violations = max(worst[each.name].violations, each.worst.violations)
+        worst[each.name] = replace(each.worst, violations=violations)
+    verdicts = _within_limits(certify(path, problem.constraints), problem.constraints)
     if meshes is None:
-        return Inspection(worst, verdicts, None)
+        return Inspection(worst, verdicts, second, None)
     found = mesh_verdict(path, meshes, regular)
     if found.state == "sampled" and look.random:  # proof would have said more than any instants
         found = mesh_verdict(path, meshes, times)
-    return Inspection(worst, verdicts, found)
+    return Inspection(worst, verdicts, second, found)
 
 
-def _within_limits(verdicts: tuple[Verdict, ...]) -> tuple[Verdict, ...]:
+def _within_limits(
+    verdicts: tuple[Verdict, ...], constraints: Sequence[Constraint]
+) -> tuple[Verdict, ...]:
     """Distances are not proved where positions leave the limits that pairs were chosen within."""
-    if all(verdict.proved for verdict in verdicts if verdict.name == "joint_position"):
+    both = list(zip(verdicts, constraints, strict=True))
+    if all(verdict.proved for verdict, constraint in both if _of_positions(constraint)):
         return verdicts
     reason = "its pairs are those that can come near within the position limits"
     return tuple(
         replace(verdict, state="sampled", reason=reason)
-        if verdict.proved and verdict.name in _OF_PAIRS
+        if verdict.proved and constraint.left_out is not None
         else verdict
-        for verdict in verdicts
+        for verdict, constraint in both
     )
+
+
+def _of_positions(constraint: Constraint) -> bool:
+    columns = constraint.of_joints
+    return columns is not None and columns.quantity == Quantity.POSITION
 
 
 def instants_of(path: Path, look: Look) -> tuple[Array, Array]:
@@ -129,16 +149,20 @@ def instants_of(path: Path, look: Look) -> tuple[Array, Array]:
     return regular, np.sort(np.concatenate([regular, random]))
 
 
-def _worst(problem: Problem, path: Path, times: Array) -> dict[str, Worst]:
+def _worst(problem: Problem, path: Path, times: Array) -> tuple[dict[str, Worst], list[Array]]:
+    """The worst margin by constraint, and of each the smallest share of its scale (T,)."""
     found: dict[str, Worst] = {}
+    least = [np.empty(len(times)) for _ in problem.constraints]
     for begin in range(0, len(times), _CHUNK):
         some = times[begin : begin + _CHUNK]
         states = path.states_at(some)
-        for constraint in problem.constraints:
-            worst = constraint.worst(constraint.margins(states), some)
+        for constraint, shares in zip(problem.constraints, least, strict=True):
+            margins = constraint.margins(states)
+            shares[begin : begin + _CHUNK] = (margins / constraint.scale).min(axis=1)
+            worst = constraint.worst(margins, some)
             before = found.get(constraint.name)
             found[constraint.name] = worst if before is None else before.with_later(worst)
-    return found
+    return found, least
 
 
 def largest_mismatch(path: Path, times: Array, stored: Sequence[Array]) -> tuple[float, float]:

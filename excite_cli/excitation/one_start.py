@@ -4,7 +4,6 @@ It depends on its arguments only, and these can be pickled: it may be done by an
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,6 @@ from excite_cli.excitation.admissible import lacking_margins
 from excite_cli.excitation.motion import Outcome, ProgressCallback
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.solvers.base import Effort, Solver
-from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import Start, random_start
 from excite_cli.excitation.task import MotionTask
@@ -26,20 +24,10 @@ _GUARD_GROWTH = 1.3
 
 @dataclass(frozen=True)
 class Search:
-    """What all starts share. It travels as the problem alone, with the solver of its config.
-
-    Solvers may hold libraries, which cannot be pickled.
-    """
+    """What all starts share."""
 
     problem: Problem
     solver: Solver
-
-    def __reduce__(self) -> tuple[Callable[[Problem], "Search"], tuple[Problem]]:
-        return _configured, (self.problem,)
-
-
-def _configured(problem: Problem) -> Search:
-    return Search(problem, build_solver(problem.spec.optimizer))
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.dynamics.states import States
 from excite_cli.kernels.library import KERNELS
 from excite_cli.trajectory.base import Basis
@@ -182,8 +181,3 @@ def _groups(times: Indices) -> tuple[Indices, Indices]:
         return np.zeros(0, int), np.zeros(0, int)
     starts = np.concatenate([[0], np.flatnonzero(np.diff(times)) + 1])
     return starts, times[starts]
-
-
-def is_joint_bound(constraint: Constraint) -> bool:
-    """Whether every row of the constraint touches one joint, linearly."""
-    return isinstance(constraint, JointBound)

@@ -6,15 +6,12 @@ from pathlib import Path
 
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
-from excite_cli.constraints.mesh_clearance import MeshClearance
-from excite_cli.constraints.obstacle_clearance import Surroundings
-from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import ProgressCallback
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result, matches
 from excite_cli.excitation.sequence import Step, generate_sequence
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.trajectory.chain import Segment
 from excite_cli.workers.base import Workers
@@ -117,7 +114,7 @@ def continue_run(
     Where `problem` separates effects, `model` is the problem that the result is kept for: the same
     without the rivals. Stack and condition numbers are then its own.
     """
-    solver, seed = build_solver(problem.spec.optimizer), problem.spec.seed
+    solver, seed = InteriorPoint(), problem.spec.seed
     remaining = range(len(result.motions) + 1, problem.spec.sequence.motions + 1)
     stack = _running(problem, result)
     for step in generate_sequence(problem, solver, stack, remaining, seed, report, starts, workers):
@@ -166,10 +163,8 @@ def _pairs(problem: Problem) -> tuple[tuple[str, ...], tuple[str, ...]]:
     checked: list[str] = []
     dropped: list[str] = []
     for constraint in problem.constraints:
-        if isinstance(constraint, SelfCollision | Surroundings | MeshClearance):
+        left_out = constraint.left_out
+        if left_out is not None:
             checked += constraint.labels
-        if isinstance(constraint, SelfCollision | Surroundings):
-            dropped += [
-                f"{pair.first} – {pair.second}: {pair.reason}" for pair in constraint.pairs.dropped
-            ]
+            dropped += [f"{pair.first} – {pair.second}: {pair.reason}" for pair in left_out]
     return tuple(checked), tuple(dropped)

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 
 from excite_cli.constraints.base import Array
-from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.states import States
 from excite_cli.excitation.motion import Progress
@@ -110,10 +109,11 @@ class MotionTask:
         metric = np.zeros((self.n, self.k, self.n, self.k))
         weights = np.zeros((3, self.n))
         for constraint in self.problem.constraints:
-            if isinstance(constraint, JointBound):
+            columns = constraint.linear
+            if columns is not None:
                 inverse = np.zeros(self.n)
-                inverse[constraint.joints] = 1.0 / constraint.scale**2
-                weights[constraint.order] += inverse
+                inverse[columns.joints] = 1.0 / constraint.scale**2
+                weights[columns.quantity] += inverse
         weights[0] += 1e-3
         weights[2, weights[2] == 0] += 1e-3
         for order in range(3):
@@ -125,14 +125,14 @@ class MotionTask:
 def first_guards(problem: Problem) -> list[Array]:
     """Guards (m,) per constraint before anything is known about the motion.
 
-    Joint bounds on a Fourier series get the exact amount (Ehlich and Zeller); others an estimate.
+    Linear margins on a Fourier series get the exact amount (Ehlich and Zeller); others an estimate.
     """
     factor = problem.trajectory.sampling_factor(
         len(problem.constraint_basis.times), float(np.diff(problem.constraint_basis.times[:2])[0])
     )
     guards = []
     for constraint in problem.constraints:
-        if isinstance(constraint, JointBound) and factor is not None:
+        if constraint.linear is not None and factor is not None:
             guards.append((1.0 - factor) * constraint.scale)
         else:
             guards.append(_FIRST_GUARD * constraint.scale)

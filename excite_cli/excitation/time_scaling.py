@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint
-from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.constraints.joint_columns import Quantity
 from excite_cli.errors import ConfigError
 from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
 from excite_cli.trajectory.base import Trajectory
@@ -24,7 +24,6 @@ from excite_cli.trajectory.chain import Chain
 
 _INTERVALS = 2000  # in a motion, or one for each of its smooth pieces
 _CHUNK = 4000
-_ORDERS = (1, 2)
 
 
 @dataclass(frozen=True)
@@ -37,11 +36,12 @@ class PaceLimits:
     @classmethod
     def of(cls, constraints: Sequence[Constraint], n: int) -> "PaceLimits":
         """From the joint bounds among `constraints`; the nearer one where two sides differ."""
-        found = {order: np.full(n, np.inf) for order in _ORDERS}
+        found = {Quantity.VELOCITY: np.full(n, np.inf), Quantity.ACCELERATION: np.full(n, np.inf)}
         for constraint in constraints:
-            if isinstance(constraint, JointBound) and constraint.order in _ORDERS:
-                np.minimum.at(found[constraint.order], constraint.joints, constraint.bounds)
-        return cls(found[1], found[2])
+            columns = constraint.linear
+            if columns is not None and columns.quantity in found:
+                np.minimum.at(found[columns.quantity], columns.joints, columns.bounds)
+        return cls(found[Quantity.VELOCITY], found[Quantity.ACCELERATION])
 
 
 def slowing(limits: PaceLimits, trajectory: Trajectory, coefficients: Array, share: float) -> float:

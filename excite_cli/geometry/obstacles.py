@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -38,6 +39,10 @@ class Obstacle(ABC):
         """Distances, normals in the world and shares of segments (3, K)."""
 
     @abstractmethod
+    def as_coal(self) -> tuple[coal.CollisionGeometry, Array, Array]:
+        """Its shape for coal, with the rotation (3, 3) and position (3,) [m] of that."""
+
+    @abstractmethod
     def in_words(self, depth: float) -> str:
         """Where something is whose signed distance is −depth [m], depth > 0."""
 
@@ -65,6 +70,10 @@ class Plane(Obstacle):
         share = np.where(rise < 0, 1.0, np.where(rise > 0, 0.0, 0.5))
         distance = self.normal @ start - self.offset + np.minimum(rise, 0.0)
         return Contact(distance, np.repeat(self.normal[:, None], start.shape[1], 1), share)
+
+    def as_coal(self) -> tuple[coal.CollisionGeometry, Array, Array]:
+        """A half-space of the world."""
+        return coal.Halfspace(self.normal, self.offset), np.eye(3), np.zeros(3)
 
     def in_words(self, depth: float) -> str:
         """`0.12 m below floor`, or behind a wall."""
@@ -99,6 +108,10 @@ class Box(Obstacle):
         """See `segment_box`."""
         distance, normal, share = segment_contacts(*self._inside(start, along), self.half)
         return Contact(distance, self.rotation @ normal, share)
+
+    def as_coal(self) -> tuple[coal.CollisionGeometry, Array, Array]:
+        """A box in its own place."""
+        return coal.Box(*(2 * self.half).tolist()), self.rotation, self.position
 
     def in_words(self, depth: float) -> str:
         """`0.12 m inside table`."""

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.config.load import parsed_spec
-from excite_cli.constraints.joint_torque import JointTorque
-from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.constraints.base import Constraint
+from excite_cli.constraints.joint_columns import Quantity
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.start import (
@@ -28,7 +28,7 @@ from excite_cli.excitation.start import (
     unclear,
 )
 from excite_cli.excitation.task import MotionTask
-from excite_cli.geometry.collision_pairs import UNGUARDED
+from excite_cli.geometry.collision_pairs import UNGUARDED, CollisionPairs
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.mesh_pairs import joined_links
 from excite_cli.geometry.pair_distances import carried_bodies
@@ -101,17 +101,18 @@ def _yielded(tree: Tree, comments: Comments, task: MotionTask, posture: Array) -
     In this order: torque limits, the distance between capsules, capsules of links that touch.
     """
     in_the_way = unclear(task, posture)
+    names = task.problem.robot.joint_names
     weak = [
-        constraint.labels[column].rsplit(" ", 1)[0]
+        names[bounded.joints[column]]
         for constraint, columns in broken(task, posture)
-        if isinstance(constraint, JointTorque)
+        if (bounded := constraint.of_joints) and bounded.quantity == Quantity.TORQUE
         for column in columns
     ]
     if weak:
         _unbound(tree, comments, weak)
         return True
     for constraint, columns in in_the_way:
-        if isinstance(constraint, SelfCollision):
+        if len(constraint.capsules_of(columns[0])) == 2:
             label = constraint.labels[columns[0]]
             return (
                 _nearer(tree, comments, label, _MARGIN)
@@ -153,10 +154,11 @@ def _by_meshes(tree: Tree, comments: Comments, task: MotionTask) -> bool:
     meshes, carried, joined = MeshDistances(robot), carried_bodies(robot), joined_links(robot)
     before = (len(own.get("by_meshes", ())), len(own.get("ignore", ())))
     for constraint, columns in unclear(task, near):
-        if not isinstance(constraint, SelfCollision):
-            continue
         for column in columns:
-            first, second = (constraint.capsules[k] for k in constraint.pairs.checked[column])
+            both = constraint.capsules_of(column)
+            if len(both) != 2:
+                continue
+            first, second = both
             joints = int((carried[first.joint] != carried[second.joint]).sum())
             for one, other in product(first.links, second.links):
                 if frozenset((one, other)) in joined:
@@ -180,10 +182,11 @@ def _kept_still(tree: Tree, comments: Comments, task: MotionTask) -> bool:
     near = pushed_clear(task, robot.posture)
     still: set[int] = set()
     for constraint, columns in broken(task, near):
-        if not isinstance(constraint, SelfCollision):
-            continue
         for column in columns:
-            first, second = (constraint.capsules[k] for k in constraint.pairs.checked[column])
+            both = constraint.capsules_of(column)
+            if len(both) != 2:
+                continue
+            first, second = both
             one, other = carried[first.joint] > 0, carried[second.joint] > 0
             chains = [np.flatnonzero(one & ~other), np.flatnonzero(other & ~one)]
             if sum(map(len, chains)) <= 2:
@@ -212,9 +215,9 @@ def _without_lasting_contacts(
     own = tree["constraints"].get("self_collision")
     robot = replace(problem.robot, posture=posture)
     for constraint in problem.constraints:
-        if own is None or not isinstance(constraint, SelfCollision):
+        if own is None or len(constraint.capsules_of(0)) != 2:
             continue
-        for pair in constraint.pairs.dropped:
+        for pair in constraint.left_out or ():
             if not pair.reason.startswith(UNGUARDED):
                 continue
             for words in pair.reason.partition("apart: ")[2][:-1].split(", "):
@@ -222,11 +225,20 @@ def _without_lasting_contacts(
                 if float(share.rstrip("%")) < 100 * _SELDOM_APART:
                     own.setdefault("ignore", []).append(names.split(" – "))
         left_out = tuple((one, other) for one, other in own.get("ignore", ()))
-        near = near_at_posture(robot, constraint.capsules, constraint.pairs, left_out, _TABLED)
+        capsules = constraint.drawing.capsules
+        near = near_at_posture(robot, capsules, _pairs(constraint), left_out, _TABLED)
         if near:
             own.setdefault("ignore", []).extend(map(list, near))
     if own is not None:
         _explain(own, comments)
+
+
+def _pairs(constraint: Constraint) -> CollisionPairs:
+    """The pairs of capsules that a constraint keeps apart, and those that it does not."""
+    place = {capsule: index for index, capsule in enumerate(constraint.drawing.capsules)}
+    kept = (constraint.capsules_of(column) for column in range(len(constraint.labels)))
+    checked = tuple((place[one], place[other]) for one, other in kept)
+    return CollisionPairs(checked, constraint.left_out or ())
 
 
 def _explain(own: Tree, comments: Comments) -> None:

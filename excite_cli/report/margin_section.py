@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from excite_cli.constraints.base import Constraint
-from excite_cli.constraints.joint_bound import JointBound
-from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.excitation.admissible import fine_margins
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
@@ -33,19 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _POINTS = 400
-_WORDS = {
-    "joint_position": "Joint position to its limit",
-    "joint_velocity": "Joint speed to its limit",
-    "joint_acceleration": "Joint acceleration to its limit",
-    "joint_torque": "Joint torque left",
-    "balance": "Centre of mass to the edge of its region",
-    "zmp": "Zero-moment point to the edge of the support",
-    "contact": "What is left of friction, torsion and load",
-    "self_collision": "Nearest pair of links, less the margin",
-    "mesh_clearance": "Nearest pair of meshes, less the margin",
-    "surroundings": "Nearest link and thing around, less the margin",
-    "keep_out": "Outside the regions of joint space",
-}
 
 
 @dataclass(frozen=True)
@@ -182,7 +167,7 @@ def _lines(problem: Problem, motion: Motion) -> list[_Line]:
 
 def _line(constraint: Constraint, margins: Array, times: Array, motion: Motion) -> _Line:
     units = {constraint.unit_of(column) for column in range(len(constraint.labels))}
-    shares = isinstance(constraint, JointBound | JointTorque) or len(units) > 1
+    shares = constraint.of_joints is not None or len(units) > 1
     values = (margins / constraint.scale if shares else margins).min(axis=1)
     seen = constraint.worst(margins, times)
     stored = motion.margins.get(constraint.name)
@@ -217,13 +202,13 @@ def _chart(line: _Line) -> Chart:
         )  # fmt: skip
         time_axis(axes, line.times)
         few_ticks(axes)
-        of_joints = isinstance(line.constraint, JointBound | JointTorque)
+        of_joints = line.constraint.of_joints is not None
         share = "share of limit" if of_joints else "share of its scale"
         what = share if line.unit == "–" else "margin"
         axes.set_ylabel(f"{what} [{line.unit}]", labelpad=2)
 
     name = line.constraint.name
-    title = _WORDS.get(name, name.replace("_", " "))
+    title = line.constraint.title
     state = {None: "", True: " Proved at every instant.", False: " Not proved between samples."}
     said = (
         f"Closest: {in_figures(worst.margin)} {worst.unit} at {worst.time:.3f} s, {worst.label}."

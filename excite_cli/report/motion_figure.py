@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from excite_cli.constraints.base import Constraint
-from excite_cli.constraints.joint_bound import JointBound
-from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.excitation.admissible import fine_margins, fine_times
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
@@ -34,16 +32,6 @@ _STEPS = (1, 2, 5, 10)
 _DOTTED = (0, (1, 1))
 # Page layout of the joint grid [in].
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.6, 0.1, 0.95, 0.45
-_WORDS = {
-    "joint_torque": ("Joint torque left", "share of limit [–]"),
-    "balance": ("Centre of mass to the edge of its region", "distance [m]"),
-    "zmp": ("Zero-moment point to the edge of the support", "distance [m]"),
-    "contact": ("What is left of friction, torsion and load", "margin [N, N·m]"),
-    "self_collision": ("Nearest pair of links, less the margin", "distance [m]"),
-    "mesh_clearance": ("Nearest pair of meshes, less the margin", "distance [m]"),
-    "surroundings": ("Nearest link and thing around, less the margin", "distance [m]"),
-    "keep_out": ("Outside the regions of joint space", "distance [rad]"),
-}
 
 
 @dataclass(frozen=True)
@@ -181,10 +169,9 @@ def _bounds(problem: Problem) -> _Bounds:
     lower = np.full((3, problem.robot.n), -np.inf)
     upper = -lower
     for constraint in problem.constraints:
-        if isinstance(constraint, JointBound):
-            low = constraint.signs < 0
-            lower[constraint.order, constraint.joints[low]] = -constraint.bounds[low]
-            upper[constraint.order, constraint.joints[~low]] = constraint.bounds[~low]
+        columns = constraint.linear
+        if columns is not None:
+            columns.put_into(lower[columns.quantity], upper[columns.quantity])
     return _Bounds(lower, upper)
 
 
@@ -194,21 +181,22 @@ def _position_units(robot: Robot) -> list[str]:
 
 def watched_constraints(problem: Problem) -> tuple[Constraint, ...]:
     """Constraints other than the bounds of single joints: those that `draw_margins` shows."""
-    return tuple(c for c in problem.constraints if not isinstance(c, JointBound))
+    return tuple(c for c in problem.constraints if c.linear is None)
 
 
 @styled
 def draw_margins(motion: Motion, problem: Problem) -> "Figure":
     """Smallest margin over the columns of each watched constraint, at controller rate.
 
-    Torque margins are divided by their limits, so that joints, rotating or sliding, compare.
+    Margins of single joints (torque) are divided by their limits, so that joints, rotating or
+    sliding, compare.
     """
     times = fine_times(problem)
     all_margins = fine_margins(problem, motion.coefficients, times)
     parts = [
         (constraint, margins)
         for constraint, margins in zip(problem.constraints, all_margins, strict=True)
-        if not isinstance(constraint, JointBound)
+        if constraint.linear is None
     ]
     figure = new_figure(0.8 + 1.75 * len(parts))
     figure.suptitle(
@@ -225,12 +213,11 @@ def draw_margins(motion: Motion, problem: Problem) -> "Figure":
 
 
 def _draw_margin(axes: "Axes", constraint: Constraint, margins: Array, times: Array) -> None:
-    torque = isinstance(constraint, JointTorque)
-    values = margins / constraint.scale if torque else margins
-    words, label = _WORDS.get(constraint.name, (constraint.name, f"margin [{constraint.unit}]"))
+    shares = constraint.of_joints is not None
+    values = margins / constraint.scale if shares else margins
+    units = dict.fromkeys(constraint.unit_of(column) for column in range(len(constraint.labels)))
     smallest = values.min(axis=1)
     worst = int(np.argmin(smallest))
-    where = constraint.labels[int(np.argmin(values[worst]))]
     top = max(float(smallest.max()), 1e-6)
     bottom = min(float(smallest.min()), 0.0) - 0.12 * top
     axes.axhspan(bottom, 0.0, color=FORBIDDEN, linewidth=0)
@@ -238,12 +225,13 @@ def _draw_margin(axes: "Axes", constraint: Constraint, margins: Array, times: Ar
     axes.plot(times, smallest, color=BLUE)
     axes.plot(times[worst], smallest[worst], "o", color=VERMILION, markersize=5, clip_on=False)
     axes.set_ylim(bottom, 1.08 * top)
-    unit = "" if torque else f" {constraint.unit}"
-    axes.set_title(words)
+    column = int(np.argmin(values[worst]))
+    unit = "" if shares else f" {constraint.unit_of(column)}"
+    axes.set_title(constraint.title)
     axes.set_title(
-        f"worst: {smallest[worst]:.3g}{unit} at {times[worst]:.2f} s, {where}",
+        f"worst: {smallest[worst]:.3g}{unit} at {times[worst]:.2f} s, {constraint.labels[column]}",
         loc="right",
         color=VERMILION,
         fontsize=8.5,
     )
-    axes.set_ylabel(label)
+    axes.set_ylabel("share of limit [–]" if shares else f"margin [{', '.join(units)}]")

@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from excite_cli.constraints.joint_bound import JointBound
-from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
@@ -102,25 +100,14 @@ def _signals(problem: Problem, motion: Motion, points: int) -> _Signals:
     lower = np.full((4, robot.n), -np.inf)
     upper = -lower
     for constraint in problem.constraints:
-        if isinstance(constraint, JointBound):
-            low = constraint.signs < 0
-            lower[constraint.order, constraint.joints[low]] = -constraint.bounds[low]
-            upper[constraint.order, constraint.joints[~low]] = constraint.bounds[~low]
-        if isinstance(constraint, JointTorque):
-            upper[3] = _torque_limits(constraint, robot.joint_names)
-    lower[3] = -upper[3]
+        columns = constraint.of_joints
+        if columns is not None:
+            columns.put_into(lower[columns.quantity], upper[columns.quantity])
     units = tuple(
         ("m", "m/s", "m/s²", "N") if slides else ("rad", "rad/s", "rad/s²", "N·m")
         for slides in robot.sliding
     )
     return _Signals(times, np.stack([q, v, a, torque]), lower, upper, units)
-
-
-def _torque_limits(constraint: JointTorque, names: tuple[str, ...]) -> Array:
-    limits = np.full(len(names), np.inf)
-    for label, limit in zip(constraint.labels, constraint.scale, strict=True):
-        limits[names.index(label.rpartition(" ")[0])] = limit
-    return limits
 
 
 def _shown(signals: _Signals, joint: int) -> list[int]:

@@ -219,7 +219,7 @@ def _capsules(
     if not view.capsules:
         return []
     near = instants.nearest.capsules[instant] if instants.nearest is not None else ()
-    return [(k, NEAREST if k in near else CAPSULE) for k in range(len(scene.capsules))]
+    return [(k, NEAREST if c in near else CAPSULE) for k, c in enumerate(scene.capsules)]
 
 
 def _mass(scene: Scene, view: View) -> bool:

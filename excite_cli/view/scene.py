@@ -7,13 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.constraints.balance import Balance
-from excite_cli.constraints.ground_contact import ZeroMomentPoint
-from excite_cli.constraints.obstacle_clearance import Surroundings
-from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.constraints.drawing import Drawing, GroundRegion
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
-from excite_cli.geometry.obstacles import FLOOR, Box, Obstacle, Plane
+from excite_cli.geometry.obstacles import FLOOR, Box, Plane
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Array
 from excite_cli.view.geometry import Body, Colour, robot_bodies
@@ -80,16 +77,17 @@ def build_scene(problem: Problem, paths: list[Array], cell: float = 0.0) -> Scen
         carried = robot.payload.capsule
         surface = smooth_surface(capsule_triangles(carried.start, carried.end, carried.radius))
         bodies = (*bodies, Body(carried.name, carried.joint, surface, PAYLOAD_COLOUR))
-    capsules, obstacles = _capsules(problem), _obstacles(problem)
+    drawings = [constraint.drawing for constraint in problem.constraints]
+    capsules, kept = _capsules(drawings), _main_region(drawings)
+    obstacles = [obstacle for drawing in drawings for obstacle in drawing.obstacles]
     outline, foot = _reach(problem, bodies, paths)
     low, high = outline.min(axis=0), outline.max(axis=0)
     floor = next((o.offset for o in obstacles if isinstance(o, Plane) and o.name == FLOOR), None)
-    height = next((c.height for c in problem.constraints if isinstance(c, ZeroMomentPoint)), None)
-    ground = _ground(floor, height, foot, float(low[2]))
+    ground = _ground(floor, kept.height if kept else None, foot, float(low[2]))
     boxes = tuple((o.name, _box_surface(o)) for o in obstacles if isinstance(o, Box))
     outline = np.vstack([outline, *(_corners(surface.points) for _, surface in boxes)])
     low, high = outline.min(axis=0), outline.max(axis=0)
-    region, contacts = _region(problem, ground)
+    region, contacts = _region(kept, ground)
     return Scene(
         name=robot.name,
         bodies=bodies,
@@ -109,19 +107,10 @@ def build_scene(problem: Problem, paths: list[Array], cell: float = 0.0) -> Scen
     )
 
 
-def _capsules(problem: Problem) -> tuple[Capsule, ...]:
-    """Those of self-collision and surroundings, which are the same where both are asked for."""
-    for constraint in problem.constraints:
-        if isinstance(constraint, SelfCollision | Surroundings):
-            return constraint.capsules
-    return ()
-
-
-def _obstacles(problem: Problem) -> tuple[Obstacle, ...]:
-    for constraint in problem.constraints:
-        if isinstance(constraint, Surroundings):
-            return constraint.obstacles
-    return ()
+def _capsules(drawings: list[Drawing]) -> tuple[Capsule, ...]:
+    """Every capsule once; self-collision and surroundings share theirs."""
+    found = {id(capsule): capsule for drawing in drawings for capsule in drawing.capsules}
+    return tuple(found.values())
 
 
 def _box_surface(box: Box) -> Surface:
@@ -177,20 +166,20 @@ def _ground(floor: float | None, height: float | None, foot: float, lowest: floa
     return foot if np.isfinite(foot) and lowest >= foot - _NEAR_BASE else lowest
 
 
-def _region(problem: Problem, ground: float) -> tuple[Region | None, Array]:
-    region, contacts = None, np.zeros((0, 3))
-    for constraint in problem.constraints:
-        if isinstance(constraint, ZeroMomentPoint):
-            support = constraint.support
-            corners = _polygon(support.normals, support.offsets)
-            region = Region(corners, constraint.height)
-            given = problem.spec.constraints.contact
-            if given is not None:
-                points = np.array(given.vertices, dtype=float)
-                contacts = np.column_stack([points, np.full(len(points), constraint.height)])
-        elif isinstance(constraint, Balance) and region is None:
-            region = Region(_polygon(constraint.normals, constraint.offsets), ground)
-    return region, contacts
+def _main_region(drawings: list[Drawing]) -> GroundRegion | None:
+    """The one at a height of its own, as a contact with the ground has it, before others."""
+    found = [drawing.region for drawing in drawings if drawing.region is not None]
+    return next((each for each in found if each.height is not None), found[0] if found else None)
+
+
+def _region(kept: GroundRegion | None, ground: float) -> tuple[Region | None, Array]:
+    """As it is drawn, and the points of contact (k, 3)."""
+    if kept is None:
+        return None, np.zeros((0, 3))
+    height = ground if kept.height is None else kept.height
+    flat = np.zeros((0, 2)) if kept.contacts is None else kept.contacts
+    contacts = np.column_stack([flat, np.full(len(flat), height)])
+    return Region(_polygon(kept.normals, kept.offsets), height), contacts
 
 
 def _polygon(normals: Array, offsets: Array) -> Array:

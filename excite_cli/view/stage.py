@@ -28,7 +28,7 @@ class Stage:
 
     def __init__(self, server: Any, scene: Scene) -> None:
         self._scene, self._api = scene, server.scene
-        self._near: tuple[int, ...] = ()
+        self._near: set[int] = set()
         unit = scene.size / 100
         self._frames: dict[str, dict[int, Any]] = {"robot": {}, "capsules": {}}
         for number, body in enumerate(scene.bodies):
@@ -77,9 +77,10 @@ class Stage:
             ball.position = end
         self._value.position = ends.mean(axis=0)
         self._value.text = f"{1000 * nearest.distances[instant]:.0f} mm"
-        near = nearest.capsules[instant]
+        at = nearest.capsules[instant]
+        near = {k for k, capsule in enumerate(self._scene.capsules) if capsule in at}
         if near != self._near:
-            for index in {*near} ^ {*self._near}:
+            for index in near ^ self._near:
                 self._capsules[index].color = _eight(NEAREST if index in near else CAPSULE)
             self._near = near
 

@@ -234,7 +234,6 @@ def test_robot_section_messages(inside: str, path: str, words: str) -> None:
         ("constraints: {balance: {kind: dics, radius: 1}}", "constraints.balance", "disc"),
         ("criterion: {kind: condition_numbre}", "criterion.kind", "condition_number"),
         ("criterion: {row_weights: efort}", "criterion.row_weights", "effort"),
-        ("optimizer: {method: slspq}", "optimizer.method", "slsqp"),
         ("constraints: {self_collision: {capsules: atuo}}",
          "constraints.self_collision.capsules", "auto"),
     ],
@@ -322,3 +321,26 @@ def test_file_messages(tmp_path: Path) -> None:
         load_spec(path)
     path.write_text(f"{ROBOT}\n#" + "x" * (MAX_BYTES // 2), encoding="utf-8")
     assert load_spec(path).robot.urdf == "arm.urdf"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("optimizer: {method: sqp}", "optimizer: method: there is one method now, the interior"),
+        ("optimizer: {method: slsqp}", "leave this key out (given: 'slsqp')"),
+        ("optimizer: {qp_solver: osqp}", "optimizer: qp_solver: no quadratic program is solved"),
+        ("measurement: {encoder_step: 1.0e-4}", "measurement: encoder_step: nothing ever used"),
+    ],
+)
+def test_keys_that_are_gone_say_what_to_do(text: str, words: str) -> None:
+    message = told(f"{ROBOT}\n{text}")
+    assert words in message
+    assert "leave" in message
+
+
+def test_what_old_results_say_by_default_is_still_read() -> None:
+    old = "optimizer: {method: interior_point, qp_solver: daqp, max_seconds: 7}"
+    spec = parse_spec(f"{ROBOT}\n{old}\nmeasurement: {{encoder_step: null, angle: deg}}")
+    assert spec == parse_spec(
+        f"{ROBOT}\noptimizer: {{max_seconds: 7}}\nmeasurement: {{angle: deg}}"
+    )

@@ -17,7 +17,7 @@ from excite_cli.excitation.admissible import fine_times
 from excite_cli.excitation.differences import central_differences
 from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture
 from excite_cli.excitation.task import MotionTask
@@ -126,7 +126,7 @@ def _problem(*settings: str) -> Problem:
 
 def _entered(problem: Problem) -> bool:
     """Whether the motion is ever, at 1 kHz, in the region of the test below."""
-    solver = build_solver(problem.spec.optimizer)
+    solver = InteriorPoint()
     stack = Stack.empty(problem.base.rank)
     motion = generate_motion(problem, solver, stack, 1, 1, lambda _: None)
     q = problem.states(motion.coefficients, problem.trajectory.basis(fine_times(problem))).q

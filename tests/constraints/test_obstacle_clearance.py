@@ -16,7 +16,7 @@ from excite_cli.excitation.differences import central_differences
 from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture
 from excite_cli.excitation.task import MotionTask
@@ -44,7 +44,7 @@ def _around() -> tuple[Problem, Surroundings]:
 
 
 def _motion(problem: Problem) -> Motion:
-    solver = build_solver(problem.spec.optimizer)
+    solver = InteriorPoint()
     return generate_motion(problem, solver, Stack.empty(problem.base.rank), 1, 1, lambda _: None)
 
 

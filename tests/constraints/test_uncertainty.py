@@ -29,7 +29,7 @@ from excite_cli.dynamics.whole_robot import drawn_states, whole_parameters
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Robot
 from tests.constraints.test_gradients import _check as check_gradients
@@ -209,7 +209,7 @@ def planned(robust: bool) -> tuple[Problem, Array]:
     settings += ["constraints.self_collision=null", "sequence.motions=1", "optimizer.certify=false"]
     settings += ["uncertainty={mass: 0.2, center_of_mass: 0.01, inertia: 0.2}"] if robust else []
     problem = build_problem(load_spec(SMOKE, settings), SMOKE.parent)
-    solver = build_solver(problem.spec.optimizer)
+    solver = InteriorPoint()
     stack = Stack.empty(problem.base.rank)
     return problem, generate_motion(problem, solver, stack, 1, 1, lambda p: None).coefficients
 

@@ -11,7 +11,7 @@ from excite_cli.excitation.admissible import worst_margins
 from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 
 CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
@@ -33,7 +33,7 @@ def _problem(*settings: str) -> Problem:
 
 def _motion(problem: Problem) -> Motion:
     stack = Stack.empty(problem.base.rank)
-    solver = build_solver(problem.spec.optimizer)
+    solver = InteriorPoint()
     return generate_motion(problem, solver, stack, 1, 1, lambda progress: None)
 
 

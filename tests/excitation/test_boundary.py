@@ -16,7 +16,7 @@ from excite_cli.excitation.differences import central_differences, relative_erro
 from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.random_baseline import random_baseline
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import random_direction, random_start
 from excite_cli.excitation.task import MotionTask
@@ -120,7 +120,7 @@ def test_an_optimised_motion_keeps_its_ends_and_all_constraints(family: str) -> 
     problem = _problem(family)
     task = MotionTask(problem)
     begin = random_start(task, base_motion(task, 1), (1, 1, 0))
-    solver = build_solver(problem.spec.optimizer)
+    solver = InteriorPoint()
     motion = generate_motion(problem, solver, Stack.empty(problem.columns), 1, 1, lambda _: None)
     q, v, a = _ends(problem.trajectory, motion.coefficients)
     ends = problem.boundary.postures
@@ -145,7 +145,7 @@ def test_a_posture_near_a_bound_is_not_moved() -> None:
                        "constraints.self_collision=null")  # fmt: skip
     start = base_motion(MotionTask(problem), 1)
     assert start.posture[2] == 2.595
-    solver = build_solver(problem.spec.optimizer)
+    solver = InteriorPoint()
     motion = generate_motion(problem, solver, Stack.empty(problem.columns), 1, 1, lambda _: None)
     q, _, _ = _ends(problem.trajectory, motion.coefficients)
     assert np.abs(q[:, 2] - 2.595).max() < 1e-9

@@ -15,7 +15,7 @@ from excite_cli.excitation.connection import State, joined_states, judge_of
 from excite_cli.excitation.entry import program
 from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.trajectory.base import Array, Trajectory
 from excite_cli.trajectory.chain import Chain, Segment
@@ -46,7 +46,7 @@ def _motion(problem: Problem) -> Segment:
         points = 0.05 * np.random.default_rng(4).normal(size=(14, problem.robot.n))
         points[:, -1] *= 0.1
         return Segment("motion", problem.trajectory, problem.robot.posture + points)
-    solver = build_solver(problem.spec.optimizer)
+    solver = InteriorPoint()
     found = generate_motion(problem, solver, Stack.empty(problem.columns), 1, 1, lambda _: None)
     return Segment("motion", problem.trajectory, found.coefficients)
 

@@ -18,7 +18,7 @@ from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.path_search import FreeSpace, find_way, standing_margins
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.task import MotionTask
 
@@ -82,7 +82,7 @@ def test_a_free_way_is_straight(table: Problem) -> None:
 
 
 def test_a_motion_round_the_wall_keeps_all_constraints(table: Problem) -> None:
-    solver = build_solver(table.spec.optimizer)
+    solver = InteriorPoint()
     motion = generate_motion(table, solver, Stack.empty(table.columns), 1, 1, lambda _: None)
     assert "surroundings" in motion.note
     assert "wall" in motion.note

@@ -1,38 +1,29 @@
-import sys
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
+from benchmarks.slsqp import BestAdmissible, ScipySlsqp
 from excite_cli.config.constraints_spec import ConstraintsSpec, JointLimitsSpec, TorqueSpec
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.config.spec import OptimizerSpec, Spec
+from excite_cli.config.spec import Spec
 from excite_cli.config.trajectory_spec import FourierSpec, GridSpec, SamplingSpec
 from excite_cli.constraints.base import Array
-from excite_cli.errors import ConfigError, MissingExtraError
+from excite_cli.excitation.correction import lowest
 from excite_cli.excitation.motion import Outcome, Progress
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.solvers.base import Effort, Solver
-from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.solvers.linearised import Linearised, dips, gathered, lowest
-from excite_cli.excitation.solvers.quadratic_program import build_backend
 from excite_cli.excitation.solvers.quasi_newton import damped_update
-from excite_cli.excitation.solvers.restoration import BestAdmissible, least_distance
-from excite_cli.excitation.solvers.slsqp import ScipySlsqp
-from excite_cli.excitation.solvers.sqp import SequentialQuadratic
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture, random_start
 from excite_cli.excitation.task import MotionTask
 
 MAKERS: dict[str, Callable[[], Solver]] = {
     "interior_point": InteriorPoint,
-    "sqp-daqp": lambda: SequentialQuadratic("daqp"),
-    "sqp-piqp": lambda: SequentialQuadratic("piqp"),
     "slsqp": ScipySlsqp,
 }
 every_solver = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
-every_backend = pytest.mark.parametrize("backend", ["daqp", "piqp"])
 
 
 @pytest.fixture(scope="module")
@@ -126,80 +117,6 @@ def test_second_motion_improves_on_its_stack(problem: Problem, make: Callable[[]
     outcome, _ = solved(second, make(), 15)
     alone = np.linalg.svd(stack.factor, compute_uv=False)
     assert condition_number(second, outcome.x) < alone[0] / alone[-1]
-
-
-def test_catalogue_builds_what_the_spec_names() -> None:
-    assert isinstance(build_solver(OptimizerSpec()), InteriorPoint)
-    assert isinstance(build_solver(OptimizerSpec(method="slsqp")), ScipySlsqp)
-    solver = build_solver(OptimizerSpec(method="sqp", qp_solver="daqp"))
-    assert isinstance(solver, SequentialQuadratic)
-    assert solver.backend.name == "daqp"
-
-
-@every_backend
-def test_missing_library_names_the_extra(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, backend, None)
-    with pytest.raises(MissingExtraError, match=r"pip install excite-cli\[qp\]") as caught:
-        build_solver(OptimizerSpec(method="sqp", qp_solver=backend))
-    assert backend in str(caught.value)
-    assert isinstance(build_solver(OptimizerSpec(method="interior_point")), InteriorPoint)
-
-
-def test_unknown_backend_is_refused_with_the_nearest_name() -> None:
-    with pytest.raises(ConfigError, match="Did you mean 'daqp'"):
-        build_backend("dapq")
-
-
-@every_backend
-@pytest.mark.parametrize("seed", range(5))
-def test_backend_meets_the_conditions_of_optimality(backend: str, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    root, gradient, rows = rng.normal(size=(8, 8)), rng.normal(size=8), rng.normal(size=(15, 8))
-    hessian = root @ root.T + np.eye(8)
-    bounds = rows @ rng.normal(size=8) - rng.uniform(0, 0.5, size=15)
-    found = build_backend(backend).minimise(hessian, gradient, rows, bounds)
-    assert found is not None
-    slack = rows @ found.x - bounds
-    assert slack.min() > -1e-7
-    assert found.multipliers.min() >= 0
-    np.testing.assert_allclose(hessian @ found.x + gradient, rows.T @ found.multipliers, atol=1e-5)
-    np.testing.assert_allclose(found.multipliers * slack, 0.0, atol=1e-5)
-
-
-@every_backend
-def test_backend_tells_contradicting_rows(backend: str) -> None:
-    rows = np.array([[1.0, 0.0], [-1.0, 0.0]])
-    found = build_backend(backend).minimise(np.eye(2), np.zeros(2), rows, np.ones(2))
-    assert found is None
-
-
-def test_linearised_residuals_match_differences(problem: Problem) -> None:
-    task = MotionTask(problem)
-    x, direction = start(task), np.random.default_rng(3).normal(size=task.size)
-    states = task.states(x)
-    linear = Linearised(task, states, task.values(states))
-    h = 1e-6
-    ahead, behind = (task.values(task.states(x + s * h * direction)) for s in (1, -1))
-    differences = [(a - b) / (2 * h) for a, b in zip(ahead, behind, strict=True)]
-    expected = gathered(differences, linear.near)
-    np.testing.assert_allclose(gathered(linear.change(direction), linear.near), expected, atol=1e-6)
-    np.testing.assert_allclose(linear.dense(linear.near) @ direction, expected, atol=1e-6)
-
-
-def test_least_distance_is_the_projection_onto_the_rows() -> None:
-    rows = np.array([[1.0, 0.0], [1.0, 1.0], [0.0, -1.0]])
-    found = least_distance(rows, np.array([0.5, 1.0, -2.0]))
-    assert found is not None
-    np.testing.assert_allclose(found, [0.5, 0.5], atol=1e-12)
-    inside = least_distance(rows, np.array([-1.0, -1.0, -1.0]))
-    assert inside is not None
-    np.testing.assert_allclose(inside, 0.0, atol=1e-12)
-    assert least_distance(np.array([[1.0, 0.0], [-1.0, 0.0]]), np.ones(2)) is None
-
-
-def test_dips_are_found_at_the_ends_too() -> None:
-    value = np.array([[0.0], [1.0], [0.5], [0.7], [0.2]])
-    np.testing.assert_array_equal(dips(value)[:, 0], [True, False, True, False, True])
 
 
 def test_restoration_brings_a_broken_motion_inside(problem: Problem) -> None:

@@ -20,7 +20,7 @@ from excite_cli.excitation.one_start import FoundMotion, Search
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.random_baseline import RandomBaseline, random_baseline
 from excite_cli.excitation.run import continue_run, new_result
-from excite_cli.excitation.solvers.catalogue import build_solver
+from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.workers.base import Workers
 from excite_cli.workers.here import Here
@@ -130,7 +130,7 @@ class _Given(Workers):
 
 
 def _best(problem: Problem, found: list[Any], alone: tuple[Motion, ...]) -> Motion:
-    solver, stack = build_solver(problem.spec.optimizer), Stack.empty(problem.columns)
+    solver, stack = InteriorPoint(), Stack.empty(problem.columns)
     return generate.generate_motion(
         problem, solver, stack, 1, 1, lambda progress: None, None, _Given(found)
     )
@@ -178,15 +178,14 @@ def test_starts_cut_short_by_time_are_told(problem: Problem, alone: tuple[Motion
 @pytest.mark.parametrize(
     "settings",
     [
-        ["optimizer.method=slsqp"],
-        ["optimizer.method=sqp", "optimizer.qp_solver=daqp"],
+        ["optimizer.tolerance=0.01"],
         ["criterion.kind=log_det", "effects=[{kind: viscous_friction}]"],
         ["trajectory={family: bspline, start: posture, end: posture, duration: 6.0}"],
     ],
 )
 def test_whatever_a_problem_holds_can_travel(settings: list[str]) -> None:
     problem = _problem(*settings)
-    search = Search(problem, build_solver(problem.spec.optimizer))
+    search = Search(problem, InteriorPoint())
     there = pickle.loads(pickle.dumps(search))
     assert type(there.solver) is type(search.solver)
     again = there.problem

@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.coal_gradients import CoalGradients
 from excite_cli.dynamics.forward_kinematics import BatchKinematics
 from excite_cli.dynamics.states import States
 from excite_cli.geometry.clearance import Clearance
-from excite_cli.geometry.clearance_coal import CoalClearance
 from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.segments import nearest_points, normals
 from excite_cli.robot.capsule import Capsule
@@ -16,7 +16,7 @@ from .fitted_robots import capsules_of, pairs_of, robot_of
 NAMES = ["talos", "ur10", "panda"]
 
 
-def spread(name: str) -> tuple[Clearance, CoalClearance, np.ndarray]:
+def spread(name: str) -> tuple[Clearance, CoalGradients, np.ndarray]:
     robot, capsules = robot_of(name), capsules_of(name)
     pairs = tuple(
         (i, j)
@@ -26,7 +26,7 @@ def spread(name: str) -> tuple[Clearance, CoalClearance, np.ndarray]:
     )[::5]  # also touching ones: penetration must be right too
     chosen = CollisionPairs(pairs, ())
     q, _, _ = robot.draw_states(40, seed=4)
-    return Clearance(robot, capsules, chosen), CoalClearance(robot, capsules, chosen), q
+    return Clearance(robot, capsules, chosen), CoalGradients(robot, capsules, pairs), q
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -6,7 +6,7 @@ from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.states import States
 from excite_cli.excitation.problem import Problem
-from excite_cli.geometry.clearance_coal import CoalClearance
+from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.chain import Segment
 from excite_cli.view.instants import Instants, closest_time, instants_of
@@ -29,7 +29,7 @@ def _distances(problem: Problem, states: States) -> Array:
     found = []
     for constraint in problem.constraints:
         if isinstance(constraint, SelfCollision):
-            coal = CoalClearance(problem.robot, constraint.capsules, constraint.pairs)
+            coal = CoalDistances(problem.robot, constraint.capsules, constraint.pairs.checked)
             found.append(coal.distances(states.q))
         elif isinstance(constraint, Surroundings):
             found.append(constraint.margins(states) + constraint.pairs.kept)
@@ -56,8 +56,8 @@ def test_the_line_is_as_long_as_the_distance_and_ends_on_the_capsules(
     np.testing.assert_allclose(lengths, np.abs(nearest.distances), atol=1e-9)
     capsules = next(c.capsules for c in problem.constraints if isinstance(c, SelfCollision))
     for t in range(len(TIMES)):
-        for index, end in zip(nearest.capsules[t], nearest.ends[t], strict=False):
-            capsule = capsules[index]
+        for capsule, end in zip(nearest.capsules[t], nearest.ends[t], strict=False):
+            assert capsule in capsules
             axis = instants.poses.points(capsule.joint, np.stack([capsule.start, capsule.end]))[t]
             along = axis[1] - axis[0]
             share = np.clip((end - axis[0]) @ along / max(along @ along, 1e-12), 0, 1)

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from excite_cli.constraints.base import Array
-from excite_cli.constraints.joint_bound import JointBound
+from excite_cli.constraints.joint_columns import JointColumns
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.states import States
 from excite_cli.errors import NoAdmissibleMotionError
@@ -82,8 +82,7 @@ class _Run:
         self.best = float("inf")
         self.hessian: Array | None = None
         self.reach = [
-            _REACH_LINEAR if isinstance(c, JointBound) else _REACH_OTHER
-            for c in task.problem.constraints
+            _REACH_OTHER if c.linear is None else _REACH_LINEAR for c in task.problem.constraints
         ]
         self.samples = task.residuals.grid.samples
 
@@ -174,13 +173,14 @@ class _Run:
         return None
 
     def longest_step(self, point: _Point, direction: Array) -> float:
-        """Share of the step that keeps every joint bound, at most 1."""
+        """Share of the step that keeps every linear bound, at most 1."""
         task, step = self.task, 1.0
         change = task.problem.constraint_basis.states(task.change(direction))
         for constraint, value in zip(task.problem.constraints, point.values, strict=True):
-            if not isinstance(constraint, JointBound):
+            columns = constraint.linear
+            if columns is None:
                 continue
-            rate = constraint.signs * change[constraint.order][:, constraint.joints]
+            rate = columns.signs * change[columns.quantity][:, columns.joints]
             rate /= constraint.scale
             closing = rate > 0
             if closing.any():
@@ -196,14 +196,15 @@ class _Run:
         for index, constraint in enumerate(task.problem.constraints):
             value, reach = point.values[index], self.reach[index]
             weight = mu / self.samples
-            counted = value if isinstance(constraint, JointBound) else value[value < reach]
+            columns = constraint.linear
+            counted = value[value < reach] if columns is None else value
             first, second = weight * _first(counted, reach), weight * _second(counted, reach)
-            if isinstance(constraint, JointBound):
-                pull, bend = _per_joint(constraint, first, second, task.n)
+            if columns is not None:
+                pull, bend = _per_joint(columns, constraint.scale, (first, second), task.n)
                 parts: list[Array | None] = [None, None, None]
-                parts[constraint.order] = pull
+                parts[columns.quantity] = pull
                 grid.add_gradient(gradient, parts)
-                grid.add_joint_curvature(hessian, constraint.order, bend)
+                grid.add_joint_curvature(hessian, columns.quantity, bend)
                 continue
             near = value < reach
             if not near.any():
@@ -241,11 +242,14 @@ def _descent(hessian: Array, gradient: Array) -> Array | None:
     return None
 
 
-def _per_joint(bound: JointBound, first: Array, second: Array, joints: int) -> tuple[Array, Array]:
-    """Weights (T, n) per joint of the gradient and of the curvature of a joint bound."""
-    select = np.zeros((len(bound.joints), joints))
-    select[np.arange(len(bound.joints)), bound.joints] = 1.0
-    return -(first * (bound.signs / bound.scale)) @ select, (second / bound.scale**2) @ select
+def _per_joint(
+    columns: JointColumns, scale: Array, weights: tuple[Array, Array], joints: int
+) -> tuple[Array, Array]:
+    """Weights (T, n) per joint of gradient and curvature, of those (T, m) of linear margins."""
+    select = np.zeros((len(columns.joints), joints))
+    select[np.arange(len(columns.joints)), columns.joints] = 1.0
+    first, second = weights
+    return -(first * (columns.signs / scale)) @ select, (second / scale**2) @ select
 
 
 def _barrier(value: Array, reach: float) -> Array:

@@ -1,4 +1,4 @@
-"""SciPy's SLSQP on working sets: slow for many rows, but it needs nothing beyond SciPy.
+"""SciPy's SLSQP on working sets: the reference that the solver of the product is compared with.
 
 SLSQP solves a dense least-squares problem with every row it is given, so it is run in short
 rounds, each within a box, on few rows: the dips (smallest in time) of residuals near zero. After
@@ -18,11 +18,17 @@ from scipy.optimize import minimize
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.states import States
+from excite_cli.excitation.correction import (
+    Mask,
+    chosen_rows,
+    corrected,
+    dips,
+    gathered,
+    lowest,
+)
 from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
 from excite_cli.excitation.objective import Spectrum
 from excite_cli.excitation.solvers.base import Effort, Solver
-from excite_cli.excitation.solvers.linearised import Linearised, Mask, dips, gathered, lowest
-from excite_cli.excitation.solvers.restoration import BestAdmissible
 from excite_cli.excitation.task import MotionTask
 
 # Residuals kept by the program, and below which a dip joins the working set.
@@ -34,6 +40,50 @@ _FIRST_ROUND, _LONGEST_ROUND, _IDLE = 2, 12, 3
 # residual by more than `_LOST` and cannot be restored is undone and the box made smaller.
 _FIRST_RADIUS, _NARROWEST, _WIDEST, _LOST = 0.1, 1e-3, 10.0, 0.05
 _CHANGES = (3e-2, 1e-2, 1e-3)
+
+
+class BestAdmissible:
+    """The best strictly admissible point seen, by the criterion asked for."""
+
+    def __init__(self, task: MotionTask) -> None:
+        self.task = task
+        self.x: Array | None = None
+        self.cost = np.inf
+
+    def offer(self, x: Array, values: list[Array], spectrum: Spectrum) -> None:
+        """Keep x if it is strictly admissible and better than what is kept."""
+        cost = self.task.problem.criterion.value(spectrum.sigma)
+        if lowest(values) > 0 and (cost < self.cost or self.x is None):
+            self.x, self.cost = x.copy(), cost
+
+    def kept(self) -> Array:
+        """The point itself; there is one as soon as an admissible start was offered."""
+        assert self.x is not None, "a solver starts from an admissible point"
+        return self.x
+
+    def offer_restored(self, x: Array) -> None:
+        """Offer the admissible point that least-length corrections or a retreat make of x."""
+        candidate = corrected(self.task, x)
+        if candidate is None:
+            candidate = self._retreated(x)
+        self.task.evaluations += 1
+        objective = self.task.objective
+        block = objective.block(self.task.coefficients(candidate))
+        values = self.task.values(self.task.states(candidate))
+        self.offer(candidate, values, objective.spectrum(block))
+
+    def _retreated(self, x: Array) -> Array:
+        """A point on the way from the kept point to x, as far along as bisection proves."""
+        inside, outside = 0.0, 1.0
+        start = self.kept()
+        for _ in range(12):
+            middle = 0.5 * (inside + outside)
+            values = self.task.values(self.task.states(start + middle * (x - start)))
+            if lowest(values) > 0:
+                inside = middle
+            else:
+                outside = middle
+        return start + inside * (x - start)
 
 
 class _Stopped(Exception):
@@ -136,7 +186,7 @@ class _Run:
 
         def jacobian(y: Array) -> Array:
             point = self.point(self.inverse @ y)
-            rows = Linearised(self.task, point.states, point.values, chosen).dense(chosen)
+            rows = chosen_rows(self.task, point.states, chosen)
             return np.asarray(rows @ self.inverse)
 
         def cost(y: Array) -> tuple[float, Array]:
