@@ -53,8 +53,8 @@ def refuse_inputs_as_outputs(
     """
     given = [Path(each) for each in inputs]
     for name, output in outputs.items():
-        for path in given if output is not None else ():
-            if _replaces(output, path):
+        for path in given:
+            if output is not None and _replaces(output, path):
                 raise FileError(
                     f"{name} {output} would replace {path}, which is read here. Results never "
                     "replace what they are made from: give another name."

@@ -18,8 +18,8 @@ def check_outputs(
     Raises
     ------
     FileError
-        An output is one of `inputs`, no regular file, or exists and may not be replaced; two have the same name; one
-        is being written by another run, or its folder cannot be written to.
+        An output is one of `inputs`, no regular file, or exists and may not be replaced; two have
+        the same name; one is being written by another run, or its folder cannot be written to.
     """
     given = {option: path for option, path in outputs.items() if path is not None}
     refuse_inputs_as_outputs({f"--{option}": path for option, path in given.items()}, inputs)

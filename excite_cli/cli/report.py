@@ -114,7 +114,8 @@ def _check_page(page: Path, overwrite: bool, inputs: Sequence[Path]) -> None:
     Raises
     ------
     FileError
-        It is one of `inputs`, exists and nothing says to replace it, or its name is that of another format.
+        It is one of `inputs`, exists and nothing says to replace it, or its name is that of another
+        format.
     """
     from excite_cli.cli.outputs import check_outputs
     from excite_cli.errors import FileError

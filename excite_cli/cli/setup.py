@@ -163,8 +163,8 @@ def output_path(
     Raises
     ------
     FileError
-        It is one of `inputs`, exists already and nothing says to replace or resume it, another run is writing it, or
-        it cannot be written.
+        It is one of `inputs`, exists already and nothing says to replace or resume it, another run
+        is writing it, or it cannot be written.
     """
     path = output or Path(f"{config.stem}.h5")
     if path.is_file() and config.is_file() and path.samefile(config):

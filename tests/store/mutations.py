@@ -37,9 +37,7 @@ def mutations(path: Path) -> Iterator[Mutation]:
             for key in item.attrs:
                 yield from _of_attribute(place, key, item.attrs[key])
             if place != "/":
-                yield Mutation(
-                    f"{place} deleted", lambda file, place=place: file.__delitem__(place)
-                )
+                yield Mutation(f"{place} deleted", partial(_delete, place))
             if isinstance(item, h5py.Dataset):
                 yield from _of_dataset(place, item[()])
 
