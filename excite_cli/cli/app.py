@@ -21,6 +21,7 @@ from excite_cli.cli.robots import robots
 from excite_cli.cli.schema import schema
 from excite_cli.cli.simulate import simulate
 from excite_cli.cli.stopping import heed_signals
+from excite_cli.cli.streams import steady_streams
 from excite_cli.cli.study import study
 from excite_cli.cli.usage_errors import USAGE_ERROR, in_our_words
 from excite_cli.cli.verify_gradient import verify_gradient
@@ -112,4 +113,5 @@ def main() -> None:
             raise SystemExit(status)
 
     heed_signals()
-    sys.exit(run_guarded(act))
+    with steady_streams():
+        sys.exit(run_guarded(act))

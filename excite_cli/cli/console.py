@@ -74,7 +74,7 @@ class Terminal:
     def answer(self, table: Table | str | Sequence[Table | str], data: dict[str, Any]) -> None:
         """The answer: JSON, or tables and sentences."""
         if self.as_json:
-            print(json.dumps(_finite(data), ensure_ascii=False))
+            print(json.dumps(_finite(data), ensure_ascii=not _is_unicode(sys.stdout)))
             return
         parts = [table] if isinstance(table, Table | str) else list(table)
         with (out := self.out).capture() as printed:
@@ -155,6 +155,11 @@ def _is_terminal(file: TextIO) -> bool:
     return file.isatty() and os.environ.get("TERM") != "dumb"
 
 
+def _is_unicode(file: TextIO) -> bool:
+    """Whether every character can be written; JSON has another way to say those that cannot."""
+    return (file.encoding or "utf-8").lower().startswith("utf")
+
+
 def _console(file: TextIO) -> Console:
     """As wide as the terminal, or as COLUMNS says; elsewhere plain, with rows in one line each.
 
@@ -204,8 +209,12 @@ def _finite(value: Any) -> Any:
 
 def run_guarded(action: Callable[[], None]) -> int:
     """Run a command; return its exit status, with one message instead of a traceback."""
+    status: Any = 0
     try:
-        action()
+        try:
+            action()
+        except SystemExit as ended:
+            status = ended.code
         sys.stdout.flush()
     except ExciteError as error:
         _tell(f"error: {error}")
@@ -214,9 +223,6 @@ def run_guarded(action: Callable[[], None]) -> int:
         status, words = stopped(sys.argv[1:])
         _tell(words)
         return status
-    except BrokenPipeError:
-        _print_nowhere()
-        return 0
     except MemoryError:
         _tell("error: out of memory; take fewer samples, harmonics or joints.")
         return 2
@@ -226,7 +232,7 @@ def run_guarded(action: Callable[[], None]) -> int:
         return _bug(error)
     finally:
         leave_claims()
-    return 0
+    return status if isinstance(status, int) else 0
 
 
 # Nothing that a user could mend: the program looked for a file that it should have asked for.
