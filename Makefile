@@ -28,6 +28,9 @@ loop: $(STAMP)           ## a UR10 with an effect its config does not know, foun
 test: $(STAMP) lint      ## lint, types, import directions, all tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -q
 
+sanitize: $(STAMP)       ## the kernels' tests on a build with the address and UB sanitizers (gcc)
+	$(BIN)/python -m pytest -q -rs tests/kernels/test_sanitized.py
+
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
