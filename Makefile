@@ -5,7 +5,8 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
-.PHONY: install run plan loop test lint lock audit docs bench peers trust battery robots clean
+.PHONY: install run plan loop test sanitize lint lock floors audit docs bench peers trust battery
+.PHONY: robots clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
 
@@ -27,6 +28,9 @@ loop: $(STAMP)           ## a UR10 with an effect its config does not know, foun
 
 test: $(STAMP) lint      ## lint, types, import directions, all tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -q
+
+sanitize: $(STAMP)       ## the kernels' tests on a build with the address and UB sanitizers (gcc)
+	$(BIN)/python -m pytest -q -rs tests/kernels/test_sanitized.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -78,6 +82,20 @@ lock:                    ## pin all dependencies anew, for Python 3.11 and newer
 	  --custom-compile-command "make lock" --output-file requirements/ci.txt
 	rm -rf $(VENV)-lock
 
+FLOOR_TESTS := tests/test_library.py tests/kernels/test_library.py tests/config tests/criteria \
+  tests/dynamics tests/measurement tests/report/test_page.py tests/simulation tests/store \
+  tests/workers
+floors:                  ## the lowest versions that pyproject.toml allows: quick tests, a whole loop
+	$(PYTHON) -m venv --clear $(VENV)-floors
+	$(VENV)-floors/bin/python -m pip install --quiet "uv>=0.5"
+	$(VENV)-floors/bin/uv pip compile pyproject.toml --quiet --extra all \
+	  --resolution lowest-direct --output-file $(VENV)-floors/floors.txt
+	$(VENV)-floors/bin/uv pip install --quiet --python $(VENV)-floors/bin/python \
+	  -r $(VENV)-floors/floors.txt pytest hypothesis pytest-xdist
+	$(VENV)-floors/bin/uv pip install --quiet --python $(VENV)-floors/bin/python --no-deps -e .
+	.ci/smoke $(VENV)-floors/bin/python
+	OPENBLAS_NUM_THREADS=1 $(VENV)-floors/bin/python -m pytest -n 2 -q $(FLOOR_TESTS)
+
 audit: $(STAMP)          ## known vulnerabilities of the pinned versions (asks the registry)
 	$(BIN)/python -m pip install --quiet pip-audit
 	$(BIN)/pip-audit -r requirements/ci.txt --disable-pip --require-hashes
@@ -89,4 +107,4 @@ $(USER_STAMP): pyproject.toml
 	touch $(USER_STAMP)
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-floors build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

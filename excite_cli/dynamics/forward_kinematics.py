@@ -89,8 +89,8 @@ class BatchKinematics:
         rotations = np.empty((len(q), self.n_bodies, 3, 3))
         translations = np.empty((len(q), self.n_bodies, 3))
         KERNELS.call(
-            "placements", len(q), self.n_bodies, self._n, self.parents, self.variable,
-            self._rotation_basis, self._offset, self._slide, q, rotations, translations,
+            "placements", self.parents, self.variable, self._rotation_basis, self._offset,
+            self._slide, q, rotations, translations,
         )  # fmt: skip
         return rotations, translations
 
@@ -122,8 +122,7 @@ class BatchKinematics:
         if KERNELS is not None:
             columns = np.empty((len(rotations), self.nv, 6))
             KERNELS.call(
-                "axes", len(rotations), self.n_bodies, self.nv, self._columns_body,
-                self.twists, np.ascontiguousarray(rotations),
+                "axes", self._columns_body, self.twists, np.ascontiguousarray(rotations),
                 np.ascontiguousarray(translations), columns,
             )  # fmt: skip
             return columns

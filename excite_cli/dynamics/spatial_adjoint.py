@@ -107,6 +107,15 @@ class SpatialAdjoint:
         self._strict = strict[np.ix_(robot.moved, robot.rows)]
         self._gravity = np.concatenate([-np.asarray(model.gravity.linear), np.zeros(3)])
 
+    @property
+    def _structure(self) -> tuple[Array | Indices, ...]:
+        """The tree as the compiled functions take it."""
+        tree = self._kinematics
+        return (
+            tree.parents, self._dof_body, tree.variable, self._moved, self._rows, self._carried,
+            tree.twists, self._gravity,
+        )  # fmt: skip
+
     def regressor(self, q: Array, v: Array, a: Array, kept: Indices) -> Array:
         """Columns `kept` (r,) of the regressor for the measured rows, (T, R, r); compiled only.
 
@@ -119,11 +128,9 @@ class SpatialAdjoint:
         position[kept] = np.arange(len(kept))
         found = np.zeros((len(q), len(robot.rows), len(kept)))
         KERNELS.call(
-            "regressor", len(q), robot.n_bodies, tree.nv, robot.n, len(robot.rows), tree.parents,
-            self._dof_body, tree.variable, self._moved, self._rows, self._carried, tree.twists,
-            self._gravity, *tree.placements(q), np.ascontiguousarray(v, dtype=float),
-            np.ascontiguousarray(a, dtype=float), position, len(kept),
-            np.empty(12 * tree.nv + 24 * robot.n_bodies), found,
+            "regressor", *self._structure, *tree.placements(q),
+            np.ascontiguousarray(v, dtype=float), np.ascontiguousarray(a, dtype=float), position,
+            found,
         )  # fmt: skip
         return found
 
@@ -150,15 +157,11 @@ class SpatialAdjoint:
         """
         if KERNELS is None:
             return self._pull_back_by_passes(q, v, a, weights)
-        robot, tree = self.robot, self._kinematics
-        samples, n = len(q), robot.n
         states = [np.ascontiguousarray(part, dtype=float) for part in (v, a, weights)]
-        found = np.empty((3, samples, n))
-        work = np.empty(12 * tree.nv + 42 * robot.n_bodies)
+        found = np.empty((3, len(q), self.robot.n))
         KERNELS.call(
-            "pull_back", samples, robot.n_bodies, tree.nv, n, len(robot.rows), tree.parents,
-            self._dof_body, tree.variable, self._moved, self._rows, self._carried, tree.twists,
-            self._gravity, _BY_SPIN, _BY_SPIN_TWICE, *tree.placements(q), *states, work, *found,
+            "pull_back", *self._structure, _BY_SPIN, _BY_SPIN_TWICE,
+            *self._kinematics.placements(q), *states, *found,
         )  # fmt: skip
         return found[0], found[1], found[2]
 

@@ -147,7 +147,7 @@ def squared_per_instant(rows: Rows, weights: Array, samples: int) -> dict[tuple[
             if j >= i:
                 n = left.shape[1]
                 found[i, j] = np.zeros((samples, n, n))
-                KERNELS.call("squared", len(times), n, times, weights, left, right, found[i, j])
+                KERNELS.call("squared", times, weights, left, right, found[i, j])
     return found
 
 

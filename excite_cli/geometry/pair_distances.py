@@ -91,10 +91,8 @@ class PairDistances:
         axes, (rotations, translations) = self._axes, world.placements
         found = np.empty((len(rotations), self.n_pairs))
         KERNELS.call(
-            "distances", len(rotations), rotations.shape[1], len(axes.joints), self.n_pairs,
-            axes.joints, axes.start, axes.along, self._first, self._second, self._radii,
-            self._balls, exact_below, rotations, translations, np.empty(9 * len(axes.joints)),
-            found,
+            "distances", axes.joints, axes.start, axes.along, self._first, self._second,
+            self._radii, self._balls, exact_below, rotations, translations, found,
         )  # fmt: skip
         return found
 
@@ -122,9 +120,8 @@ class PairDistances:
         columns = np.ascontiguousarray(world.columns())
         found = np.empty((len(rows), len(self._moved)))
         KERNELS.call(
-            "gradients", len(rows), rotations.shape[1], columns.shape[1], len(self._moved),
-            axes.joints, axes.start, axes.along, self._first, self._second, self._sign,
-            self._moved, rotations, translations, columns,
+            "gradients", axes.joints, axes.start, axes.along, self._first, self._second,
+            self._sign, self._moved, rotations, translations, columns,
             np.ascontiguousarray(rows, dtype=np.int64), np.ascontiguousarray(cols, dtype=np.int64),
             found,
         )  # fmt: skip

@@ -58,15 +58,13 @@ class PairTable:
         first, second, coefficients = self._knots_and_coefficients
         at = np.ascontiguousarray(self.positions(q), dtype=float)
         found = np.empty((len(at), 3))
-        KERNELS.call(
-            "bicubic", len(at), len(first), len(second), first, second, coefficients, at, found
-        )
+        KERNELS.call("bicubic", first, second, coefficients, at, found)
         return found
 
     @cached_property
     def _knots_and_coefficients(self) -> tuple[Array, Array, Array]:
         first, second, coefficients = (np.ascontiguousarray(part) for part in self._spline.tck)
-        return first, second, coefficients
+        return first, second, coefficients.reshape(len(first) - 4, len(second) - 4)
 
     def holds(self, at: Array) -> NDArray[np.bool_]:
         """Whether positions (T, 2) of the two joints are within the table (T,)."""

@@ -83,7 +83,7 @@ EXPORT void bicubic(index_t count, index_t first_knots, index_t second_knots, co
     }
 }
 
-/* Raised, here and in kernels.py, when a function takes other arguments. */
+/* Raised, here and in library.py, when a function takes other arguments. */
 EXPORT int version(void) { return 2; }
 
 /* setuptools asks for this name on some systems. The library is no module and is never imported: it

@@ -9,50 +9,42 @@ two to ten times slower.
 import ctypes
 import importlib.util
 import os
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.kernels.arguments import CheckedFunction
+from excite_cli.kernels.signatures import SIGNATURES
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_NAMES = (
-    "placements", "axes", "regressor", "pull_back", "distances", "gradients", "squared", "bicubic",
-)  # fmt: skip
 _ASKED = "EXCITE_KERNELS"
 _VERSION = 2  # that of the C files; raise both when a function takes other arguments
 
 
 class Kernels:
-    """The compiled functions; arrays must be C-contiguous float64 and int64."""
+    """The compiled functions, each with the arguments that `signatures.py` declares."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
         if library.version() != _VERSION:
             raise OSError("compiled from another version of the C files")
-        self._functions = {name: getattr(library, name) for name in _NAMES}
-        for function in self._functions.values():
-            function.restype = None
+        self._functions = {
+            name: CheckedFunction(name, getattr(library, name), signature)
+            for name, signature in SIGNATURES.items()
+        }
 
-    def call(self, name: str, *arguments: int | float | Array | Indices) -> None:
-        """Run one function: integers as sizes, floats as doubles, arrays as their first entry.
+    def call(self, name: str, *given: float | Array | Indices) -> None:
+        """Run one function on arrays and numbers; sizes come from the shapes.
 
         Raises
         ------
         TypeError
-            An array is not contiguous, or of another type than float64 and int64.
+            An array is of another type, not contiguous, or read-only where it would be written.
+        ValueError
+            The shapes do not agree, or there are too many arguments or too few.
         """
-        self._functions[name](*[_passed(argument) for argument in arguments])
-
-
-def _passed(argument: int | float | Array | Indices) -> Any:
-    if isinstance(argument, np.ndarray):
-        if not argument.flags.c_contiguous or argument.dtype not in (np.float64, np.int64):
-            raise TypeError(f"a kernel cannot take an array of {argument.dtype} as it lies")
-        return ctypes.c_void_p(argument.ctypes.data)
-    if isinstance(argument, float):
-        return ctypes.c_double(argument)
-    return ctypes.c_int64(argument)
+        self._functions[name](given)
 
 
 def _loaded() -> Kernels | None:

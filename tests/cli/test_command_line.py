@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from importlib.metadata import version
 
 import pytest
 import typer.main
@@ -47,6 +48,14 @@ def test_no_arguments_shows_the_help(excite: Program) -> None:
 
 def test_version(excite: Program) -> None:
     run = excite("--version")
+    assert (run.returncode, run.stdout.strip()) == (0, f"excite {__version__}")
+    assert version("excite-cli") == __version__
+
+
+def test_the_package_runs_as_a_module() -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "excite_cli", "--version"], capture_output=True, text=True, cwd=ROOT
+    )
     assert (run.returncode, run.stdout.strip()) == (0, f"excite {__version__}")
 
 

@@ -1,0 +1,139 @@
+"""What a public project says of itself is true: versions, commands, paths, links."""
+
+import ast
+import os
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from excite_cli import __version__
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+FORMS = [
+    p for p in sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml")) if p.stem != "config"
+]
+# Modules that a workflow installs itself or that are of the tools of development.
+TOOLS = {"pip", "build", "cibuildwheel", "pytest", "venv"}
+
+
+def loaded(path: Path) -> Any:
+    return yaml.safe_load(path.read_text(encoding="utf-8"))
+
+
+def commands(path: Path) -> list[str]:
+    """Everything that a workflow runs."""
+    jobs = loaded(path)["jobs"].values()
+    return [step["run"] for job in jobs for step in job["steps"] if "run" in step]
+
+
+def missing(text: str) -> list[str]:
+    """Targets, modules, scripts and tests that a text names and that there are not."""
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([\w-]+):", makefile, re.MULTILINE))
+    wrong = [
+        f"make {name}" for name in re.findall(r"\bmake ([a-z][\w-]*)", text) if name not in targets
+    ]
+    for name in re.findall(r"python -m ([\w.]+)", text):
+        path = ROOT / Path(*name.split("."))
+        if name not in TOOLS and not path.with_suffix(".py").exists():
+            wrong.append(f"python -m {name}")
+    for name in re.findall(r"(?<![\w/])(\.ci/\w+)", text):
+        if not os.access(ROOT / name, os.X_OK):
+            wrong.append(name)
+    for path, test in re.findall(r"(tests/[\w/]+\.py)(?:::(\w+))?", text):
+        if not (ROOT / path).exists() or f"def {test}" not in (ROOT / path).read_text("utf-8"):
+            wrong.append(f"{path}::{test}")
+    return wrong
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.stem)
+def test_workflows_run_what_there_is(path: Path) -> None:
+    ran = commands(path)
+    assert ran
+    assert missing("\n".join(ran)) == []
+
+
+def test_contributing_names_what_there_is() -> None:
+    assert missing(CONTRIBUTING) == []
+    named = re.findall(r"`((?:excite_cli|tests|docs)/[\w/.]+)`", CONTRIBUTING)
+    named += re.findall(r"\]\((?!https:)([^)]+)\)", CONTRIBUTING)
+    assert len(named) > 15
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_contributing_names_what_members_must_have() -> None:
+    """Names in the recipes are those of the abstract classes."""
+    for heading, path in {
+        "effect": "effects/base.py",
+        "constraint": "constraints/base.py",
+        "criterion": "criteria/base.py",
+        "reader": "measurement/reader.py",
+    }.items():
+        (recipe,) = re.findall(rf"## Add an? {heading}\n1\. (.*)", CONTRIBUTING)
+        text = (ROOT / "excite_cli" / path).read_text(encoding="utf-8")
+        defined = {
+            node.name if isinstance(node, ast.FunctionDef) else ast.unparse(node.target)
+            for node in ast.walk(ast.parse(text))
+            if isinstance(node, ast.FunctionDef | ast.AnnAssign)
+        }
+        required = set(re.findall(r"abstractmethod\n    def (\w+)", text))
+        words = set(re.findall(r"`(\w+)`", recipe.partition(":")[2]))
+        assert required <= words <= defined | {"RawRun"}, heading
+
+
+def test_what_is_missing_is_noticed() -> None:
+    text = "make nothing; python -m docs.none; .ci/none; tests/criteria/test_criteria.py::test_none"
+    assert len(missing(text)) == 4
+
+
+def test_pythons_agree() -> None:
+    """Classifiers, tests and wheels name the same versions."""
+    prefix = "Programming Language :: Python :: 3."
+    listed = [c for c in PROJECT["project"]["classifiers"] if c.startswith(prefix)]
+    pythons = [name.rpartition(" ")[2] for name in listed]
+    tested = loaded(ROOT / ".github/workflows/test.yml")["jobs"]["test"]["strategy"]["matrix"]
+    assert tested["python"] == pythons
+    built = PROJECT["tool"]["cibuildwheel"]["build"].split()
+    assert built == [f"cp{name.replace('.', '')}-*" for name in pythons]
+    assert PROJECT["project"]["requires-python"] == f">={pythons[0]}"
+
+
+def test_there_is_one_version() -> None:
+    assert PROJECT["project"]["dynamic"] == ["version"]
+    assert PROJECT["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "excite_cli.__version__"}
+    assert loaded(ROOT / "CITATION.cff")["version"] == __version__
+    assert f"\n## {__version__}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_there_is_one_home() -> None:
+    home = PROJECT["project"]["urls"]["Homepage"]
+    assert all(url.startswith(home) for url in PROJECT["project"]["urls"].values())
+    assert loaded(ROOT / "CITATION.cff")["repository-code"] == home
+    assert f"git clone {home}\n" in CONTRIBUTING
+
+
+@pytest.mark.parametrize("path", FORMS, ids=lambda path: path.stem)
+def test_issue_forms_ask(path: Path) -> None:
+    form = loaded(path)
+    assert form["name"]
+    assert form["description"]
+    asked = [part["id"] for part in form["body"]]
+    assert len(set(asked)) == len(asked) >= 2
+    assert any(part.get("validations", {}).get("required") for part in form["body"])
+
+
+def test_hooks_are_the_tools_of_lint() -> None:
+    (local,) = loaded(ROOT / ".pre-commit-config.yaml")["repos"]
+    assert local["repo"] == "local"
+    programs = {hook["entry"].split()[0].removeprefix(".venv/bin/") for hook in local["hooks"]}
+    (lint,) = re.findall(
+        r"^lint: .*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE
+    )
+    assert programs == set(re.findall(r"\$\(BIN\)/([\w-]+)", lint))
