@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
-.PHONY: install run plan loop test lint lock audit docs bench peers trust battery robots clean
+.PHONY: install run plan loop test lint lock audit docs bench peers real trust battery robots clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
 
@@ -58,6 +58,9 @@ trust: $(STAMP)          ## broken and hostile files, kills, full disks, determi
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.kill --kills 500
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.disk
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.determinism
+
+real: $(STAMP)           ## logs of four real robots, into the README's table (five minutes)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.real_robots --markdown README.md
 
 battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about 20 minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.diagnosis_battery --cases 130 --seed 11001

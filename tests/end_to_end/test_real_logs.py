@@ -14,7 +14,7 @@ DATA = ROOT / "data"
 
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Runs `excite diagnose --json` on a log with the config beside it, which names the URDF only."""
+    """Runs `excite diagnose --json` on a log with the config beside it: the URDF alone."""
     folder = tmp_path_factory.mktemp("logs")
     program = Installed(folder, folder / "cache")
     known: dict[tuple[str, ...], Any] = {}
