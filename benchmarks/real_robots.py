@@ -153,12 +153,13 @@ def kr300(answers: Sequence[Answer]) -> str:
 
 def kr300_cad(answers: Sequence[Answer]) -> str:
     """The spring over the three splits, and the armatures of the data sheet."""
-    stiffness = [answer.value("spring", "stiffness", "axis_2") / 1e3 for answer in answers]
+    stiffness = sorted(answer.value("spring", "stiffness", "axis_2") / 1e3 for answer in answers)
+    spread = " to ".join(dict.fromkeys(f"{each:.1f}" for each in (stiffness[0], stiffness[-1])))
     sheet = {"axis_2": 844.0, "axis_3": 751.0}
     worst = max(abs(answer.value("armature", "inertia", axis) / value - 1)
                 for answer in answers for axis, value in sheet.items())  # fmt: skip
     return (
-        f"the hydraulic spring of axis_2, {min(stiffness):.1f} to {max(stiffness):.1f} kN·m/rad "
+        f"the hydraulic spring of axis_2, {spread} kN·m/rad "
         f"over the {len(answers)} splits (about 7 known); armatures of {told(list(sheet))} within "
         f"{percent(worst)} of the data sheet"
     )
