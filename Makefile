@@ -59,7 +59,7 @@ trust: $(STAMP)          ## broken and hostile files, kills, full disks, determi
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.disk
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.determinism
 
-real: $(STAMP)           ## logs of four real robots, into the README's table (five minutes)
+real: $(STAMP)           ## logs of four real robots, into the table of the README (three minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.real_robots --markdown README.md
 
 battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about 20 minutes)

@@ -1,11 +1,11 @@
 """Real robots, from the URDF alone: what a diagnosis finds, and the error before and after.
 
-    python -m benchmarks.real_robots [--log tx40 …] [--markdown README.md]
+    python -m benchmarks.real_robots [--log tx40 … | --markdown README.md]
 
 Runs `excite diagnose` on the logs of `data/`, whose configs declare no effect, and prints the table
 of the README; `--markdown` puts it between the marks of that page. Errors are relative, of the
 torque on data that the fit never saw, mean over joints, where joints move. Published and data-sheet
-values are those of the logs' authors. Three to ten minutes.
+values are those of the logs' authors. Three minutes of processor time.
 """
 
 import argparse
@@ -68,6 +68,8 @@ def main() -> None:
     parser.add_argument("--log", nargs="+", choices=sorted({log.folder for log in LOGS}))
     parser.add_argument("--markdown", type=Path, help="put the table between the marks there")
     arguments = parser.parse_args()
+    if arguments.log and arguments.markdown:
+        parser.error("--markdown takes the whole table: leave --log out")
     rows = []
     for log in LOGS:
         if not arguments.log or log.folder in arguments.log:
