@@ -200,5 +200,6 @@ def _text(number: int) -> TextIO:
 def _flush() -> None:
     """What Python and C have not written yet."""
     for stream in (sys.stdout, sys.stderr):
-        stream.flush()
+        if stream is not None and not stream.closed:
+            stream.flush()
     ctypes.CDLL(None).fflush(None)
