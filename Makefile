@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
 .PHONY: install run plan loop test sanitize lint lock floors audit docs bench peers trust battery
-.PHONY: robots clean
+.PHONY: robots real clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
 
@@ -62,6 +62,9 @@ trust: $(STAMP)          ## broken and hostile files, kills, full disks, determi
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.kill --kills 500
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.disk
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.determinism
+
+real: $(STAMP)           ## logs of four real robots, into the table of the README (three minutes)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.real_robots --markdown README.md
 
 battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about 20 minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.diagnosis_battery --cases 130 --seed 11001

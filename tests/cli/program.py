@@ -1,4 +1,9 @@
-"""The installed program, run as a user runs it."""
+"""The program as a user runs it: its command line, in this process or installed in one of its own.
+
+Most tests look at what a command says and writes; starting Python and importing everything anew
+would take most of their time. `Program` calls the entry point of the console script instead, as
+`this_process.call` says; `Installed` starts the installed script.
+"""
 
 import json
 import os
@@ -8,10 +13,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tests.cli.this_process import call
+
 ROOT = Path(__file__).resolve().parents[2]
 SMOKE = ROOT / "configs" / "smoke.yaml"
 # A few iterations only: what is tested here is the program, not how good the motions get.
 BRIEF = ("--set", "optimizer.max_iterations=12")
+_PATIENCE = 300.0  # s; for what hangs, on a busy machine too
 
 _found = shutil.which("excite", path=f"{Path(sys.executable).parent}{os.pathsep}{os.defpath}")
 EXCITE = (
@@ -32,19 +40,10 @@ class Program:
         self.folder, self.cache = folder, cache
 
     def __call__(self, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [*EXCITE, *map(str, arguments)],
-            cwd=self.folder,
-            env=environment(self.cache),
-            capture_output=True,
-            text=True,
-            stdin=subprocess.DEVNULL,
-            timeout=120,
-            check=False,
-        )
+        return call([*map(str, arguments)], self.folder, environment(self.cache), _PATIENCE)
 
     def start(self, *arguments: str | Path) -> subprocess.Popen[str]:
-        """As a call, without waiting for the end."""
+        """As a call, but in a process of its own and without waiting for its end."""
         return subprocess.Popen(
             [*EXCITE, *map(str, arguments)],
             cwd=self.folder,
@@ -60,3 +59,19 @@ class Program:
         run = self(*arguments, "--json")
         assert run.returncode == 0, run.stderr
         return json.loads(run.stdout)
+
+
+class Installed(Program):
+    """The same, with the installed script in a process of its own for every call."""
+
+    def __call__(self, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*EXCITE, *map(str, arguments)],
+            cwd=self.folder,
+            env=environment(self.cache),
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            timeout=_PATIENCE,
+            check=False,
+        )

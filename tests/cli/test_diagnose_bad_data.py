@@ -23,9 +23,8 @@ from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.fourier import FourierTrajectory
-from tests.cli.program import SMOKE, Program
+from tests.cli.program import ROOT, SMOKE, Program
 
-LOGS = Path(__file__).resolve().parents[3] / "shared" / "data"
 NAMES = ("shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide")
 Damage = Callable[[Run], Run]
 
@@ -216,9 +215,7 @@ def test_a_bag_cut_short(excite: Program, config: Path) -> None:
 
 
 def test_a_real_bag_cut_short(excite: Program) -> None:
-    folder = LOGS / "ur10_cb"
-    if not folder.is_dir():
-        pytest.skip(f"no real logs at {LOGS}")
+    folder = ROOT / "data" / "ur10_cb"
     whole = (folder / "ur10_exciting_trajectory.db3").read_bytes()
     (excite.folder / "cut.db3").write_bytes(whole[: len(whole) // 2])
     problem = {"robot": {"urdf": str(folder / "ur10.urdf")}}

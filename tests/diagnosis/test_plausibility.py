@@ -21,7 +21,7 @@ from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.simulation.planted import Planted, plant
 from tests.simulation.arms import arm, played
 
-LOGS = Path(__file__).resolve().parents[3] / "shared" / "data"
+LOGS = Path(__file__).resolve().parents[2] / "data"
 URDFS = {"kr300": "kr300.urdf", "tx40": "tx40_mdh_modified.urdf", "ur10_cb": "ur10.urdf"}
 SPEC: Spec = load_spec(Path(__file__).resolve().parents[2] / "configs" / "ur10.yaml")
 SIZES = [10.0, 15.0, 8.0, 3.0, 2.0, 1.0]  # N·m of dry friction
@@ -133,7 +133,6 @@ def test_a_wrist_without_friction_cannot_be_judged_and_nothing_wrong_is_said(
     assert message == "" or "torque of wrist_3_joint counts the other way" in message
 
 
-@pytest.mark.skipif(not LOGS.is_dir(), reason=f"no real logs at {LOGS}")
 @pytest.mark.parametrize("name", URDFS)
 def test_real_logs(name: str) -> None:
     robot = build_robot(RobotSpec(urdf=str(LOGS / name / URDFS[name])))

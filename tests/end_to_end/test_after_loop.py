@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tests.cli.program import SMOKE, Program
+from tests.cli.program import SMOKE, Installed
 
 BRIEF = ("--set", "optimizer.restarts=1", "--set", "optimizer.max_iterations=60")
 SLOW = ("--set", "constraints.joint_limits.scale=0.15")
@@ -19,7 +19,9 @@ def names(effects: list[dict]) -> list[tuple[str, list[str]]]:
     return [(effect["kind"], effect["joints"]) for effect in effects]
 
 
-def test_the_next_motion_settles_what_the_first_left_open(excite: Program, tmp_path: Path) -> None:
+def test_the_next_motion_settles_what_the_first_left_open(
+    excite: Installed, tmp_path: Path
+) -> None:
     excite.answer("optimize", SMOKE, "-o", "slow.h5", "--motions", "1", *BRIEF, *SLOW)
     excite.answer("simulate", SMOKE, "slow.h5", "-o", "first.h5", "--repeat", "3", *ROBOT)
     first = excite.answer("diagnose", SMOKE, "first.h5", "-o", "diagnosis.h5")

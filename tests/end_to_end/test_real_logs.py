@@ -3,32 +3,26 @@
 Figures are those of the logs' authors: data sheets, publications, and fits with the effects known.
 """
 
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.cli.program import Program
+from tests.cli.program import ROOT, Installed
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
-pytestmark = pytest.mark.skipif(
-    not DATA.is_dir(), reason=f"the real logs are not here: {DATA} does not exist"
-)
-URDF = {"kr300": "kr300.urdf", "tx40": "tx40_mdh_modified.urdf", "ur10_cb": "ur10.urdf"}
+DATA = ROOT / "data"
 
 
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Runs `excite diagnose --json` on a log with a config that names the URDF only."""
+    """Runs `excite diagnose --json` on a log with the config beside it: the URDF alone."""
     folder = tmp_path_factory.mktemp("logs")
-    program = Program(folder, folder / "cache")
+    program = Installed(folder, folder / "cache")
     known: dict[tuple[str, ...], Any] = {}
 
     def run(robot: str, file: str, *options: str) -> Any:
         key = (robot, file, *options)
         if key not in known:
-            config = folder / f"{robot}.yaml"
-            config.write_text(f"robot: {{urdf: {DATA / robot / URDF[robot]}}}\n", encoding="utf-8")
+            config = DATA / robot / f"{robot}.yaml"
             known[key] = program.answer("diagnose", config, DATA / robot / file, *options)
         return known[key]
 

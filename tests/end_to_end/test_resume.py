@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from excite_cli.store.result_file import read_result
-from tests.cli.program import SMOKE, Program
+from tests.cli.program import SMOKE, Installed
 
 ASKED = ("optimize", SMOKE, "--motions", "3", "--set", "optimizer.max_iterations=40")
 
@@ -19,7 +19,7 @@ ASKED = ("optimize", SMOKE, "--motions", "3", "--set", "optimizer.max_iterations
 def whole(tmp_path_factory: pytest.TempPathFactory, cache: Path) -> Path:
     """Three motions in one go."""
     folder = tmp_path_factory.mktemp("whole")
-    run = Program(folder, cache)(*ASKED, "-o", "whole.h5")
+    run = Installed(folder, cache)(*ASKED, "-o", "whole.h5")
     assert run.returncode == 0, run.stderr
     return folder / "whole.h5"
 
@@ -55,7 +55,7 @@ def assert_same_numbers(first: Path, second: Path) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=["killed", "ctrl-c"])
 def test_an_interrupted_run_goes_on_to_the_same_numbers(
-    excite: Program, whole: Path, number: signal.Signals
+    excite: Installed, whole: Path, number: signal.Signals
 ) -> None:
     path = excite.folder / "cut.h5"
     process = excite.start(*ASKED, "-o", path)
@@ -76,7 +76,7 @@ def test_an_interrupted_run_goes_on_to_the_same_numbers(
     assert_same_numbers(path, whole)
 
 
-def test_a_finished_run_has_nothing_to_go_on_with(excite: Program, whole: Path) -> None:
+def test_a_finished_run_has_nothing_to_go_on_with(excite: Installed, whole: Path) -> None:
     path = excite.folder / "done.h5"
     path.write_bytes(whole.read_bytes())
     answer = excite.answer(*ASKED, "-o", path, "--resume")
@@ -92,7 +92,7 @@ def test_a_finished_run_has_nothing_to_go_on_with(excite: Program, whole: Path) 
     ],
 )
 def test_another_config_is_refused_by_the_name_of_what_differs(
-    excite: Program, whole: Path, change: tuple[str, ...], section: str
+    excite: Installed, whole: Path, change: tuple[str, ...], section: str
 ) -> None:
     path = excite.folder / "cut.h5"
     path.write_bytes(whole.read_bytes())
@@ -102,7 +102,7 @@ def test_another_config_is_refused_by_the_name_of_what_differs(
     assert path.read_bytes() == whole.read_bytes()
 
 
-def test_a_prior_that_the_file_was_not_made_with_is_refused(excite: Program, whole: Path) -> None:
+def test_a_prior_that_the_file_was_not_made_with_is_refused(excite: Installed, whole: Path) -> None:
     """It is not in the stored stack, so to go on without a word would be to ignore it."""
     path = excite.folder / "cut.h5"
     path.write_bytes(whole.read_bytes())

@@ -152,6 +152,22 @@ def test_an_invalid_sample_touches_no_row_that_is_used() -> None:
     assert np.count_nonzero(~spoilt.usable) < 1.3 * np.count_nonzero(~clean.usable) + 20
 
 
+def test_what_sticks_around_a_reversal_counts_in_no_fit() -> None:
+    """Also without a filter of the positions, which smears reversals and widens what is left out:
+    15 ms around a reversal the friction may be anything."""
+    t = np.arange(0, 10, 1e-3)
+    v = np.where(np.sin(2 * np.pi * 0.3 * t + 0.4) >= 0, 0.5, -0.5)
+    reversals = t[1:][np.diff(v) != 0]
+    near = np.abs(t[:, None] - reversals).min(axis=1) < 0.015
+    tau = np.where(near, 1000.0, np.sign(v))
+    run = Run("r", t, np.cumsum(v)[:, None] * 1e-3, tau[:, None], dq=v[:, None])
+    found = ready(run, position="none", velocity="measured")
+    assert len(reversals) == 6
+    assert np.abs(found.tau).max() > 10
+    assert found.usable.mean() > 0.9
+    assert np.abs(found.tau_fit[found.usable]).max() < 1 + 1e-9
+
+
 def test_a_standstill_is_not_usable_and_a_reversal_hardly() -> None:
     run = recorded(encoder=0.0)
     stop = (run.t > 4) & (run.t < 6)

@@ -1,4 +1,4 @@
-"""Logs of three real robots: no error is found in them, and what is known of them comes out."""
+"""Logs of real robots: no error is found in them, and what is known of them comes out."""
 
 import gzip
 import xml.etree.ElementTree as ElementTree
@@ -15,8 +15,7 @@ from excite_cli.measurement.channel_order import speed_lag
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.quality import raise_for_errors
 
-LOGS = Path(__file__).resolve().parents[3] / "shared" / "data"
-pytestmark = pytest.mark.skipif(not LOGS.is_dir(), reason=f"no real logs at {LOGS}")
+LOGS = Path(__file__).resolve().parents[2] / "data"
 ROBOTS = {
     "kr300": ("kr300.h5", "kr300.urdf"),
     "tx40": ("tx40.h5", "tx40_mdh_modified.urdf"),

@@ -12,7 +12,7 @@ import typer
 
 from excite_cli.cli.app import app
 from excite_cli.cli.console import run_guarded
-from tests.cli.program import EXCITE, SMOKE, Program, environment
+from tests.cli.program import EXCITE, SMOKE, Installed, environment
 
 LONG = ("optimize", SMOKE, "--motions", "9", "--set", "optimizer.max_iterations=300")
 
@@ -23,11 +23,11 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def excite(tmp_path: Path, cache: Path) -> Program:
-    return Program(tmp_path, cache)
+def excite(tmp_path: Path, cache: Path) -> Installed:
+    return Installed(tmp_path, cache)
 
 
-def test_two_runs_on_one_output_and_a_stop(excite: Program) -> None:
+def test_two_runs_on_one_output_and_a_stop(excite: Installed) -> None:
     first = excite.start(*LONG, "-o", "out.h5")
     until = time.monotonic() + 60.0
     while not (excite.folder / ".out.h5.lock").exists():
@@ -86,7 +86,7 @@ def test_a_full_disk_under_stdout_is_told(cache: Path) -> None:
     assert run.stderr.count("\n") == 1
 
 
-def test_a_file_that_outgrows_its_limit_leaves_the_old_one(excite: Program) -> None:
+def test_a_file_that_outgrows_its_limit_leaves_the_old_one(excite: Installed) -> None:
     (excite.folder / "s.json").write_text("old")
     limited = ["bash", "-c", f'trap "" XFSZ; ulimit -f 8; exec {EXCITE[0]} "$@"', "excite"]
     run = subprocess.run(

@@ -1,0 +1,241 @@
+"""Real robots, from the URDF alone: what a diagnosis finds, and the error before and after.
+
+    python -m benchmarks.real_robots [--log tx40 … | --markdown README.md]
+
+Runs `excite diagnose` on the logs of `data/`, whose configs declare no effect, and prints the table
+of the README; `--markdown` puts it between the marks of that page. Errors are relative, of the
+torque on data that the fit never saw, mean over joints, where joints move. Published and data-sheet
+values are those of the logs' authors. Three minutes of processor time.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from excite_cli.atomic import write_text_atomically
+
+DATA = Path(__file__).parents[1] / "data"
+BEGIN, END = "<!-- real robots: written by benchmarks.real_robots -->", "<!-- real robots: end -->"
+HEADS = ("log", "before", "after", "what was found")
+_PROGRAM = "from excite_cli.cli.app import main; main()"
+_CAD = ("--set", "identification.inertias=cad")
+_FRICTION = ("viscous_friction", "coulomb_friction")
+
+
+class Answer:
+    """What `excite diagnose --json` says."""
+
+    def __init__(self, content: dict[str, Any]) -> None:
+        self.content = content
+
+    def joints(self, kind: str) -> list[str]:
+        """Where effects of a kind were found, in the robot's order."""
+        found = {"–".join(e["joints"]) for e in self.content["effects"] if e["kind"] == kind}
+        order = list(self.content["error"]["after"]["relative_moving"])
+        return sorted(found, key=lambda name: order.index(name.split("–")[0]))
+
+    def value(self, kind: str, parameter: str, *joints: str) -> float:
+        """A parameter of an effect; not a number where the effect was not found."""
+        for effect in self.content["effects"]:
+            if effect["kind"] == kind and effect["joints"] == list(joints):
+                return float(effect["parameters"][parameter]["value"])
+        return float("nan")
+
+    def error(self, when: str) -> float:
+        """Mean over the joints, `before` or `after`."""
+        return float(self.content["error"][when]["mean_relative_moving"])
+
+
+@dataclass(frozen=True)
+class Log:
+    """A recording, how it is diagnosed, and what is told of the answers; the first gives errors."""
+
+    words: str
+    folder: str
+    file: str
+    found: Callable[[Sequence[Answer]], str]
+    runs: tuple[tuple[str, ...], ...] = ((),)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--log", nargs="+", choices=sorted({log.folder for log in LOGS}))
+    parser.add_argument("--markdown", type=Path, help="put the table between the marks there")
+    arguments = parser.parse_args()
+    if arguments.log and arguments.markdown:
+        parser.error("--markdown takes the whole table: leave --log out")
+    rows = []
+    for log in LOGS:
+        if not arguments.log or log.folder in arguments.log:
+            answers = [diagnosed(log, options) for options in log.runs]
+            rows.append(row(log, answers))
+            print(line(rows[-1]), flush=True)
+    if arguments.markdown is not None:
+        page = arguments.markdown.read_text(encoding="utf-8")
+        write_text_atomically(arguments.markdown, placed(page, table(rows)))
+
+
+def diagnosed(log: Log, options: Sequence[str]) -> Answer:
+    """The answer of `excite diagnose`, by the program in a process of its own."""
+    folder = DATA / log.folder
+    asked = ["diagnose", folder / f"{log.folder}.yaml", folder / log.file, *options]
+    run = subprocess.run(
+        [sys.executable, "-c", _PROGRAM, *map(str, asked), "--json", "--no-progress"],
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if run.returncode:
+        raise SystemExit(f"{log.words}: {run.stderr}")
+    return Answer(json.loads(run.stdout))
+
+
+def row(log: Log, answers: Sequence[Answer]) -> tuple[str, ...]:
+    """Cells of the table."""
+    first = answers[0]
+    return (log.words, percent(first.error("before")), percent(first.error("after")),
+            log.found(answers))  # fmt: skip
+
+
+def tx40(answers: Sequence[Answer]) -> str:
+    """Beside the published friction of every joint and of the wrist's coupled motors."""
+    (answer,) = answers
+    published = [
+        *(("viscous_friction", "viscous", f"joint_{j}", value)
+          for j, value in enumerate((8.05, 5.53, 1.97, 1.11, 1.86, 0.65), 1)),
+        *(("coulomb_friction", "coulomb", f"joint_{j}", value)
+          for j, value in enumerate((7.14, 8.26, 6.34, 2.48, 3.03, 0.28), 1)),
+        *(("coupled_friction", name, "joint_5 joint_6", value)
+          for name, value in (("viscous", 0.616), ("coulomb", 1.95))),
+    ]  # fmt: skip
+    deviations = {
+        (kind, name, joints): abs(answer.value(kind, name, *joints.split()) / value - 1)
+        for kind, name, joints, value in published
+    }
+    far = [f"{name} of {joints}: {percent(deviation)} off"
+           for (_, name, joints), deviation in deviations.items()
+           if not deviation <= 0.1]  # fmt: skip
+    rest = f" ({', '.join(far)})" if far else ""
+    return (
+        f"{friction(answer)}; coupled friction of {told(answer.joints('coupled_friction'))}; "
+        f"{len(published) - len(far)} of {len(published)} published friction values within 10 %"
+        f"{rest}"
+    )
+
+
+def ur10(answers: Sequence[Answer]) -> str:
+    """Offsets, friction that saturates, friction that grows with load."""
+    (answer,) = answers
+    return (
+        f"{friction(answer)}; torque offset of {told(answer.joints('torque_offset'))}; friction "
+        f"concave in speed on {told(answer.joints('nonlinear_viscous_friction'))}; "
+        f"load-dependent on {told(answer.joints('load_dependent_friction'))}"
+    )
+
+
+def kr300(answers: Sequence[Answer]) -> str:
+    """All inertias free: what takes the spring's place is told."""
+    (answer,) = answers
+    by = [each["by"] for each in answer.content["absorbed"]
+          if each["kind"] == "spring" and each["joints"] == ["axis_2"]]  # fmt: skip
+    offsets = answer.joints("torque_offset")
+    return (
+        f"{friction(answer)}; armature of {told(answer.joints('armature'))}; "
+        f"{'offset of ' + told(offsets) if offsets else 'no offset'}; a spring on axis_2 "
+        + (f"would be absorbed by {told(by[0])}" if by else "is not said to be absorbed")
+    )
+
+
+def kr300_cad(answers: Sequence[Answer]) -> str:
+    """The spring over the three splits, and the armatures of the data sheet."""
+    stiffness = sorted(answer.value("spring", "stiffness", "axis_2") / 1e3 for answer in answers)
+    spread = " to ".join(dict.fromkeys(f"{each:.1f}" for each in (stiffness[0], stiffness[-1])))
+    sheet = {"axis_2": 844.0, "axis_3": 751.0}
+    worst = max(abs(answer.value("armature", "inertia", axis) / value - 1)
+                for answer in answers for axis, value in sheet.items())  # fmt: skip
+    return (
+        f"the hydraulic spring of axis_2, {spread} kN·m/rad "
+        f"over the {len(answers)} splits (about 7 known); armatures of {told(list(sheet))} within "
+        f"{percent(worst)} of the data sheet"
+    )
+
+
+def tiago(answers: Sequence[Answer]) -> str:
+    """What is named, what is left open, and the joints whose torque constants are known."""
+    (answer,) = answers
+    errors = answer.content["error"]["after"]["relative_moving"]
+    known = {joint: percent(errors[joint]) for joint in (f"arm_{j}_joint" for j in (2, 3, 4))}
+    named = [f"{each['kind'].replace('_', ' ')} of {told(each['joints'])}"
+             for each in answer.content["effects"]]  # fmt: skip
+    unexplained = [each["joint"] for each in answer.content["unexplained"]]
+    return (
+        f"{told(named)}; residuals of {told(unexplained)} told as unexplained. "
+        f"{told(list(known))}, whose torque constants are known, stay at "
+        f"{told(list(known.values()))}"
+    )
+
+
+LOGS = (
+    Log("Stäubli TX40, 9 s, every third second sealed", "tx40", "tx40.h5", tx40),
+    Log("UR10 (CB3), 27 s, from the rosbag", "ur10_cb", "ur10_exciting_trajectory.db3", ur10),
+    Log("KUKA KR300, run C sealed, inertias free", "kr300", "kr300.h5", kr300,
+        (("--sealed", "C"),)),
+    Log("the same, inertias kept at CAD within 10 %", "kr300", "kr300.h5", kr300_cad,
+        tuple(("--sealed", run, *_CAD) for run in "CBA")),
+    Log("TIAGo, torso and arm, 80 s, currents with assumed constants", "tiago", "tiago.h5", tiago),
+)  # fmt: skip
+
+
+def friction(answer: Answer) -> str:
+    """Where viscous and Coulomb friction were found."""
+    everywhere = list(answer.content["error"]["after"]["relative_moving"])
+    both = [joint for joint in everywhere
+            if all(joint in answer.joints(kind) for kind in _FRICTION)]  # fmt: skip
+    return f"friction on {'all joints' if both == everywhere else told(both)}"
+
+
+def told(names: Sequence[str]) -> str:
+    """`a, b and c`; `none`."""
+    if not names:
+        return "none"
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def percent(value: float) -> str:
+    """`94 %`, `8.8 %`."""
+    return f"{100 * value:.0f} %" if value >= 0.0995 else f"{100 * value:.1f} %"
+
+
+def line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """The rows under their heads, in Markdown."""
+    return "\n".join(line(each) for each in [HEADS, ["---"] * len(HEADS), *rows])
+
+
+def placed(page: str, content: str) -> str:
+    """`page` with `content` between the two marks.
+
+    Raises
+    ------
+    ValueError
+        The page lacks the marks.
+    """
+    before, _, rest = page.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not end:
+        raise ValueError(f"the page lacks {BEGIN} … {END}")
+    return f"{before}{BEGIN}\n{content}\n{END}{after}"
+
+
+if __name__ == "__main__":
+    main()
