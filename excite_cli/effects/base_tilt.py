@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
@@ -42,6 +41,8 @@ class BaseTilt(Effect):
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
     ) -> None:
         """Gravity as the turned base sees it, R(δ)ᵀ g."""
+        from scipy.spatial.transform import Rotation  # slow to import; only a simulation needs it
+
         turned = Rotation.from_rotvec(values @ _axes(robot.robot)).inv()
         robot.gravity = turned.apply(robot.gravity)
 

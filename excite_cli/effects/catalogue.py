@@ -68,7 +68,8 @@ def catalogue() -> Mapping[str, type[Effect]]:
     Raises
     ------
     ConfigError
-        An effect of a package cannot be loaded, is none, or takes a name that exists.
+        An effect of a package cannot be loaded, is none, takes a name that exists, or states
+        something about a kind that does not.
     """
     kinds = {effect.kind: effect for effect in _OURS}
     for point in entry_points(group=GROUP):
@@ -83,7 +84,20 @@ def catalogue() -> Mapping[str, type[Effect]]:
         if found.kind in kinds:
             raise ConfigError(f"effect '{found.kind}' ({point.value}): there is one of this name.")
         kinds[found.kind] = found
+    for kind in kinds.values():
+        _require_known(kind, kinds)
     return kinds
+
+
+def _require_known(kind: type[Effect], kinds: Mapping[str, type[Effect]]) -> None:
+    """Raise ConfigError if a trait of `kind` names a kind that there is not."""
+    for trait in ("refines", "excludes", "same_as", "deviates_from"):
+        for name in getattr(kind, trait):
+            if name not in kinds:
+                raise ConfigError(
+                    f"effect '{kind.kind}': {trait} names '{name}', which there is not."
+                    f"{nearest(name, kinds)} Effects: {', '.join(kinds)}."
+                )
 
 
 def kind_named(name: str, where: str = "effects") -> type[Effect]:

@@ -10,11 +10,15 @@ from excite_cli.diagnosis.possible_sizes import possible_sizes
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 
-NONNEGATIVE = sorted(
-    name
-    for name, kind in catalogue().items()
-    if len(kind.parameters) == 1 and kind.parameters[0].nonnegative
-)
+NONNEGATIVE = (
+    "viscous_friction", "coulomb_friction", "nonlinear_viscous_friction", "stribeck_friction",
+    "load_dependent_friction", "armature", "elasticity",
+)  # fmt: skip
+# Of those with several parameters, which cannot be negative.
+SOME_NONNEGATIVE = {
+    "asymmetric_friction": (0, 1), "coupled_friction": (0, 1), "spring": (0,),
+    "payload": (0, 4, 6, 9), "ripple": (), "cable_force": (), "friction_drift": (), "contact": (),
+}  # fmt: skip
 WHOLE = ("torque_saturation", "backlash")
 # Candidates of 1, 2, 10, 1 and 3 columns, and values with which each is possible.
 MIXED = ("viscous_friction", "coupled_friction", "payload", "encoder_offset", "cable_force")
@@ -33,12 +37,21 @@ def possible(
     return allowed(np.array([-1.0, -1e9, 7.0, *values]), [0], [0])
 
 
-@pytest.mark.parametrize("kind", [k for k in NONNEGATIVE if k not in WHOLE])
+@pytest.mark.parametrize("kind", NONNEGATIVE)
 def test_friction_and_inertia_are_never_negative(kind: str) -> None:
     assert possible(kind, 1e-9)
     assert possible(kind, 0.0)
     assert possible(kind, 1e9)  # how large depends on the robot
     assert not possible(kind, -1e-9)
+
+
+@pytest.mark.parametrize("kind", SOME_NONNEGATIVE)
+def test_of_several_parameters_those_that_are_sizes_are_never_negative(kind: str) -> None:
+    width = len(catalogue()[kind].parameters)
+    for at in range(width):
+        values = np.ones(width)
+        values[at] = -1.0
+        assert possible(kind, *values) == (at not in SOME_NONNEGATIVE[kind])
 
 
 def test_one_negative_parameter_of_several_is_enough() -> None:

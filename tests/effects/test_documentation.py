@@ -114,6 +114,13 @@ def test_example_is_a_kind_of_the_catalogue_once_installed(
             "broken_effects:Thing",
             "effect 'spring' .*: there is one of this name",
         ),
+        (
+            "from excite_cli.effects.spring import Spring\n"
+            "class Thing(Spring):\n    kind = 'mine'\n    refines = ('coulom_friction',)\n",
+            "broken_effects:Thing",
+            "effect 'mine': refines names 'coulom_friction', which there is not. "
+            "Did you mean 'coulomb_friction'",
+        ),
     ],
 )
 def test_effect_that_cannot_be_used_is_named(
