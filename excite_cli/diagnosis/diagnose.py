@@ -34,11 +34,12 @@ from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
+from excite_cli.identification.declared_runs import check_declared_runs
 from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
-from excite_cli.identification.split import Split, run_name, split
+from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.robot.model import Array, Robot
@@ -67,6 +68,7 @@ def diagnose(
         The data cannot be what the configuration says (joint order, signs), or are too short.
     """
     started = time.monotonic()
+    check_declared_runs(spec.effects, dataset)
     model = _model(robot, base, spec)
     parts = split(dataset, sealed, spec.diagnosis.block)
     processing = choose_processing(
@@ -79,8 +81,7 @@ def diagnose(
 
     training = prepared(())
     check_plausibility(robot, training)
-    names = [run.name for run in dataset.runs]
-    traced = trace(model, spec.diagnosis, prepared, parts.folds, names, progress)
+    traced = trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
     progress("naming", 8)
     parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
     covariance = covariance_of(
@@ -121,7 +122,7 @@ def diagnose(
             *_assumed(traced, parts),
             *(floor.noticed(robot.joint_names) if floor else ()),
         ),
-        processing=_choices(processing, traced, training),
+        processing=_choices(processing, traced, parts, training),
         phi=model.full_inertias(parameters),
         base_values=base_values,
         base_std=base_std,
@@ -267,17 +268,17 @@ def _information(model: Model, traced: Traced, rivals: list[tuple[Alias, Array]]
 
 def _assumed(traced: Traced, parts: Split) -> list[Finding]:
     """Effects of single runs leave open whether the sealed one has them: say what was assumed."""
-    names = {run_name(run.name) for run in parts.sealed}
+    names = ", ".join(sorted({run.id.key for run in parts.sealed}))
     found = []
     for effect in traced.effects:
         if effect.runs:
-            there = "is" if names & set(effect.runs) else "is not"
+            there = "is" if any(effect.active(run.id) for run in parts.sealed) else "is not"
             found.append(
                 Finding(
                     "assumed",
                     "warning",
                     f"{effect.kind} was found in {', '.join(effect.runs)}; for the error it is "
-                    f"assumed that it {there} in the sealed {', '.join(sorted(names))}. If you "
+                    f"assumed that it {there} in the sealed {names}. If you "
                     "know better, declare it under effects with its runs.",
                 )
             )
@@ -285,7 +286,7 @@ def _assumed(traced: Traced, parts: Split) -> list[Finding]:
 
 
 def _choices(
-    processing: Processing, traced: Traced, training: Sequence[PreparedRun]
+    processing: Processing, traced: Traced, parts: Split, training: Sequence[PreparedRun]
 ) -> dict[str, Any]:
     """Every choice that was made, for the result."""
     valid = np.concatenate([run.valid for run in training])
@@ -296,7 +297,7 @@ def _choices(
         "invalid_share": [float(x) for x in (~valid).mean(axis=0)],
         "noise_orders": [len(c) for c in traced.noise.coefficients],
         "noise_rms": [float(x) for x in traced.levels],
-        "runs": sorted({run_name(run.name) for run in training}),
+        "runs": sorted({parts.unit(run.id) for run in parts.training}),
         "inflation": traced.inflation,
         "candidates": len(traced.candidates),
         "samples": int(usable.any(axis=1).sum()),

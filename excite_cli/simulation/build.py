@@ -7,6 +7,7 @@ import numpy as np
 
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.errors import RobotError
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.engine import load_mujoco
 from excite_cli.simulation.mujoco_model import Plant, build_plant, refresh
@@ -63,7 +64,7 @@ class Build:
 
     robot: Robot
     phi: Array
-    run: str
+    run: RunId
     gravity: Array
     armature: Array
     damping: Array
@@ -83,7 +84,7 @@ class Build:
     recorded: list[Planted] = field(default_factory=list)
 
     @classmethod
-    def bare(cls, robot: Robot, phi: Array, run: str) -> "Build":
+    def bare(cls, robot: Robot, phi: Array, run: RunId) -> "Build":
         """Rigid bodies only."""
         zeros = np.zeros((8, robot.n))
         return cls(

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import Build, Coupling, Push, Transmission, last_body
 from excite_cli.simulation.planted import Planted
@@ -17,7 +18,7 @@ _JOINT_PARTS = {"damping", "frictionloss", "armature", "stiffness", "springref"}
 _ROTOR_SHARE = 0.5  # of the link's inertia, for a rotor whose size nobody said
 
 
-def assemble(robot: Robot, phi: Array, run: str, planted: Iterable[Planted]) -> Build:
+def assemble(robot: Robot, phi: Array, run: RunId, planted: Iterable[Planted]) -> Build:
     """The robot of one run with the effects that are active in it."""
     build = Build.bare(robot, phi, run)
     for each in planted:

@@ -9,6 +9,7 @@ import numpy as np
 from excite_cli.effects.base import Effect
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import make
 from excite_cli.simulation.controller import (
@@ -115,10 +116,11 @@ def _takes(
     reference = reference_of(robot, motion, t)
     played: dict[tuple[bool, ...], Played] = {}
     for name in names:
-        build = assemble(robot, phi, name, planted)
+        run_id = RunId(name)
+        build = assemble(robot, phi, run_id, planted)
         if settings.torque_limits:
             build.clip = np.minimum(build.clip, robot.limits.effort)
-        active = tuple(p.effect.active(name) for p in planted)
+        active = tuple(p.effect.active(run_id) for p in planted)
         if active not in played:
             plant = make(build, settings.physics_step)
             gains = gains_of(build, plant, reference, settings.bandwidth)
