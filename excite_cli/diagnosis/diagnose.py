@@ -21,6 +21,7 @@ from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.plausibility import check_plausibility
 from excite_cli.diagnosis.records import (
+    Approximation,
     Diagnosis,
     EffectRecord,
     Information,
@@ -159,7 +160,11 @@ def _column_names(model: Model) -> list[str]:
 
 
 def _named(
-    model: Model, traced: Traced, parameters: Array, covariance: Array, doubts: Mapping[int, str]
+    model: Model,
+    traced: Traced,
+    parameters: Array,
+    covariance: Array,
+    doubts: Mapping[int, Approximation],
 ) -> tuple[tuple[NamedEffect, ...], list[tuple[Alias, Array]]]:
     """Named effects with values, evidence and aliases; and the aliases with their own values."""
     judge, names = traced.judge, model.robot.joint_names
@@ -209,7 +214,7 @@ def _named(
                 share_of_residual=float(np.clip(share, 0.0, 1.0)),
                 gain=float(judge.left_out_gain(rest, [i])),
                 aliases=tuple(records),
-                approximates=doubts.get(i, ""),
+                approximates=doubts.get(i),
             )
         )
     order = np.argsort([-each for each in strength], kind="stable")

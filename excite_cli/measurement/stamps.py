@@ -94,11 +94,14 @@ def _identified(recordings: list[list[Run]]) -> list[Run]:
             [replace(run, name=f"{run.name}/{number}") for run in stretches]
             for number, stretches in enumerate(named, 1)
         ]
-    return [
-        replace(run, part=replace(run.part, stretch=number if len(stretches) > 1 else 0))
-        for stretches in named
-        for number, run in enumerate(stretches, 1)
-    ]
+    found = []
+    for stretches in named:
+        if len(stretches) == 1:
+            found += stretches
+        else:
+            parts = (replace(run.part, stretch=i) for i, run in enumerate(stretches, 1))
+            found += [replace(run, part=p) for run, p in zip(stretches, parts, strict=True)]
+    return found
 
 
 def _is_long(run: Run) -> bool:

@@ -56,11 +56,12 @@ class Simulation:
     tracking: dict[str, Array]
 
 
-def run_names(motions: Sequence[Planned], repeat: int) -> tuple[tuple[str, ...], ...]:
-    """Names of the takes of each motion."""
+def takes_of(motions: Sequence[Planned], repeat: int) -> dict[str, tuple[str, ...]]:
+    """Names of the recordings of each motion, by its name."""
     if repeat == 1:
-        return tuple((motion.name,) for motion in motions)
-    return tuple(tuple(f"{m.name}_take_{k}" for k in range(1, repeat + 1)) for m in motions)
+        return {motion.name: (motion.name,) for motion in motions}
+    count = range(1, repeat + 1)
+    return {m.name: tuple(f"{m.name}_take_{k}" for k in count) for m in motions}
 
 
 def simulate(
@@ -88,8 +89,9 @@ def simulate(
     runs: list[Run] = []
     tracking: dict[str, Array] = {}
     with silent_engine():
-        for motion, names in zip(motions, run_names(motions, settings.repeat), strict=True):
-            taken = _takes(robot, phi, motion, names, settings, planted)
+        takes = takes_of(motions, settings.repeat)
+        for motion in motions:
+            taken = _takes(robot, phi, motion, takes[motion.name], settings, planted)
             for run, error in taken:
                 progress(run.name, len(runs))
                 runs.append(run)

@@ -4,7 +4,7 @@ Reading trusts nothing: a foreign or damaged file gives one message.
 """
 
 import json
-from dataclasses import asdict
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from excite_cli.atomic import write_atomically
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
     Absorbed,
     Diagnosis,
@@ -28,6 +29,7 @@ from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_file import new_hdf5
 from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.robot.model import Array
+from excite_cli.store.approximation_text import approximation_as_data, approximation_of
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 from excite_cli.store.trace_groups import (
     read_torque_traces,
@@ -159,8 +161,13 @@ def _text(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, Covariate):
+        return value.code
+    if isinstance(value, NamedEffect):
+        known = {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+        return {**known, **approximation_as_data(value.approximates)}
     if hasattr(value, "__dataclass_fields__"):
-        return _plain(asdict(value))
+        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -173,7 +180,25 @@ def _plain(value: Any) -> Any:
 def _record(group: Any, name: str, kind: Any) -> Any:
     text = group[name][()]
     value = json.loads(text.decode() if isinstance(text, bytes) else str(text))
-    return _adapter(kind).validate_python(value)
+    return _adapter(kind).validate_python(_known(name, value))
+
+
+def _known(name: str, value: Any) -> Any:
+    """What stands in the file as a text, as a record."""
+    if name == "records/unexplained":
+        return [
+            {**each, "depends_on": tuple(map(Covariate.of_code, each["depends_on"]))}
+            for each in value
+        ]
+    if name == "records/effects":
+        return [
+            {
+                **{key: item for key, item in each.items() if key != "approximation"},
+                "approximates": approximation_of(each),
+            }
+            for each in value
+        ]
+    return value
 
 
 def _finite(dataset: Any) -> Array:

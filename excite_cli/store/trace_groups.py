@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.robot.model import Array
@@ -66,7 +67,9 @@ def write_traces(group: Any, traces: Traces) -> None:
         _write_arrays(own, {name: getattr(trace, name) for name in ("part", "t", *_EFFECT)})
     dependence = group.create_group("dependence")
     dependence.attrs["joints"] = json.dumps(traces.dependence.joints)
-    dependence.attrs["quantities"] = json.dumps(traces.dependence.quantities)
+    dependence.attrs["quantities"] = json.dumps(
+        [each.code for each in traces.dependence.quantities]
+    )
     dependence["shares"] = np.asarray(traces.dependence.shares, dtype=float)
 
 
@@ -80,7 +83,8 @@ def read_traces(group: Any) -> Traces:
     """
     effects = group["effects"]
     dependence = group["dependence"]
-    joints, quantities = (_names(dependence, name) for name in ("joints", "quantities"))
+    joints = _names(dependence, "joints")
+    quantities = tuple(Covariate.of_code(code) for code in _names(dependence, "quantities"))
     shares = _array(dependence["shares"])
     if shares.shape != (len(joints), len(quantities)):
         raise ValueError("the map of dependences does not fit its names")

@@ -10,6 +10,7 @@ from scipy.linalg import qr
 from excite_cli.config.load import load_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
+from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import (
     Absorbed,
     Diagnosis,
@@ -101,7 +102,11 @@ def make_diagnosis(
             ),
         ),
         absorbed=(Absorbed("armature", (names[0],), ("Izz[shoulder_yaw]",), 1e-5),),
-        unexplained=(Unexplained("elbow", ("q", "sgn v"), 0.3),),
+        unexplained=(
+            Unexplained(
+                "elbow", (Covariate("position", "elbow", Aspect.DIRECTION), Covariate("time")), 0.3
+            ),
+        ),
         sealed_run="run_3",
         before=errors,
         after=errors,
@@ -154,6 +159,11 @@ def make_traces(
     )  # fmt: skip
     shares = np.zeros((n, 3))
     shares[elbow] = 0.3, 0.0, 0.02
-    dependence = Dependence(tuple(joints), ("q[elbow]", "time", "own direction and q"), shares)
+    covariates = (
+        Covariate("position", "elbow"),
+        Covariate("time"),
+        Covariate("position", aspect=Aspect.DIRECTION, own=True),
+    )
+    dependence = Dependence(tuple(joints), covariates, shares)
     units = ("N·m",) * n
     return Traces(units, (first, second), (effect,), dependence), (sealed,)

@@ -153,8 +153,7 @@ def test_an_offset_of_the_sealed_run_counts_for_the_error(
     both = replace(
         recorded,
         runs=tuple(
-            replace(run, tau=run.tau + offset) if run.name == "c" else run
-            for run in recorded.runs
+            replace(run, tau=run.tau + offset) if run.name == "c" else run for run in recorded.runs
         ),
     )
     error = identify(robot, base, both, spec, sealed="c").error

@@ -237,7 +237,7 @@ def test_missing_positions_are_bridged_or_split() -> None:
     q[800:900, 2] = np.nan
     parts, findings = check(with_q(run, q))
     assert "gap" in [found.kind for found in findings]
-    assert [part.name for part in parts] == ["run/1", "run/2"]
+    assert [part.label for part in parts] == ["run/1", "run/2"]
 
 
 def test_missing_speed_and_stamps() -> None:
