@@ -160,8 +160,8 @@ def _absorbed(found: Diagnosis) -> list[Table | str]:
 def _unexplained(found: Diagnosis) -> list[Table | str]:
     return [
         f"Unexplained: the residual of {each.joint} still depends on "
-        f"{', '.join(map(covariate_in_symbols, each.depends_on))} ({each.share_of_residual:.1%} of it); no effect of the "
-        "catalogue has this form."
+        f"{', '.join(map(covariate_in_symbols, each.depends_on))} "
+        f"({each.share_of_residual:.1%} of it); no effect of the catalogue has this form."
         for each in found.unexplained
     ]
 

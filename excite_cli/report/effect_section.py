@@ -108,7 +108,8 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
         others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]
         text += f" These data cannot tell it from: {', '.join(others)}."
     if named.approximates:
-        text += f" An approximation only: it stands for {approximation_in_words(named.approximates, covariate_in_words)}."
+        what = approximation_in_words(named.approximates, covariate_in_words)
+        text += f" An approximation only: it stands for {what}."
     return text
 
 
