@@ -9,8 +9,10 @@ from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.excitation.problem import Problem
-from excite_cli.geometry.collision_pairs import ALWAYS, UNGUARDED, CollisionPairs
+from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs
+from excite_cli.geometry.reasons import Why
+from excite_cli.geometry.words import dropped_in_words, reason_in_words, why_in_words
 
 
 def tell_problem(terminal: Terminal, problem: Problem) -> None:
@@ -98,13 +100,14 @@ def _tell_effects(terminal: Terminal, problem: Problem) -> None:
         terminal.detail(f"  effect column {name}")
 
 
-def _tabled(problem: Problem) -> tuple[str, ...]:
+def _tabled(problem: Problem) -> tuple[tuple[str, str], ...]:
     """Pairs of links that are kept apart by tables of their meshes' distances."""
-    return next((c.labels for c in problem.constraints if isinstance(c, MeshClearance)), ())
+    found = next((c.tables for c in problem.constraints if isinstance(c, MeshClearance)), ())
+    return tuple((table.first, table.second) for table in found)
 
 
 def _tell_self_collision(
-    terminal: Terminal, constraint: SelfCollision, tabled: tuple[str, ...]
+    terminal: Terminal, constraint: SelfCollision, tabled: tuple[tuple[str, str], ...]
 ) -> None:
     pairs = constraint.pairs
     terminal.detail(
@@ -114,14 +117,13 @@ def _tell_self_collision(
     if tabled:
         terminal.detail(
             "kept apart by their meshes, since their capsules overlap whatever the posture: "
-            f"{'; '.join(tabled)}"
+            f"{'; '.join(map(' – '.join, tabled))}"
         )
     loose = {
-        words
+        f"{links.first} – {links.second} {links.percent}%"
         for pair in pairs.dropped
-        if pair.reason.startswith(UNGUARDED)
-        for words in pair.reason.partition("apart: ")[2][:-1].split(", ")
-        if not words.endswith("100%") and not any(words.startswith(label) for label in tabled)
+        for links in pair.reason.apart
+        if links.percent < 100 and (links.first, links.second) not in tabled
     }
     if loose:
         terminal.say(
@@ -152,9 +154,9 @@ def _tell_surroundings(terminal: Terminal, constraint: Surroundings) -> None:
             f"{most:g} m: {'; '.join(closer)}"
         )
     touching = [
-        f"{pair.first} – {pair.second} {pair.reason}"
+        f"{pair.first} – {pair.second} {reason_in_words(pair.reason)}"
         for pair in pairs.dropped
-        if pair.reason.startswith(ALWAYS)
+        if pair.reason.why is Why.ALWAYS_TOUCHING
     ]
     if touching:
         terminal.say(
@@ -168,13 +170,14 @@ def _tell_each(terminal: Terminal, constraint: SelfCollision | Surroundings) -> 
     for label in constraint.labels:
         terminal.detail(f"  checked  {label}")
     for pair in constraint.pairs.dropped:
-        terminal.detail(f"  dropped  {pair.first} – {pair.second}: {pair.reason}")
+        terminal.detail(f"  dropped  {dropped_in_words(pair)}")
 
 
 def _reasons(pairs: CollisionPairs | ObstaclePairs) -> str:
     """How many pairs were dropped for each reason, figures in the reasons left aside."""
-    counts = Counter(pair.reason.split(" (")[0] for pair in pairs.dropped)
-    return ", ".join(f"{count} {reason}" for reason, count in counts.most_common()) or "none"
+    counts = Counter(pair.reason.why for pair in pairs.dropped)
+    told = (f"{count} {why_in_words(why)}" for why, count in counts.most_common())
+    return ", ".join(told) or "none"
 
 
 def _symbols(problem: Problem) -> list[str]:

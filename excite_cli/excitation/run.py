@@ -16,6 +16,7 @@ from excite_cli.excitation.result import Result, matches
 from excite_cli.excitation.sequence import Step, generate_sequence
 from excite_cli.excitation.solvers.catalogue import build_solver
 from excite_cli.excitation.stack import Stack
+from excite_cli.geometry.words import dropped_in_words
 from excite_cli.trajectory.chain import Segment
 from excite_cli.workers.base import Workers
 
@@ -169,7 +170,5 @@ def _pairs(problem: Problem) -> tuple[tuple[str, ...], tuple[str, ...]]:
         if isinstance(constraint, SelfCollision | Surroundings | MeshClearance):
             checked += constraint.labels
         if isinstance(constraint, SelfCollision | Surroundings):
-            dropped += [
-                f"{pair.first} – {pair.second}: {pair.reason}" for pair in constraint.pairs.dropped
-            ]
+            dropped += map(dropped_in_words, constraint.pairs.dropped)
     return tuple(checked), tuple(dropped)

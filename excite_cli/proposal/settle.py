@@ -28,7 +28,6 @@ from excite_cli.excitation.start import (
     unclear,
 )
 from excite_cli.excitation.task import MotionTask
-from excite_cli.geometry.collision_pairs import UNGUARDED
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.mesh_pairs import joined_links
 from excite_cli.geometry.pair_distances import carried_bodies
@@ -215,12 +214,9 @@ def _without_lasting_contacts(
         if own is None or not isinstance(constraint, SelfCollision):
             continue
         for pair in constraint.pairs.dropped:
-            if not pair.reason.startswith(UNGUARDED):
-                continue
-            for words in pair.reason.partition("apart: ")[2][:-1].split(", "):
-                names, _, share = words.rpartition(" ")
-                if float(share.rstrip("%")) < 100 * _SELDOM_APART:
-                    own.setdefault("ignore", []).append(names.split(" – "))
+            for links in pair.reason.apart:
+                if links.percent < 100 * _SELDOM_APART:
+                    own.setdefault("ignore", []).append([links.first, links.second])
         left_out = tuple((one, other) for one, other in own.get("ignore", ()))
         near = near_at_posture(robot, constraint.capsules, constraint.pairs, left_out, _TABLED)
         if near:
