@@ -30,9 +30,9 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import path_of
 from excite_cli.excitation.inspection import Inspection, Look, inspect, mesh_check_of
-from excite_cli.excitation.motion import Progress
 from excite_cli.excitation.planned_prior import planned_stack
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.progress import Progress
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.sequence import Step

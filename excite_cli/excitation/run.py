@@ -10,8 +10,8 @@ from excite_cli.constraints.mesh_clearance import MeshClearance
 from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.errors import FileError
-from excite_cli.excitation.motion import ProgressCallback
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import ProgressCallback
 from excite_cli.excitation.result import Result, matches
 from excite_cli.excitation.sequence import Step, generate_sequence
 from excite_cli.excitation.solvers.catalogue import build_solver

@@ -107,7 +107,7 @@ def _write_motion(group: Any, motion: Motion, problem: Problem) -> None:
             "stacked_condition_number": motion.stacked_condition_number,
             "improved": motion.improved,
             "note": motion.note,
-            "status": motion.status,
+            "status": str(motion.status),
             "seconds": motion.seconds,
             "iterations": motion.iterations,
             "evaluations": motion.evaluations,

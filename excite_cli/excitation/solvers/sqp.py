@@ -29,8 +29,9 @@ from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.states import States
-from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
+from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.objective import Spectrum
+from excite_cli.excitation.progress import ProgressCallback, Stage, Status
 from excite_cli.excitation.residuals import summed_per_instant
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.solvers.linearised import Linearised, Mask, dips, gathered, lowest
@@ -110,29 +111,29 @@ class _Run:
     def all_stages(self, x: Array) -> Outcome:
         steps = self.task.problem.criterion.continuation()
         steps = steps[-1:] if self.effort.polish else steps
-        status: Status = "converged"
+        status = Status.CONVERGED
         for number, criterion in enumerate(steps):
             change = _CHANGES[max(number - len(steps), -len(_CHANGES))]
             change = max(change, self.effort.tolerance)
-            x, status = self.stage(x, criterion, change, f"{number + 1}/{len(steps)}")
-            if status in ("iteration limit", "time limit"):
+            x, status = self.stage(x, criterion, change, Stage(number + 1, len(steps)))
+            if status.is_limit:
                 break
         self.best.offer_restored(x)
         return Outcome(self.best.kept(), status, self.iterations, self.task.evaluations)
 
     def stage(
-        self, x: Array, criterion: Criterion, change: float, stage: str
+        self, x: Array, criterion: Criterion, change: float, stage: Stage
     ) -> tuple[Array, Status]:
         point = self.point(x, criterion)
         history = [(point.cost, point.violation)]
         while True:
             if self.iterations >= self.effort.max_iterations:
-                return point.x, "iteration limit"
+                return point.x, Status.ITERATION_LIMIT
             if time.perf_counter() - self.began > self.effort.max_seconds:
-                return point.x, "time limit"
+                return point.x, Status.TIME_LIMIT
             found = self.iterate(point, criterion)
             if found is None:
-                return point.x, "stalled"
+                return point.x, Status.STALLED
             point = found
             self.iterations += 1
             seconds = time.perf_counter() - self.began
@@ -142,7 +143,7 @@ class _Run:
             history.append((point.cost, point.violation))
             merits = [cost + self.penalty * violation for cost, violation in history]
             if len(merits) > _WINDOW and merits[-1 - _WINDOW] - merits[-1] < change:
-                return point.x, "converged"
+                return point.x, Status.CONVERGED
 
     def point(self, x: Array, criterion: Criterion) -> _Point:
         states = self.task.states(x)
