@@ -8,6 +8,7 @@ from rich.table import Table
 from excite_cli.cli.layout import table as new_table
 from excite_cli.cli.noise_floor_words import floor_cells, floor_columns
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Round
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
     approximation_in_words,
@@ -78,7 +79,7 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
             f"{suspect.share_of_residual:.1%}",
             f"{suspect.gain:.1%}",
             suspect.verdict,
-            style="bold" if suspect.verdict == "accepted" else None,
+            style="bold" if suspect.verdict is Verdict.ACCEPTED else None,
         )
     return table
 

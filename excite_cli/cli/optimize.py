@@ -136,7 +136,7 @@ def optimize(
                 motion = step.motion
                 note = "" if motion.improved else "; it brings no improvement"
                 note += (
-                    "; raise optimizer.max_seconds" if motion.status == Status.TIME_LIMIT else ""
+                    "; raise optimizer.max_seconds" if motion.status is Status.TIME_LIMIT else ""
                 )
                 note += f"; {motion.note}" if motion.note else ""
                 if motion.certified:

@@ -36,9 +36,9 @@ class JointTorque(Constraint):
     ) -> None:
         self._dynamics = InverseDynamics(robot)
         bounded = np.flatnonzero(np.isfinite(limits))
-        self._joints = np.concatenate([bounded, bounded])
+        self.joints = np.concatenate([bounded, bounded])
         self._signs = np.concatenate([-np.ones(len(bounded)), np.ones(len(bounded))])
-        self._limits = limits[self._joints]
+        self._limits = limits[self.joints]
         self.scale = self._limits
         self._sliding = robot.sliding
         self.labels = tuple(
@@ -55,22 +55,22 @@ class JointTorque(Constraint):
 
     def unit_of(self, column: int) -> str:
         """Newtons for a prismatic joint."""
-        return "N" if self._sliding[self._joints[column]] else self.unit
+        return "N" if self._sliding[self.joints[column]] else self.unit
 
     def margins(self, states: States) -> Array:
         """limit − |τ| on either side (T, m) [N·m or N], the least over the admitted inertias."""
         if self.uncertainty is None:
             torque = self._dynamics.torques(states.q, states.v, states.a)
-            return self._limits - self._signs * torque[:, self._joints]
-        half = len(self._joints) // 2
-        rows = self._regressor.evaluate(states.q, states.v, states.a)[:, self._joints[:half]]
+            return self._limits - self._signs * torque[:, self.joints]
+        half = len(self.joints) // 2
+        rows = self._regressor.evaluate(states.q, states.v, states.a)[:, self.joints[:half]]
         lower, upper = self._admitted.least_both(rows)
         return self._limits + np.hstack([lower, upper])
 
     def least(self, motion: EnclosedMotion) -> Array:
         """Lower bounds on what is left on either side (T, m), for every admitted inertia."""
-        half = len(self._joints) // 2
-        rows = torque_rows(motion)[:, self._joints[:half]]
+        half = len(self.joints) // 2
+        rows = torque_rows(motion)[:, self.joints[:half]]
         below, above = least_of(rows, self._admitted), least_of(-rows, self._admitted)
         return self._limits + np.hstack([below, above])
 
@@ -78,7 +78,7 @@ class JointTorque(Constraint):
         self, states: States, times: Indices, columns: Indices
     ) -> tuple[Array | None, Array | None, Array | None]:
         """Rows of the inverse-dynamics derivatives, with the worst inertias of each."""
-        joints, sign = self._joints[columns], -self._signs[columns][:, None]
+        joints, sign = self.joints[columns], -self._signs[columns][:, None]
         if self.uncertainty is not None:
             return self._robust_gradients(states, times, joints, sign)
         instants, inverse = np.unique(times, return_inverse=True)

@@ -5,6 +5,7 @@ from typing import Any
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.traces import Traces
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Value
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
@@ -77,7 +78,7 @@ class Suspect:
     p_value: float
     share_of_residual: float
     gain: float
-    verdict: str
+    verdict: Verdict
 
 
 @dataclass(frozen=True)

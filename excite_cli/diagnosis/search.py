@@ -14,6 +14,7 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import SHARED, Schur
 from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.diagnosis.kinds import EXCLUDES, tier, together
+from excite_cli.diagnosis.verdict import Verdict
 
 _MOST_STEPS = 80
 _TRIED = 12  # best candidates whose gain on runs left out is looked at in a step
@@ -98,7 +99,7 @@ class Search:
                 continue
             if (
                 self.judge.in_order(schur, chosen, [i])
-                and self.judge.verdict(chosen, [i]) == "accepted"
+                and self.judge.verdict(chosen, [i]) is Verdict.ACCEPTED
             ):
                 best = i
         return () if best is None else (best,)
@@ -112,7 +113,7 @@ class Search:
                 break
             if (
                 self.judge.in_order(schur, chosen, pair)
-                and self.judge.verdict(chosen, pair) == "accepted"
+                and self.judge.verdict(chosen, pair) is Verdict.ACCEPTED
             ):
                 return pair
         return ()

@@ -31,7 +31,7 @@ class Motion:
     condition_number: float
     stacked_condition_number: float
     improved: bool
-    status: str
+    status: Status
     seconds: float
     iterations: int
     evaluations: int

@@ -107,20 +107,13 @@ def _signals(problem: Problem, motion: Motion, points: int) -> _Signals:
             lower[constraint.order, constraint.joints[low]] = -constraint.bounds[low]
             upper[constraint.order, constraint.joints[~low]] = constraint.bounds[~low]
         if isinstance(constraint, JointTorque):
-            upper[3] = _torque_limits(constraint, robot.joint_names)
+            upper[3, constraint.joints] = constraint.scale
     lower[3] = -upper[3]
     units = tuple(
         ("m", "m/s", "m/s²", "N") if slides else ("rad", "rad/s", "rad/s²", "N·m")
         for slides in robot.sliding
     )
     return _Signals(times, np.stack([q, v, a, torque]), lower, upper, units)
-
-
-def _torque_limits(constraint: JointTorque, names: tuple[str, ...]) -> Array:
-    limits = np.full(len(names), np.inf)
-    for label, limit in zip(constraint.labels, constraint.scale, strict=True):
-        limits[names.index(label.rpartition(" ")[0])] = limit
-    return limits
 
 
 def _shown(signals: _Signals, joint: int) -> list[int]:

@@ -17,6 +17,7 @@ from excite_cli.atomic import write_atomically
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import Status
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
@@ -233,7 +234,7 @@ def _read_motion(group: Any, index: int) -> Motion:
         stacked_condition_number=float(attributes["stacked_condition_number"]),
         improved=bool(attributes["improved"]),
         note=str(attributes["note"]),
-        status=str(attributes["status"]),
+        status=Status(str(attributes["status"])),
         seconds=float(attributes["seconds"]),
         iterations=int(attributes["iterations"]),
         evaluations=int(attributes["evaluations"]),

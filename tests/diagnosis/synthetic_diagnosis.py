@@ -22,6 +22,7 @@ from excite_cli.diagnosis.records import (
     Unexplained,
 )
 from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.base import Value
 from excite_cli.excitation.effect_columns import EffectColumns
@@ -88,7 +89,7 @@ def make_diagnosis(
         0.1, 0.12, dict.fromkeys(names, 0.1), dict.fromkeys(names, float("nan")),
         dict.fromkeys(names, 1.0), dict.fromkeys(names, 2.0), (0.08, 0.12),
     )  # fmt: skip
-    suspect = Suspect(model[0], 1e-9, 0.4, 0.2, "accepted")
+    suspect = Suspect(model[0], 1e-9, 0.4, 0.2, Verdict.ACCEPTED)
     return Diagnosis(
         config=spec_as_yaml(earlier.problem.spec),
         config_folder=str(CONFIG.parent),
