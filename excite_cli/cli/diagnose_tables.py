@@ -267,6 +267,7 @@ def answer_of(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
             "before": found.before.as_data(),
             "after": found.after.as_data(),
         },
+        "assumed": [asdict(each) for each in found.assumed],
         "noise_floor": found.noise_floor,
         "next_experiment": experiment,
         "findings": [asdict(finding) for finding in found.findings],

@@ -22,6 +22,7 @@ from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.plausibility import check_plausibility
 from excite_cli.diagnosis.records import (
     Approximation,
+    Assumption,
     Diagnosis,
     EffectRecord,
     Information,
@@ -32,6 +33,7 @@ from excite_cli.diagnosis.rounds import rounds_of
 from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.unexplained import unexplained_structure
+from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
@@ -98,7 +100,7 @@ def diagnose(
     models = both_models(model, traced, parameters)
     sealed_part = on_sealed(robot, models, [prepare(run, processing) for run in parts.sealed])
     base_values, base_std = _base_parameters(model, parameters, covariance)
-    floor = noise_floor(parts.training, processing)
+    floor, assumed = noise_floor(parts.training, processing), _assumed(traced, parts)
     return Diagnosis(
         config="",
         config_folder="",
@@ -120,7 +122,7 @@ def diagnose(
         rounds=rounds_of(traced, robot.joint_names),
         findings=(
             *dataset.findings,
-            *_assumed(traced, parts),
+            *(Finding("assumed", "warning", assumption_in_words(each)) for each in assumed),
             *(floor.noticed(robot.joint_names) if floor else ()),
         ),
         processing=_choices(processing, traced, parts, training),
@@ -138,6 +140,7 @@ def diagnose(
             dependence,
         ),
         sealed_traces=sealed_part.traces,
+        assumed=assumed,
     )  # fmt: skip
 
 
@@ -271,23 +274,19 @@ def _information(model: Model, traced: Traced, rivals: list[tuple[Alias, Array]]
     )
 
 
-def _assumed(traced: Traced, parts: Split) -> list[Finding]:
-    """Effects of single runs leave open whether the sealed one has them: say what was assumed."""
-    names = ", ".join(sorted({run.id.key for run in parts.sealed}))
-    found = []
-    for effect in traced.effects:
-        if effect.runs:
-            there = "is" if any(effect.active(run.id) for run in parts.sealed) else "is not"
-            found.append(
-                Finding(
-                    "assumed",
-                    "warning",
-                    f"{effect.kind} was found in {', '.join(effect.runs)}; for the error it is "
-                    f"assumed that it {there} in the sealed {names}. If you "
-                    "know better, declare it under effects with its runs.",
-                )
-            )
-    return found
+def _assumed(traced: Traced, parts: Split) -> tuple[Assumption, ...]:
+    """Effects of single runs leave open whether the sealed one has them."""
+    sealed = tuple(sorted({run.id.key for run in parts.sealed}))
+    return tuple(
+        Assumption(
+            effect.kind,
+            effect.runs,
+            sealed,
+            any(effect.active(run.id) for run in parts.sealed),
+        )
+        for effect in traced.effects
+        if effect.runs
+    )
 
 
 def _choices(

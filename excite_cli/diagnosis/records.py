@@ -71,6 +71,16 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
+class Assumption:
+    """An effect of single `runs` was taken to be `present` in what is sealed, or to be absent."""
+
+    kind: str
+    runs: tuple[str, ...]
+    sealed: tuple[str, ...]
+    present: bool
+
+
+@dataclass(frozen=True)
 class Suspect:
     """One candidate in one round, with its evidence and what became of it."""
 
@@ -141,6 +151,7 @@ class Diagnosis:
     noise_floor: dict[str, float] | None = None
     traces: Traces | None = None
     sealed_traces: tuple[TorqueTrace, ...] = ()
+    assumed: tuple[Assumption, ...] = ()
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:

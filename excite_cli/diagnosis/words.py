@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate
-from excite_cli.diagnosis.records import Approximation, EffectRecord, NamedEffect
+from excite_cli.diagnosis.records import Approximation, Assumption, EffectRecord, NamedEffect
 from excite_cli.effects.base import Quantity, Value
 from excite_cli.effects.catalogue import catalogue
 
@@ -75,6 +75,16 @@ def approximation_in_words(
     if found.covariates:
         return f"a function of {', '.join(map(say, found.covariates))}"
     return f"something that also looks like {title_of(found.kind)}"
+
+
+def assumption_in_words(assumed: Assumption) -> str:
+    """What was assumed of an effect of single runs, and what to do if it is wrong."""
+    there = "is" if assumed.present else "is not"
+    return (
+        f"{assumed.kind} was found in {', '.join(assumed.runs)}; for the error it is assumed that "
+        f"it {there} in the sealed {', '.join(assumed.sealed)}. If you know better, declare it "
+        "under effects with its runs."
+    )
 
 
 def counted(count: int, what: str) -> str:

@@ -17,6 +17,7 @@ from excite_cli.atomic import write_atomically
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
     Absorbed,
+    Assumption,
     Diagnosis,
     EffectRecord,
     Information,
@@ -59,8 +60,11 @@ _RECORDS: dict[str, Any] = {
     "processing": dict[str, Any],
     "versions": dict[str, str],
 }
-# Records that files of earlier versions lack; they are then None.
-_LATER: dict[str, Any] = {"noise_floor": dict[str, float] | None}
+# Records that files of earlier versions lack.
+_LATER: dict[str, Any] = {
+    "noise_floor": dict[str, float] | None,
+    "assumed": tuple[Assumption, ...],
+}
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
     "rivals": tuple[EffectRecord, ...],
@@ -129,8 +133,8 @@ def _read(file: Any) -> Diagnosis:
     fields.update({name: np.asarray(file[name], dtype=float) for name in _ARRAYS})
     fields.update({name: _record(file, f"records/{name}", _RECORDS[name]) for name in _RECORDS})
     for name, kind in _LATER.items():
-        stored = f"records/{name}" in file
-        fields[name] = _record(file, f"records/{name}", kind) if stored else None
+        if f"records/{name}" in file:
+            fields[name] = _record(file, f"records/{name}", kind)
     group = file["information"]
     information = Information(
         factor=_finite(group["factor"]),
