@@ -21,8 +21,8 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.spec import Spec
 from excite_cli.config.trajectory_spec import FourierSpec
 from excite_cli.errors import ExciteError
-from excite_cli.excitation.motion import Progress
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.progress import Progress
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.start import clear_posture, random_start

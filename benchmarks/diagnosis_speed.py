@@ -62,7 +62,9 @@ class Case:
             for k, coefficients in enumerate(pool(name, 1)[:4], start=1)
         ]
         planted = parse_planted(
-            f"load_dependent_friction@{names[joints // 2]}=0.06", self.robot, ["motion_1"]
+            f"load_dependent_friction@{names[joints // 2]}=0.06",
+            self.robot,
+            {"motion_1": ("motion_1",)},
         )
         declared = declared_effects(self.spec.effects, self.robot)
         settings = SimulationSettings(periods=periods)

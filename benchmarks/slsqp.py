@@ -26,8 +26,9 @@ from excite_cli.excitation.correction import (
     gathered,
     lowest,
 )
-from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
+from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.objective import Spectrum
+from excite_cli.excitation.progress import ProgressCallback, Stage, Status
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.task import MotionTask
 
@@ -91,7 +92,7 @@ class _Stopped(Exception):
 
     def __init__(self, status: Status) -> None:
         super().__init__(status)
-        self.status: Status = status
+        self.status = status
 
 
 class ScipySlsqp(Solver):
@@ -124,7 +125,7 @@ class _Run:
         self.best = BestAdmissible(task)
         self.last: _Point | None = None
         self.criterion: Criterion = task.problem.criterion
-        self.stage = ""
+        self.stage = Stage()
         self.reached = np.zeros(0)
         self.length = _FIRST_ROUND
         self.radius = _FIRST_RADIUS
@@ -137,12 +138,12 @@ class _Run:
     def all_stages(self, x: Array) -> Outcome:
         steps = self.task.problem.criterion.continuation()
         steps = steps[-1:] if self.effort.polish else steps
-        status: Status = "converged"
+        status = Status.CONVERGED
         self.reached = x
         try:
             for number, criterion in enumerate(steps):
                 self.criterion, self.last = criterion, None
-                self.stage = f"{number + 1}/{len(steps)}"
+                self.stage = Stage(number + 1, len(steps))
                 change = _CHANGES[max(number - len(steps), -len(_CHANGES))]
                 self.rounds(max(change, self.effort.tolerance))
         except _Stopped as stopped:
@@ -221,14 +222,14 @@ class _Run:
             self.task.progress(self.iterations, point.spectrum, point.values, seconds, self.stage)
         )
         if self.iterations >= self.effort.max_iterations:
-            raise _Stopped("iteration limit")
+            raise _Stopped(Status.ITERATION_LIMIT)
 
     def point(self, x: Array) -> _Point:
         """All about x; the last point is kept, as SciPy asks for its parts one by one."""
         if self.last is not None and np.array_equal(self.last.x, x):
             return self.last
         if time.perf_counter() - self.began > self.effort.max_seconds:
-            raise _Stopped("time limit")
+            raise _Stopped(Status.TIME_LIMIT)
         states = self.task.states(x)
         values = self.task.values(states)
         cost, gradient, spectrum = self.task.cost(x, self.criterion)

@@ -31,9 +31,9 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import path_of
 from excite_cli.excitation.inspection import Inspection, Look, inspect, mesh_check_of
-from excite_cli.excitation.motion import Progress
 from excite_cli.excitation.planned_prior import planned_stack
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.progress import Progress
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.sequence import Step
@@ -51,7 +51,7 @@ from excite_cli.robot.model import Robot, build_robot
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import parse_planted
 from excite_cli.simulation.settings import SimulationSettings
-from excite_cli.simulation.simulate import Simulation, run_names
+from excite_cli.simulation.simulate import Simulation, takes_of
 from excite_cli.simulation.simulate import simulate as simulate_motions
 from excite_cli.store.diagnosis_file import write_diagnosis
 from excite_cli.store.fit_file import write_fit
@@ -297,8 +297,8 @@ def simulate(
     """
     segments = motions_of(motions) if isinstance(motions, Result) else motions
     planned = [PlannedMotion(each.name, each.trajectory, each.coefficients) for each in segments]
-    names = [name for takes in run_names(planned, settings.repeat) for name in takes]
-    planted = [p for text in effects for p in parse_planted(text, problem.robot, names)]
+    takes = takes_of(planned, settings.repeat)
+    planted = [p for text in effects for p in parse_planted(text, problem.robot, takes)]
     own = declared_effects(problem.spec.effects, problem.robot) if declared else ()
     return simulate_motions(problem.robot, planned, settings, planted, own)
 

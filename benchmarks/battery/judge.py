@@ -16,6 +16,7 @@ from benchmarks.battery.sizes import Sized
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord
+from excite_cli.diagnosis.words import approximation_in_words
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Dataset
@@ -247,12 +248,17 @@ def _fill(outcome: Outcome, found: Diagnosis, result: Score) -> None:
             "share": each.share_of_residual,
             "gain": each.gain,
             "verdict": verdict,
-            "approximates": each.approximates,
+            "approximates": (
+                approximation_in_words(each.approximates) if each.approximates else ""
+            ),
             "aliases": [{"kind": a.kind, "joints": list(a.joints)} for a in each.aliases],
         }
         for each, verdict in zip(found.effects, result.names, strict=True)
     ]
-    outcome.unexplained = [asdict(each) for each in found.unexplained]
+    outcome.unexplained = [
+        {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
+        for each in found.unexplained
+    ]
     kinds = {(p["kind"], tuple(p["joints"])) for p in outcome.planted}
     outcome.absorbed = any((a.kind, a.joints) in kinds for a in found.absorbed)
     outcome.score = asdict(result)

@@ -12,6 +12,7 @@ import numpy as np
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import kind_named
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import Planted
@@ -64,9 +65,9 @@ def ground_of(
         t = np.linspace(0.0, motion.trajectory.duration, _SAMPLES)
         q, v, a = motion.states(t)
         body = RigidBody(robot, phi, q, v, a)
-        bare = Signals(t, q, v, a, body.load, body.load, body, motion.name)
+        bare = Signals(t, q, v, a, body.load, body.load, body, RunId(motion.name))
         torque = body.load + sum(p.effect.torque(bare, p.values) for p in declared)
-        found.append(Signals(t, q, v, a, body.load, torque, body, motion.name))
+        found.append(Signals(t, q, v, a, body.load, torque, body, RunId(motion.name)))
     for p in declared:
         if p.effect.kind == "coulomb_friction":
             friction[list(p.effect.joints)] += p.values[0]

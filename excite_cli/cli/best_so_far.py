@@ -1,8 +1,7 @@
 """The figure of a progress line: where the solver is, and its best within all limits so far."""
 
-from excite_cli.excitation.motion import Progress
-
-_CONDITION = "cond "
+from excite_cli.excitation.progress import Measure, Progress
+from excite_cli.excitation.words import figure_in_words
 
 
 class Best:
@@ -13,10 +12,10 @@ class Best:
 
     def words(self, progress: Progress) -> str:
         """`condition number 5.48 (best 5.31)`; another figure is told as it is."""
-        if not progress.figure.startswith(_CONDITION):
-            return progress.figure
-        value = float(progress.figure.removeprefix(_CONDITION))
+        figure = progress.figure
+        if figure.measure is not Measure.CONDITION_NUMBER:
+            return figure_in_words(figure)
         if progress.worst_margin >= 0.0:
-            self._best = min(self._best, value)
+            self._best = min(self._best, figure.value)
         best = f" (best {self._best:.2f})" if self._best < float("inf") else ""
-        return f"condition number {value:.2f}{best}"
+        return f"condition number {figure.value:.2f}{best}"

@@ -7,6 +7,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.geometry.words import standing_in_words
 
 if TYPE_CHECKING:
     from excite_cli.excitation.inspection import Inspection
@@ -178,7 +179,7 @@ def _data(
                     "distance": gap.distance,
                     "time": float(times[gap.index]),
                     "touching": gap.touching,
-                    "not_judged": gap.standing,
+                    "not_judged": standing_in_words(gap.standing),
                 }
                 for gap in gaps.near
             ],
@@ -239,7 +240,8 @@ def _notes(name: str, inspection: "Inspection", off: tuple[float, float]) -> lis
     ]
     if inspection.meshes is not None:
         notes += [
-            f"{name}: meshes of {gap.first} and {gap.second} touch; not judged ({gap.standing})."
+            f"{name}: meshes of {gap.first} and {gap.second} touch; not judged "
+            f"({standing_in_words(gap.standing)})."
             for gap in inspection.meshes.told
         ]
     if off[0] > _SAME:

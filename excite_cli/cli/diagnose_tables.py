@@ -8,9 +8,12 @@ from rich.table import Table
 from excite_cli.cli.layout import table as new_table
 from excite_cli.cli.noise_floor_words import floor_cells, floor_columns
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Round
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
+    approximation_in_words,
     counted,
+    covariate_in_symbols,
     is_small,
     p_in_words,
     place_in_words,
@@ -76,7 +79,7 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
             f"{suspect.share_of_residual:.1%}",
             f"{suspect.gain:.1%}",
             suspect.verdict,
-            style="bold" if suspect.verdict == "accepted" else None,
+            style="bold" if suspect.verdict is Verdict.ACCEPTED else None,
         )
     return table
 
@@ -135,7 +138,7 @@ def _approximation_table(found: Diagnosis) -> Table:
             place_in_words(each.effect, len(found.joint_names)),
             "\n".join(value_in_words(name, value) for name, value in each.parameters.items()),
             f"{each.share_of_residual:.2%}",
-            each.approximates,
+            approximation_in_words(each.approximates) if each.approximates else "",
         )
     return table
 
@@ -158,8 +161,8 @@ def _absorbed(found: Diagnosis) -> list[Table | str]:
 def _unexplained(found: Diagnosis) -> list[Table | str]:
     return [
         f"Unexplained: the residual of {each.joint} still depends on "
-        f"{', '.join(each.depends_on)} ({each.share_of_residual:.1%} of it); no effect of the "
-        "catalogue has this form."
+        f"{', '.join(map(covariate_in_symbols, each.depends_on))} "
+        f"({each.share_of_residual:.1%} of it); no effect of the catalogue has this form."
         for each in found.unexplained
     ]
 
@@ -247,18 +250,24 @@ def answer_of(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
         "declared_effects": [_record(record) for record in found.declared],
         "effects": [_named(each, runs) for each in found.named],
         "approximations": [
-            {**_named(each, runs), "stands_for": each.approximates} for each in found.approximations
+            {**_named(each, runs), "stands_for": approximation_in_words(each.approximates)}
+            for each in found.effects
+            if each.approximates
         ],
         "absorbed": [
             {"kind": a.kind, "joints": list(a.joints), "by": list(a.by), "left": a.left}
             for a in found.absorbed
         ],
-        "unexplained": [asdict(each) for each in found.unexplained],
+        "unexplained": [
+            {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
+            for each in found.unexplained
+        ],
         "error": {
             "sealed_run": found.sealed_run,
             "before": found.before.as_data(),
             "after": found.after.as_data(),
         },
+        "assumed": [asdict(each) for each in found.assumed],
         "noise_floor": found.noise_floor,
         "next_experiment": experiment,
         "findings": [asdict(finding) for finding in found.findings],

@@ -55,7 +55,7 @@ def load_motions(
     if is_motion(path, spec):
         return [_motion(terminal, path, robot)]
     return [
-        Segment(run.name, *through_samples(run.t, run.q, run.v, run.a))
+        Segment(run.run.key, *through_samples(run.t, run.q, run.v, run.a))
         for run in _measured(terminal, path, robot, spec)
     ]
 

@@ -90,6 +90,7 @@ def optimize(
     from excite_cli.cli.working import tell_idle, working
     from excite_cli.config.inputs import files_of_config
     from excite_cli.errors import ConfigError
+    from excite_cli.excitation.progress import Status
     from excite_cli.excitation.result import Result
     from excite_cli.excitation.run import continue_run, new_result, resumed_result
     from excite_cli.excitation.sequence import Step
@@ -138,7 +139,9 @@ def optimize(
                 write_result(path, current, problem)
                 motion = step.motion
                 note = "" if motion.improved else "; it brings no improvement"
-                note += "; raise optimizer.max_seconds" if motion.status == "time limit" else ""
+                note += (
+                    "; raise optimizer.max_seconds" if motion.status is Status.TIME_LIMIT else ""
+                )
                 note += f"; {motion.note}" if motion.note else ""
                 if motion.certified:
                     loose = [name for name, proved in motion.certified.items() if not proved]

@@ -168,8 +168,8 @@ def simulate(
     from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
     from excite_cli.simulation.planted import parse_planted
     from excite_cli.simulation.settings import SimulationSettings
-    from excite_cli.simulation.simulate import run_names
     from excite_cli.simulation.simulate import simulate as simulate_motions
+    from excite_cli.simulation.simulate import takes_of
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     check_outputs({"output": output}, overwrite, (config, file))
@@ -204,15 +204,15 @@ def simulate(
                 chains = [repeated(m, periods, robot.joint_names) for m in found]
                 motions = [PlannedProgram(m.name, c) for m, c in zip(found, chains, strict=True)]
                 settings = replace(settings, periods=1)
-        names = [name for takes in run_names(motions, repeat) for name in takes]
-        planted = [p for text in effect or [] for p in parse_planted(text, robot, names)]
+        takes = takes_of(motions, repeat)
+        planted = [p for text in effect or [] for p in parse_planted(text, robot, takes)]
         declared = () if no_declared else declared_effects(spec.effects, robot)
         if _converts(spec):
             terminal.say(
                 "warning: the config converts recorded positions or torques (measurement: …), but "
                 "this file holds rad and N·m at the joints. Read it with a config without that."
             )
-        with terminal.live("simulating", len(names)) as show:
+        with terminal.live("simulating", len(motions) * repeat) as show:
             simulation = simulate_motions(robot, motions, settings, planted, declared, show)
         write_dataset(output, simulation.dataset, _attributes(simulation, settings, spec, robot))
     records = [p.record(robot) for p in simulation.truth.effects]

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from excite_cli.cli.best_so_far import Best
 from excite_cli.config.spec import Spec
-from excite_cli.excitation.motion import Progress, ProgressCallback
+from excite_cli.excitation.progress import Progress, ProgressCallback
 
 
 def iterations_of(spec: Spec) -> int:

@@ -6,6 +6,7 @@ from excite_cli.cli.console import Terminal
 from excite_cli.constraints.base import Constraint
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.excitation.problem import Problem
+from excite_cli.geometry.words import dropped_in_words
 
 
 def tell_problem(terminal: Terminal, problem: Problem) -> None:
@@ -96,7 +97,7 @@ def _tell_constraint(terminal: Terminal, constraint: Constraint) -> None:
     for label in constraint.labels:
         terminal.detail(f"  checked  {label}")
     for pair in constraint.left_out:
-        terminal.detail(f"  dropped  {pair.first} – {pair.second}: {pair.reason}")
+        terminal.detail(f"  dropped  {dropped_in_words(pair)}")
 
 
 def _symbols(problem: Problem) -> list[str]:

@@ -26,7 +26,9 @@ class EffectSpec(Section):
     shape: dict[str, Finite] = Field(
         default_factory=dict, description="values of the effect's non-linear parameters"
     )
-    runs: Literal["all"] | tuple[str, ...] = Field("all", description="runs it is present in")
+    runs: Literal["all"] | tuple[str, ...] = Field(
+        "all", description="runs it is present in, or stretches of them between gaps (`b/2`)"
+    )
 
 
 PerJoint = Finite | dict[str, Finite]

@@ -17,8 +17,8 @@ from excite_cli.constraints.joint_columns import JointColumns
 from excite_cli.constraints.remark import Remark
 from excite_cli.dynamics.states import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
-from excite_cli.geometry.collision_pairs import DroppedPair
 from excite_cli.geometry.link_meshes import Poses
+from excite_cli.geometry.reasons import DroppedPair
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.worst_margin import Worst
 from excite_cli.robot.capsule import Capsule

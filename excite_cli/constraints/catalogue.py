@@ -114,7 +114,7 @@ def _self_collision(spec: SelfCollisionSpec, setting: Setting) -> Iterable[Const
     meshes = [MeshClearance(tables, min(KEPT, spec.margin))] if tables else []
     if not pairs.checked:
         return meshes
-    tabled = tuple(label for each in meshes for label in each.labels)
+    tabled = tuple((table.first, table.second) for each in meshes for table in each.tables)
     return [SelfCollision(robot, capsules, pairs, spec.margin, tabled), *meshes]
 
 

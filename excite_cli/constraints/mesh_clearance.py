@@ -5,9 +5,9 @@ import numpy as np
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.remark import Remark
 from excite_cli.dynamics.states import States
-from excite_cli.geometry.collision_pairs import DroppedPair
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.geometry.pair_tables import FAR
+from excite_cli.geometry.reasons import DroppedPair
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.taylor import Taylor
 

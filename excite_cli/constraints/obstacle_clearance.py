@@ -8,11 +8,12 @@ from excite_cli.constraints.nearest_bodies import nearest_obstacles
 from excite_cli.constraints.remark import Remark, counted_reasons
 from excite_cli.dynamics.states import States
 from excite_cli.geometry.coal_distances import CoalDistances
-from excite_cli.geometry.collision_pairs import ALWAYS, DroppedPair
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs
 from excite_cli.geometry.obstacles import Box, Obstacle
+from excite_cli.geometry.reasons import DroppedPair, Why
+from excite_cli.geometry.words import reason_in_words
 from excite_cli.proof.enclosed_distances import EnclosedCapsules
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_obstacles import least_clearances
@@ -77,9 +78,9 @@ class Surroundings(Constraint):
             words = "these never get far from each other, so half of the farthest is kept instead"
             said.append(Remark(f"{words} of {most:g} m: {'; '.join(closer)}", important=True))
         touching = [
-            f"{pair.first} – {pair.second} {pair.reason}"
+            f"{pair.first} – {pair.second} {reason_in_words(pair.reason)}"
             for pair in self.pairs.dropped
-            if pair.reason.startswith(ALWAYS)
+            if pair.reason.why is Why.ALWAYS_TOUCHING
         ]
         if touching:
             warning = (

@@ -4,7 +4,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from excite_cli.geometry.collision_pairs import DroppedPair
+from excite_cli.geometry.reasons import DroppedPair
+from excite_cli.geometry.words import why_in_words
 
 
 @dataclass(frozen=True)
@@ -17,5 +18,6 @@ class Remark:
 
 def counted_reasons(dropped: Sequence[DroppedPair]) -> str:
     """How many pairs were dropped for each reason, figures in the reasons left aside."""
-    counts = Counter(pair.reason.split(" (")[0] for pair in dropped)
-    return ", ".join(f"{count} {reason}" for reason, count in counts.most_common()) or "none"
+    counts = Counter(pair.reason.why for pair in dropped)
+    told = (f"{count} {why_in_words(why)}" for why, count in counts.most_common())
+    return ", ".join(told) or "none"

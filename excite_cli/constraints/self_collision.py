@@ -9,8 +9,9 @@ from excite_cli.constraints.remark import Remark, counted_reasons
 from excite_cli.dynamics.states import States
 from excite_cli.geometry.clearance import Clearance
 from excite_cli.geometry.coal_distances import CoalDistances
-from excite_cli.geometry.collision_pairs import UNGUARDED, CollisionPairs, DroppedPair
+from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.link_meshes import Poses
+from excite_cli.geometry.reasons import DroppedPair
 from excite_cli.proof.enclosed_distances import EnclosedCapsules
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.capsule import Capsule
@@ -24,7 +25,7 @@ _NEAR, _LEAST_NEAR, _RADII = 0.1, 0.02, 2.5
 class SelfCollision(Constraint):
     """One column per checked pair of capsules.
 
-    `tabled`: pairs of links whose meshes are kept apart instead, as `MeshClearance` labels them.
+    `tabled`: pairs of links whose meshes are kept apart instead.
     """
 
     name = "self_collision"
@@ -37,7 +38,7 @@ class SelfCollision(Constraint):
         capsules: tuple[Capsule, ...],
         pairs: CollisionPairs,
         margin: float,
-        tabled: tuple[str, ...] = (),
+        tabled: tuple[tuple[str, str], ...] = (),
     ) -> None:
         self._robot = robot
         self.capsules, self.pairs, self.margin, self.tabled = capsules, pairs, margin, tabled
@@ -63,11 +64,10 @@ class SelfCollision(Constraint):
             f"checked: {counted_reasons(self.pairs.dropped)}"
         )
         loose = {
-            words
+            f"{links.first} – {links.second} {links.percent}%"
             for pair in self.pairs.dropped
-            if pair.reason.startswith(UNGUARDED)
-            for words in pair.reason.partition("apart: ")[2][:-1].split(", ")
-            if not words.endswith("100%") and not words.startswith(self.tabled)
+            for links in pair.reason.apart
+            if links.percent < 100 and (links.first, links.second) not in self.tabled
         }
         if not loose:
             return (count,)

@@ -14,7 +14,6 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.split import run_name
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace
 from excite_cli.robot.model import Array, Robot
 
@@ -91,4 +90,4 @@ def _predicted(robot: Robot, fitted: FittedModel, run: PreparedRun, regressor: A
     body = RigidBody(robot, fitted.phi, run.q, run.v, run.a)
     body.__dict__["regressor"] = regressor  # it does not depend on φ, and takes a while
     values = fitted.values if len(fitted.effects) else np.zeros(0)
-    return predicted(body, fitted.effects, values, run.t, run_name(run.name))
+    return predicted(body, fitted.effects, values, run.t, run.run)

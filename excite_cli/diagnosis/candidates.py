@@ -82,7 +82,7 @@ def possible_effects(
                 continue
             if kind.per_run:
                 effects += _in_runs(kind, robot, place, signals, residuals, runs)
-                tests += len(set(runs)) * kind.tests_of_grid(robot, place, signals[:1])
+                tests += len(runs) * kind.tests_of_grid(robot, place, signals[:1])
             else:
                 shapes = kind.tuned(robot, place, signals, residuals)
                 effects += [kind(place, shape) for shape in shapes]
@@ -118,9 +118,9 @@ def _in_runs(
     would be part of the robot.
     """
     found: list[Effect] = []
-    trained = [run for run in runs if any(s.run == run for s in signals)]
+    trained = [run for run in runs if any(s.run.is_among((run,)) for s in signals)]
     for run in trained:
-        own = [i for i, s in enumerate(signals) if s.run == run]
+        own = [i for i, s in enumerate(signals) if s.run.is_among((run,))]
         shapes = kind.tuned(robot, place, [signals[i] for i in own], [residuals[i] for i in own])
         if kind.shapes or len(runs) > 1:
             found += [kind(place, shape, (run,)) for shape in shapes]

@@ -26,15 +26,3 @@ def confirmed_shares(plain: Evidence, chosen: Sequence[int], joint: int) -> Arra
     )
     shares = 1.0 - np.maximum(after / max(before, 1e-300), fitted / max(rest, 1e-300))
     return np.clip(shares, 0.0, 1.0)
-
-
-def common_names(quantities: Sequence[str], joint: str) -> tuple[str, ...]:
-    """Names of the quantities of `joint` that hold for every joint: its own ones without its name.
-
-    Time, angles, speeds and accelerations are those of all joints and keep their names.
-    """
-    general = ("time", "q[", "v[", "a[")
-    return tuple(
-        name if name.startswith(general) else f"own {name.replace(f'[{joint}]', '')}"
-        for name in quantities
-    )

@@ -21,6 +21,8 @@ from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.plausibility import check_plausibility
 from excite_cli.diagnosis.records import (
+    Approximation,
+    Assumption,
     Diagnosis,
     EffectRecord,
     Information,
@@ -31,14 +33,16 @@ from excite_cli.diagnosis.rounds import rounds_of
 from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.unexplained import unexplained_structure
+from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
+from excite_cli.identification.declared_runs import check_declared_runs
 from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
-from excite_cli.identification.split import Split, run_name, split
+from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.robot.model import Array, Robot
@@ -67,6 +71,7 @@ def diagnose(
         The data cannot be what the configuration says (joint order, signs), or are too short.
     """
     started = time.monotonic()
+    check_declared_runs(spec.effects, dataset)
     model = _model(robot, base, spec)
     parts = split(dataset, sealed, spec.diagnosis.block)
     processing = choose_processing(
@@ -79,8 +84,7 @@ def diagnose(
 
     training = prepared(())
     check_plausibility(robot, training)
-    names = [run.name for run in dataset.runs]
-    traced = trace(model, spec.diagnosis, prepared, parts.folds, names, progress)
+    traced = trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
     progress("naming", 8)
     parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
     covariance = covariance_of(
@@ -96,7 +100,7 @@ def diagnose(
     models = both_models(model, traced, parameters)
     sealed_part = on_sealed(robot, models, [prepare(run, processing) for run in parts.sealed])
     base_values, base_std = _base_parameters(model, parameters, covariance)
-    floor = noise_floor(parts.training, processing)
+    floor, assumed = noise_floor(parts.training, processing), _assumed(traced, parts)
     return Diagnosis(
         config="",
         config_folder="",
@@ -118,10 +122,10 @@ def diagnose(
         rounds=rounds_of(traced, robot.joint_names),
         findings=(
             *dataset.findings,
-            *_assumed(traced, parts),
+            *(Finding("assumed", "warning", assumption_in_words(each)) for each in assumed),
             *(floor.noticed(robot.joint_names) if floor else ()),
         ),
-        processing=_choices(processing, traced, training),
+        processing=_choices(processing, traced, parts, training),
         phi=model.full_inertias(parameters),
         base_values=base_values,
         base_std=base_std,
@@ -136,6 +140,7 @@ def diagnose(
             dependence,
         ),
         sealed_traces=sealed_part.traces,
+        assumed=assumed,
     )  # fmt: skip
 
 
@@ -158,7 +163,11 @@ def _column_names(model: Model) -> list[str]:
 
 
 def _named(
-    model: Model, traced: Traced, parameters: Array, covariance: Array, doubts: Mapping[int, str]
+    model: Model,
+    traced: Traced,
+    parameters: Array,
+    covariance: Array,
+    doubts: Mapping[int, Approximation],
 ) -> tuple[tuple[NamedEffect, ...], list[tuple[Alias, Array]]]:
     """Named effects with values, evidence and aliases; and the aliases with their own values."""
     judge, names = traced.judge, model.robot.joint_names
@@ -208,7 +217,7 @@ def _named(
                 share_of_residual=float(np.clip(share, 0.0, 1.0)),
                 gain=float(judge.left_out_gain(rest, [i])),
                 aliases=tuple(records),
-                approximates=doubts.get(i, ""),
+                approximates=doubts.get(i),
             )
         )
     order = np.argsort([-each for each in strength], kind="stable")
@@ -265,27 +274,23 @@ def _information(model: Model, traced: Traced, rivals: list[tuple[Alias, Array]]
     )
 
 
-def _assumed(traced: Traced, parts: Split) -> list[Finding]:
-    """Effects of single runs leave open whether the sealed one has them: say what was assumed."""
-    names = {run_name(run.name) for run in parts.sealed}
-    found = []
-    for effect in traced.effects:
-        if effect.runs:
-            there = "is" if names & set(effect.runs) else "is not"
-            found.append(
-                Finding(
-                    "assumed",
-                    "warning",
-                    f"{effect.kind} was found in {', '.join(effect.runs)}; for the error it is "
-                    f"assumed that it {there} in the sealed {', '.join(sorted(names))}. If you "
-                    "know better, declare it under effects with its runs.",
-                )
-            )
-    return found
+def _assumed(traced: Traced, parts: Split) -> tuple[Assumption, ...]:
+    """Effects of single runs leave open whether the sealed one has them."""
+    sealed = tuple(sorted({run.id.key for run in parts.sealed}))
+    return tuple(
+        Assumption(
+            effect.kind,
+            effect.runs,
+            sealed,
+            any(effect.active(run.id) for run in parts.sealed),
+        )
+        for effect in traced.effects
+        if effect.runs
+    )
 
 
 def _choices(
-    processing: Processing, traced: Traced, training: Sequence[PreparedRun]
+    processing: Processing, traced: Traced, parts: Split, training: Sequence[PreparedRun]
 ) -> dict[str, Any]:
     """Every choice that was made, for the result."""
     valid = np.concatenate([run.valid for run in training])
@@ -296,7 +301,7 @@ def _choices(
         "invalid_share": [float(x) for x in (~valid).mean(axis=0)],
         "noise_orders": [len(c) for c in traced.noise.coefficients],
         "noise_rms": [float(x) for x in traced.levels],
-        "runs": sorted({run_name(run.name) for run in training}),
+        "runs": sorted({parts.unit(run.id) for run in parts.training}),
         "inflation": traced.inflation,
         "candidates": len(traced.candidates),
         "samples": int(usable.any(axis=1).sum()),

@@ -11,29 +11,21 @@ size would explain. The effect is an approximation
 
 from collections.abc import Sequence
 
-from excite_cli.diagnosis.records import Unexplained
+from excite_cli.diagnosis.covariate import Covariate
+from excite_cli.diagnosis.records import Approximation, Unexplained
 from excite_cli.diagnosis.tracing import Traced
 
 _SAME_QUANTITY = 0.1
 _TRIED = 12  # of the strongest candidates of a joint
 
-# How the quantities of effects begin in the words of `unexplained`.
-_WORDS = {
-    "position": ("q[",),
-    "speed": ("v[", "direction and q[", "history of q["),
-    "acceleration": ("a[",),
-    "load": ("load[", "history of load["),
-    "time": ("time",),
-}
-
 
 def approximations(
     traced: Traced, unexplained: Sequence[Unexplained], joint_names: Sequence[str]
-) -> dict[int, str]:
-    """Which chosen candidates are approximations, and of what (in words)."""
+) -> dict[int, Approximation]:
+    """Which chosen candidates are approximations, and of what."""
     left = {each.joint: each for each in unexplained}
     impossible: dict[int, tuple[float, str]] = {}
-    found: dict[int, str] = {}
+    found: dict[int, Approximation] = {}
     plain = traced.judge.plain
     for i in traced.chosen:
         joint, explained = _strongest(traced, i)
@@ -44,13 +36,13 @@ def approximations(
             structure = each.share_of_residual * rest
             same = _same_quantity(traced, i, each.depends_on, joint_names)
             if structure > (_SAME_QUANTITY if same else 1.0) * explained:
-                found[i] = f"a function of {', '.join(each.depends_on)}"
+                found[i] = Approximation(covariates=each.depends_on)
                 continue
         if joint not in impossible:
             impossible[joint] = _impossible(traced, joint, rest)
         energy, what = impossible[joint]
         if energy > explained:
-            found[i] = f"something that also looks like {what}"
+            found[i] = Approximation(kind=what)
     return found
 
 
@@ -67,19 +59,15 @@ def _strongest(traced: Traced, i: int) -> tuple[int, float]:
 
 
 def _same_quantity(
-    traced: Traced, i: int, depends_on: Sequence[str], joint_names: Sequence[str]
+    traced: Traced, i: int, depends_on: Sequence[Covariate], joint_names: Sequence[str]
 ) -> bool:
     effect = traced.candidates[i].effect
-    words = tuple(word for quantity in effect.function_of for word in _WORDS[quantity])
-    own = [joint_names[j] for j in effect.joints]
-    return any(
-        text.startswith(words) and (text == "time" or any(f"[{name}]" in text for name in own))
-        for text in depends_on
-    )
+    own = ("", *(joint_names[j] for j in effect.joints))  # time belongs to no joint
+    return any(each.like in effect.function_of and each.joint in own for each in depends_on)
 
 
 def _impossible(traced: Traced, joint: int, rest: float) -> tuple[float, str]:
-    """The most that a candidate which cannot be so would explain, and its title."""
+    """The most that a candidate which cannot be so would explain, and its kind."""
     judge, chosen = traced.judge, traced.chosen
     taken = {traced.candidates[i].place for i in chosen}
     singles = judge.plain.schur(chosen).singles
@@ -93,5 +81,5 @@ def _impossible(traced: Traced, joint: int, rest: float) -> tuple[float, str]:
         together = [*chosen, k]
         energy = rest - judge.plain.energy_on(together, [joint])
         if energy > best[0] and not judge.allowed(judge.plain.solve(together), together, [k]):
-            best = (energy, traced.candidates[k].effect.title)
+            best = (energy, traced.candidates[k].effect.kind)
     return best

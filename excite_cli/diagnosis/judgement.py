@@ -14,6 +14,7 @@ from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate, Place
 from excite_cli.diagnosis.evidence import SHARED, Evidence, Gain, Schur
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.robot.model import Array
 
 # It stays in beside its refinement unless it is useless there (χ² units).
@@ -220,18 +221,18 @@ class Judgement:
         before = self.left_out_gain(rest, [member])
         return self.left_out_gain(rest, move) < before - _FAR_MORE
 
-    def verdict(self, chosen: Sequence[int], added: Sequence[int]) -> str:
-        """`accepted`, or why `added` may not join the chosen ones."""
+    def verdict(self, chosen: Sequence[int], added: Sequence[int]) -> Verdict:
+        """Accepted, or why `added` may not join the chosen ones."""
         together = [*chosen, *added]
         if not self.allowed(self.plain.solve(together), together, added):
-            return "impossible sign"
+            return Verdict.IMPOSSIBLE_SIGN
         if self.too_small(chosen, added):
-            return "too small to matter"
+            return Verdict.TOO_SMALL
         if self._leftover(chosen, added):
-            return "what another effect leaves"
+            return Verdict.LEFTOVER
         if not self._generalises(chosen, added):
-            return "no gain on runs left out"
-        return "accepted"
+            return Verdict.NO_GAIN
+        return Verdict.ACCEPTED
 
     def _generalises(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
         """Whether runs left out gain, and not far less than those fitted."""

@@ -12,7 +12,6 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import effect_columns
-from excite_cli.identification.split import run_name
 from excite_cli.robot.model import Array
 
 
@@ -35,7 +34,7 @@ class ModelledRun:
         """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
         run, body = self.run, self._at(phi)
         load = body.load
-        signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run_name(run.name))
+        signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run.run)
         if not len(values):
             return signals
         # Defects of the measurement do not change the torque that they act upon.

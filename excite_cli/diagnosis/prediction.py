@@ -10,6 +10,7 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import effect_columns
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 
 _SETTLED = 3
@@ -24,7 +25,7 @@ class Prediction:
 
 
 def predicted(
-    body: RigidBody, effects: Sequence[Effect], values: Array, t: Array, run: str
+    body: RigidBody, effects: Sequence[Effect], values: Array, t: Array, run: RunId
 ) -> Prediction:
     """What a model says of a motion at instants `t` (T,) of a run; its inertias are the body's.
 

@@ -3,7 +3,9 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.traces import Traces
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Value
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
@@ -23,13 +25,21 @@ class EffectRecord:
 
 
 @dataclass(frozen=True)
+class Approximation:
+    """What an effect only comes near: a function of `covariates`, or what `kind` looks like too."""
+
+    covariates: tuple[Covariate, ...] = ()
+    kind: str = ""
+
+
+@dataclass(frozen=True)
 class NamedEffect:
     """An effect that the declared model lacks, with its evidence.
 
     `parameters` as people know them; `p_value` corrected for the family of tests;
     `share_of_residual` of the energy of the residual before, on the rows it touches;
     `gain` by which the error on runs left out fell; `aliases` what the data cannot tell it from.
-    If it is only an approximation, `approximates` says of what; else it is empty.
+    If it is only an approximation, `approximates` says of what.
     """
 
     effect: EffectRecord
@@ -38,7 +48,7 @@ class NamedEffect:
     share_of_residual: float
     gain: float
     aliases: tuple[EffectRecord, ...] = ()
-    approximates: str = ""
+    approximates: Approximation | None = None
 
 
 @dataclass(frozen=True)
@@ -56,8 +66,18 @@ class Unexplained:
     """Structure in a joint's residual that fits no name, and what it depends on."""
 
     joint: str
-    depends_on: tuple[str, ...]
+    depends_on: tuple[Covariate, ...]
     share_of_residual: float
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """An effect of single `runs` was taken to be `present` in what is sealed, or to be absent."""
+
+    kind: str
+    runs: tuple[str, ...]
+    sealed: tuple[str, ...]
+    present: bool
 
 
 @dataclass(frozen=True)
@@ -68,7 +88,7 @@ class Suspect:
     p_value: float
     share_of_residual: float
     gain: float
-    verdict: str
+    verdict: Verdict
 
 
 @dataclass(frozen=True)
@@ -131,6 +151,7 @@ class Diagnosis:
     noise_floor: dict[str, float] | None = None
     traces: Traces | None = None
     sealed_traces: tuple[TorqueTrace, ...] = ()
+    assumed: tuple[Assumption, ...] = ()
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:

@@ -7,6 +7,7 @@ import numpy as np
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.records import Round, Suspect
 from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.robot.model import Array
 
 _SUSPECTS = 5
@@ -83,13 +84,13 @@ def _suspects(
         before = judge.plain.energy_on(chosen, joints)
         share = 1.0 - judge.plain.energy_on([*chosen, i], joints) / max(before, 1e-300)
         if i == accepted:
-            verdict = "accepted"
+            verdict = Verdict.ACCEPTED
         elif p > judge.rules.significance:
-            verdict = "not significant"
+            verdict = Verdict.NOT_SIGNIFICANT
         else:
             verdict = judge.verdict(chosen, [i])
-            if verdict == "accepted":
-                verdict = "later" if i in traced.chosen else "another explains it"
+            if verdict is Verdict.ACCEPTED:
+                verdict = Verdict.LATER if i in traced.chosen else Verdict.EXPLAINED
         found.append(Suspect(record_of(candidate.effect, joint_names), p, share, left_out, verdict))
         if len(found) == _SUSPECTS:
             break

@@ -12,6 +12,7 @@ import numpy as np
 
 from excite_cli.diagnosis.evidence import SHARED, Schur
 from excite_cli.diagnosis.judgement import Judgement
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Tier
 
 _MOST_STEPS = 80
@@ -97,7 +98,7 @@ class Search:
                 continue
             if (
                 self.judge.in_order(schur, chosen, [i])
-                and self.judge.verdict(chosen, [i]) == "accepted"
+                and self.judge.verdict(chosen, [i]) is Verdict.ACCEPTED
             ):
                 best = i
         return () if best is None else (best,)
@@ -111,7 +112,7 @@ class Search:
                 break
             if (
                 self.judge.in_order(schur, chosen, pair)
-                and self.judge.verdict(chosen, pair) == "accepted"
+                and self.judge.verdict(chosen, pair) is Verdict.ACCEPTED
             ):
                 return pair
         return ()

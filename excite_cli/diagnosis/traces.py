@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.robot.model import Array
 
@@ -36,7 +37,7 @@ class Dependence:
     """`shares` (n, K), 0 to 1: of the residual of each of `joints`, by each of `quantities`."""
 
     joints: tuple[str, ...]
-    quantities: tuple[str, ...]
+    quantities: tuple[Covariate, ...]
     shares: Array
 
 

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.dependence import common_names, confirmed_shares
+from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.dependence import confirmed_shares
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.grams import JointGram
 from excite_cli.diagnosis.history import histories
@@ -68,12 +69,12 @@ def unexplained_structure(
         joint = strongest.named[0].rows[0]
         found[joint] = Unexplained(
             joint_names[joint],
-            tuple(feature.quantity for feature in strongest.named),
+            tuple(feature.covariate for feature in strongest.named),
             strongest.share,
         )
         kept += strongest.named
     assert shares is not None
-    quantities = common_names([each.quantity for each in features[0]], joint_names[0])
+    quantities = tuple(each.covariate.common for each in features[0])
     dependence = Dependence(tuple(joint_names), quantities, shares)
     return [found[joint] for joint in sorted(found)], dependence
 
@@ -82,7 +83,7 @@ def unexplained_structure(
 class Feature:
     """Smooth functions of one quantity, with free coefficients; not an effect with a name."""
 
-    quantity: str
+    covariate: Covariate
     rows: tuple[int, ...]
     columns: tuple[Array, ...]
 
@@ -135,19 +136,23 @@ def _features(
     joint: int,
     joint_names: Sequence[str],
 ) -> list[Feature]:
-    names, columns = _quantities(data, signals, joint, joint_names)
-    for name, series in (
-        (f"history of q[{joint_names[joint]}]", past.q),
-        (f"history of load[{joint_names[joint]}]", past.load),
+    covariates, columns = _quantities(data, signals, joint, joint_names)
+    own = joint_names[joint]
+    for covariate, series in (
+        (Covariate("position", own, Aspect.HISTORY), past.q),
+        (Covariate("load", own, Aspect.HISTORY), past.load),
     ):
-        names.append(name)
+        covariates.append(covariate)
         columns.append(
             tuple(
                 run.averaged_for_fit(x[:, None, joint], [joint])
                 for x, run in zip(series, data.runs, strict=True)
             )
         )
-    return [Feature(name, (joint,), blocks) for name, blocks in zip(names, columns, strict=True)]
+    return [
+        Feature(covariate, (joint,), blocks)
+        for covariate, blocks in zip(covariates, columns, strict=True)
+    ]
 
 
 def _structure(
@@ -248,25 +253,25 @@ def _best(
 
 def _quantities(
     data: TrainingData, signals: Sequence[Signals], joint: int, joint_names: Sequence[str]
-) -> tuple[list[str], list[tuple[Array, ...]]]:
-    """Names of quantities and their columns (M, 1, p) per part."""
-    names = ["time"]
+) -> tuple[list[Covariate], list[tuple[Array, ...]]]:
+    """Covariates and their columns (M, 1, p) per part."""
+    covariates = [Covariate("time")]
     longest = float(max(x.t[-1] for x in signals))
     made: list[Callable[[Signals], Array]] = [lambda s: _powers(s.t, longest)]
     for k, name in enumerate(joint_names):
         fastest = max(float(np.abs(s.v[:, k]).max()) for s in signals) + 1e-12
         strongest = max(float(np.abs(s.a[:, k]).max()) for s in signals) + 1e-12
         made.append(partial(_of_position, k))
-        names.append(f"q[{name}]")
+        covariates.append(Covariate("position", name))
         made.append(partial(_of_speed, k, fastest))
-        names.append(f"v[{name}]")
+        covariates.append(Covariate("speed", name))
         made.append(partial(_of_acceleration, k, strongest))
-        names.append(f"a[{name}]")
+        covariates.append(Covariate("acceleration", name))
     made.append(partial(_of_direction_and_position, joint))
-    names.append(f"direction and q[{joint_names[joint]}]")
+    covariates.append(Covariate("position", joint_names[joint], Aspect.DIRECTION))
     heaviest = max(float(np.abs(s.load[:, joint]).max()) for s in signals) + 1e-12
     made.append(lambda s: _odd_even(s.load[:, joint] / heaviest)[:, :3])
-    names.append(f"load[{joint_names[joint]}]")
+    covariates.append(Covariate("load", joint_names[joint]))
     columns = [
         tuple(
             run.averaged_for_fit(make(s)[:, None], [joint])
@@ -274,7 +279,7 @@ def _quantities(
         )
         for make in made
     ]
-    return names, columns
+    return covariates, columns
 
 
 def _of_position(k: int, s: Signals) -> Array:

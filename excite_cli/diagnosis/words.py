@@ -1,13 +1,23 @@
 """A diagnosis in words, the same ones wherever it is told."""
 
-from excite_cli.diagnosis.records import EffectRecord, NamedEffect
-from excite_cli.effects.base import Value
+from collections.abc import Callable
+
+from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.records import Approximation, Assumption, EffectRecord, NamedEffect
+from excite_cli.effects.base import Quantity, Value
 from excite_cli.effects.catalogue import catalogue
 
 # Effects that explain less of the residual, and without which runs left out are hardly worse, are
 # told with few words.
 SMALL_SHARE = 0.002
 _SMALL_GAIN = 0.3
+_QUANTITIES: dict[Quantity, str] = {
+    "time": "time",
+    "position": "angle",
+    "speed": "speed",
+    "acceleration": "acceleration",
+    "load": "rigid-body torque",
+}
 
 
 def is_small(named: NamedEffect) -> bool:
@@ -39,6 +49,42 @@ def value_in_words(name: str, value: Value) -> str:
     if value.std != value.std:
         return f"{name} {value.value:.3g}{unit}"
     return f"{name} {value.value:.4g} ± {2 * value.std:.2g}{unit}"
+
+
+def covariate_in_symbols(covariate: Covariate) -> str:
+    """What a residual depends on, briefly: `q[elbow]`."""
+    return covariate.code
+
+
+def covariate_in_words(covariate: Covariate) -> str:
+    """What a residual depends on: `angle of elbow`."""
+    words = _QUANTITIES[covariate.quantity]
+    if covariate.own:
+        words = f"own {words}"
+    elif covariate.joint:
+        words = f"{words} of {covariate.joint}"
+    if covariate.aspect is Aspect.HISTORY:
+        return f"history of {words}"
+    return f"{words} and direction" if covariate.aspect is Aspect.DIRECTION else words
+
+
+def approximation_in_words(
+    found: Approximation, say: Callable[[Covariate], str] = covariate_in_symbols
+) -> str:
+    """What an effect only comes near; covariates as `say` puts them."""
+    if found.covariates:
+        return f"a function of {', '.join(map(say, found.covariates))}"
+    return f"something that also looks like {title_of(found.kind)}"
+
+
+def assumption_in_words(assumed: Assumption) -> str:
+    """What was assumed of an effect of single runs, and what to do if it is wrong."""
+    there = "is" if assumed.present else "is not"
+    return (
+        f"{assumed.kind} was found in {', '.join(assumed.runs)}; for the error it is assumed that "
+        f"it {there} in the sealed {', '.join(assumed.sealed)}. If you know better, declare it "
+        "under effects with its runs."
+    )
 
 
 def counted(count: int, what: str) -> str:

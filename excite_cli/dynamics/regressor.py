@@ -10,6 +10,7 @@ from excite_cli.robot.model import Array, Robot
 
 PARAMETERS_PER_BODY = 10
 PARAMETER_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+_UNITS = ("kg", *["kg·m"] * 3, *["kg·m²"] * 6)
 
 
 class Regressor:
@@ -55,6 +56,11 @@ def payload_parameters(robot: Robot) -> Array:
     if robot.payload is not None:
         phi[robot.payload.capsule.joint] = robot.payload.phi
     return phi[1:].ravel()
+
+
+def standard_parameter_unit(index: int) -> str:
+    """The unit of φ_index."""
+    return _UNITS[index % PARAMETERS_PER_BODY]
 
 
 def standard_parameter_names(robot: Robot) -> tuple[str, ...]:

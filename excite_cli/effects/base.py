@@ -24,6 +24,7 @@ import numpy as np
 from excite_cli.effects.parameter import Parameter, Value, deviation
 from excite_cli.effects.signals import Cotangents, Signals
 from excite_cli.effects.simulated_robot import JOINT_PARTS, SimulatedRobot
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 
 Scope = Literal["joint", "pair", "robot"]
@@ -68,7 +69,7 @@ _DRAWN_OVER: Mapping[Quantity, tuple[str, str, str]] = {
 class Effect(ABC):
     """An effect on given joints with given shape (values of its non-linear parameters).
 
-    `runs`: the runs in which it is present; empty means all.
+    `runs`: the recordings, or stretches of them, in which it is present; empty means all.
     """
 
     joints: tuple[int, ...]
@@ -146,9 +147,9 @@ class Effect(ABC):
         """How many independent tests the choice of the non-linear parameters stands for."""
         return len(cls.grid(robot, joints, signals))
 
-    def active(self, run: str) -> bool:
+    def active(self, run: RunId) -> bool:
         """Whether the effect is present in `run`."""
-        return not self.runs or run in self.runs
+        return not self.runs or run.is_among(self.runs)
 
     def rows(self, n: int) -> tuple[int, ...]:
         """Moved joints in whose torque it shows."""

@@ -1,10 +1,11 @@
 """What an effect sees of a motion, and how its derivative is handed back."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
 
 
@@ -24,7 +25,7 @@ class Signals:
     load: Array
     torque: Array
     body: RigidBody
-    run: str = ""
+    run: RunId = field(default_factory=RunId)
 
     def rate(self, x: Array) -> Array:
         """dx/dt by central differences along the first axis."""

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve
 
 from excite_cli.excitation.objective import Objective, Spectrum
+from excite_cli.excitation.progress import Figure, Measure
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array
 
@@ -64,9 +65,9 @@ class SeparationSpectrum(Spectrum):
     """√Δ of every direction in descending order, and the z of each as columns of `right`."""
 
     @property
-    def words(self) -> str:
+    def figure(self) -> Figure:
         """The smallest divergence."""
-        return f"divergence {0.5 * float(self.sigma[-1]) ** 2:.3g}"
+        return Figure(Measure.DIVERGENCE, 0.5 * float(self.sigma[-1]) ** 2)
 
 
 def residual_directions(gram: Array, directions: Sequence[Direction]) -> tuple[Array, Array]:

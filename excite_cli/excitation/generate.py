@@ -10,9 +10,10 @@ from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import verdicts, worst_margins
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.given_start import start_from
-from excite_cli.excitation.motion import Motion, Outcome, ProgressCallback
+from excite_cli.excitation.motion import Motion, Outcome
 from excite_cli.excitation.one_start import FoundMotion, OneStart, Search, solve_start
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import ProgressCallback, Status
 from excite_cli.excitation.solvers.base import Solver
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import Start, moved_note
@@ -113,9 +114,9 @@ def _best_of_starts(
     if not found:
         raise ended[-1]
     best = min(found, key=_rank).outcome
-    cut = sum(each.outcome.status == "time limit" for each in found)
+    cut = sum(each.outcome.status is Status.TIME_LIMIT for each in found)
     told = ""
-    if cut and best.status != "time limit":
+    if cut and best.status is not Status.TIME_LIMIT:
         told = (
             f"{cut} of {restarts} starts ended at optimizer.max_seconds, so another run may find "
             "another best one; raise it"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array
 from excite_cli.geometry.mesh_check import MeshCheck, MeshGap, MeshGaps
+from excite_cli.geometry.reasons import Standing
 from excite_cli.proof.certificate import Path, State
 from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
 from excite_cli.proof.worst_margin import Worst
@@ -40,7 +41,7 @@ class MeshVerdict:
 
     def worst(self) -> Worst:
         """The nearest judged pair; a bound for all where none came near."""
-        judged = [gap for gap in self.gaps.near if not gap.standing]
+        judged = [gap for gap in self.gaps.near if gap.standing is Standing.JUDGED]
         if not judged:
             return Worst(self.gaps.beyond, "m", "all pairs farther", float(self.times[0]), 0)
         nearest = judged[0]
@@ -52,7 +53,9 @@ class MeshVerdict:
     @property
     def told(self) -> tuple[MeshGap, ...]:
         """Pairs that touch and are not judged, with the reason in `standing`."""
-        return tuple(gap for gap in self.gaps.near if gap.standing and gap.touching)
+        return tuple(
+            gap for gap in self.gaps.near if gap.standing is not Standing.JUDGED and gap.touching
+        )
 
 
 def mesh_verdict(path: Path, check: MeshCheck, times: Array) -> MeshVerdict:

@@ -1,46 +1,10 @@
 """Records that travel from the optimiser to the file and the terminal."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
 
 from excite_cli.constraints.base import Array
+from excite_cli.excitation.progress import Status
 from excite_cli.proof.worst_margin import Worst
-
-Status = Literal["converged", "iteration limit", "time limit", "stalled"]
-
-
-@dataclass(frozen=True)
-class Starts:
-    """How far the starts of a motion are: done, running, and how many there are.
-
-    `iterations` are those of all of them; a start that has ended counts with the most it may take.
-    """
-
-    done: int
-    running: int
-    total: int
-    iterations: int
-
-
-@dataclass(frozen=True)
-class Progress:
-    """What a solver tells while it runs; `worst` is the smallest margin, in its own unit.
-
-    `figure` is what is improved, in words: `cond 5.48`. `starts`: where there is more than one.
-    """
-
-    iteration: int
-    figure: str
-    worst_name: str
-    worst_margin: float
-    worst_unit: str
-    seconds: float
-    stage: str
-    starts: Starts | None = None
-
-
-ProgressCallback = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)
@@ -67,7 +31,7 @@ class Motion:
     condition_number: float
     stacked_condition_number: float
     improved: bool
-    status: str
+    status: Status
     seconds: float
     iterations: int
     evaluations: int

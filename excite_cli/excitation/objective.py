@@ -19,6 +19,7 @@ from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
 from excite_cli.excitation.effect_columns import SeenColumns
 from excite_cli.excitation.extension import Extension
+from excite_cli.excitation.progress import Figure, Measure
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting
 from excite_cli.kernels.library import KERNELS
@@ -45,9 +46,9 @@ class Spectrum:
         return condition_number(self.sigma)
 
     @property
-    def words(self) -> str:
-        """The figure that is shown while a solver runs."""
-        return f"cond {self.condition_number:.2f}"
+    def figure(self) -> Figure:
+        """What a solver improves."""
+        return Figure(Measure.CONDITION_NUMBER, self.condition_number)
 
 
 class Objective:

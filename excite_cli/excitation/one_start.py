@@ -11,8 +11,9 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import lacking_margins
-from excite_cli.excitation.motion import Outcome, ProgressCallback
+from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import Figure, ProgressCallback, Status
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import Start, random_start
@@ -45,10 +46,10 @@ class OneStart:
 
 @dataclass(frozen=True)
 class FoundMotion:
-    """What a start led to: the criterion of that, the same in words, how long it took [s]."""
+    """What a start led to: the criterion of that, what is told of it, how long it took [s]."""
 
     value: float
-    words: str
+    figure: Figure
     outcome: Outcome
     seconds: float
 
@@ -70,7 +71,7 @@ def solve_start(
         return NoAdmissibleMotionError(str(error))
     spectrum = run.objective.spectrum(run.objective.block(run.coefficients(outcome.x)))
     value = problem.criterion.value(spectrum.sigma)
-    return FoundMotion(value, spectrum.words, outcome, time.perf_counter() - began)
+    return FoundMotion(value, spectrum.figure, outcome, time.perf_counter() - began)
 
 
 def kept_between_instants(
@@ -109,7 +110,7 @@ def kept_between_instants(
         again = solver.solve(tighter, inside, short, report)
         outcome = Outcome(
             again.x,
-            "time limit" if again.status == "time limit" else outcome.status,
+            again.status if again.status is Status.TIME_LIMIT else outcome.status,
             outcome.iterations + again.iterations,
             outcome.evaluations + again.evaluations,
         )

@@ -7,12 +7,13 @@ from pathlib import Path
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.errors import FileError
-from excite_cli.excitation.motion import ProgressCallback
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import ProgressCallback
 from excite_cli.excitation.result import Result, matches
 from excite_cli.excitation.sequence import Step, generate_sequence
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
+from excite_cli.geometry.words import dropped_in_words
 from excite_cli.trajectory.chain import Segment
 from excite_cli.workers.base import Workers
 
@@ -166,5 +167,5 @@ def _pairs(problem: Problem) -> tuple[tuple[str, ...], tuple[str, ...]]:
         left_out = constraint.left_out
         if left_out is not None:
             checked += constraint.labels
-            dropped += [f"{pair.first} – {pair.second}: {pair.reason}" for pair in left_out]
+            dropped += map(dropped_in_words, left_out)
     return tuple(checked), tuple(dropped)

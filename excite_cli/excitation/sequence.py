@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from excite_cli.excitation.generate import generate_motion
-from excite_cli.excitation.motion import Motion, ProgressCallback
+from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import ProgressCallback
 from excite_cli.excitation.solvers.base import Solver
 from excite_cli.excitation.stack import Stack
 from excite_cli.trajectory.chain import Segment

@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
-from excite_cli.excitation.motion import Progress, ProgressCallback, Starts
 from excite_cli.excitation.one_start import FoundMotion
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import Progress, ProgressCallback, Stage, Starts
 from excite_cli.workers.base import News, Watch
 
 
@@ -17,7 +17,7 @@ def followed(report: ProgressCallback, problem: Problem, starts: int) -> Watch:
         told: Progress | None = news.word
         if isinstance(news.result, FoundMotion):  # its last point keeps all limits
             count = news.result.outcome.iterations
-            told = Progress(count, news.result.words, "", 0.0, "", news.result.seconds, "done")
+            told = Progress(count, news.result.figure, "", 0.0, "", news.result.seconds, Stage())
             iterations[news.index] = most
         elif told is not None:
             iterations[news.index] = min(told.iteration, most)

@@ -12,9 +12,9 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.states import States
-from excite_cli.excitation.motion import Progress
 from excite_cli.excitation.objective import Spectrum
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import Progress, Stage
 from excite_cli.excitation.residuals import Residuals
 from excite_cli.excitation.stack import Stack
 
@@ -83,7 +83,7 @@ class MotionTask:
         return self.residuals.values(states)
 
     def progress(
-        self, iteration: int, spectrum: Spectrum, values: list[Array], seconds: float, stage: str
+        self, iteration: int, spectrum: Spectrum, values: list[Array], seconds: float, stage: Stage
     ) -> Progress:
         """The record that is shown while a solver runs."""
         name, margin, unit = "", float("inf"), ""
@@ -96,7 +96,7 @@ class MotionTask:
                 smallest = float(value[:, at].min())
                 margin = smallest * float(constraint.scale[at]) + float(guard[at])
                 name, unit = constraint.name, constraint.unit_of(at)
-        return Progress(iteration, spectrum.words, name, margin, unit, seconds, stage)
+        return Progress(iteration, spectrum.figure, name, margin, unit, seconds, stage)
 
     @cached_property
     def metric(self) -> Array:

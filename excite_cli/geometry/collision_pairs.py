@@ -19,6 +19,7 @@ from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.mesh_pairs import joined_links
 from excite_cli.geometry.pair_choice_cache import choice_key, store_reasons, stored_reasons
 from excite_cli.geometry.pair_distances import PairDistances, carried_bodies
+from excite_cli.geometry.reasons import NEVER, DroppedPair, LinksApart, Reason, Why
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 
@@ -26,10 +27,6 @@ Array = NDArray[np.float64]
 
 _ALWAYS = 0.99  # share of the sample in contact
 _CONTACT_SAMPLES = 200
-ALWAYS = "always in contact"
-NEVER = "never near"
-BY_MESHES = "kept apart by their meshes, as configured"
-UNGUARDED = "unguarded: capsules always overlap"
 _CONTACT = 0.01  # [m] a wider margin does not make a contact; it may make the problem infeasible
 _ALLOWANCE = 0.05  # [m] beyond the margin that the nearest posture found must keep
 _STARTS = 3
@@ -38,15 +35,6 @@ _BLOCK = 500
 _DOUBTFUL = 0.02  # share of the sample in contact above which the meshes are asked
 _FEW_JOINTS = 3
 _MESH_SAMPLES = 200
-
-
-@dataclass(frozen=True)
-class DroppedPair:
-    """Names of two capsules that are not checked, and why."""
-
-    first: str
-    second: str
-    reason: str
 
 
 @dataclass(frozen=True)
@@ -74,7 +62,7 @@ def choose_pairs(
     margin. What never comes near within the limits is kept unless positions are `bounded` by a
     constraint.
     """
-    dropped: dict[tuple[int, int], str] = {}
+    dropped: dict[tuple[int, int], Reason] = {}
     possible: list[tuple[int, int]] = []
     known = _Known(robot, spec)
     for pair in _all_pairs(len(capsules)):
@@ -91,7 +79,7 @@ def choose_pairs(
             reasons = _by_sampling(*asked)
             store_reasons(key, reasons)
         for pair, reason in zip(possible, reasons, strict=True):
-            if reason and (bounded or NEVER not in reason):
+            if reason and (bounded or reason.why not in NEVER):
                 dropped[pair] = reason
     return CollisionPairs(
         checked=tuple(pair for pair in possible if pair not in dropped),
@@ -115,18 +103,18 @@ class _Known:
         self._ignored = {frozenset(pair) for pair in spec.ignore}
         self._by_meshes = {frozenset(pair) for pair in spec.by_meshes}
 
-    def reason(self, first: Capsule, second: Capsule) -> str:
+    def reason(self, first: Capsule, second: Capsule) -> Reason | None:
         between = int(np.abs(self._carried[first.joint] - self._carried[second.joint]).sum())
         links = {frozenset((one, two)) for one in first.links for two in second.links}
         if between == 0:
-            return "same body"
+            return Reason(Why.SAME_BODY)
         if links & self._ignored:
-            return "ignored in the config"
+            return Reason(Why.IGNORED)
         if links & self._by_meshes:
-            return BY_MESHES
+            return Reason(Why.BY_MESHES)
         if between == 1 and links & self._neighbours:
-            return "adjacent"
-        return ""
+            return Reason(Why.ADJACENT)
+        return None
 
 
 def _by_sampling(
@@ -136,8 +124,8 @@ def _by_sampling(
     margin: float,
     samples: int,
     seed: int,
-) -> list[str]:
-    """Why each pair is dropped; empty where it is kept."""
+) -> list[Reason | None]:
+    """Why each pair is dropped; None where it is kept."""
     measure = PairDistances(robot, capsules, pairs)
     q, _, _ = robot.draw_states(samples, seed)
     distances = np.vstack([measure.distances(q[k : k + _BLOCK]) for k in range(0, len(q), _BLOCK)])
@@ -149,9 +137,9 @@ def _by_sampling(
         starts = np.argsort(distances[:, clear], axis=0)[:_STARTS]
         target = margin + _ALLOWANCE
         nearest[clear] = _descend(robot, measure, q[starts], clear, target)
-    reasons = [""] * len(pairs)
+    reasons: list[Reason | None] = [None] * len(pairs)
     for k in np.flatnonzero(nearest > margin + _ALLOWANCE).tolist():
-        reasons[k] = f"{NEVER} (at least {nearest[k]:.2f} m found)"
+        reasons[k] = Reason(Why.NEVER_NEAR, float(nearest[k]))
     start = measure.distances(robot.posture[None])[0]
     doubtful = ~always & (nearest <= margin + _ALLOWANCE)
     doubtful &= (touching > _DOUBTFUL) | (start < 2 * margin)
@@ -171,7 +159,7 @@ def _by_meshes(
     doubtful: dict[int, tuple[int, int]],
     sample: tuple[Array, Array],
     margin: float,
-) -> Iterator[tuple[int, str]]:
+) -> Iterator[tuple[int, Reason]]:
     """Those of the doubtful pairs, few joints apart, whose meshes never come near the margin.
 
     doubtful: pair of capsules by column of the sample, which is positions and their distances.
@@ -193,7 +181,7 @@ def _by_meshes(
             starts = np.vstack([robot.posture, q[np.argsort(distances[:, k])[:_MESH_SAMPLES]]])
             known[links] = meshes.least_distance(*links, starts, moved, stop=margin)
         if known[links] > margin:
-            yield k, f"meshes {NEVER} (at least {known[links]:.3f} m found)"
+            yield k, Reason(Why.MESHES_NEVER_NEAR, known[links])
 
 
 def _contacts(
@@ -201,7 +189,7 @@ def _contacts(
     capsules: tuple[Capsule, ...],
     always: dict[int, tuple[int, int]],
     q: Array,
-) -> Iterator[tuple[int, str]]:
+) -> Iterator[tuple[int, Reason]]:
     """Why each pair of capsules that overlap at all times is not checked.
 
     No motion can part the capsules, so nothing can be asked of them. Where the meshes do part at
@@ -214,7 +202,7 @@ def _contacts(
         first, second = (capsules[index] for index in pair)
         meshes = meshes or MeshDistances(robot)
         if first.by_hand or second.by_hand or not meshes.knows(first.links + second.links):
-            yield k, ALWAYS
+            yield k, Reason(Why.ALWAYS_TOUCHING)
             continue
         apart = {}
         # Link by link: one that always touches must not excuse another in the same capsule.
@@ -224,8 +212,10 @@ def _contacts(
                 gaps = [meshes.distance([one], [other], at) for at in some]
                 known[links] = float(np.mean(np.array(gaps) > 0.0))
             apart[links] = known[links]
-        loose = [f"{a} – {b} {share:.0%}" for (a, b), share in apart.items() if share > 1 - _ALWAYS]
-        yield k, f"{UNGUARDED} (meshes apart: {', '.join(loose)})" if loose else ALWAYS
+        loose = tuple(
+            LinksApart(*names, share) for names, share in apart.items() if share > 1 - _ALWAYS
+        )
+        yield k, Reason(Why.UNGUARDED, apart=loose) if loose else Reason(Why.ALWAYS_TOUCHING)
 
 
 def _descend(

@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 from excite_cli.geometry.hull_bounds import ball_bounds, hull_bounds
 from excite_cli.geometry.link_meshes import LinkMesh, Poses, link_meshes
 from excite_cli.geometry.mesh_pairs import (
-    ALWAYS,
-    AT_POSTURE,
-    BY_HAND,
     MeshPair,
     PairMeshes,
     movable_pairs,
 )
+from excite_cli.geometry.reasons import Standing
 from excite_cli.geometry.relative_reach import RelativeReach
 from excite_cli.robot.model import Robot
 
@@ -43,7 +41,7 @@ class MeshGap:
     """The least distance [m] of the meshes of two links along a motion.
 
     index: of the instant where it occurs; touching: instants at which the meshes touch; standing:
-    empty where contact breaks the motion, else why it does not (see `MeshPair`).
+    whether contact breaks the motion, else why it does not.
     """
 
     first: str
@@ -51,12 +49,12 @@ class MeshGap:
     distance: float
     index: int
     touching: int
-    standing: str = ""
+    standing: Standing = Standing.JUDGED
 
     @property
     def broken(self) -> bool:
         """Whether meshes touch that must not."""
-        return self.touching > 0 and not self.standing
+        return self.touching > 0 and self.standing is Standing.JUDGED
 
 
 @dataclass(frozen=True)
@@ -119,8 +117,8 @@ class MeshCheck:
         self._reach = RelativeReach(robot)
         self._coal: dict[tuple[int, int], PairMeshes] = {}
         pairs = self._with_standing(movable_pairs(robot, self.meshes, ignore), by_hand, seed)
-        self.always = tuple(pair for pair in pairs if pair.standing == ALWAYS)
-        self.pairs = tuple(pair for pair in pairs if pair.standing != ALWAYS)
+        self.always = tuple(pair for pair in pairs if pair.standing is Standing.ALWAYS_TOUCHING)
+        self.pairs = tuple(pair for pair in pairs if pair.standing is not Standing.ALWAYS_TOUCHING)
         self.judged = tuple(pair for pair in self.pairs if pair.judged)
 
     def names(self, pair: MeshPair) -> tuple[str, str]:
@@ -279,13 +277,13 @@ class MeshCheck:
         found = []
         for pair, bounds in zip(pairs, balls, strict=True):
             touching = self._touching(pair, poses, bounds)
-            standing = ""
+            standing = Standing.JUDGED
             if touching.mean() >= _ALWAYS:
-                standing = ALWAYS
+                standing = Standing.ALWAYS_TOUCHING
             elif {self.links[pair[0]], self.links[pair[1]]} & set(by_hand):
-                standing = BY_HAND
+                standing = Standing.BY_HAND
             elif touching[0]:
-                standing = AT_POSTURE
+                standing = Standing.AT_POSTURE
             found.append(MeshPair(*pair, standing))
         return found
 

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from excite_cli.geometry.link_meshes import LinkMesh, Part, Poses
 from excite_cli.geometry.pair_distances import carried_bodies
+from excite_cli.geometry.reasons import Standing
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]
 
-ALWAYS = "always in contact"
-AT_POSTURE = "in contact at the posture"
-BY_HAND = "capsule given by hand"
 _TOUCH = 1e-9  # [m]
 _FAR = 1e3  # [m] farther than any robot reaches
 
@@ -25,18 +23,18 @@ _FAR = 1e3  # [m] farther than any robot reaches
 class MeshPair:
     """Two links that can move relative to each other.
 
-    first, second: indices into the links. standing: empty where their meshes must stay apart, else
-    why they are only told: `ALWAYS`, `AT_POSTURE` or `BY_HAND`.
+    first, second: indices into the links. standing: whether their meshes must stay
+    apart, else why they are only told.
     """
 
     first: int
     second: int
-    standing: str = ""
+    standing: Standing = Standing.JUDGED
 
     @property
     def judged(self) -> bool:
         """Whether contact of this pair breaks a motion."""
-        return not self.standing
+        return self.standing is Standing.JUDGED
 
 
 class PairMeshes:

@@ -17,10 +17,11 @@ import pinocchio as pin
 from excite_cli.config.constraints_spec import SurroundingsSpec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.geometry.capsules import link_names
-from excite_cli.geometry.collision_pairs import ALWAYS, DroppedPair
 from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacles import FLOOR, Obstacle
 from excite_cli.geometry.pair_distances import carried_bodies
+from excite_cli.geometry.reasons import DroppedPair, Reason, Why
+from excite_cli.geometry.words import reason_in_words
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Array, Robot
 
@@ -91,16 +92,16 @@ def choose_obstacle_pairs(
     moved_by = carried_bodies(robot).sum(axis=1)
     reach = _Reach(robot)
     possible: list[tuple[int, int]] = []
-    dropped: dict[tuple[int, int], str] = {}
+    dropped: dict[tuple[int, int], Reason] = {}
     for i, capsule in enumerate(capsules):
         if not moved_by[capsule.joint]:
             continue
         for j, obstacle in enumerate(obstacles):
             least = reach.least_distance(capsule, obstacle)
             if any((link, obstacle.name) in ignored for link in capsule.links):
-                dropped[i, j] = "ignored in the config"
+                dropped[i, j] = Reason(Why.IGNORED)
             elif bounded and least > spec.margin:
-                dropped[i, j] = "out of reach"
+                dropped[i, j] = Reason(Why.OUT_OF_REACH)
             else:
                 possible.append((i, j))
     distances = ObstacleDistances(robot, capsules, obstacles, possible).distances(
@@ -126,21 +127,22 @@ def choose_obstacle_pairs(
         i, j = possible[0]
         raise ConfigError(
             f"constraints.surroundings: nothing is left to check: {capsules[i].name} and "
-            f"{obstacles[j].name} are {dropped[i, j]}, whatever the posture. Correct the place of "
-            f"{obstacles[j].name}, or list the pair under constraints.surroundings.ignore."
+            f"{obstacles[j].name} are {reason_in_words(dropped[i, j])}, whatever the posture. "
+            f"Correct the place of {obstacles[j].name}, or list the pair under "
+            "constraints.surroundings.ignore."
         )
     return chosen
 
 
-def _inseparable(distances: Array, margin: float, moved_by: int) -> str:
-    """Why a pair whose distances over the sample are these cannot be parted; empty if it can."""
+def _inseparable(distances: Array, margin: float, moved_by: int) -> Reason | None:
+    """Why a pair whose distances over the sample are these cannot be parted; None if it can."""
     low, high = float(distances.min()), float(distances.max())
     unchanged = high < margin and high - low <= _UNCHANGED
     if not unchanged and not (high <= 0 and moved_by == 1):
-        return ""
+        return None
     if low < 0:
-        return f"{ALWAYS} (up to {-low:.3f} m deep)"
-    return f"always nearer than the margin (at least {low:.3f} m apart)"
+        return Reason(Why.ALWAYS_TOUCHING, -low)
+    return Reason(Why.ALWAYS_NEAR, low)
 
 
 class _Reach:

@@ -5,6 +5,10 @@ no error.
 """
 
 import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
 
 import coal
 import numpy as np
@@ -12,11 +16,12 @@ import numpy as np
 from excite_cli.errors import RobotError
 from excite_cli.geometry.capsule_cache import capsule_key
 from excite_cli.geometry.link_shapes import collision_model
+from excite_cli.geometry.reasons import LinksApart, Reason, Why
 from excite_cli.geometry.table_cache import store_arrays, stored_arrays
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 
-_VERSION = 1  # raise when the choice changes
+_VERSION = 2  # raise when the choice changes
 _REASONS = "reasons"
 
 
@@ -44,18 +49,29 @@ def choice_key(
     return digest.hexdigest()
 
 
-def stored_reasons(key: str | None, count: int) -> list[str] | None:
-    """The reasons of `count` pairs stored under `key`, empty where a pair is kept, or None."""
+def stored_reasons(key: str | None, count: int) -> list[Reason | None] | None:
+    """The reasons of `count` pairs stored under `key`, None where a pair is kept; or None."""
     found = stored_arrays(key) if key is not None else None
     if found is None or _REASONS not in found:
         return None
     reasons = found[_REASONS]
     if reasons.shape != (count,) or reasons.dtype.kind != "U":
         return None
-    return [str(reason) for reason in reasons]
+    try:
+        return [_reason(json.loads(str(text))) for text in reasons]
+    except (ValueError, TypeError, KeyError):  # no reasons of ours
+        return None
 
 
-def store_reasons(key: str | None, reasons: list[str]) -> None:
+def store_reasons(key: str | None, reasons: Sequence[Reason | None]) -> None:
     """Keep `reasons` under `key`."""
     if key is not None:
-        store_arrays(key, {_REASONS: np.array(reasons, dtype=np.str_)})
+        texts = [json.dumps(None if reason is None else asdict(reason)) for reason in reasons]
+        store_arrays(key, {_REASONS: np.array(texts, dtype=np.str_)})
+
+
+def _reason(data: dict[str, Any] | None) -> Reason | None:
+    if data is None:
+        return None
+    distance, apart = data["distance"], tuple(LinksApart(**each) for each in data["apart"])
+    return Reason(Why(data["why"]), None if distance is None else float(distance), apart)

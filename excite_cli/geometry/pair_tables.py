@@ -24,6 +24,7 @@ from excite_cli.geometry.link_shapes import collision_model
 from excite_cli.geometry.mesh_pairs import PairMeshes, joined_links, movable_pairs
 from excite_cli.geometry.pair_distances import carried_bodies
 from excite_cli.geometry.pair_table import PairTable
+from excite_cli.geometry.reasons import NEVER
 from excite_cli.geometry.table_cache import store_arrays, stored_arrays
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
@@ -230,7 +231,7 @@ def _guarded(capsules: tuple[Capsule, ...], pairs: CollisionPairs) -> set[frozen
         for link in capsule.links:
             of.setdefault(link, set()).add(index)
     checked = {frozenset(pair) for pair in pairs.checked}
-    never = {frozenset((d.first, d.second)) for d in pairs.dropped if "never near" in d.reason}
+    never = {frozenset((d.first, d.second)) for d in pairs.dropped if d.reason.why in NEVER}
     names = {index: capsule.name for index, capsule in enumerate(capsules)}
     return {
         frozenset((one, two))

@@ -13,7 +13,7 @@ import numpy as np
 
 from excite_cli.config.data_spec import IdentificationSpec
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.effects.base import Effect, Parameter, Signals, Value
 from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
 from excite_cli.identification.covariance import Rows
@@ -230,7 +230,7 @@ def _record(
             *effect_parameter_names(effects, robot.joint_names),
         ),
         units=(
-            *(_unit(base.names[index]) for index in base.selection),
+            *(standard_parameter_unit(index) for index in base.selection),
             *(parameter.unit for parameter in parameters),
         ),
         words=(*base.in_words(), *("" for _ in parameters)),
@@ -253,11 +253,6 @@ def _essential(linear: LinearFit, std: Array) -> Mask:
     with np.errstate(divide="ignore", invalid="ignore"):
         inflation = np.where(np.isfinite(std) & (plain > 0), std**2 / plain, 1.0)
     return essential_parameters(linear.factor, inflation, np.ones(len(std), bool))[0]
-
-
-def _unit(name: str) -> str:
-    symbol = name.partition("[")[0]
-    return {"m": "kg"}.get(symbol, "kg·m" if symbol.startswith("m") else "kg·m²")
 
 
 def effect_parameters(effects: Sequence[Effect]) -> tuple[Parameter, ...]:

@@ -76,7 +76,7 @@ class _Whole:
 def noise_floor(parts: Sequence[Run], processing: Processing) -> NoiseFloor | None:
     """Floor of the torque, filtered as `processing` says, over all runs with repeated periods.
 
-    parts: runs that begin at time zero, and parts of runs, each after the one that it continues.
+    parts: runs, and blocks of runs in their order.
 
     Squares are added over the runs. None if no run holds two whole periods.
     """
@@ -100,7 +100,7 @@ def _put_together(parts: Sequence[Run]) -> list[_Whole]:
     """Runs with gaps where their sealed blocks are."""
     groups: list[list[Run]] = []
     for part in parts:
-        if part.t[0] > 0.0 and groups:
+        if part.part.block and groups and groups[-1][-1].id == part.id:
             groups[-1].append(part)
         else:
             groups.append([part])

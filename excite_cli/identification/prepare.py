@@ -19,6 +19,7 @@ from excite_cli.identification.averages import (
 )
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Run
+from excite_cli.measurement.run_identity import RunId
 
 # Around a reversal a joint sticks: what its friction then is, only the torque itself knows.
 _STICKING = 0.02  # s
@@ -30,17 +31,17 @@ _FEWEST = 8  # decimated samples a run needs to say anything
 class PreparedRun:
     """One run (or block of it) ready for regression.
 
-    `t` (T,) from the run's start, `q, v, a, tau_raw` (T, n) at the working rate with borders cut;
-    `averages` (M, T) gives filtered and decimated values, at `step`, of any column: A x;
-    `tau` (M, n) = A tau_raw; `valid` (M, n) samples untouched by invalid ones; `moving` (M, n)
-    where the joint itself moves.
+    `t` (T,) from the start of the recording `run`, `q, v, a, tau_raw` (T, n) at the working rate
+    with borders cut; `averages` (M, T) gives filtered and decimated values, at `step`, of any
+    column: A x; `tau` (M, n) = A tau_raw; `valid` (M, n) samples untouched by invalid ones;
+    `moving` (M, n) where the joint itself moves.
 
     For fits every joint has averages of its own, which leave out invalid samples and those in
     which it stands or reverses; `tau_fit` (M, n) are those of the torque, `usable` (M, n) where
     enough is left.
     """
 
-    name: str
+    run: RunId
     t: Array
     q: Array
     v: Array
@@ -80,11 +81,11 @@ def prepare(
     """
     fs, q = 1.0 / run.step, run.q
     if processing.position_cutoff is not None:
-        q = _smooth(q, processing.position_cutoff, fs, run.name)
+        q = _smooth(q, processing.position_cutoff, fs, run.label)
     if processing.velocity == "measured" and run.dq is not None:
         v = run.dq
         if processing.position_cutoff is not None:
-            v = _smooth(v, processing.position_cutoff, fs, run.name)
+            v = _smooth(v, processing.position_cutoff, fs, run.label)
     else:
         v = np.gradient(q, run.step, axis=0)
     a = np.gradient(v, run.step, axis=0)
@@ -97,7 +98,7 @@ def prepare(
     centers = _centers(len(t), h, processing)
     if len(centers) < _FEWEST:
         raise FileError(
-            f"run '{run.name}' is too short: {run.duration:.3g} s leave {len(centers)} "
+            f"run '{run.label}' is too short: {run.duration:.3g} s leave {len(centers)} "
             f"averaged samples at {processing.rate:.3g} Hz after its borders are cut; "
             f"{_FEWEST} are needed. Record longer, or raise measurement.filter.rate."
         )
@@ -116,7 +117,7 @@ def prepare(
     fit_averages = tuple((each @ to_full_rate).tocsr() for each in for_fit)
     tau = run.tau[inside]
     return PreparedRun(
-        name=run.name,
+        run=run.id,
         t=t,
         q=q[keep],
         v=v[keep],

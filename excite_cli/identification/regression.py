@@ -23,7 +23,6 @@ class RunColumns:
     between the samples [s]; `prepared` holds the motion at the working rate.
     """
 
-    name: str
     step: float
     inertial: Array
     effects: Array
@@ -49,7 +48,7 @@ def signals_of(prepared: PreparedRun, robot: Robot, phi: Array | None = None) ->
     body = RigidBody(robot, phi, prepared.q, prepared.v, prepared.a)
     return Signals(
         prepared.t, prepared.q, prepared.v, prepared.a, body.load, body.load, body,
-        prepared.name,
+        prepared.run,
     )  # fmt: skip
 
 
@@ -78,7 +77,6 @@ def build_regression(
         signals = signals_of(prepared, robot, phi)
         found.append(
             RunColumns(
-                name=prepared.name,
                 step=prepared.step,
                 inertial=prepared.averaged_for_fit(signals.body.regressor),
                 effects=prepared.averaged_for_fit(effect_columns(effects, signals)),

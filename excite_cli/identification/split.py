@@ -1,63 +1,96 @@
-"""What is fitted and what is sealed: whole runs, or blocks of a single one.
+"""What is fitted and what is sealed: whole recordings, or blocks of a single one.
 
-Blocks are cut before any filter runs, so that nothing of a sealed block leaks into its neighbours.
+A recording with gaps is sealed, or left out, with all its stretches; if there is no other, its
+stretches count as recordings. Blocks are cut before any filter runs, so that nothing of a sealed
+block leaks into its neighbours.
 """
 
-import re
 from dataclasses import dataclass, replace
 
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.run_identity import Part, RunId
 
 # A single run is cut into about this many blocks of one to two seconds; every third is sealed.
 _BLOCKS, _SHORTEST, _LONGEST = 9, 1.0, 2.0
 _EVERY = 3
-# What is added to the name of a run for a part of it.
-_PART = re.compile(r" (?:[^ ]+-[^ ]+ s|\((?:first|second) half\))$")
 
 
 @dataclass(frozen=True)
 class Split:
-    """Training and sealed parts, and the fold (left out together) of each training part."""
+    """Training and sealed parts, and the fold (left out together) of each training part.
+
+    `units`: what can be sealed, in order: recordings, or the stretches of the only one.
+    `sealed_name` tells people what is sealed.
+    """
 
     training: tuple[Run, ...]
     sealed: tuple[Run, ...]
     sealed_name: str
     folds: tuple[int, ...]
+    units: tuple[str, ...]
 
     @property
     def n_folds(self) -> int:
         """Number of folds."""
         return max(self.folds) + 1
 
+    def unit(self, run: RunId) -> str:
+        """The unit that a run belongs to."""
+        return run.name if run.name in self.units else run.key
+
+
+def units_of(dataset: Dataset) -> tuple[str, ...]:
+    """What can be sealed: recordings, or the stretches of the only one."""
+    recordings = dataset.recordings
+    if len(recordings) > 1:
+        return recordings
+    return tuple(dict.fromkeys(run.id.key for run in dataset.runs))
+
 
 def split(dataset: Dataset, sealed: str | None = None, block: float | None = None) -> Split:
-    """Seal a run (the last, unless `sealed` names one); a single run is cut into blocks of time.
+    """Seal a recording (the last, unless `sealed` names one, or a stretch of one).
+
+    A single one without gaps is cut into blocks of time. Time counts from a recording's start.
 
     Raises
     ------
     ConfigError
         There is no run of that name, or a single run is too short to be cut.
     """
-    runs = [replace(run, t=run.t - run.t[0]) for run in dataset.runs]
-    names = [run.name for run in runs]
-    if sealed is not None and sealed not in names:
+    runs = [_from_start(run) for run in dataset.runs]
+    if sealed is not None and sealed not in dataset.names:
         raise ConfigError(
-            f"--sealed: there is no run '{sealed}'.{nearest(sealed, names)} "
-            f"Runs: {', '.join(names)}."
+            f"--sealed: there is no run '{sealed}'.{nearest(sealed, dataset.names)} "
+            f"Runs: {', '.join(dataset.names)}."
         )
-    if len(names) == 1:
+    units = units_of(dataset)
+    if len(runs) == 1:
         return _blocks(runs[0], block)
-    sealed = sealed or names[-1]
-    training = tuple(run for run in runs if run.name != sealed)
-    kept = tuple(run for run in runs if run.name == sealed)
+    if sealed is None or all(run.id.is_among((sealed,)) for run in runs):
+        sealed = units[-1]
+    training = [run for run in runs if not run.id.is_among((sealed,))]
+    kept = tuple(run for run in runs if run.id.is_among((sealed,)))
     if len(training) == 1:  # folds are still needed: halves of the only run
         run = training[0]
         middle = len(run.t) // 2
-        parts = (run.part(0, middle, f"{run.name} (first half)"),
-                 run.part(middle, len(run.t), f"{run.name} (second half)"))  # fmt: skip
-        return Split(parts, kept, sealed, (0, 1))
-    return Split(training, kept, sealed, tuple(range(len(training))))
+        training = [_block(run, 1, 0, middle), _block(run, 2, middle, len(run.t))]
+    return Split(tuple(training), kept, sealed, _folds(training), units)
+
+
+def _from_start(run: Run) -> Run:
+    """The run with its time counted from the start of its recording."""
+    shift = run.t[0] - run.part.start if run.part.start else run.t[0]
+    epoch = None if run.epoch is None else run.epoch + float(shift)
+    return replace(run, t=run.t - shift, epoch=epoch)
+
+
+def _folds(training: list[Run]) -> tuple[int, ...]:
+    """A fold for each recording; of a single one, for each of its parts."""
+    names = list(dict.fromkeys(run.name for run in training))
+    if len(names) == 1:
+        return tuple(range(len(training)))
+    return tuple(names.index(run.name) for run in training)
 
 
 def _blocks(run: Run, block: float | None) -> Split:
@@ -65,7 +98,7 @@ def _blocks(run: Run, block: float | None) -> Split:
     count = round(run.duration / length)
     if count < _EVERY:
         raise ConfigError(
-            f"run '{run.name}' lasts {run.duration:.3g} s: too short to seal a part of it. Give "
+            f"run '{run.label}' lasts {run.duration:.3g} s: too short to seal a part of it. Give "
             "at least two runs, or one of at least 3 s (diagnosis.block sets the blocks' length)."
         )
     edges = [round(i * (len(run.t)) / count) for i in range(count + 1)]
@@ -74,23 +107,18 @@ def _blocks(run: Run, block: float | None) -> Split:
     for i in range(count):
         if i % _EVERY == _EVERY - 1:
             if start < i:
-                training.append(_named(run, edges[start], edges[i]))
-            sealed.append(_named(run, edges[i], edges[i + 1]))
+                training.append(_block(run, i, edges[start], edges[i]))
+            sealed.append(_block(run, i + 1, edges[i], edges[i + 1]))
             start = i + 1
     if start < count:
-        training.append(_named(run, edges[start], edges[count]))
+        training.append(_block(run, count, edges[start], edges[count]))
     blocks = "1 block" if len(sealed) == 1 else f"{len(sealed)} blocks"
-    share = f"{blocks} of {run.duration / count:.3g} s of {run.name}"
+    share = f"{blocks} of {run.duration / count:.3g} s of {run.label}"
     # Few folds, each of stretches spread over the run.
     folds = tuple(i % min(len(training), 4) for i in range(len(training)))
-    return Split(tuple(training), tuple(sealed), share, folds)
+    return Split(tuple(training), tuple(sealed), share, folds, (run.id.key,))
 
 
-def _named(run: Run, first: int, last: int) -> Run:
-    times = f"{run.t[first]:.4g}-{run.t[last - 1]:.4g} s"
-    return run.part(first, last, f"{run.name} {times}")
-
-
-def run_name(part: str) -> str:
-    """The run a part of it belongs to."""
-    return _PART.sub("", part)
+def _block(run: Run, number: int, first: int, last: int) -> Run:
+    times = float(run.t[first]), float(run.t[last - 1])
+    return run.cut(first, last, Part(run.part.stretch, number, *times))

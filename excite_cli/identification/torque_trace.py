@@ -11,7 +11,6 @@ import numpy as np
 
 from excite_cli.identification.factors import Mask
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.split import run_name
 from excite_cli.robot.model import Array, Robot
 
 MOST_SAMPLES = 1500  # per part of a run
@@ -55,7 +54,7 @@ def torque_trace(
     n = run.q.shape[1]
     t, rest = stacked[:, 0], np.split(stacked[:, 1:], np.arange(n, stacked.shape[1] - 1, n), axis=1)
     whole = TorqueTrace(
-        run=run_name(run.name),
+        run=run.run.key,
         sealed=sealed,
         t=t,
         q=rest[0],

@@ -17,7 +17,8 @@ from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.hdf5_reader import Hdf5Reader
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.quality import checked
-from excite_cli.measurement.reader import RawRun, Reader, ReadOptions
+from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOptions
+from excite_cli.measurement.run_identity import Origin
 from excite_cli.measurement.torque import SECONDS, check_joints, declared, to_joints
 from excite_cli.measurement.units import Limits
 
@@ -72,7 +73,8 @@ def read_dataset(
         arranged = []
         for raw in named:
             run, more = arrange(raw, joint_names, spec.names, str(path))
-            run = replace(run, t=_seconds(raw, spec))
+            t, epoch = _seconds(raw, spec)
+            run = replace(run, t=t, epoch=epoch, origin=Origin(str(path), raw.place))
             arranged.append(to_joints(run, spec, joint_names, turning))
             findings += more
         parts, more = _checked(path, arranged, spec, joint_names, known)
@@ -128,14 +130,20 @@ def _named(raws: list[RawRun], path: Path, taken: set[str]) -> list[RawRun]:
     return named
 
 
-def _seconds(raw: RawRun, spec: MeasurementSpec) -> Array:
-    """Stamps in seconds; those counted from 1970 start at 0, to keep their digits."""
+def _seconds(raw: RawRun, spec: MeasurementSpec) -> tuple[Array, float | None]:
+    """Stamps in seconds, and the time from 1970 to their zero, if known.
+
+    Those counted from 1970 start at 0, to keep their digits.
+    """
     t = np.asarray(raw.t, dtype=float)
     factor = 1.0 if raw.seconds else SECONDS[spec.time]
     known = t[known_stamps(t)]
+    epoch = raw.epoch
     if len(known) and known[0] * factor > _EPOCH:
         t = t - known[0]
-    return t * factor
+        if known[0] * factor > SINCE_1970:
+            epoch = float(known[0] * factor)
+    return t * factor, epoch
 
 
 def _check_all_met(names: dict[str, str], seen: set[str]) -> None:

@@ -16,7 +16,7 @@ def check_order(runs: Sequence[Run], joints: tuple[str, ...]) -> list[Finding]:
     """Recorded speeds that follow another joint's positions, go the other way, or lag behind."""
     if any(run.dq is None for run in runs):
         return []
-    where = ", ".join(run.name for run in runs)
+    where = ", ".join(run.label for run in runs)
     correlation = speeds(runs).correlation()
     own = np.diag(correlation)
     foreign = np.where(np.eye(len(joints), dtype=bool), 0.0, correlation)
@@ -53,7 +53,7 @@ def _lagging(run: Run) -> list[Finding]:
         f"recorded speeds come {abs(lag) * 1e3:.3g} ms {'after' if lag > 0 else 'before'} the "
         "change of position: one of them is filtered or late, and the torque may be too"
     )
-    return [Finding("lag", "warning", text, run.name)]
+    return [Finding("lag", "warning", text, run.label)]
 
 
 def speed_lag(run: Run, longest: float = 0.1) -> float:

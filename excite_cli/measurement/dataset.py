@@ -10,6 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.measurement.run_identity import Origin, Part, RunId
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Severity = Literal["note", "warning", "error"]
@@ -32,10 +34,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class Run:
-    """One recording: t (T,), q and tau (T, n), dq (T, n) if it was recorded.
+    """One recording, or a part of it: t (T,), q and tau (T, n), dq (T, n) if it was recorded.
 
-    `valid` (T, n): samples that may be used, per joint (false where saturated, stuck or bridged).
-    `extra` holds further channels of the file, (T,) or (T, m), untouched.
+    `name` is the recording's, `part` says which part of it. `valid` (T, n): samples that may be
+    used, per joint (false where saturated, stuck or bridged). `extra` holds further channels of the
+    file, (T,) or (T, m), untouched. `epoch`: seconds from 1970 (UTC) to t = 0, where the data know.
     """
 
     name: str
@@ -45,6 +48,21 @@ class Run:
     dq: Array | None = None
     valid: NDArray[np.bool_] | None = None
     extra: dict[str, Array] = field(default_factory=dict)
+    origin: Origin = field(default_factory=Origin)
+    part: Part = field(default_factory=Part)
+    epoch: float | None = None
+
+    @property
+    def id(self) -> RunId:
+        """The recording, and which stretch of it."""
+        return RunId(self.name, self.part.stretch)
+
+    @property
+    def label(self) -> str:
+        """For people: `b`, `b/2`, or `b 6-12 s` of a block."""
+        if not self.part.block:
+            return self.id.key
+        return f"{self.id.key} {self.part.start:.4g}-{self.part.end or 0.0:.4g} s"
 
     @property
     def step(self) -> float:
@@ -60,12 +78,12 @@ class Run:
         """`valid`, or all true."""
         return np.ones(self.tau.shape, bool) if self.valid is None else self.valid
 
-    def part(self, first: int, last: int, name: str) -> "Run":
-        """Samples [first, last) as a run of its own."""
+    def cut(self, first: int, last: int, part: Part | None = None) -> "Run":
+        """Samples [first, last); they are another `part` of the recording if that is given."""
         cut = slice(first, last)
         return replace(
             self,
-            name=name,
+            part=part or self.part,
             t=self.t[cut],
             q=self.q[cut],
             tau=self.tau[cut],
@@ -83,3 +101,13 @@ class Dataset:
     runs: tuple[Run, ...]
     sources: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """Names of the recordings, each once."""
+        return tuple(dict.fromkeys(run.name for run in self.runs))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What a configuration may call runs: recordings, then stretches of those with gaps."""
+        return tuple(dict.fromkeys((*self.recordings, *(run.id.key for run in self.runs))))

@@ -189,7 +189,12 @@ def _run(path: Path, file: Any, group: Any, name: str, wanted: ReadOptions) -> R
     columns, others = _by_channel(where, arrays, names, wanted)
     text = f"not numbers per sample, left out: {', '.join(skipped)}"
     findings = (Finding("left_out", "note", text),) if skipped else ()
-    return RawRun(name, t, columns, others, False, not stamped, findings)
+    epoch = group.attrs.get("epoch")  # as written beside simulated data
+    known = isinstance(epoch, float) and np.isfinite(epoch)
+    return RawRun(
+        name, t, columns, others, False, not stamped, findings, group.name,
+        float(epoch) if known else None,
+    )  # fmt: skip
 
 
 def _by_channel(

@@ -30,10 +30,12 @@ def _write(path: Path, dataset: Dataset, attributes: Mapping[str, Any]) -> None:
         file.attrs["joint_names"] = list(dataset.joint_names)
         file.attrs["units"] = "t: s, q: rad (m), dq: rad/s, tau: N·m at the joint"
         for run in dataset.runs:
-            _write_run(file.create_group(f"runs/{run.name}", track_order=True), run)
+            _write_run(file.create_group(f"runs/{run.id.key}", track_order=True), run)
 
 
 def _write_run(group: Any, run: Run) -> None:
+    if run.epoch is not None:
+        group.attrs["epoch"] = run.epoch
     arrays = {"t": run.t, "q": run.q, "dq": run.dq, "tau": run.tau, "valid": run.valid}
     for name, array in arrays.items():
         if array is not None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Finding
-from excite_cli.measurement.reader import RawRun, ReadOptions
+from excite_cli.measurement.reader import SINCE_1970, RawRun, ReadOptions
 
 _FIELDS = {"q": "position", "dq": "velocity", "tau": "effort"}
 
@@ -75,7 +75,11 @@ class JointStates:
         t = (stamps - stamps[0]) * 1e-9
         if set(wanted.channels) & {"q", "dq", "tau"}:
             columns = self._renamed(path, columns, wanted)
-        return RawRun("", t, columns, {}, False, True, tuple(findings))
+        epoch = float(stamps[0]) * 1e-9  # of a simulator's clock it is no date
+        return RawRun(
+            "", t, columns, {}, False, True, tuple(findings), self.topic,
+            epoch if epoch > SINCE_1970 else None,
+        )  # fmt: skip
 
     def _chosen(
         self, path: Path, wanted: ReadOptions

@@ -19,6 +19,7 @@ MAX_BYTES = 4 * 2**30  # of a file
 MAX_VALUES = 2**28  # numbers taken from a file: 2 GiB in memory
 ALWAYS, PACKED = 2**27, 50  # bytes that any file may unpack to; times its size
 CHANNELS = ("q", "dq", "tau")
+SINCE_1970 = 1e9  # s: no clock that counts from its own start has come so far
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ class RawRun:
     `columns`: channel -> the file's joint name -> (T,). `others`: channels that belong to no
     joint. `numbered`: the joint names are only numbers. `name` is empty if the file gives none.
     `seconds`: t is in seconds whatever the YAML declares (bags, and stamps made from a rate).
+    `place` in the file: a group or a topic. `epoch`: seconds from 1970 to t = 0, if known.
     """
 
     name: str
@@ -67,6 +69,8 @@ class RawRun:
     numbered: bool = False
     seconds: bool = False
     findings: tuple[Finding, ...] = ()
+    place: str = ""
+    epoch: float | None = None
 
 
 class Reader(ABC):

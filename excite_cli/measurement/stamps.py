@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.missing_values import BEYOND, rows_of
+from excite_cli.measurement.run_identity import Part
 
 _EVEN = 0.05  # of a step
 _BRIDGED = 0.02  # s
@@ -35,7 +36,9 @@ class _Notes:
 
 
 def equidistant(run: Run) -> tuple[list[Run], list[Finding]]:
-    """The run as equidistant parts (`run/1`, `run/2` … if there is more than one).
+    """The run as equidistant parts, more than one where there are gaps.
+
+    Where time starts anew in the file, another recording begins: `run/1`, `run/2` …
 
     Raises
     ------
@@ -53,11 +56,13 @@ def equidistant(run: Run) -> tuple[list[Run], list[Finding]]:
             f"from {run.t[0]:g} to {run.t[-1]:g} s: no clock gives such time stamps. Check "
             "measurement.time and the recorder."
         )
-    pieces = []
+    recordings = []
     for recording in _recordings(_without_strays(run, notes), notes):
         ordered = _spread_bursts(_ordered(recording, notes), notes)
-        pieces += _split_at_gaps(_without_duplicates(ordered, notes), notes)
-    long = [p for p in pieces if len(pieces) == 1 or _is_long(p)]
+        recordings.append(_split_at_gaps(_without_duplicates(ordered, notes), notes))
+    pieces = [piece for recording in recordings for piece in recording]
+    kept = [[p for p in each if len(pieces) == 1 or _is_long(p)] for each in recordings]
+    long = [piece for recording in kept for piece in recording]
     if not long:
         raise FileError(
             f"Run {run.name} falls into {len(pieces)} pieces, none longer than {_SHORTEST_PART} s: "
@@ -78,9 +83,25 @@ def equidistant(run: Run) -> tuple[list[Run], list[Finding]]:
         )
     if len(long) > _MANY:
         raise FileError(f"Run {run.name} has more than {_MANY} gaps; it cannot be used.")
-    if len(long) > 1:
-        long = [replace(p, name=f"{run.name}/{i}") for i, p in enumerate(long, 1)]
-    return [_resampled(part, notes) for part in long], notes.found
+    return [_resampled(part, notes) for part in _identified(kept)], notes.found
+
+
+def _identified(recordings: list[list[Run]]) -> list[Run]:
+    """All stretches, numbered where their recording has several; so are recordings of a file."""
+    named = [stretches for stretches in recordings if stretches]
+    if len(named) > 1:
+        named = [
+            [replace(run, name=f"{run.name}/{number}") for run in stretches]
+            for number, stretches in enumerate(named, 1)
+        ]
+    found = []
+    for stretches in named:
+        if len(stretches) == 1:
+            found += stretches
+        else:
+            parts = (replace(run.part, stretch=i) for i, run in enumerate(stretches, 1))
+            found += [replace(run, part=p) for run, p in zip(stretches, parts, strict=True)]
+    return found
 
 
 def _is_long(run: Run) -> bool:
@@ -112,7 +133,7 @@ def _recordings(run: Run, notes: _Notes) -> list[Run]:
     if not len(back) or np.diff(edges).min() < 50:
         return [run]
     notes.add("restart", f"time starts anew {len(back)} times: taken as {len(back) + 1} runs")
-    return [run.part(a, b, run.name) for a, b in pairwise(edges)]
+    return [run.cut(a, b) for a, b in pairwise(edges)]
 
 
 def _ordered(run: Run, notes: _Notes) -> Run:
@@ -175,7 +196,11 @@ def _split_at_gaps(run: Run, notes: _Notes) -> list[Run]:
         f"split there",
     )
     edges = np.concatenate([[0], cuts, [len(run.t)]])
-    return [run.part(a, b, run.name) for a, b in pairwise(edges)]
+    times = run.t - run.t[0]
+    return [
+        run.cut(a, b, Part(start=float(times[a]), end=float(times[b - 1])))
+        for a, b in pairwise(edges)
+    ]
 
 
 def _resampled(run: Run, notes: _Notes) -> Run:

@@ -45,7 +45,7 @@ def check_units(
 ) -> list[Finding]:
     """Findings about time, angles and torque of equidistant runs of one file."""
     found = speeds(runs)
-    where = ", ".join(run.name for run in runs)
+    where = ", ".join(run.label for run in runs)
     findings = _time_by_speed(found, spec, where) or _time_by_limits(
         runs, found, spec, limits, where
     )

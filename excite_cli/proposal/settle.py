@@ -28,7 +28,7 @@ from excite_cli.excitation.start import (
     unclear,
 )
 from excite_cli.excitation.task import MotionTask
-from excite_cli.geometry.collision_pairs import UNGUARDED, CollisionPairs
+from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.mesh_pairs import joined_links
 from excite_cli.geometry.pair_distances import carried_bodies
@@ -218,12 +218,9 @@ def _without_lasting_contacts(
         if own is None or len(constraint.capsules_of(0)) != 2:
             continue
         for pair in constraint.left_out or ():
-            if not pair.reason.startswith(UNGUARDED):
-                continue
-            for words in pair.reason.partition("apart: ")[2][:-1].split(", "):
-                names, _, share = words.rpartition(" ")
-                if float(share.rstrip("%")) < 100 * _SELDOM_APART:
-                    own.setdefault("ignore", []).append(names.split(" – "))
+            for links in pair.reason.apart:
+                if links.percent < 100 * _SELDOM_APART:
+                    own.setdefault("ignore", []).append([links.first, links.second])
         left_out = tuple((one, other) for one, other in own.get("ignore", ()))
         capsules = constraint.drawing.capsules
         near = near_at_posture(robot, capsules, _pairs(constraint), left_out, _TABLED)

@@ -1,14 +1,15 @@
 """What is still unexplained: on which quantities the rest depends, as a map and as pictures."""
 
-import re
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import Diagnosis, Unexplained
 from excite_cli.diagnosis.traces import Dependence, Traces
+from excite_cli.diagnosis.words import covariate_in_words
 from excite_cli.report.chart import (
     BLUE,
     INK,
@@ -33,10 +34,9 @@ if TYPE_CHECKING:
 _SHOWN = 0.01  # share from which on a quantity gets a line of the map
 _MOST_ROWS = 18
 _MOST_DOTS = 400
-_NAMED = {"q": "angle", "v": "speed", "a": "acceleration", "load": "rigid-body torque"}
-_UNITS = {"q": "rad", "v": "rad/s", "a": "rad/s²", "load": "N·m", "time": "s"}
-_SYMBOL = re.compile(r"(?:history of |direction and )?\b(?:q|v|a|load)\[[^\]]+\]")
-_QUANTITY = re.compile(r"^(?:(history of|direction and) )?(\w+)(?:\[(.+)\])?$")
+_UNITS = {"position": "rad", "speed": "rad/s", "acceleration": "rad/s²", "load": "N·m", "time": "s"}
+# Where a trace has it.
+_SERIES = {"position": "q", "speed": "v", "acceleration": "a", "load": "load", "time": "t"}
 
 
 def dependence_section(found: Diagnosis) -> Section:
@@ -62,8 +62,8 @@ def dependence_section(found: Diagnosis) -> Section:
         pictures = [
             chart
             for each in found.unexplained
-            for quantity in each.depends_on[:2]
-            for chart in _picture(found, found.traces, each, quantity)
+            for covariate in each.depends_on[:2]
+            for chart in _picture(found, found.traces, each, covariate)
         ]
         if pictures:
             blocks.append(Charts(tuple(pictures), "What is left, over what it depends on"))
@@ -76,30 +76,8 @@ def dependence_section(found: Diagnosis) -> Section:
     return Section("diagnosis-unexplained", "What stays unexplained", tuple(blocks), lead)
 
 
-def quantity_in_words(quantity: str) -> str:
-    """`q[elbow]` → `angle of elbow`; names of quantities are those of the diagnosis."""
-    own = quantity.startswith("own ")
-    found = _QUANTITY.match(quantity.removeprefix("own "))
-    if found is None:
-        return quantity
-    past, symbol, joint = found.groups()
-    words = _NAMED.get(symbol, symbol)
-    if own:
-        words = f"own {words}"
-    elif joint:
-        words = f"{words} of {joint}"
-    if past == "history of":
-        return f"history of {words}"
-    return f"{words} and direction" if past else words
-
-
-def in_plain_words(text: str) -> str:
-    """A sentence in which quantities stand by their symbols, with their words instead."""
-    return _SYMBOL.sub(lambda found: quantity_in_words(found[0]), text)
-
-
-def _joined(quantities: Sequence[str]) -> str:
-    words = [quantity_in_words(each) for each in quantities]
+def _joined(covariates: Sequence[Covariate]) -> str:
+    words = [covariate_in_words(each) for each in covariates]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
@@ -115,7 +93,7 @@ def _map(dependence: Dependence) -> Block:
     words = (
         f"Of {len(dependence.quantities)} quantities, {len(rows)} explain {_SHOWN:.0%} or more of "
         f"the rest of some joint, at most {most[rows[0]]:.0%}: "
-        f"{quantity_in_words(dependence.quantities[rows[0]])} for {dependence.joints[j]}."
+        f"{covariate_in_words(dependence.quantities[rows[0]])} for {dependence.joints[j]}."
     )
     wide = len(dependence.joints) > 6
     return draw_chart(
@@ -144,7 +122,7 @@ def _draw_map(dependence: Dependence, rows: Sequence[int], wide: bool, figure: "
             axes.text(x, y, f"{100 * share:.0f}", ha="center", va="center", fontsize=8, color=INK)
     axes.set_xlim(-0.5, len(dependence.joints) - 0.5)
     axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.set_yticks(range(len(rows)), [quantity_in_words(dependence.quantities[k]) for k in rows])
+    axes.set_yticks(range(len(rows)), [covariate_in_words(dependence.quantities[k]) for k in rows])
     axes.set_xticks(range(len(dependence.joints)), dependence.joints, rotation=40, ha="right",
                     rotation_mode="anchor")  # fmt: skip
     axes.grid(visible=False)
@@ -154,28 +132,26 @@ def _draw_map(dependence: Dependence, rows: Sequence[int], wide: bool, figure: "
 
 
 def _picture(
-    found: Diagnosis, traces: Traces, unexplained: Unexplained, quantity: str
+    found: Diagnosis, traces: Traces, unexplained: Unexplained, covariate: Covariate
 ) -> list[Chart]:
-    """What is left of the joint over the quantity; nothing if the quantity is not stored."""
-    parsed = _QUANTITY.match(quantity)
-    if parsed is None or parsed[2] not in _UNITS:
-        return []
-    past, symbol, other = parsed.groups()
+    """What is left of the joint over the covariate; nothing if too few samples are known."""
+    timed = covariate.quantity == "time"
     names = list(found.joint_names)
     j = names.index(unexplained.joint)
-    k = names.index(other) if other in names else j
+    k = names.index(covariate.joint) if covariate.joint in names else j
     left = np.concatenate([run.measured[:, j] - run.predicted[:, j] for run in traces.runs])
-    x = np.concatenate([run.t if symbol == "time" else getattr(run, symbol)[:, k]
-                        for run in traces.runs])  # fmt: skip
+    series = [getattr(run, _SERIES[covariate.quantity]) for run in traces.runs]
+    x = np.concatenate(series if timed else [each[:, k] for each in series])
     forward = np.concatenate([run.v[:, j] >= 0 for run in traces.runs])
     known = np.isfinite(left) & np.concatenate([run.counted[:, j] for run in traces.runs])
     unit = traces.torque_units[j]
-    of_x = _UNITS[symbol]
+    of_x = _UNITS[covariate.quantity]
     if traces.torque_units[k] == "N":
         of_x = of_x.replace("N·m", "N").replace("rad", "m")
-    axis = f"{_NAMED.get(symbol, symbol)}{f' of {names[k]}' if symbol != 'time' else ''} [{of_x}]"
+    plain = Covariate(covariate.quantity, "" if timed else names[k])
+    axis = f"{covariate_in_words(plain)} [{of_x}]"
     groups = [("", known)]
-    if past:
+    if covariate.aspect is not Aspect.VALUE:
         groups = [("forwards", known & forward), ("backwards", known & ~forward)]
     means = [(label, *_means(x[at], left[at])) for label, at in groups if at.sum() >= 20]
     if not means:
@@ -204,7 +180,7 @@ def _picture(
         few_ticks(axes)
         legend_below(figure)
 
-    return [draw_chart(f"{unexplained.joint}: left, over {quantity_in_words(quantity)}", words,
+    return [draw_chart(f"{unexplained.joint}: left, over {covariate_in_words(covariate)}", words,
                        draw, height=2.5, layout=LAYOUT)]  # fmt: skip
 
 

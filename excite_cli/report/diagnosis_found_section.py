@@ -5,14 +5,15 @@ from collections.abc import Sequence
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
+    approximation_in_words,
     counted,
+    covariate_in_words,
     is_small,
     p_in_words,
     place_in_words,
     title_of,
     value_in_words,
 )
-from excite_cli.report.dependence_section import in_plain_words
 from excite_cli.report.page import Block, Section, Table
 
 _COLUMNS = ("effect", "where", "size ± 2 standard deviations", "p", "share", "gain")
@@ -97,6 +98,8 @@ def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:
     others = ", ".join(
         f"{title_of(alias.kind)} on {place_in_words(alias, everything)}" for alias in named.aliases
     )
+    if named.approximates:
+        others = approximation_in_words(named.approximates, covariate_in_words)
     return (
         title_of(named.effect.kind),
         place_in_words(named.effect, everything),
@@ -104,7 +107,7 @@ def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:
         p_in_words(named.p_value),
         f"{named.share_of_residual:.2%}",
         f"{named.gain:.1%}",
-        in_plain_words(named.approximates) or others or "–",
+        others or "–",
     )
 
 

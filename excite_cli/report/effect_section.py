@@ -8,7 +8,9 @@ from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.traces import EffectTrace, Traces
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
+    approximation_in_words,
     counted,
+    covariate_in_words,
     is_small,
     p_in_words,
     place_in_words,
@@ -18,7 +20,6 @@ from excite_cli.diagnosis.words import (
 from excite_cli.effects.base import Effect, Picture
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.report.chart import Chart
-from excite_cli.report.dependence_section import in_plain_words
 from excite_cli.report.effect_chart import Cloud, cloud_of, draw_cloud, draw_window, together
 from excite_cli.report.page import Block, Charts, Fold, Section, Text
 
@@ -109,7 +110,8 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
         others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]
         text += f" These data cannot tell it from: {', '.join(others)}."
     if named.approximates:
-        text += f" An approximation only: it stands for {in_plain_words(named.approximates)}."
+        what = approximation_in_words(named.approximates, covariate_in_words)
+        text += f" An approximation only: it stands for {what}."
     return text
 
 

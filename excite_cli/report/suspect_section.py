@@ -1,6 +1,7 @@
 """How the effects were found: round by round the suspects, and why the others were refused."""
 
 from excite_cli.diagnosis.records import Diagnosis, Round
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import counted, p_in_words, place_in_words, title_of
 from excite_cli.report.page import Block, Fold, Section, Table
 
@@ -40,7 +41,7 @@ def _round(found: Diagnosis, each: Round) -> Table:
         )
         for suspect in each.suspects
     )
-    taken = {k for k, suspect in enumerate(each.suspects) if suspect.verdict == "accepted"}
+    taken = {k for k, suspect in enumerate(each.suspects) if suspect.verdict is Verdict.ACCEPTED}
     return Table(
         ("suspect", "where", "p", "share", "gain", "verdict"),
         rows,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.report.campaign import Campaign, in_figures
@@ -19,7 +19,6 @@ from excite_cli.robot.model import Array
 
 _SHOWN = 6
 _SINGULAR = 1e-14
-_UNITS = {"m": "kg", "x": "kg·m", "y": "kg·m", "z": "kg·m"}
 
 
 @dataclass(frozen=True)
@@ -73,16 +72,11 @@ def _columns(result: Result, problem: Problem) -> _Columns:
     effects = result.effect_names
     return _Columns(
         names=(*names, *effects),
-        units=(*map(_unit, names), *("" for _ in effects)),
+        units=(*map(standard_parameter_unit, result.base_selection), *("" for _ in effects)),
         words=result.base_words,
         scales=result.column_scales,
         expected=np.concatenate([expected, np.full(len(effects), np.nan)]),
     )
-
-
-def _unit(name: str) -> str:
-    symbol = name.partition("[")[0]
-    return "kg·m²" if symbol.startswith("I") else _UNITS[symbol[-1]]
 
 
 def _direction_table(columns: _Columns, direction: Array) -> Table:

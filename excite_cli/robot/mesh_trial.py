@@ -16,6 +16,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from excite_cli.errors import RobotError
@@ -27,7 +28,6 @@ MAX_TRIANGLES = 1_000_000
 _MAX_MEMORY = 2**30  # bytes that the reading of one robot's meshes may take
 _SECONDS, _BYTES_PER_SECOND = 1.0, 2**20  # processor time allowed: a base, and by size
 _SLOWEST = 20  # times the processor time, on a machine with much else to do
-_HARM = "reading it"  # so begins what is said of a file that ended the process
 # The parent's path of imports, so that a checkout finds itself; never (-P) the current folder,
 # where anything may lie.
 _BOOT = (
@@ -36,7 +36,17 @@ _BOOT = (
 # Threads of linear algebra, of no use here, reserve much of the memory that there is.
 _ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
 _IDLE = 10.0  # s without a question after which the process ends
-_known: dict[str, str] = {}  # content -> what is wrong with it
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong with a mesh; `harms`: reading it ends the process or takes for ever."""
+
+    words: str
+    harms: bool = False
+
+
+_known: dict[str, Fault | None] = {}  # by content
 
 
 def try_meshes(paths: Sequence[Path], any_format: bool = False) -> None:
@@ -52,11 +62,12 @@ def try_meshes(paths: Sequence[Path], any_format: bool = False) -> None:
     contents = {path: _content(path, any_format) for path in dict.fromkeys(paths)}
     for path, content in contents.items():
         if content not in _known:
-            _known[content] = _trial.said(path)
+            _known[content] = _trial.fault(path)
     for path, content in contents.items():
-        if _known[content] and (not any_format or _known[content].startswith(_HARM)):
+        fault = _known[content]
+        if fault is not None and (fault.harms or not any_format):
             raise RobotError(
-                f"the mesh {path} cannot be loaded: {_known[content]}. Repair it, or convert it to "
+                f"the mesh {path} cannot be loaded: {fault.words}. Repair it, or convert it to "
                 "STL with another program."
             )
 
@@ -82,16 +93,18 @@ class _Trial:
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
 
-    def said(self, path: Path) -> str:
-        """What is wrong with a mesh; empty where it is good."""
+    def fault(self, path: Path) -> Fault | None:
+        """What is wrong with a mesh, if anything is."""
         seconds = _SECONDS + path.stat().st_size / _BYTES_PER_SECOND
         line = json.dumps([str(path), seconds]).encode() + b"\n"
         while True:
             answer, status = self._asked(line, _SLOWEST * seconds)
             if answer:
-                return str(json.loads(answer))
+                said = str(json.loads(answer))
+                return Fault(said) if said else None
             if status != 0:  # else it was idle and has just ended
-                return f"{_HARM} {'takes too long' if status in _OUT_OF_TIME else 'fails'}"
+                how = "takes too long" if status in _OUT_OF_TIME else "fails"
+                return Fault(f"reading it {how}", harms=True)
 
     def _asked(self, line: bytes, longest: float) -> tuple[bytes, int]:
         """The answer, or how the process ended; it is ended if it takes longer [s]."""

@@ -9,6 +9,7 @@ import numpy as np
 from excite_cli.effects.base import Effect
 from excite_cli.effects.simulated_robot import Coupling, Push, Transmission
 from excite_cli.errors import RobotError
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.engine import load_mujoco
 from excite_cli.simulation.mujoco_model import Plant, build_plant, refresh
@@ -31,7 +32,7 @@ class Build:
 
     robot: Robot
     phi: Array
-    run: str
+    run: RunId
     gravity: Array
     armature: Array
     damping: Array
@@ -51,7 +52,7 @@ class Build:
     recorded: list[Planted] = field(default_factory=list)
 
     @classmethod
-    def bare(cls, robot: Robot, phi: Array, run: str) -> "Build":
+    def bare(cls, robot: Robot, phi: Array, run: RunId) -> "Build":
         """Rigid bodies only."""
         zeros = np.zeros((8, robot.n))
         return cls(
@@ -97,7 +98,7 @@ class Build:
         self.recorded.append(Planted(effect, values))
 
 
-def assemble(robot: Robot, phi: Array, run: str, planted: Iterable[Planted]) -> Build:
+def assemble(robot: Robot, phi: Array, run: RunId, planted: Iterable[Planted]) -> Build:
     """The robot of one run with the effects that are active in it."""
     build = Build.bare(robot, phi, run)
     for each in planted:

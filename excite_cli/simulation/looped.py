@@ -15,6 +15,7 @@ import numpy as np
 
 from excite_cli.dynamics.rigid_body import RigidBody, robot_with
 from excite_cli.effects.base import Effect, Signals
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.planted import Planted
 
@@ -24,7 +25,7 @@ EDGE = 5e-3  # rad/s; the smoothed sign is ±1 to 1e-4 there
 class LoopedEffects:
     """The torque of some effects on the robot with inertias φ, instant by instant."""
 
-    def __init__(self, robot: Robot, phi: Array, run: str, planted: Sequence[Planted]) -> None:
+    def __init__(self, robot: Robot, phi: Array, run: RunId, planted: Sequence[Planted]) -> None:
         self._robot, self._phi, self._run = robot, phi, run
         self._model = robot_with(robot, phi)
         self._local = [p for p in planted if p.effect.scope == "joint"]

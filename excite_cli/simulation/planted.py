@@ -73,10 +73,12 @@ def plant(
     return Planted(kind(joints, shape, runs), values, extra)
 
 
-def parse_planted(text: str, robot: Robot, runs: Sequence[str]) -> tuple[Planted, ...]:
+def parse_planted(
+    text: str, robot: Robot, takes: Mapping[str, Sequence[str]]
+) -> tuple[Planted, ...]:
     """The effects that `text` asks for; a kind local to a joint gives one for each joint named.
 
-    `runs` are the names that exist.
+    `takes`: names of the runs of each motion; a motion's name stands for all its runs.
 
     Raises
     ------
@@ -94,7 +96,7 @@ def parse_planted(text: str, robot: Robot, runs: Sequence[str]) -> tuple[Planted
         )
     kind = kind_named(kind_name.strip(), where)
     value, others = _numbers(numbers, kind, where)
-    chosen = _runs(clauses, runs, where)
+    chosen = _runs(clauses, takes, where)
     places = _places(joints_text, kind, robot, where)
     return tuple(plant(kind, joints, value, others, chosen) for joints in places)
 
@@ -141,20 +143,23 @@ def _number(text: str, where: str) -> float:
     return value
 
 
-def _runs(clauses: Sequence[str], runs: Sequence[str], where: str) -> tuple[str, ...]:
+def _runs(
+    clauses: Sequence[str], takes: Mapping[str, Sequence[str]], where: str
+) -> tuple[str, ...]:
+    runs = [run for each in takes.values() for run in each]
+    known = {**{run: (run,) for run in runs}, **takes}
     chosen: list[str] = []
     for clause in clauses:
         word, colon, names = (part.strip() for part in clause.partition(":"))
         if word != "runs" or not colon or not names:
             raise ConfigError(f"{where}: after ';' only 'runs:name|name' is allowed.")
         for name in (part.strip() for part in names.split("|")):
-            takes = [run for run in runs if run == name or run.startswith(f"{name}_take_")]
-            if not takes:
+            if name not in known:
                 raise ConfigError(
                     f"{where}: there is no run '{name}'.{nearest(name, runs)} "
                     f"Runs: {', '.join(runs)}."
                 )
-            chosen += takes
+            chosen += known[name]
     return tuple(dict.fromkeys(chosen))
 
 

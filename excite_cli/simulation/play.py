@@ -152,6 +152,6 @@ def _check(build: Build, reference: Reference, q: Array) -> None:
     k = int(np.argmax(away.any(axis=1)))
     joint = build.robot.joint_names[int(np.argmax(away[k]))]
     raise RobotError(
-        f"run '{build.run}': the simulated robot ran away at {reference.t[k]:.3f} s, first joint "
-        f"'{joint}'. Take smaller effects, or a slower controller."
+        f"run '{build.run.key}': the simulated robot ran away at {reference.t[k]:.3f} s, first "
+        f"joint '{joint}'. Take smaller effects, or a slower controller."
     )

@@ -37,7 +37,7 @@ def record(
     tau = (1.0 + build.gain) * (tau + sharpness * (np.clip(tau, -level, level) - tau))
     tau = tau + _other_defects(build, t, q, tau) + build.offset
     tau = tau + settings.torque_noise * rms * _noise(tau.shape, settings.noise_correlation, rng)
-    return Run(build.run, t, _counted(q, settings.encoder), tau, dq)
+    return Run(build.run.name, t, _counted(q, settings.encoder), tau, dq)
 
 
 def _torques(build: Build, played: Played, t: Array, settings: SimulationSettings) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from excite_cli.effects.base import Effect
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import assemble, make
 from excite_cli.simulation.controller import (
@@ -54,11 +55,12 @@ class Simulation:
     tracking: dict[str, Array]
 
 
-def run_names(motions: Sequence[Planned], repeat: int) -> tuple[tuple[str, ...], ...]:
-    """Names of the takes of each motion."""
+def takes_of(motions: Sequence[Planned], repeat: int) -> dict[str, tuple[str, ...]]:
+    """Names of the recordings of each motion, by its name."""
     if repeat == 1:
-        return tuple((motion.name,) for motion in motions)
-    return tuple(tuple(f"{m.name}_take_{k}" for k in range(1, repeat + 1)) for m in motions)
+        return {motion.name: (motion.name,) for motion in motions}
+    count = range(1, repeat + 1)
+    return {m.name: tuple(f"{m.name}_take_{k}" for k in count) for m in motions}
 
 
 def simulate(
@@ -86,8 +88,9 @@ def simulate(
     runs: list[Run] = []
     tracking: dict[str, Array] = {}
     with silent_engine():
-        for motion, names in zip(motions, run_names(motions, settings.repeat), strict=True):
-            taken = _takes(robot, phi, motion, names, settings, planted)
+        takes = takes_of(motions, settings.repeat)
+        for motion in motions:
+            taken = _takes(robot, phi, motion, takes[motion.name], settings, planted)
             for run, error in taken:
                 progress(run.name, len(runs))
                 runs.append(run)
@@ -114,10 +117,11 @@ def _takes(
     reference = reference_of(robot, motion, t)
     played: dict[tuple[bool, ...], Played] = {}
     for name in names:
-        build = assemble(robot, phi, name, planted)
+        run_id = RunId(name)
+        build = assemble(robot, phi, run_id, planted)
         if settings.torque_limits:
             build.clip = np.minimum(build.clip, robot.limits.effort)
-        active = tuple(p.effect.active(name) for p in planted)
+        active = tuple(p.effect.active(run_id) for p in planted)
         if active not in played:
             plant = make(build, settings.physics_step)
             gains = gains_of(build, plant, reference, settings.bandwidth)

@@ -4,7 +4,8 @@ Reading trusts nothing: a foreign or damaged file gives one message.
 """
 
 import json
-from dataclasses import asdict
+from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,10 @@ import h5py
 import numpy as np
 
 from excite_cli.atomic import write_atomically
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
     Absorbed,
+    Assumption,
     Diagnosis,
     EffectRecord,
     Information,
@@ -26,6 +29,7 @@ from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_file import new_hdf5
 from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.store import checked
+from excite_cli.store.approximation_text import approximation_as_data, approximation_of
 from excite_cli.store.joint_errors import require_joints
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 from excite_cli.store.trace_groups import (
@@ -56,8 +60,11 @@ _RECORDS: dict[str, Any] = {
     "processing": dict[str, Any],
     "versions": dict[str, str],
 }
-# Records that files of earlier versions lack; they are then None.
-_LATER: dict[str, Any] = {"noise_floor": dict[str, float] | None}
+# Records that files of earlier versions lack.
+_LATER: dict[str, Any] = {
+    "noise_floor": dict[str, float] | None,
+    "assumed": tuple[Assumption, ...],
+}
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
     "rivals": tuple[EffectRecord, ...],
@@ -185,8 +192,13 @@ def _text(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, Covariate):
+        return value.code
+    if isinstance(value, NamedEffect):
+        known = {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+        return {**known, **approximation_as_data(value.approximates)}
     if hasattr(value, "__dataclass_fields__"):
-        return _plain(asdict(value))
+        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -197,4 +209,22 @@ def _plain(value: Any) -> Any:
 
 
 def _record(group: Any, name: str, kind: Any) -> Any:
-    return checked.record(group[name][()], kind)
+    return checked.record(group[name][()], kind, partial(_known, name))
+
+
+def _known(name: str, value: Any) -> Any:
+    """What stands in the file as a text, as a record."""
+    if name == "records/unexplained":
+        return [
+            {**each, "depends_on": tuple(map(Covariate.of_code, each["depends_on"]))}
+            for each in value
+        ]
+    if name == "records/effects":
+        return [
+            {
+                **{key: item for key, item in each.items() if key != "approximation"},
+                "approximates": approximation_of(each),
+            }
+            for each in value
+        ]
+    return value

@@ -17,6 +17,7 @@ from excite_cli.atomic import write_atomically
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import Status
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
@@ -109,7 +110,7 @@ def _write_motion(group: Any, motion: Motion, problem: Problem) -> None:
             "stacked_condition_number": motion.stacked_condition_number,
             "improved": motion.improved,
             "note": motion.note,
-            "status": motion.status,
+            "status": str(motion.status),
             "seconds": motion.seconds,
             "iterations": motion.iterations,
             "evaluations": motion.evaluations,
@@ -231,7 +232,7 @@ def _read_motion(group: Any, index: int, shape: tuple[int, int]) -> Motion:
         stacked_condition_number=checked.number(attributes, "stacked_condition_number"),
         improved=checked.flag(attributes, "improved"),
         note=checked.text(attributes, "note"),
-        status=checked.text(attributes, "status"),
+        status=Status(checked.text(attributes, "status")),
         seconds=checked.number(attributes, "seconds"),
         iterations=checked.count(attributes, "iterations"),
         evaluations=checked.count(attributes, "evaluations"),

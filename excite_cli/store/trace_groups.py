@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.robot.model import Array
@@ -69,7 +70,9 @@ def write_traces(group: Any, traces: Traces) -> None:
         _write_arrays(own, {name: getattr(trace, name) for name in ("part", "t", *_EFFECT)})
     dependence = group.create_group("dependence")
     dependence.attrs["joints"] = json.dumps(traces.dependence.joints)
-    dependence.attrs["quantities"] = json.dumps(traces.dependence.quantities)
+    dependence.attrs["quantities"] = json.dumps(
+        [each.code for each in traces.dependence.quantities]
+    )
     dependence["shares"] = np.asarray(traces.dependence.shares, dtype=float)
 
 
@@ -82,7 +85,8 @@ def read_traces(group: Any, joints: Sequence[str]) -> Traces:
         Arrays do not fit together, or joints are others.
     """
     effects, dependence = group["effects"], group["dependence"]
-    rows, quantities = (_names(dependence, name) for name in ("joints", "quantities"))
+    rows = _names(dependence, "joints")
+    quantities = tuple(Covariate.of_code(code) for code in _names(dependence, "quantities"))
     found = Traces(
         torque_units=_names(group, "torque_units"),
         runs=read_torque_traces(group["runs"], len(joints)),

@@ -10,8 +10,9 @@ from typing import Any
 from excite_cli import api
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import FileError
-from excite_cli.excitation.motion import Progress
+from excite_cli.excitation.progress import Progress
 from excite_cli.excitation.result import Result
+from excite_cli.excitation.words import figure_in_words
 from excite_cli.study.request import request_of
 from excite_cli.workers.base import Tell
 
@@ -98,7 +99,7 @@ def _optimised(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Fi
     problem = api.load_problem(task.config, overrides_of(task, case))
 
     def progress(index: int, state: Progress) -> None:
-        tell(f"motion {index}, {state.figure}")
+        tell(f"motion {index}, {figure_in_words(state.figure)}")
 
     result: Result = api.plan(problem, output=folder / "motions.h5", progress=progress)
     last = result.motions[-1]

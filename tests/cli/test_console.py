@@ -20,7 +20,7 @@ from excite_cli.cli.console import BUG, Terminal, run_guarded
 from excite_cli.cli.export import _MODELS
 from excite_cli.cli.layout import table
 from excite_cli.errors import FileError
-from excite_cli.excitation.motion import Progress
+from excite_cli.excitation.progress import Figure, Measure, Progress, Stage
 from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.robot.glance import known_robots
 
@@ -116,13 +116,14 @@ def test_robots_have_kinds() -> None:
 def test_the_best_so_far_keeps_all_limits() -> None:
     best = Best()
 
-    def words(figure: str, margin: float) -> str:
-        return best.words(Progress(1, figure, "torque", margin, "N·m", 0.1, "search"))
+    def words(value: float, margin: float, measure: Measure = Measure.CONDITION_NUMBER) -> str:
+        figure = Figure(measure, value)
+        return best.words(Progress(1, figure, "torque", margin, "N·m", 0.1, Stage(1, 3)))
 
-    assert words("cond 9.00", -0.1) == "condition number 9.00"
-    assert words("cond 12.00", 0.1) == "condition number 12.00 (best 12.00)"
-    assert words("cond 5.00", -0.1) == "condition number 5.00 (best 12.00)"
-    assert words("divergence 3", 0.1) == "divergence 3"
+    assert words(9.0, -0.1) == "condition number 9.00"
+    assert words(12.0, 0.1) == "condition number 12.00 (best 12.00)"
+    assert words(5.0, -0.1) == "condition number 5.00 (best 12.00)"
+    assert words(3.0, 0.1, Measure.DIVERGENCE) == "divergence 3"
 
 
 def test_a_terminal_does_not_obey_names_of_files(

@@ -7,7 +7,8 @@ import pytest
 from rich.console import Console
 
 from excite_cli.cli.diagnose_tables import answer_of, tables_of
-from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.covariate import Covariate
+from excite_cli.diagnosis.records import Approximation, Diagnosis
 from excite_cli.robot.model import build_robot
 from tests.diagnosis.synthetic_diagnosis import CONFIG, make_diagnosis, smoke_spec
 
@@ -19,7 +20,7 @@ REASON = "a function of v[elbow]"
 def doubted() -> Diagnosis:
     """The one effect that was found is only an approximation."""
     found = make_diagnosis(rivals=())
-    first = replace(found.effects[0], approximates=REASON)
+    first = replace(found.effects[0], approximates=Approximation((Covariate("speed", "elbow"),)))
     processing = {
         "samples": 10, "rate": 20.0, "position_cutoff": 8.0, "candidates": 3, "inflation": 1.0,
     }  # fmt: skip

@@ -18,6 +18,7 @@ from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.identification.prepare import PreparedRun
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
 
 STEP = 0.02
@@ -43,7 +44,7 @@ def prepared(
     zero = np.zeros(shape)
     as_it_is = identity(shape[0], format="csr")
     return PreparedRun(
-        name="run",
+        run=RunId("run"),
         t=STEP * np.arange(shape[0]),
         q=zero if q is None else q,
         v=zero if v is None else v,

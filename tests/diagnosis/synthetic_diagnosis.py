@@ -10,6 +10,7 @@ from scipy.linalg import qr
 from excite_cli.config.load import load_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
+from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import (
     Absorbed,
     Diagnosis,
@@ -21,6 +22,7 @@ from excite_cli.diagnosis.records import (
     Unexplained,
 )
 from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.base import Value
 from excite_cli.excitation.effect_columns import EffectColumns
@@ -87,7 +89,7 @@ def make_diagnosis(
         0.1, 0.12, dict.fromkeys(names, 0.1), dict.fromkeys(names, float("nan")),
         dict.fromkeys(names, 1.0), dict.fromkeys(names, 2.0), (0.08, 0.12),
     )  # fmt: skip
-    suspect = Suspect(model[0], 1e-9, 0.4, 0.2, "accepted")
+    suspect = Suspect(model[0], 1e-9, 0.4, 0.2, Verdict.ACCEPTED)
     return Diagnosis(
         config=spec_as_yaml(earlier.problem.spec),
         config_folder=str(CONFIG.parent),
@@ -101,7 +103,11 @@ def make_diagnosis(
             ),
         ),
         absorbed=(Absorbed("armature", (names[0],), ("Izz[shoulder_yaw]",), 1e-5),),
-        unexplained=(Unexplained("elbow", ("q", "sgn v"), 0.3),),
+        unexplained=(
+            Unexplained(
+                "elbow", (Covariate("position", "elbow", Aspect.DIRECTION), Covariate("time")), 0.3
+            ),
+        ),
         sealed_run="run_3",
         before=errors,
         after=errors,
@@ -154,6 +160,11 @@ def make_traces(
     )  # fmt: skip
     shares = np.zeros((n, 3))
     shares[elbow] = 0.3, 0.0, 0.02
-    dependence = Dependence(tuple(joints), ("q[elbow]", "time", "own direction and q"), shares)
+    covariates = (
+        Covariate("position", "elbow"),
+        Covariate("time"),
+        Covariate("position", aspect=Aspect.DIRECTION, own=True),
+    )
+    dependence = Dependence(tuple(joints), covariates, shares)
     units = ("N·m",) * n
     return Traces(units, (first, second), (effect,), dependence), (sealed,)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.records import Unexplained
+from excite_cli.diagnosis.records import Approximation, Unexplained
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
@@ -25,6 +26,14 @@ Allowed = Callable[[Array, Sequence[int], Sequence[int]], bool]
 
 def effect(kind: str, *joints: int) -> Effect:
     return catalogue()[kind](joints or (0,))
+
+
+def unexplained(joint: str, *codes: str, share: float) -> Unexplained:
+    return Unexplained(joint, tuple(Covariate.of_code(code) for code in codes), share)
+
+
+def function_of(*codes: str) -> Approximation:
+    return Approximation(tuple(Covariate.of_code(code) for code in codes))
 
 
 def all_but(vetoed: int) -> Allowed:
@@ -90,9 +99,9 @@ def beside(kind: str, words: Sequence[str], energy: float, joints: tuple[int, ..
     torque[0, joints[0]] = np.sqrt(energy)
     torque[width] = [1.0, 2.0]  # half of the residual of joint a has no candidate
     data, candidates = planted([effect(kind, *joints)], torque)
-    left = [Unexplained("a", tuple(words), 0.5)]
+    left = [unexplained("a", *words, share=0.5)]
     found = approximations(traced(data, candidates, [0]), left, NAMES)
-    assert found in ({}, {0: f"a function of {', '.join(words)}"})
+    assert found in ({}, {0: function_of(*words)})
     return bool(found)
 
 
@@ -142,7 +151,7 @@ def test_what_depends_on_something_else_must_be_more_than_the_effect(
 
 def test_a_line_through_a_cubic_is_no_spring() -> None:
     """Of q³ on ±1 a line explains 21/25, and 4/21 of that are left; of q³ + q it leaves less."""
-    for straight, expected in ((0.0, {0: "a function of q[a]"}), (1.0, {})):
+    for straight, expected in ((0.0, {0: function_of("q[a]")}), (1.0, {})):
         rng = np.random.default_rng(2)
         q = [rng.uniform(-1.0, 1.0, SAMPLES) for _ in FOLDS]
         declared = tuple(rng.normal(size=(SAMPLES, 2, FIXED)) for _ in FOLDS)
@@ -161,7 +170,7 @@ def test_a_line_through_a_cubic_is_no_spring() -> None:
         curve = np.column_stack([x, position**2, position**3])
         left = [torque - z @ np.linalg.lstsq(z, torque, rcond=None)[0] for z in (x, curve)]
         share = 1.0 - float(left[1] @ left[1]) / float(left[0] @ left[0])
-        record = [Unexplained("a", ("q[a]",), share)]
+        record = [unexplained("a", "q[a]", share=share)]
         assert approximations(traced(data, [spring], [0]), record, NAMES) == expected
 
 
@@ -171,18 +180,17 @@ def test_structure_counts_on_the_joint_where_an_effect_is_most() -> None:
     torque = np.array([[3.0, 4.0], [9.0, 0.0]])
     data, candidates = planted(effects, torque)
     both = traced(data, candidates, [0, 1])
-    words = ("time",)
-    assert approximations(both, [Unexplained("b", words, 0.99)], NAMES) == {}
-    large = [Unexplained("b", words, 20.0)]  # of the residual's energy of one
-    assert approximations(both, large, NAMES) == {0: "a function of time"}
-    assert approximations(both, [Unexplained("a", words, 20.0)], NAMES) == {}
+    assert approximations(both, [unexplained("b", "time", share=0.99)], NAMES) == {}
+    large = [unexplained("b", "time", share=20.0)]  # of the residual's energy of one
+    assert approximations(both, large, NAMES) == {0: function_of("time")}
+    assert approximations(both, [unexplained("a", "time", share=20.0)], NAMES) == {}
 
 
 def test_straight_friction_is_measured_without_what_refines_it() -> None:
     """Beside its refinement, which shares nearly all, little of Coulomb friction would be left."""
     mix = np.array([[1.0, 1.0], [0.0, 0.2]])
     torque = np.array([[4.0, 0.0], [1.0, 0.0]])
-    left = [Unexplained("a", ("v[a]",), 1.0)]  # energy one
+    left = [unexplained("a", "v[a]", share=1.0)]  # energy one
     for kind, expected in (
         ("load_dependent_friction", {1}),  # 16 + 1 of Coulomb, 1 of the refinement
         ("armature", {0}),  # refines nothing: 1/26 of Coulomb's, and no function of speed
@@ -196,7 +204,7 @@ def test_straight_friction_is_measured_without_what_refines_it() -> None:
 def test_what_cannot_be_and_explains_more_makes_a_name_doubtful(rival: float) -> None:
     effects = [effect("viscous_friction"), effect("armature"), effect("torque_offset")]
     data, candidates = planted(effects, np.array([[3.0, 0.0], [rival, 0.0], [2.0, 0.0]]))
-    expected = {0: "something that also looks like inertia of the motor (armature)"}
+    expected = {0: Approximation(kind="armature")}
     found = approximations(traced(data, candidates, [0], all_but(1)), [], NAMES)
     assert found == (expected if rival > 3.0 else {})
     assert approximations(traced(data, candidates, [0]), [], NAMES) == {}
@@ -223,12 +231,12 @@ def test_another_shape_of_a_chosen_effect_is_no_rival() -> None:
 def test_structure_is_told_before_a_rival() -> None:
     effects = [effect("viscous_friction"), effect("armature")]
     data, candidates = planted(effects, np.array([[3.0, 0.0], [9.0, 0.0]]))
-    left = [Unexplained("a", ("v[a]", "time"), 0.5)]
+    left = [unexplained("a", "v[a]", "time", share=0.5)]
     found = approximations(traced(data, candidates, [0], all_but(1)), left, NAMES)
-    assert found == {0: "a function of v[a], time"}
+    assert found == {0: function_of("v[a]", "time")}
 
 
 def test_without_effects_there_is_nothing_to_doubt() -> None:
     data, candidates = planted([effect("viscous_friction")], np.array([[3.0, 0.0]]))
-    left = [Unexplained("a", ("v[a]",), 0.9)]
+    left = [unexplained("a", "v[a]", share=0.9)]
     assert approximations(traced(data, candidates, [], all_but(0)), left, NAMES) == {}

@@ -13,6 +13,7 @@ from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import possible_sizes
 from excite_cli.diagnosis.training import TrainingData
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import (
@@ -213,15 +214,15 @@ def test_size_is_the_share_of_the_torque_where_it_is_most(
 @pytest.mark.parametrize(
     ("kind", "size", "noise", "declared", "expected"),
     [
-        ("viscous_friction", 1.0, 1.0, 1.0, "accepted"),
-        ("viscous_friction", -1.0, 1.0, 1.0, "impossible sign"),
-        ("torque_offset", -1.0, 1.0, 1.0, "accepted"),
+        ("viscous_friction", 1.0, 1.0, 1.0, Verdict.ACCEPTED),
+        ("viscous_friction", -1.0, 1.0, 1.0, Verdict.IMPOSSIBLE_SIGN),
+        ("torque_offset", -1.0, 1.0, 1.0, Verdict.ACCEPTED),
         # 1 / √(1² + declared²) is 0.1 % of the torque, then 0.25 %.
-        ("viscous_friction", 1.0, 0.1, 1000.0, "too small to matter"),
-        ("viscous_friction", 1.0, 0.1, 400.0, "accepted"),
+        ("viscous_friction", 1.0, 0.1, 1000.0, Verdict.TOO_SMALL),
+        ("viscous_friction", 1.0, 0.1, 400.0, Verdict.ACCEPTED),
         # 1 − 1 / √(1 + size²) is 0.5 % of the error, then 1.1 %.
-        ("viscous_friction", 0.1, 1.0, 1.0, "no gain on runs left out"),
-        ("viscous_friction", 0.15, 1.0, 1.0, "accepted"),
+        ("viscous_friction", 0.1, 1.0, 1.0, Verdict.NO_GAIN),
+        ("viscous_friction", 0.15, 1.0, 1.0, Verdict.ACCEPTED),
     ],
 )
 def test_verdicts(kind: str, size: float, noise: float, declared: float, expected: str) -> None:
@@ -249,16 +250,16 @@ def test_no_effect_is_what_another_leaves(kind: str, angle: float, left: float) 
         torque = np.array([50.0, 9.0, 100.0 * np.sign(angle), size, 0.0])
         data, candidates = planted(effects, mix, on_joint_0(list(torque)), noise=0.1)
         judge = judge_of(data, candidates)
-        words = "accepted" if expected else "what another effect leaves"
+        words = Verdict.ACCEPTED if expected else Verdict.LEFTOVER
         assert judge.verdict([0, 1], [2]) == words
         assert judge.fails(2, [0, 1], [0, 1, 2]) != expected
-    assert judge.verdict([0], [2]) != "what another effect leaves"  # it is not in
+    assert judge.verdict([0], [2]) != Verdict.LEFTOVER  # it is not in
 
 
 def test_what_two_effects_leave_is_not_added_up() -> None:
     effects = [effect("elasticity"), effect("torque_delay"), effect("torque_offset")]
     mix = np.diag([1e5, 1e4, 1.0])  # 2 % and 1 % of 100² are 200 and 100
-    for energy, expected in ((150.0, "what another effect leaves"), (250.0, "accepted")):
+    for energy, expected in ((150.0, Verdict.LEFTOVER), (250.0, Verdict.ACCEPTED)):
         torque = on_joint_0([100.0, 100.0, np.sqrt(energy)])
         judge = judge_of(*planted(effects, mix, torque, noise=0.1))
         assert judge.verdict([0, 1], [2]) == expected
@@ -270,12 +271,12 @@ def test_an_effect_leaves_nothing_on_other_joints() -> None:
     mix = np.diag([1e5, 1.0, 100.0, 1.0])
     torque = np.array([[100.0, 0.0], [0.0, 1.0], [5.0, 5.0], [0.0, 0.0]])
     judge = judge_of(*planted(effects, mix, torque, noise=0.1))
-    assert judge.verdict([0], [1]) == "accepted"
-    assert judge.verdict([0], [2]) == "accepted"
+    assert judge.verdict([0], [1]) == Verdict.ACCEPTED
+    assert judge.verdict([0], [2]) == Verdict.ACCEPTED
     torque[2] = [5.0, 0.0]
     data, candidates = planted([effects[0], effect("torque_offset")], mix[:2, :2], torque[[0, 2]],
                                noise=0.1)  # fmt: skip
-    assert judge_of(data, candidates).verdict([0], [1]) == "what another effect leaves"
+    assert judge_of(data, candidates).verdict([0], [1]) == Verdict.LEFTOVER
 
 
 def test_inertias_bent_on_one_joint_leave_nothing_to_effects_of_another() -> None:
@@ -287,7 +288,7 @@ def test_inertias_bent_on_one_joint_leave_nothing_to_effects_of_another() -> Non
         tau[:, 0] += 100.0 * declared[:, 0, 0]
     judge = judge_of(data, [replace(first, columns=bent), second])
     assert 0.02 * judge.plain.energy_on([1], [1]) > TOTAL
-    assert judge.verdict([0], [1]) == "accepted"
+    assert judge.verdict([0], [1]) == Verdict.ACCEPTED
 
 
 @pytest.mark.parametrize(("transferred", "expected"), [(0.03, False), (0.12, True)])
@@ -308,7 +309,7 @@ def test_runs_left_out_gain_not_far_less_than_those_fitted(
     data, candidate = replace(data, tau=tau), replace(candidate, columns=columns)
     judge = judge_of(data, [candidate], Rules(0.01, 0.01))
     assert judge.left_out_gain([], [0]) == pytest.approx(transferred, abs=0.01)
-    words = "accepted" if expected else "no gain on runs left out"
+    words = Verdict.ACCEPTED if expected else Verdict.NO_GAIN
     assert judge.verdict([], [0]) == words
 
 

@@ -20,6 +20,7 @@ from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.regression import build_regression
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from tests.identification.synthetic import measured
 from tests.robot.random_robots import random_robot
@@ -56,7 +57,7 @@ def torque(
     kinds: Sequence[Effect],
     values: Array,
     run: PreparedRun,
-    name: str,
+    name: RunId,
 ) -> Array:
     return predicted(body_of(robot, phi, run), kinds, values, run.t, name).torque
 
@@ -69,7 +70,7 @@ def test_prediction_is_columns_times_parameters(robot: Robot, runs: list[Prepare
     values = rng.uniform(0.1, 0.5, sum(len(e.parameters) for e in kinds))
     regression = build_regression(robot, find_base_parameters(robot), kinds, runs, phi)
     for run, columns in zip(runs, regression.runs, strict=True):
-        tau = torque(robot, phi, kinds, values, run, run.name)
+        tau = torque(robot, phi, kinds, values, run, run.run)
         assert tau.shape == run.q.shape
         modelled = columns.inertial @ phi + columns.effects @ values
         assert run.averaged_for_fit(tau) == pytest.approx(modelled, rel=1e-9, abs=1e-9)
@@ -81,7 +82,7 @@ def test_an_effect_acts_in_its_runs_by_the_name_that_is_given(
     phi = standard_parameters(robot)
     payload = (Payload((0, 1, 2), {}, ("r2",)),)
     values = np.full(len(payload[0].parameters), 0.3)
-    one, two = (torque(robot, phi, payload, values, runs[0], name) for name in ("r1", "r2"))
+    one, two = (torque(robot, phi, payload, values, runs[0], RunId(name)) for name in ("r1", "r2"))
     load = RigidBody(robot, phi, runs[0].q, runs[0].v, runs[0].a).load
     assert np.array_equal(one, load)
     assert np.abs(two - load).max() > 0.1

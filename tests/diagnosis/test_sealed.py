@@ -135,7 +135,7 @@ def test_a_run_sealed_by_name_is_used_for_the_errors_only(
     robot: Robot, base: BaseParameters, spec: Spec, dataset: Dataset
 ) -> None:
     first = disturbed(dataset.runs[0], everywhere(dataset.runs[0]))
-    changed = replace(dataset, runs=(first.part(0, 700, first.name), *dataset.runs[1:]))
+    changed = replace(dataset, runs=(first.cut(0, 700), *dataset.runs[1:]))
     one, other = (diagnose(robot, base, data, spec, "motion_1") for data in (dataset, changed))
     assert one.sealed_run == "motion_1"
     assert set(differences(one, other)) == FREE

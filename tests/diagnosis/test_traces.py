@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.load import load_spec
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.dynamics.base_parameters import find_base_parameters
@@ -95,7 +96,7 @@ def test_the_map_of_dependences(found: Diagnosis) -> None:
     assert dependence.joints == found.joint_names
     n = len(found.joint_names)
     assert len(dependence.quantities) == 1 + 3 * n + 4
-    assert dependence.quantities[0] == "time"
-    assert dependence.quantities[-1] == "own history of load"
+    assert dependence.quantities[0] == Covariate("time")
+    assert dependence.quantities[-1].code == "own history of load"
     assert dependence.shares.shape == (n, len(dependence.quantities))
     assert ((dependence.shares >= 0) & (dependence.shares <= 1)).all()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.records import Unexplained
 from excite_cli.diagnosis.training import TrainingData
@@ -75,7 +76,7 @@ def test_the_position_behind_a_residual_is_named(
     names = regression.robot.joint_names
     (record,) = found(regression, signals, extra)
     assert record.joint == names[joint]
-    assert record.depends_on[0] == f"q[{names[other]}]"
+    assert record.depends_on[0] == Covariate("position", names[other])
     assert 0.1 < record.share_of_residual < 1.0
 
 
@@ -84,7 +85,10 @@ def test_time_is_named_too(regression: Regression, signals: list[Signals]) -> No
     for run, s, more in zip(regression.runs, signals, extra, strict=True):
         more[:, 1] += run.prepared.averaged(0.08 * s.t)
     (record,) = found(regression, signals, extra)
-    assert (record.joint, record.depends_on[0]) == (regression.robot.joint_names[1], "time")
+    assert (record.joint, record.depends_on[0]) == (
+        regression.robot.joint_names[1],
+        Covariate("time"),
+    )
 
 
 def test_the_noise_of_another_joint_does_not_hide_it(

@@ -5,6 +5,7 @@ import numpy as np
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Signals
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 
 
@@ -20,7 +21,7 @@ def states(robot: Robot, samples: int, step: float, seed: int = 0) -> tuple[Arra
 def signals_at(robot: Robot, t: Array, q: Array, v: Array, a: Array, run: str = "") -> Signals:
     """Signals whose model is the rigid bodies of the URDF alone."""
     body = RigidBody(robot, standard_parameters(robot), q, v, a)
-    return Signals(t, q, v, a, body.load, body.load, body, run)
+    return Signals(t, q, v, a, body.load, body.load, body, RunId(run))
 
 
 def signals_of(robot: Robot, samples: int = 200, step: float = 0.02, seed: int = 0) -> Signals:

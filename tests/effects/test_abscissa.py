@@ -9,6 +9,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Parameter, Signals
 from excite_cli.effects.catalogue import catalogue, kind_named
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from tests.robot.random_robots import random_robot
 
@@ -25,7 +26,7 @@ def signals(robot: Robot) -> Signals:
     q = np.sin(2.0 * t[:, None] + phase)
     v, a = 2.0 * np.cos(2.0 * t[:, None] + phase), -4.0 * q
     body = RigidBody(robot, standard_parameters(robot), q, v, a)
-    return Signals(t, q, v, a, body.load, 1.5 * body.load, body, "r1")
+    return Signals(t, q, v, a, body.load, 1.5 * body.load, body, RunId("r1"))
 
 
 @pytest.mark.parametrize("kind", sorted(catalogue()))

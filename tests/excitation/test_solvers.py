@@ -10,8 +10,9 @@ from excite_cli.config.spec import Spec
 from excite_cli.config.trajectory_spec import FourierSpec, GridSpec, SamplingSpec
 from excite_cli.constraints.base import Array
 from excite_cli.excitation.correction import lowest
-from excite_cli.excitation.motion import Outcome, Progress
+from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.progress import Measure, Progress, Status
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.solvers.quasi_newton import damped_update
@@ -79,9 +80,10 @@ def test_same_start_gives_the_same_outcome(problem: Problem, make: Callable[[], 
 def test_max_iterations_and_progress(problem: Problem, make: Callable[[], Solver]) -> None:
     outcome, seen = solved(MotionTask(problem), make(), iterations=5)
     assert outcome.iterations == 5
-    assert outcome.status == "iteration limit"
+    assert outcome.status is Status.ITERATION_LIMIT
     assert [progress.iteration for progress in seen] == [1, 2, 3, 4, 5]
-    assert all(progress.stage for progress in seen)
+    assert all(1 <= progress.stage.number <= progress.stage.total for progress in seen)
+    assert {progress.figure.measure for progress in seen} == {Measure.CONDITION_NUMBER}
 
 
 @every_solver
@@ -90,7 +92,7 @@ def test_no_time_at_all_still_gives_an_admissible_outcome(
 ) -> None:
     task = MotionTask(problem)
     outcome, _ = solved(task, make(), seconds=0.02)
-    assert outcome.status == "time limit"
+    assert outcome.status is Status.TIME_LIMIT
     assert lowest(task.values(task.states(outcome.x))) > 0
 
 

@@ -15,9 +15,10 @@ from excite_cli.config.load import load_spec
 from excite_cli.config.spec import SequenceSpec
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation import generate
-from excite_cli.excitation.motion import Motion, Outcome, Progress
+from excite_cli.excitation.motion import Motion, Outcome
 from excite_cli.excitation.one_start import FoundMotion, Search
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.progress import Figure, Measure, Progress, Status
 from excite_cli.excitation.random_baseline import RandomBaseline, random_baseline
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
@@ -136,8 +137,10 @@ def _best(problem: Problem, found: list[Any], alone: tuple[Motion, ...]) -> Moti
     )
 
 
-def _found(value: float, x: Any, status: Any = "converged") -> FoundMotion:
-    return FoundMotion(value, "", Outcome(x, status, 10, 20), 0.0)
+def _found(value: float, x: Any, status: Any = Status.CONVERGED) -> FoundMotion:
+    return FoundMotion(
+        value, Figure(Measure.CONDITION_NUMBER, value), Outcome(x, status, 10, 20), 0.0
+    )
 
 
 def test_of_equal_starts_the_first_is_taken_and_failures_are_passed_over(
@@ -171,7 +174,7 @@ def test_starts_cut_short_by_time_are_told(problem: Problem, alone: tuple[Motion
     from excite_cli.excitation.task import MotionTask
 
     x = MotionTask(problem).variables(alone[0].coefficients)
-    found = [_found(1.0, x), _found(2.0, x, "time limit"), _found(2.0, x, "time limit")]
+    found = [_found(1.0, x), _found(2.0, x, Status.TIME_LIMIT), _found(2.0, x, Status.TIME_LIMIT)]
     assert "2 of 3 starts ended at optimizer.max_seconds" in _best(problem, found, alone).note
 
 

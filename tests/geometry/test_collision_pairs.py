@@ -8,6 +8,8 @@ from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.geometry import collision_pairs
 from excite_cli.geometry.clearance import Clearance
 from excite_cli.geometry.collision_pairs import CollisionPairs, choose_pairs
+from excite_cli.geometry.reasons import Why
+from excite_cli.geometry.words import reason_in_words
 from excite_cli.robot.capsule import Capsule
 
 from .fitted_robots import capsules_of, pairs_of, robot_of
@@ -16,7 +18,9 @@ NAMES = ["talos", "ur10", "panda"]
 
 
 def reasons(pairs: CollisionPairs) -> dict[frozenset[str], str]:
-    return {frozenset((pair.first, pair.second)): pair.reason for pair in pairs.dropped}
+    return {
+        frozenset((pair.first, pair.second)): reason_in_words(pair.reason) for pair in pairs.dropped
+    }
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -72,7 +76,7 @@ def test_pairs_dropped_as_never_near_stay_apart(name: str) -> None:
     never = [
         (number[pair.first], number[pair.second])
         for pair in pairs_of(name).dropped
-        if pair.reason.startswith("never near")
+        if pair.reason.why is Why.NEVER_NEAR
     ]
     q, _, _ = robot.draw_states(1500, seed=99)  # not the sample that the choice was made from
     distances = Clearance(robot, capsules, CollisionPairs(tuple(never), ())).distances(q)

@@ -18,6 +18,8 @@ from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs, choose_obstacle_pairs
 from excite_cli.geometry.obstacles import build_obstacles
 from excite_cli.geometry.pair_distances import carried_bodies
+from excite_cli.geometry.reasons import Why
+from excite_cli.geometry.words import reason_in_words
 from excite_cli.robot.model import Robot, build_robot
 from tests.robot.random_robots import random_robot
 
@@ -42,7 +44,11 @@ def _names(
         f"{capsules[i].name} {things[j].name}": float(kept)
         for (i, j), kept in zip(pairs.checked, pairs.kept, strict=True)
     }
-    return checked, {f"{d.first} {d.second}": d.reason for d in pairs.dropped}, pairs
+    return (
+        checked,
+        {f"{d.first} {d.second}": reason_in_words(d.reason) for d in pairs.dropped},
+        pairs,
+    )
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -54,7 +60,11 @@ def test_what_is_out_of_reach_stays_so(seed: int) -> None:
     pairs = choose_obstacle_pairs(robot, capsules, things, spec)
     number = {c.name: i for i, c in enumerate(capsules)}
     thing = {t.name: j for j, t in enumerate(things)}
-    far = [(number[d.first], thing[d.second]) for d in pairs.dropped if d.reason == "out of reach"]
+    far = [
+        (number[d.first], thing[d.second])
+        for d in pairs.dropped
+        if d.reason.why is Why.OUT_OF_REACH
+    ]
     moving = [i for i, c in enumerate(capsules) if carried_bodies(robot)[c.joint].any()]
     assert len(pairs.checked) + len(pairs.dropped) == len(moving) * len(things)
     if far:

@@ -17,6 +17,7 @@ from excite_cli.identification.regression import (
     effect_columns,
 )
 from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 
 RATE = 100.0
@@ -76,7 +77,7 @@ def torque(
     body = RigidBody(robot, phi, q, v, a)
     if values is None or not effects:
         return body.load
-    signals = Signals(t, q, v, a, body.load, body.load, body, name)
+    signals = Signals(t, q, v, a, body.load, body.load, body, RunId(name))
     return body.load + effect_columns(effects, signals) @ values
 
 

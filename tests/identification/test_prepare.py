@@ -217,9 +217,9 @@ def test_a_run_too_short_is_refused_in_words() -> None:
     run = recorded()
     processing = choose_processing([run], FilterSpec())
     with pytest.raises(FileError, match=r"run 'brief' is too short: 0\.598 s leave \d averaged"):
-        prepare(run.part(0, 300, "brief"), processing)
+        prepare(replace(run, name="brief").cut(0, 300), processing)
     with pytest.raises(FileError, match="only 9 samples"):
-        prepare(run.part(0, 9, "brief"), processing)
+        prepare(replace(run, name="brief").cut(0, 9), processing)
 
 
 def test_a_run_too_slow_for_the_cutoff_is_refused_in_words() -> None:

@@ -71,7 +71,7 @@ def test_effects_stand_in_their_own_rows_and_runs(robot: Robot) -> None:
         assert np.array_equal(columns[:, 0, 0], run.v[:, 0])
         assert not columns[:, 1:, 0].any()
         assert not columns[:, :2, 1].any()
-        assert columns[:, :, 2:].any() == (run.name == "r2")
+        assert columns[:, :, 2:].any() == (run.run.name == "r2")
 
 
 def test_no_effects_give_no_columns(robot: Robot) -> None:

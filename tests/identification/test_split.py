@@ -1,11 +1,14 @@
 """What is fitted and what is sealed have no sample in common."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from excite_cli.errors import ConfigError
 from excite_cli.identification.split import Split, split
 from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.run_identity import Part
 
 
 def run(name: str, seconds: float, rate: float = 100.0, start: float = 0.0) -> Run:
@@ -90,6 +93,66 @@ def test_a_run_too_short_for_blocks_is_refused() -> None:
         split(data(run("only", 2.0)))
     with pytest.raises(ConfigError, match="too short"):
         split(data(run("only", 10.0)), block=8.0)
+
+
+def with_gap(name: str, *stretches: tuple[float, float]) -> list[Run]:
+    """Stretches from … to [s] of a recording that began at 100 s."""
+    whole = run(name, max(end for _, end in stretches), start=100.0)
+    found = []
+    for number, (start, end) in enumerate(stretches, 1):
+        first, last = (round(100 * edge) for edge in (start, end))
+        found.append(whole.cut(first, last, Part(number, 0, start, end)))
+    return found
+
+
+def test_a_recording_with_a_gap_is_sealed_and_left_out_as_one() -> None:
+    b = with_gap("b", (0.0, 4.0), (4.3, 8.0))
+    runs = data(run("a", 5.0), *b, run("c", 5.0))
+    found = split(runs)
+    assert [each.label for each in found.training] == ["a", "b/1", "b/2"]
+    assert (found.folds, found.sealed_name, found.units) == ((0, 1, 1), "c", ("a", "b", "c"))
+    assert [each.label for each in split(runs, "b").sealed] == ["b/1", "b/2"]
+    stretch = split(runs, "b/2")
+    assert [each.label for each in stretch.sealed] == ["b/2"]
+    assert [each.label for each in stretch.training] == ["a", "b/1", "c"]
+    # On the clock of the recording, so that a time within it means the same in all stretches.
+    assert found.training[2].t[0] == pytest.approx(4.3)
+
+
+def test_stretches_of_the_only_recording_count_as_recordings() -> None:
+    runs = data(*with_gap("only", (0.0, 4.0), (4.3, 8.0), (9.0, 12.0)))
+    for sealed in (None, "only", "only/3"):
+        found = split(runs, sealed)
+        assert [each.label for each in found.sealed] == ["only/3"]
+        assert (found.sealed_name, found.folds) == ("only/3", (0, 1))
+        assert found.units == ("only/1", "only/2", "only/3")
+
+
+def test_names_are_never_taken_apart() -> None:
+    """Names that look like those of parts are names like others."""
+    names = ("take 6-12 s", "take (first half)", "take/2", "take")
+    found = split(data(*(run(name, 5.0) for name in names)))
+    assert found.units == names
+    assert [found.unit(each.id) for each in found.training] == list(names[:3])
+    (only,) = split(data(run("take 6-12 s", 20.0))).units
+    assert only == "take 6-12 s"
+
+
+def test_parts_say_where_they_are() -> None:
+    found = split(data(run("only", 12.0)))
+    first = found.sealed[0]
+    assert first.part.start == pytest.approx(first.t[0])
+    assert first.part.end == pytest.approx(first.t[-1])
+    assert first.label == f"only {first.t[0]:.4g}-{first.t[-1]:.4g} s"
+    numbers = sorted(each.part.block for each in (*found.training, *found.sealed))
+    assert numbers == sorted(set(numbers))
+
+
+def test_absolute_time_stays_with_its_instant() -> None:
+    late = replace(run("one", 3.0, start=5.0), epoch=1.7e9)
+    found = split(data(late, run("two", 3.0)))
+    first, second = found.training
+    assert (first.epoch, second.epoch) == (1.7e9 + 5.0, 1.7e9 + 5.0)
 
 
 def test_time_counts_from_the_start_of_the_run() -> None:

@@ -11,6 +11,7 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.torque_trace import MOST_SAMPLES, thinned, torque_trace
+from excite_cli.measurement.run_identity import Part
 from tests.identification.synthetic import measured
 from tests.robot.random_robots import random_robot
 
@@ -20,7 +21,7 @@ def prepared() -> tuple[PreparedRun, np.ndarray]:
     robot = random_robot(4, joints=3, branches=False, prismatic=False)
     phi = standard_parameters(robot)
     data = measured(robot, phi, noise=0.5, seconds=5.0)
-    run = replace(data.runs[0], name="A 0-5 s")
+    run = replace(data.runs[0], name="A 0-5 s", part=Part(2, 1, 0.0, 5.0))
     valid = np.ones(run.tau.shape, bool)
     valid[len(run.t) // 2, 1] = False
     run = replace(run, valid=valid)
@@ -31,7 +32,7 @@ def prepared() -> tuple[PreparedRun, np.ndarray]:
 def test_it_is_what_errors_are_counted_from(prepared: tuple[PreparedRun, np.ndarray]) -> None:
     run, load = prepared
     trace = torque_trace(run, load, 2.0 * load, before=load, sealed=True)
-    assert (trace.run, trace.sealed) == ("A", True)
+    assert (trace.run, trace.sealed) == ("A 0-5 s/2", True)
     assert trace.predicted == pytest.approx(run.averaged(2.0 * load), rel=1e-6, abs=1e-4)
     assert trace.before == pytest.approx(run.averaged(load), rel=1e-6, abs=1e-4)
     assert trace.load == pytest.approx(trace.before)

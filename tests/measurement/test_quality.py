@@ -167,7 +167,7 @@ def test_swapped_and_turned_speeds() -> None:
 def test_late_speeds(steps: int) -> None:
     run = recorded()
     assert run.dq is not None
-    late = replace(run, dq=np.roll(run.dq, steps, axis=0)).part(20, 1500, "run")
+    late = replace(run, dq=np.roll(run.dq, steps, axis=0)).cut(20, 1500)
     assert speed_lag(late) == pytest.approx(steps / 200, abs=1e-3)
     assert [found.kind for found in check(late)[1]] == (["lag"] if steps else [])
 
@@ -237,7 +237,7 @@ def test_missing_positions_are_bridged_or_split() -> None:
     q[800:900, 2] = np.nan
     parts, findings = check(with_q(run, q))
     assert "gap" in [found.kind for found in findings]
-    assert [part.name for part in parts] == ["run/1", "run/2"]
+    assert [part.label for part in parts] == ["run/1", "run/2"]
 
 
 def test_missing_speed_and_stamps() -> None:

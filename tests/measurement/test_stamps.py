@@ -48,7 +48,7 @@ def test_a_gap_splits_the_run() -> None:
     parts, findings = equidistant(taken(run, keep))
     found = only(findings, "gap")
     assert "1 gap in time, the longest of 0.305 s at 2.995 s" in found.text
-    assert [part.name for part in parts] == ["run/1", "run/2"]
+    assert [part.label for part in parts] == ["run/1", "run/2"]
     assert parts[1].t[0] == pytest.approx(3.3)
     for part in parts:
         follows_the_motion(part)
@@ -73,7 +73,7 @@ def test_short_parts_are_left_out_and_said() -> None:
     parts, findings = equidistant(taken(run, keep))
     assert [found.kind for found in findings] == ["gap", "short_part"]
     assert "1 parts shorter than 0.5 s" in findings[1].text
-    assert [part.name for part in parts] == ["run/1", "run/2"]
+    assert [part.label for part in parts] == ["run/1", "run/2"]
 
 
 def test_samples_in_another_order() -> None:
@@ -139,7 +139,7 @@ def test_time_that_cannot_be_used() -> None:
     with pytest.raises(FileError, match="time stands still at 3"):
         equidistant(replace(run, t=np.full(len(run.t), 3.0)))
     with pytest.raises(FileError, match="has 5 samples; at least 10"):
-        equidistant(run.part(0, 5, "run"))
+        equidistant(run.cut(0, 5))
     scattered = taken(run, np.arange(len(run.t)) % 40 < 10)
     with pytest.raises(FileError, match=r"falls into 40 pieces.*too irregular"):
         equidistant(scattered)

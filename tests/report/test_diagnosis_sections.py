@@ -7,14 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Unexplained
+from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.records import (
+    Approximation,
+    Diagnosis,
+    EffectRecord,
+    NamedEffect,
+    Unexplained,
+)
+from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words
 from excite_cli.effects.base import Value
 from excite_cli.report.chart import Chart
-from excite_cli.report.dependence_section import (
-    dependence_section,
-    in_plain_words,
-    quantity_in_words,
-)
+from excite_cli.report.dependence_section import dependence_section
 from excite_cli.report.diagnosis_found_section import found_section
 from excite_cli.report.diagnosis_sections import diagnosis_figures, diagnosis_sections
 from excite_cli.report.effect_chart import Cloud, law_line
@@ -45,7 +49,7 @@ def plain() -> Diagnosis:
 def diagnosis(plain: Diagnosis) -> Diagnosis:
     traces, sealed = make_traces(plain.joint_names)
     traces = replace(traces, runs=traces.runs[:1])
-    unexplained = (Unexplained("elbow", ("direction and q[elbow]",), 0.3),)
+    unexplained = (Unexplained("elbow", (Covariate("position", "elbow", Aspect.DIRECTION),), 0.3),)
     return replace(plain, traces=traces, sealed_traces=sealed, unexplained=unexplained)
 
 
@@ -211,9 +215,10 @@ def test_joints_that_never_move_are_told_not_drawn(sections: dict[str, Section])
     ],
 )
 def test_quantities_in_words(symbol: str, words: str) -> None:
-    assert quantity_in_words(symbol) == words
-    if not symbol.startswith("own"):
-        assert in_plain_words(f"a function of {symbol}") == f"a function of {words}"
+    covariate = Covariate.of_code(symbol)
+    assert covariate_in_words(covariate) == words
+    found = Approximation((covariate,))
+    assert approximation_in_words(found, covariate_in_words) == f"a function of {words}"
 
 
 def test_a_law_that_jumps_is_drawn_as_a_step_and_a_line_is_not() -> None:

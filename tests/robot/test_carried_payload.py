@@ -19,6 +19,7 @@ from excite_cli.export.mjcf import mjcf
 from excite_cli.export.urdf import updated_urdf
 from excite_cli.geometry.capsules import fit_capsules
 from excite_cli.geometry.collision_pairs import choose_pairs
+from excite_cli.geometry.reasons import Why
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.simulation.mujoco_model import build_plant
 from excite_cli.simulation.true_robot import true_inertias
@@ -122,16 +123,16 @@ def test_neighbour_of_its_own_link_only() -> None:
     capsules = fit_capsules(robot, spec)
     assert [c.name for c in capsules if c.by_hand] == ["payload"]
     pairs = choose_pairs(robot, capsules, spec)
-    reasons = {frozenset((d.first, d.second)): d.reason for d in pairs.dropped}
-    assert reasons[frozenset(("payload", "wrist"))] == "same body"
+    reasons = {frozenset((d.first, d.second)): d.reason.why for d in pairs.dropped}
+    assert reasons[frozenset(("payload", "wrist"))] is Why.SAME_BODY
     for other in ("forearm", "tool", "upper_arm", "base"):
-        assert "adjacent" not in reasons.get(frozenset(("payload", other)), "")
+        assert reasons.get(frozenset(("payload", other))) is not Why.ADJACENT
     checked = {frozenset((capsules[i].name, capsules[j].name)) for i, j in pairs.checked}
     assert frozenset(("payload", "upper_arm")) in checked
     ignoring = SelfCollisionSpec(ignore=(("payload", "upper_arm"),))
     pairs = choose_pairs(robot, fit_capsules(robot, ignoring), ignoring)
-    reasons = {frozenset((d.first, d.second)): d.reason for d in pairs.dropped}
-    assert reasons[frozenset(("payload", "upper_arm"))] == "ignored in the config"
+    reasons = {frozenset((d.first, d.second)): d.reason.why for d in pairs.dropped}
+    assert reasons[frozenset(("payload", "upper_arm"))] is Why.IGNORED
 
 
 def test_a_link_of_the_same_name_is_told_apart(tmp_path: Path) -> None:

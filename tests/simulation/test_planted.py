@@ -10,7 +10,7 @@ from excite_cli.robot.model import Robot
 from excite_cli.simulation.planted import parse_planted
 from tests.simulation.arms import arm
 
-RUNS = ("motion_1_take_1", "motion_1_take_2", "motion_2")
+RUNS = {"motion_1": ("motion_1_take_1", "motion_1_take_2"), "motion_2": ("motion_2",)}
 
 
 @pytest.fixture(scope="module")

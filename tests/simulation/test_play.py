@@ -10,6 +10,7 @@ from excite_cli.effects.catalogue import kind_named
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.errors import ConfigError, MissingExtraError, RobotError
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Robot
 from excite_cli.simulation.build import Build, make
 from excite_cli.simulation.engine import silent_engine
@@ -159,7 +160,7 @@ def test_motors_stop_at_their_limits_if_asked(robot: Robot) -> None:
 
 def test_a_joint_that_moves_no_inertia_is_named() -> None:
     robot = arm()
-    empty = Build.bare(robot, np.zeros(10 * robot.n_bodies), "motion_1")
+    empty = Build.bare(robot, np.zeros(10 * robot.n_bodies), RunId("motion_1"))
     with (
         silent_engine(),
         pytest.raises(RobotError, match=r"'shoulder_pan_joint' moves no inertia(.|\n)*armature@"),

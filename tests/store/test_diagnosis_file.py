@@ -1,5 +1,6 @@
 """Diagnoses go to a file and come back whole; other files are refused with one message."""
 
+import json
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -7,7 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.covariate import Covariate
+from excite_cli.diagnosis.records import Approximation, Diagnosis
 from excite_cli.errors import FileError
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis, write_diagnosis
 from excite_cli.store.result_file import is_result, read_result
@@ -49,6 +51,49 @@ def test_everything_comes_back(diagnosis: Diagnosis, path: Path) -> None:
     found = read_diagnosis(path)
     for field in fields(Diagnosis):
         assert same(getattr(diagnosis, field.name), getattr(found, field.name)), field.name
+
+
+APPROXIMATIONS = [
+    (
+        Approximation((Covariate("speed", "elbow"), Covariate("time"))),
+        "a function of v[elbow], time",
+    ),
+    (
+        Approximation(kind="armature"),
+        "something that also looks like inertia of the motor (armature)",
+    ),
+]
+
+
+@pytest.mark.parametrize(("found", "text"), APPROXIMATIONS)
+@pytest.mark.parametrize("earlier", [False, True])
+def test_approximations_are_records_and_a_text_that_earlier_versions_wrote_alone(
+    diagnosis: Diagnosis, tmp_path: Path, found: Approximation, text: str, earlier: bool
+) -> None:
+    doubted = replace(diagnosis.effects[0], approximates=found)
+    path = tmp_path / "doubted.h5"
+    write_diagnosis(path, replace(diagnosis, effects=(doubted,)))
+    with h5py.File(path, "a") as file:
+        (record,) = json.loads(file["records/effects"][()])
+        assert record["approximates"] == text
+        (left,) = json.loads(file["records/unexplained"][()])
+        assert left["depends_on"] == ["direction and q[elbow]", "time"]
+        del file["records/effects"]
+        if earlier:
+            del record["approximation"]
+        else:  # the text is for people
+            record["approximates"] = "in other words"
+        file["records/effects"] = json.dumps([record])
+    assert read_diagnosis(path).effects[0].approximates == found
+
+
+def test_a_dependence_on_nothing_known_is_damage(diagnosis: Diagnosis, path: Path) -> None:
+    with h5py.File(path, "a") as file:
+        text = file["records/unexplained"][()].decode().replace("direction and q", "mood of q")
+        del file["records/unexplained"]
+        file["records/unexplained"] = text
+    with pytest.raises(FileError, match="damaged"):
+        read_diagnosis(path)
 
 
 def test_the_noise_floor_comes_back_and_older_files_have_none(

@@ -195,9 +195,9 @@ def test_after_an_interruption_the_next_answer_is_its_own(
 
     monkeypatch.setattr(process, "stdout", SimpleNamespace(readline=interrupted, close=read.close))
     with pytest.raises(KeyboardInterrupt):
-        mesh_trial._trial.said(bad)
+        mesh_trial._trial.fault(bad)
     monkeypatch.setattr(process, "stdout", read)
-    assert mesh_trial._trial.said(good) == ""
+    assert mesh_trial._trial.fault(good) is None
     assert process.poll() is not None
 
 

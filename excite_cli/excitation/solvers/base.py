@@ -4,7 +4,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 from excite_cli.constraints.base import Array
-from excite_cli.excitation.motion import Outcome, ProgressCallback
+from excite_cli.excitation.motion import Outcome
+from excite_cli.excitation.progress import ProgressCallback
 from excite_cli.excitation.task import MotionTask
 
 

@@ -25,8 +25,9 @@ from excite_cli.constraints.joint_columns import JointColumns
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.states import States
 from excite_cli.errors import NoAdmissibleMotionError
-from excite_cli.excitation.motion import Outcome, ProgressCallback, Status
+from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.objective import Spectrum
+from excite_cli.excitation.progress import ProgressCallback, Stage, Status
 from excite_cli.excitation.residuals import (
     REACH,
     Rows,
@@ -88,20 +89,20 @@ class _Run:
 
     def all_stages(self, x: Array) -> Outcome:
         steps = self.task.problem.criterion.continuation()
-        status: Status = "converged"
+        status = Status.CONVERGED
         first = len(_STAGES) - 1 if self.effort.polish else 0
         for number, (mu, step, change) in enumerate(_STAGES[first:], start=first):
             criterion = steps[min(step, len(steps) - 1)]
             change = max(change, self.effort.tolerance)
-            stage = f"{number + 1}/{len(_STAGES)}"
+            stage = Stage(number + 1, len(_STAGES), mu)
             x, status = self.stage(x, criterion, mu, change, stage)
-            if status in ("iteration limit", "time limit"):
+            if status.is_limit:
                 break
         assert self.best_x is not None
         return Outcome(self.best_x, status, self.iterations, self.task.evaluations)
 
     def stage(
-        self, x: Array, criterion: Criterion, mu: float, change: float, stage: str
+        self, x: Array, criterion: Criterion, mu: float, change: float, stage: Stage
     ) -> tuple[Array, Status]:
         point = self.point(x, criterion, mu)
         if point is None:
@@ -113,12 +114,12 @@ class _Run:
         merits = [point.merit]
         while True:
             if self.iterations >= self.effort.max_iterations:
-                return point.x, "iteration limit"
+                return point.x, Status.ITERATION_LIMIT
             if time.perf_counter() - self.began > self.effort.max_seconds:
-                return point.x, "time limit"
+                return point.x, Status.TIME_LIMIT
             found = self.iterate(point, criterion, mu)
             if found is None:
-                return point.x, "stalled"
+                return point.x, Status.STALLED
             self.update(found.x - point.x, found.gradient - point.gradient)
             point = found
             self.iterations += 1
@@ -129,7 +130,7 @@ class _Run:
             )
             merits.append(point.merit)
             if len(merits) > _WINDOW and merits[-1 - _WINDOW] - merits[-1] < change:
-                return point.x, "converged"
+                return point.x, Status.CONVERGED
 
     def remember(self, point: _Point) -> None:
         """Keep the best admissible point by the criterion asked for, not its stand-in."""

@@ -1,0 +1,79 @@
+"""What solvers and searches tell while they run: numbers and kinds; words are made where shown."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Status(StrEnum):
+    """How a search for a motion ended, as files and JSON call it."""
+
+    CONVERGED = "converged"
+    ITERATION_LIMIT = "iteration limit"
+    TIME_LIMIT = "time limit"
+    STALLED = "stalled"
+
+    @property
+    def is_limit(self) -> bool:
+        """Whether the search was cut short."""
+        return self in (Status.ITERATION_LIMIT, Status.TIME_LIMIT)
+
+
+class Measure(StrEnum):
+    """What is improved."""
+
+    CONDITION_NUMBER = "condition_number"
+    DIVERGENCE = "divergence"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What is improved, and where it is."""
+
+    measure: Measure
+    value: float
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The stage of a solver's continuation, from 1; `barrier` is its parameter, if it has one.
+
+    Stage 0 is a start that has ended.
+    """
+
+    number: int = 0
+    total: int = 0
+    barrier: float | None = None
+
+
+@dataclass(frozen=True)
+class Starts:
+    """How far the starts of a motion are: done, running, and how many there are.
+
+    `iterations` are those of all of them; a start that has ended counts with the most it may take.
+    """
+
+    done: int
+    running: int
+    total: int
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a solver tells while it runs; `worst` is the smallest margin, in its own unit.
+
+    `starts`: where there is more than one.
+    """
+
+    iteration: int
+    figure: Figure
+    worst_name: str
+    worst_margin: float
+    worst_unit: str
+    seconds: float
+    stage: Stage
+    starts: Starts | None = None
+
+
+ProgressCallback = Callable[[Progress], None]

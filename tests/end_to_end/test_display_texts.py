@@ -1,0 +1,207 @@
+"""Texts are for people: with every one of them replaced, no figure of a diagnosis or plan changes.
+
+Replaced is whatever the program puts into words: functions of the files of words, titles of
+effects, labels of runs, names in words, sentences of findings.
+"""
+
+import inspect
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass, replace
+from enum import Enum
+from functools import wraps
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import excite_cli.api as api
+import excite_cli.cli.diagnose_tables
+import excite_cli.cli.telling  # noqa: F401  (with all that it imports)
+from excite_cli.diagnosis.diagnose import diagnose
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.effects.catalogue import catalogue, kind_named
+from excite_cli.excitation.result import Result
+from excite_cli.measurement.dataset import Dataset, Finding, Run
+from excite_cli.robot.model import Robot
+from excite_cli.store.diagnosis_file import read_diagnosis, write_diagnosis
+from tests.cli.program import SMOKE
+from tests.diagnosis.test_sealed import motion
+
+pytest.importorskip("mujoco")
+
+from excite_cli.simulation.planted import plant
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.simulate import simulate
+
+JUNK = "q[elbow] 6-12 s (first half): always in contact"  # looks like much, and means nothing
+ELBOW = 2
+# Fields of records that hold words; all others are compared.
+PROSE = {"text", "base_names", "base_words", "reasons", "note", "dropped_pairs", "verdict"}
+FREE = {"seconds", "versions"}
+WORDS = ("in_words", "label", "sentence")
+
+
+def junk(value: Any) -> Any:
+    """The same with every text replaced."""
+    if isinstance(value, str):
+        return JUNK
+    if isinstance(value, tuple | list):
+        return type(value)(map(junk, value))
+    return value
+
+
+def speechless(function: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(function)
+    def told(*arguments: Any, **options: Any) -> Any:
+        return junk(function(*arguments, **options))
+
+    return told
+
+
+def puts_into_words(value: Any) -> bool:
+    """Whether a function of a module is there to make words."""
+    if not isinstance(value, FunctionType) or not value.__module__.startswith("excite_cli"):
+        return False
+    if value.__name__.endswith("in_words"):
+        return True
+    return value.__module__.endswith("words") and "str" in str(
+        inspect.signature(value).return_annotation
+    )
+
+
+@contextmanager
+def without_words() -> Iterator[int]:
+    """Every text replaced; how many places were."""
+    count = 0
+    with pytest.MonkeyPatch.context() as patch:
+        modules = [m for name, m in sys.modules.items() if name.startswith("excite_cli") and m]
+        for module in modules:
+            for name, value in list(vars(module).items()):
+                if puts_into_words(value):
+                    patch.setattr(module, name, speechless(value))
+                    count += 1
+                if not (inspect.isclass(value) and value.__module__ == module.__name__):
+                    continue
+                for attribute in set(WORDS) & set(vars(value)):
+                    told = vars(value)[attribute]
+                    if isinstance(told, property):
+                        assert told.fget is not None
+                        patch.setattr(value, attribute, property(speechless(told.fget)))
+                        count += 1
+                    elif isinstance(told, FunctionType):
+                        patch.setattr(value, attribute, speechless(told))
+                        count += 1
+        for kind in catalogue().values():
+            patch.setattr(kind, "title", JUNK)
+            patch.setattr(kind, "signature", JUNK)
+            count += 2
+        made = Finding.__init__
+
+        def silent(
+            self: Finding, kind: str, severity: Any, text: str, *rest: Any, **more: Any
+        ) -> None:
+            made(self, kind, severity, JUNK, *rest, **more)
+
+        patch.setattr(Finding, "__init__", silent)
+        yield count
+
+
+def differences(one: Any, other: Any, where: str = "") -> list[str]:
+    """Where two records differ in what is no prose."""
+    if type(one) is not type(other):
+        return [f"{where}: {type(one)} {type(other)}"]
+    if is_dataclass(one) and not isinstance(one, type):
+        names = [f.name for f in fields(one) if f.name not in PROSE | FREE]
+        return differences(
+            {name: getattr(one, name) for name in names},
+            {name: getattr(other, name) for name in names},
+            where,
+        )
+    if isinstance(one, dict):
+        if set(one) != set(other):
+            return [f"{where}: {set(one) ^ set(other)}"]
+        return [d for k in one if k not in PROSE | FREE
+                for d in differences(one[k], other[k], f"{where}[{k}]")]  # fmt: skip
+    if isinstance(one, tuple | list):
+        if len(one) != len(other):
+            return [f"{where}: {len(one)} {len(other)}"]
+        pairs = enumerate(zip(one, other, strict=True))
+        return [d for i, (a, b) in pairs for d in differences(a, b, f"{where}[{i}]")]
+    if isinstance(one, np.ndarray):
+        return [] if np.array_equal(one, other, equal_nan=one.dtype.kind == "f") else [where]
+    same = (
+        one is other if isinstance(one, Enum) else one == other or (one != one and other != other)
+    )
+    return [] if same else [f"{where}: {one} {other}"]
+
+
+def recorded(robot: Robot) -> Dataset:
+    """Three runs, an offset in the second; on the elbow a torque that no effect has by name."""
+    names = ("take 1-6 s", "take 6-12 s", "take 7-18 s")
+    motions = [replace(motion(robot, k + 1), name=name) for k, name in enumerate(names)]
+    offset = plant(kind_named("torque_offset"), (1,), 6.0, {})
+    offset = replace(offset, effect=replace(offset.effect, runs=(names[1],)))
+    settings = SimulationSettings(rate=200.0, lead_in=0.5)
+    dataset = simulate(robot, motions, settings, [offset]).dataset
+
+    def bent(run: Run) -> Run:
+        away = run.q[:, ELBOW] - dataset.runs[0].q[:, ELBOW].mean()
+        curve = 40.0 * away + 400.0 * away**3
+        return replace(run, tau=run.tau + np.outer(curve, np.eye(robot.n)[ELBOW]))
+
+    return replace(dataset, runs=tuple(map(bent, dataset.runs)))
+
+
+def diagnosed(folder: Path) -> Diagnosis:
+    problem = api.load_problem(
+        SMOKE,
+        [
+            'effects=[{kind: torque_offset, joints: [shoulder_pitch], runs: ["take 6-12 s"]}]',
+            "diagnosis.kinds=[spring, viscous_friction, coulomb_friction, payload]",
+        ],
+    )
+    dataset = recorded(problem.robot)
+    found = diagnose(problem.robot, problem.base, dataset, problem.spec)
+    write_diagnosis(folder / "diagnosis.h5", found)
+    again = read_diagnosis(folder / "diagnosis.h5")
+    assert not differences(found.effects, again.effects)
+    return found
+
+
+def planned(folder: Path) -> Result:
+    few = ["optimizer.max_iterations=6", "sequence.motions=2"]
+    return api.plan(api.load_problem(SMOKE, few))
+
+
+@pytest.mark.parametrize("work", [diagnosed, planned])
+def test_no_text_decides_anything(
+    work: Callable[[Path], Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = []
+    for name in ("plain", "junk"):  # nothing is known from before
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / name))
+        (tmp_path / name).mkdir()
+        if name == "plain":
+            found.append(work(tmp_path / name))
+            continue
+        with without_words() as count:
+            assert count > 80
+            found.append(work(tmp_path / name))
+    first, second = found
+    assert differences(first, second) == []
+    words = "base_names" if work is diagnosed else "base_words"
+    assert set(getattr(second, words)) == {JUNK} != set(getattr(first, words))
+
+
+def test_what_is_diagnosed_needs_every_judgement_that_texts_once_made(tmp_path: Path) -> None:
+    """The case above holds an approximation by its covariates and an effect of a single run."""
+    found = diagnosed(tmp_path)
+    doubted = {each.effect.kind: each.approximates for each in found.effects if each.approximates}
+    assert doubted["spring"] is not None
+    assert [c.code for c in doubted["spring"].covariates] == ["q[elbow]"]
+    (offset,) = [each for each in found.information.model if each.kind == "torque_offset"]
+    assert offset.values[0] == pytest.approx(6.0, abs=0.2)

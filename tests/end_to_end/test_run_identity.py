@@ -1,0 +1,186 @@
+"""Effects of single runs follow the recording, whatever it is called and wherever it is cut.
+
+Simulated with MuJoCo, read and checked as a measured file, identified and diagnosed: an offset of
+6 N·m on one joint in one of three recordings.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.config.load import load_spec
+from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.diagnose import diagnose
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.errors import ConfigError
+from excite_cli.identification.identify import Identification, identify
+from excite_cli.measurement.catalogue import read_dataset
+from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.robot.model import Robot, build_robot
+from tests.cli.program import SMOKE
+
+pytest.importorskip("mujoco")
+
+from excite_cli.simulation.planned_motion import PlannedMotion
+from excite_cli.simulation.planted import plant
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.simulate import simulate
+from excite_cli.trajectory.fourier import FourierTrajectory
+
+SECONDS, RATE, OFFSET = 6.0, 250.0, 6.0
+GAP = (2.5, 2.8)  # s
+NAMES = ("a", "b", "c")
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return build_robot(load_spec(SMOKE).robot, SMOKE.parent)
+
+
+@pytest.fixture(scope="module")
+def base(robot: Robot) -> BaseParameters:
+    return find_base_parameters(robot)
+
+
+@pytest.fixture(scope="module")
+def recorded(robot: Robot) -> Dataset:
+    motions = []
+    for number, name in enumerate(NAMES):
+        rng = np.random.default_rng(number)
+        trajectory = FourierTrajectory(4, 2 * np.pi / SECONDS)
+        lower, upper = robot.limits.ranges()
+        shape = (trajectory.n_coefficients, robot.n)
+        coefficients = rng.normal(size=shape) * 0.04 * (upper - lower)
+        coefficients[-1] = (lower + upper) / 2
+        motions.append(PlannedMotion(name, trajectory, coefficients))
+    planted = plant(kind_named("torque_offset"), (1,), OFFSET, {})
+    planted = replace(planted, effect=replace(planted.effect, runs=("b",)))
+    settings = SimulationSettings(rate=RATE, lead_in=0.5)
+    return simulate(robot, motions, settings, [planted]).dataset
+
+
+def spec_of(robot: Robot, *runs: str) -> Spec:
+    """The offset declared for `runs`, beside the friction that the arm has."""
+    joint = robot.joint_names[1]
+    listed = ", ".join(f'"{run}"' for run in runs)
+    declared = f"{{kind: torque_offset, joints: [{joint}], runs: [{listed}]}}"
+    return load_spec(
+        SMOKE,
+        [
+            f"effects=[{{kind: viscous_friction}}, {{kind: coulomb_friction}}, {declared}]",
+            "diagnosis.kinds=[armature, spring]",
+            "identification.consistent=false",
+        ],
+    )
+
+
+def renamed(dataset: Dataset, *names: str) -> Dataset:
+    runs = zip(dataset.runs, names, strict=True)
+    return replace(dataset, runs=tuple(replace(run, name=name) for run, name in runs))
+
+
+def with_gap(run: Run) -> Run:
+    kept = (run.t < GAP[0]) | (run.t >= GAP[1])
+    assert run.dq is not None
+    return replace(
+        run, t=run.t[kept], q=run.q[kept], tau=run.tau[kept], dq=run.dq[kept], extra={}
+    )  # fmt: skip
+
+
+def read_again(dataset: Dataset, folder: Path, spec: Spec) -> Dataset:
+    path = folder / "log.h5"
+    write_dataset(path, dataset, {})
+    return read_dataset([path], spec.measurement, dataset.joint_names)
+
+
+def declared_offset(found: Identification | Diagnosis) -> float:
+    """The offset that a fit or a diagnosis gives to the declared effect."""
+    if isinstance(found, Identification):
+        (index,) = [k for k, e in enumerate(found.fit.effects) if e.kind == "torque_offset"]
+        return float(found.fit.effect_values(index)[0])
+    (record,) = [each for each in found.information.model if each.kind == "torque_offset"]
+    return record.values[0]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [NAMES, ("take 0-6 s", "take 6-12 s", "take 7-18 s"), ("x (1)", "x (first half)", "x 2-3 s")],
+)
+def test_an_offset_of_one_run_is_found_whatever_the_run_is_called(
+    names: tuple[str, ...], robot: Robot, base: BaseParameters, recorded: Dataset, tmp_path: Path
+) -> None:
+    spec = spec_of(robot, names[1])
+    dataset = read_again(renamed(recorded, *names), tmp_path, spec)
+    assert dataset.recordings == names
+    for found in (
+        identify(robot, base, dataset, spec),
+        diagnose(robot, base, dataset, spec),
+    ):
+        assert declared_offset(found) == pytest.approx(OFFSET, abs=0.1)
+        assert found.sealed_run == names[2]
+
+
+@pytest.mark.parametrize("cut", ["b", "abc"])
+def test_an_offset_of_one_run_is_found_on_both_sides_of_a_gap(
+    cut: str, robot: Robot, base: BaseParameters, recorded: Dataset, tmp_path: Path
+) -> None:
+    spec = spec_of(robot, "b")
+    runs = tuple(with_gap(run) if run.name in cut else run for run in recorded.runs)
+    dataset = read_again(replace(recorded, runs=runs), tmp_path, spec)
+    assert dataset.recordings == NAMES
+    assert len(dataset.runs) == len(NAMES) + len(cut)
+    fitted = identify(robot, base, dataset, spec)
+    diagnosed = diagnose(robot, base, dataset, spec)
+    for found in (fitted, diagnosed):
+        assert declared_offset(found) == pytest.approx(OFFSET, abs=0.1)
+        assert found.sealed_run == "c"
+    traces = fitted.traces
+    sealed = [trace.run for trace in traces if trace.sealed]
+    assert sealed == (["c/1", "c/2"] if "c" in cut else ["c"])
+
+
+def test_an_offset_of_the_sealed_run_counts_for_the_error(
+    robot: Robot, base: BaseParameters, recorded: Dataset
+) -> None:
+    """With the offset declared, b and c are sealed in turn and predicted alike."""
+    spec = spec_of(robot, "b", "c")
+    offset = OFFSET * np.eye(robot.n)[1]
+    both = replace(
+        recorded,
+        runs=tuple(
+            replace(run, tau=run.tau + offset) if run.name == "c" else run for run in recorded.runs
+        ),
+    )
+    error = identify(robot, base, both, spec, sealed="c").error
+    without = identify(robot, base, both, spec_of(robot, "b"), sealed="c").error
+    assert error.rms[robot.joint_names[1]] < 1.0 < without.rms[robot.joint_names[1]]
+
+
+def test_a_stretch_may_be_named_alone(
+    robot: Robot, base: BaseParameters, recorded: Dataset, tmp_path: Path
+) -> None:
+    first, second, third = recorded.runs
+    later = second.t >= GAP[1]
+    half = replace(second, tau=second.tau - OFFSET * np.eye(robot.n)[1] * ~later[:, None])
+    spec = spec_of(robot, "b/2")
+    dataset = read_again(replace(recorded, runs=(first, with_gap(half), third)), tmp_path, spec)
+    assert declared_offset(identify(robot, base, dataset, spec)) == pytest.approx(OFFSET, abs=0.1)
+
+
+@pytest.mark.parametrize("call", [identify, diagnose])
+def test_a_run_that_is_not_in_the_data_is_named_with_the_nearest(
+    call: object, robot: Robot, base: BaseParameters, recorded: Dataset
+) -> None:
+    assert callable(call)
+    dataset = renamed(recorded, "slow", "payload", "last")
+    with pytest.raises(ConfigError) as error:
+        call(robot, base, dataset, spec_of(robot, "slow", "paylod"))
+    assert str(error.value) == (
+        "effects[2].runs: there is no run 'paylod' in the data. Did you mean 'payload'? "
+        "Runs: slow, payload, last."
+    )
