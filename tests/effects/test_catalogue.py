@@ -7,6 +7,7 @@ from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, declared_effects, kind_named
 from excite_cli.errors import ConfigError
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Robot
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
@@ -105,7 +106,7 @@ def test_an_effect_is_silent_in_the_runs_it_does_not_name(robot: Robot) -> None:
     kind = kind_named("torque_offset")
     effect = kind((1,), {}, ("second",))
     first, second = (
-        type(s)(**{**vars(s), "run": run})
+        type(s)(**{**vars(s), "run": RunId(run)})
         for run in ("first", "second")
         for s in [signals_of(robot, 4)]
     )
