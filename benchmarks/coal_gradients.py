@@ -10,7 +10,7 @@ Indices = NDArray[np.intp]
 
 
 class CoalGradients(CoalDistances):
-    """`CoalDistances` with derivatives from its witness points."""
+    """`CoalDistances` with derivatives from its witness points, which are in millimetres."""
 
     def gradients(self, q: Array, rows: Indices, cols: Indices) -> Array:
         """Derivatives (K, n) of the distance at instant rows[k] of pair cols[k] by q."""
@@ -30,7 +30,7 @@ class CoalGradients(CoalDistances):
         for joint, point in zip(
             self.joints[pair], (answer.getNearestPoint1(), answer.getNearestPoint2()), strict=True
         ):
-            wrench = np.concatenate([normal, np.cross(np.asarray(point).ravel(), normal)])
+            wrench = np.concatenate([normal, np.cross(np.asarray(point).ravel() / 1000.0, normal)])
             columns = pin.getJointJacobian(
                 self.robot.model, self.data, joint, pin.ReferenceFrame.WORLD
             )
