@@ -25,11 +25,6 @@ class Split:
     sealed_name: str
     folds: tuple[int, ...]
 
-    @property
-    def n_folds(self) -> int:
-        """Number of folds."""
-        return max(self.folds) + 1
-
 
 def split(dataset: Dataset, sealed: str | None = None, block: float | None = None) -> Split:
     """Seal a run (the last, unless `sealed` names one); a single run is cut into blocks of time.
