@@ -24,7 +24,7 @@ class CoalGradients(CoalDistances):
         return result
 
     def _gradient(self, pair: int) -> Array:
-        answer = self.state.distanceResults[pair]
+        answer = self.results[pair]
         normal = np.asarray(answer.normal).ravel()
         slopes = []
         for joint, point in zip(

@@ -46,9 +46,12 @@ class CoalDistances:
         shift = len(capsules) if obstacles else 0
         for first, second in pairs:
             geometry.addCollisionPair(pin.CollisionPair(first, second + shift))
-        self._geometry, self.state = geometry, pin.GeometryData(geometry)
-        for request in self.state.distanceRequests:
+        self._geometry, self._state = geometry, pin.GeometryData(geometry)
+        for request in self._state.distanceRequests:
             request.gjk_tolerance = request.epa_tolerance = _TOLERANCE
+        # Views into Pinocchio's data: asking anew for each instant would take most of the time.
+        self._places = [place.translation for place in self._state.oMg]
+        self.results = list(self._state.distanceResults)
         self.joints = [
             (bodies[first].parentJoint, bodies[second + shift].parentJoint)
             for first, second in pairs
@@ -60,15 +63,15 @@ class CoalDistances:
         result = np.empty((len(configurations), len(self.joints)))
         for t, configuration in enumerate(configurations):
             self.measure(configuration)
-            result[t] = [one.min_distance for one in self.state.distanceResults]
+            result[t] = [one.min_distance for one in self.results]
         return result / _SCALE
 
     def measure(self, configuration: Array) -> None:
-        """All distances at one configuration of `robot.model`, into `state`, in millimetres."""
-        model, state = self.robot.model, self.state
+        """All distances at one configuration of `robot.model`, into `results`, in millimetres."""
+        model, state = self.robot.model, self._state
         pin.updateGeometryPlacements(model, self.data, self._geometry, state, configuration)
-        for place in state.oMg:
-            place.translation *= _SCALE
+        for place in self._places:
+            place *= _SCALE
         pin.computeDistances(self._geometry, state)
 
 
