@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.config.section import Section
+from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.spec import Spec
 from excite_cli.constraints.catalogue import CONSTRAINTS
 
@@ -25,40 +25,31 @@ def test_every_key_is_read() -> None:
     assert not unread, f"documented, and nothing reads them: {sorted(unread)}"
 
 
-class Inner(Section):
-    read: float = 0.0
-    idle: float = 0.0
-
-
-class Outer(Section):
-    inner: Inner = Inner()
-    seldom: float = 0.0
-
-
 SOURCE = """
 class Problem:
-    spec: Outer
+    spec: MeasurementSpec
 
-def direct(spec: Inner, other: Problem) -> float:
-    return spec.read + other.idle
+def direct(spec: FilterSpec, other: Problem) -> float:
+    return spec.border + other.parallel
 
 def through(problem: Problem) -> None:
-    for each in [problem.spec.inner]:
+    for each in [problem.spec.filter]:
         print({})
 """
 
 
 @pytest.mark.parametrize(
     ("line", "idle"),
-    [("1", True), ("each.idle", False), ("problem.idle", True), ("(each or None).idle", False)],
-)
+    [("1", True), ("each.parallel", False), ("problem.parallel", True),
+     ("(each or None).parallel", False)],
+)  # fmt: skip
 def test_a_key_that_nothing_reads_is_found(tmp_path: Path, line: str, idle: bool) -> None:
     (tmp_path / "room").mkdir()
     (tmp_path / "room" / "work.py").write_text(SOURCE.format(line))
     (tmp_path / "config").mkdir()
-    (tmp_path / "config" / "check.py").write_text("def check(s: Outer): return s.seldom")
-    found = Reads(tmp_path, sections_of(Outer)).found
-    assert ("Inner", "read") in found
-    assert ("Outer", "inner") in found
-    assert ("Outer", "seldom") not in found
-    assert (("Inner", "idle") not in found) is idle
+    (tmp_path / "config" / "check.py").write_text("def check(s: FilterSpec): return s.velocity")
+    found = Reads(tmp_path, sections_of(MeasurementSpec)).found
+    assert ("FilterSpec", "border") in found
+    assert ("MeasurementSpec", "filter") in found
+    assert ("FilterSpec", "velocity") not in found
+    assert (("FilterSpec", "parallel") not in found) is idle
