@@ -10,7 +10,7 @@ Indices = NDArray[np.intp]
 
 
 class CoalGradients(CoalDistances):
-    """`CoalDistances` with derivatives from its witness points."""
+    """`CoalDistances` with derivatives from its witness points, which are in millimetres."""
 
     def gradients(self, q: Array, rows: Indices, cols: Indices) -> Array:
         """Derivatives (K, n) of the distance at instant rows[k] of pair cols[k] by q."""
@@ -24,13 +24,13 @@ class CoalGradients(CoalDistances):
         return result
 
     def _gradient(self, pair: int) -> Array:
-        answer = self.state.distanceResults[pair]
+        answer = self.results[pair]
         normal = np.asarray(answer.normal).ravel()
         slopes = []
         for joint, point in zip(
             self.joints[pair], (answer.getNearestPoint1(), answer.getNearestPoint2()), strict=True
         ):
-            wrench = np.concatenate([normal, np.cross(np.asarray(point).ravel(), normal)])
+            wrench = np.concatenate([normal, np.cross(np.asarray(point).ravel() / 1000.0, normal)])
             columns = pin.getJointJacobian(
                 self.robot.model, self.data, joint, pin.ReferenceFrame.WORLD
             )

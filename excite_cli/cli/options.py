@@ -16,7 +16,6 @@ Sealed = Annotated[
     str | None,
     typer.Option("--sealed", metavar="RUN", help="Run kept out of the fit. Default: the last one."),
 ]
-ResultFile = Annotated[Path, typer.Argument(help="A result file.", show_default=False)]
 MotionFile = Annotated[
     Path,
     typer.Argument(

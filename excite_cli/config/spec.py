@@ -33,8 +33,10 @@ CriterionKind = Literal[
 class CriterionSpec(Section):
     """What is minimised, and how rows and columns of the regressor are weighted."""
 
-    kind: CriterionKind = Field(
-        "condition_number", description="function of the singular values; see docs/criteria.md"
+    kind: CriterionKind | str = Field(
+        "condition_number",
+        description="function of the singular values; see docs/criteria.md; or the name of one "
+        "that was added to the catalogue",
     )
     smoothing: Power = Field(64.0, description="p of the smooth condition number")
     row_weights: Literal["none", "effort"] | dict[str, Positive] = Field(

@@ -16,6 +16,8 @@ class Criterion(ABC):
     """Minimised function of the singular values, in descending order."""
 
     name: str
+    compares_columns: bool = False
+    """Whether it is about columns beside each other, so that one alone says nothing."""
 
     @abstractmethod
     def value(self, sigma: Array) -> float:

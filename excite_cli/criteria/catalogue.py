@@ -10,6 +10,7 @@ from excite_cli.criteria.log_det import LogDet
 from excite_cli.criteria.sigma_min import SigmaMin
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
 from excite_cli.criteria.trace_inverse import TraceInverse
+from excite_cli.errors import ConfigError, nearest
 
 CRITERIA: dict[str, Callable[[CriterionSpec], Criterion]] = {
     "condition_number": lambda spec: ConditionNumber(),
@@ -22,5 +23,16 @@ CRITERIA: dict[str, Callable[[CriterionSpec], Criterion]] = {
 
 
 def build_criterion(spec: CriterionSpec) -> Criterion:
-    """The criterion that `spec` asks for."""
+    """The criterion that `spec` asks for.
+
+    Raises
+    ------
+    ConfigError
+        There is none of this name.
+    """
+    if spec.kind not in CRITERIA:
+        raise ConfigError(
+            f"criterion.kind: there is no criterion '{spec.kind}'.{nearest(spec.kind, CRITERIA)} "
+            f"Criteria: {', '.join(CRITERIA)}."
+        )
     return CRITERIA[spec.kind](spec)

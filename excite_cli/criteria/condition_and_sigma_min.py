@@ -17,6 +17,7 @@ class ConditionAndSigmaMin(Criterion):
     """log((σ_max + 1) / σ_min)."""
 
     name = "condition_and_sigma_min"
+    compares_columns = True
 
     def value(self, sigma: Array) -> float:
         """Logarithm of the sum."""

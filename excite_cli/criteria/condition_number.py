@@ -10,6 +10,7 @@ class ConditionNumber(Criterion):
     """log cond; not differentiable where the extreme singular values meet."""
 
     name = "condition_number"
+    compares_columns = True
 
     def value(self, sigma: Array) -> float:
         """Log σ_max − log σ_min."""

@@ -16,6 +16,7 @@ class SmoothConditionNumber(Criterion):
 
     p: float
     name = "smooth_condition_number"
+    compares_columns = True
 
     def value(self, sigma: Array) -> float:
         """Computed in logarithms, so that no power overflows."""

@@ -52,10 +52,6 @@ class NoiseModel:
         touched = np.convolve(~usable, np.ones(self.order + 1))[: len(usable)] > 0.5
         return ~touched[self.order :]
 
-    def long_run(self, joint: int) -> float:
-        """Standard deviation of independent samples that would be as informative at frequency 0."""
-        return float(self.sigma[joint] / max(1e-3, 1.0 - self.coefficients[joint].sum()))
-
     def levels(self) -> Array:
         """Standard deviation (n,) of the noise itself, from its response to an impulse."""
         impulse = np.zeros(_RESPONSE)

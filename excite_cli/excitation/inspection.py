@@ -86,8 +86,13 @@ class Inspection:
 
     @property
     def states(self) -> dict[str, tuple[str, str]]:
-        """State and reason of each constraint."""
-        found = {verdict.name: (str(verdict.state), verdict.reason) for verdict in self.verdicts}
+        """State and reason of each constraint; what no bound is known of is broken as seen."""
+        found = {
+            verdict.name: ("broken", "broken at the instants")
+            if self.worst[verdict.name].violations and not verdict.bounded
+            else (str(verdict.state), verdict.reason)
+            for verdict in self.verdicts
+        }
         if self.meshes is not None:
             found[MESHES] = (str(self.meshes.state), self.meshes.reason)
         return found

@@ -126,7 +126,8 @@ def build_problem(
             f"{base.rank} base parameters{beside}. Take at least "
             f"{-(-columns // len(robot.rows))} samples."
         )
-    if columns == 1 and "condition" in spec.criterion.kind:
+    criterion = build_criterion(spec.criterion)
+    if columns == 1 and criterion.compares_columns:
         raise ConfigError(
             "criterion.kind: this robot has one base parameter, so its condition number is always "
             "1. Take log_det or sigma_min."
@@ -137,7 +138,7 @@ def build_problem(
         base=base,
         trajectory=trajectory,
         boundary=build_boundary(spec.trajectory, robot, trajectory),
-        criterion=build_criterion(spec.criterion),
+        criterion=criterion,
         weighting=weighting,
         constraints=build_constraints(
             spec.constraints, robot, _uncertainty(spec, robot, base, fit)

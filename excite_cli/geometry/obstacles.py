@@ -39,8 +39,8 @@ class Obstacle(ABC):
         """Distances, normals in the world and shares of segments (3, K)."""
 
     @abstractmethod
-    def as_coal(self) -> tuple[coal.CollisionGeometry, Array, Array]:
-        """Its shape for coal, with the rotation (3, 3) and position (3,) [m] of that."""
+    def as_coal(self, scale: float) -> tuple[coal.CollisionGeometry, Array, Array]:
+        """Its shape for coal, enlarged, with the rotation (3, 3) and position (3,) [m] of that."""
 
     @abstractmethod
     def in_words(self, depth: float) -> str:
@@ -71,9 +71,9 @@ class Plane(Obstacle):
         distance = self.normal @ start - self.offset + np.minimum(rise, 0.0)
         return Contact(distance, np.repeat(self.normal[:, None], start.shape[1], 1), share)
 
-    def as_coal(self) -> tuple[coal.CollisionGeometry, Array, Array]:
+    def as_coal(self, scale: float) -> tuple[coal.CollisionGeometry, Array, Array]:
         """A half-space of the world."""
-        return coal.Halfspace(self.normal, self.offset), np.eye(3), np.zeros(3)
+        return coal.Halfspace(self.normal, scale * self.offset), np.eye(3), np.zeros(3)
 
     def in_words(self, depth: float) -> str:
         """`0.12 m below floor`, or behind a wall."""
@@ -109,9 +109,9 @@ class Box(Obstacle):
         distance, normal, share = segment_contacts(*self._inside(start, along), self.half)
         return Contact(distance, self.rotation @ normal, share)
 
-    def as_coal(self) -> tuple[coal.CollisionGeometry, Array, Array]:
+    def as_coal(self, scale: float) -> tuple[coal.CollisionGeometry, Array, Array]:
         """A box in its own place."""
-        return coal.Box(*(2 * self.half).tolist()), self.rotation, self.position
+        return coal.Box(*(2 * scale * self.half).tolist()), self.rotation, self.position
 
     def in_words(self, depth: float) -> str:
         """`0.12 m inside table`."""

@@ -189,17 +189,3 @@ def _curvature(runs: Sequence[Rows], x: Array, sigma: Array, extra: Array | None
         run_factors(run.columns, run.tau, mask) for run, mask in zip(runs, inner, strict=True)
     ]
     return solve(stacked(factors, sigma, extra)).inverse
-
-
-def leave_one_run_out(
-    runs: Sequence[Rows], noise: Array, prior: tuple[Array, Array] | None = None
-) -> Array:
-    """x (R, p) fitted to all runs but one, for each one; the price is that of the factors."""
-    factors = [run_factors(run.columns, run.tau, run.usable) for run in runs]
-    extra = None if prior is None else np.column_stack(prior)
-    return np.array(
-        [
-            solve(stacked([f for i, f in enumerate(factors) if i != out], noise, extra)).x
-            for out in range(len(runs))
-        ]
-    )

@@ -30,11 +30,6 @@ class Split:
     folds: tuple[int, ...]
     units: tuple[str, ...]
 
-    @property
-    def n_folds(self) -> int:
-        """Number of folds."""
-        return max(self.folds) + 1
-
     def unit(self, run: RunId) -> str:
         """The unit that a run belongs to."""
         return run.name if run.name in self.units else run.key
@@ -46,6 +41,7 @@ def units_of(dataset: Dataset) -> tuple[str, ...]:
     if len(recordings) > 1:
         return recordings
     return tuple(dict.fromkeys(run.id.key for run in dataset.runs))
+
 
 
 def split(dataset: Dataset, sealed: str | None = None, block: float | None = None) -> Split:

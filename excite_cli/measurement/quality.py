@@ -5,7 +5,7 @@ then the time stamps, then what needs equidistant samples (units, order, sign). 
 without a finding; findings of severity `error` mean that any diagnosis would be wrong.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
@@ -55,11 +55,3 @@ def raise_for_errors(dataset: Dataset) -> None:
 def sentence(finding: Finding) -> str:
     """`run: text.`, as it is told to a person."""
     return f"{finding.run}: {finding.text}." if finding.run else f"{finding.text}."
-
-
-def count_by_severity(findings: Iterable[Finding]) -> dict[str, int]:
-    """How many findings of each severity, the worst first."""
-    counts = {"error": 0, "warning": 0, "note": 0}
-    for finding in findings:
-        counts[finding.severity] += 1
-    return counts

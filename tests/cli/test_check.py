@@ -1,4 +1,6 @@
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.cli.conftest import Run
-from tests.cli.program import SMOKE, Program
+from tests.cli.program import SMOKE, Program, environment
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +42,37 @@ def test_stored_motions_keep_every_limit(checked: Any) -> None:
         assert {verdict["state"] for verdict in motion["verdicts"].values()} == {"proved"}
         assert motion["samples_differ"]["share"] < 1e-9
         assert motion["meshes"]["pairs"] > 0
+
+
+def test_distances_are_measured_a_second_time(checked: Any) -> None:
+    for motion in checked["motions"]:
+        (name, second), *others = motion["second_path"].items()
+        assert (name, others) == ("self_collision", [])
+        assert second["agrees"]
+        assert second["difference"] < 1e-9
+        assert 250 <= second["instants"] < second["of"]
+
+
+# The program with distances of its own that are 0.1 mm too large.
+WRONG = """
+from excite_cli.cli.app import main
+from excite_cli.geometry.pair_distances import PairDistances
+own = PairDistances.distances
+PairDistances.distances = lambda *args, **others: own(*args, **others) + 1e-4
+main()
+"""
+
+
+def test_a_wrong_distance_of_the_program_is_said_first(
+    excite: Program, cache: Path, two_motions: Run
+) -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", WRONG, "check", str(SMOKE), str(two_motions.path), "--no-meshes"],
+        cwd=excite.folder, env=environment(cache), capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert run.returncode == 1
+    assert run.stdout.startswith("motion_1: BROKEN: self_collision of ")
+    assert "differ by 0.0001 m" in run.stdout.splitlines()[0]
 
 
 def test_margins_are_those_stored(checked: Any, two_motions: Run) -> None:

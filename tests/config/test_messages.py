@@ -232,7 +232,6 @@ def test_robot_section_messages(inside: str, path: str, words: str) -> None:
     [
         ("trajectory: {family: furier}", "trajectory", "fourier"),
         ("constraints: {balance: {kind: dics, radius: 1}}", "constraints.balance", "disc"),
-        ("criterion: {kind: condition_numbre}", "criterion.kind", "condition_number"),
         ("criterion: {row_weights: efort}", "criterion.row_weights", "effort"),
         ("constraints: {self_collision: {capsules: atuo}}",
          "constraints.self_collision.capsules", "auto"),

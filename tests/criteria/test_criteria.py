@@ -9,7 +9,13 @@ from excite_cli.config.spec import CriterionSpec
 from excite_cli.criteria.catalogue import CRITERIA, build_criterion
 from excite_cli.criteria.condition_number import ConditionNumber
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
+from excite_cli.errors import ConfigError
 from excite_cli.excitation.differences import central_differences, relative_error
+
+
+def test_unknown_kind_suggests_the_nearest() -> None:
+    with pytest.raises(ConfigError, match=r"criterion\.kind: .*Did you mean 'condition_number'\?"):
+        build_criterion(CriterionSpec(kind="condition_numbre"))
 
 
 def _all_members() -> list:

@@ -129,7 +129,6 @@ def test_drifting_noise_gives_a_stable_model() -> None:
         found = fit_noise(runs, all_usable(runs))
         roots = np.roots(np.concatenate([[1.0], -found.coefficients[0]]))
         assert np.abs(roots).max(initial=0.0) < 1.0
-        assert np.isfinite(found.long_run(0))
 
 
 def test_clean_rows_are_those_whose_taps_are_all_usable() -> None:
@@ -143,14 +142,6 @@ def test_clean_rows_are_those_whose_taps_are_all_usable() -> None:
     for joint in range(2):
         clean = model.clean(usable)
         assert np.array_equal(model.whitened(wild, joint)[clean], model.whitened(x, joint)[clean])
-
-
-def test_long_run_noise_is_that_of_the_mean() -> None:
-    """The variance of the mean of N samples is long_run² / N."""
-    model = NoiseModel((TAPS,), np.array([SIGMA]))
-    means = [series(seed, 2000).mean() for seed in range(400)]
-    assert np.std(means) * np.sqrt(2000) == pytest.approx(model.long_run(0), rel=0.12)
-    assert NoiseModel.white(np.array([2.0])).long_run(0) == 2.0
 
 
 @pytest.mark.parametrize("memory", [-0.9, 0.0, 0.5, 0.98])

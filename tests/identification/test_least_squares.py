@@ -3,7 +3,7 @@ import pytest
 
 from excite_cli.identification.covariance import Rows
 from excite_cli.identification.factors import run_factors, solve, stacked
-from excite_cli.identification.least_squares import fit_rows, leave_one_run_out
+from excite_cli.identification.least_squares import fit_rows
 from excite_cli.robot.model import Array
 
 X = np.array([2.0, -1.0, 0.5, 3.0])
@@ -32,15 +32,6 @@ def test_factors_give_what_lstsq_gives() -> None:
     assert solution.x == pytest.approx(expected, rel=1e-10)
     assert solution.inverse == pytest.approx(np.linalg.inv(c.T @ c), rel=1e-8)
     assert solution.remainder == pytest.approx(float(remainder[0]), rel=1e-10)
-
-
-def test_a_run_left_out_equals_a_fit_without_it() -> None:
-    runs = [random_rows(seed, np.array([1.0, 2.0])) for seed in (1, 2, 3)]
-    sigma = np.array([1.0, 2.0])
-    found = leave_one_run_out(runs, sigma)
-    for out in range(3):
-        c, tau = stack([run for k, run in enumerate(runs) if k != out], sigma)
-        assert found[out] == pytest.approx(np.linalg.lstsq(c, tau, rcond=None)[0], rel=1e-9)
 
 
 def test_weighting_by_noise_beats_equal_weights() -> None:
