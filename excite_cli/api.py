@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Literal
 
 from excite_cli.atomic import write_text_atomically
+from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import load_spec, parse_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose as diagnose_dataset
@@ -38,6 +39,7 @@ from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.sequence import Step
 from excite_cli.excitation.stack import Stack
 from excite_cli.export.found_config import found_config
+from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.identify import Identification
 from excite_cli.identification.identify import identify as identify_dataset
 from excite_cli.measurement.catalogue import read_dataset
@@ -182,11 +184,14 @@ def plan(
     ['iteration limit', 'iteration limit']
     """
     path = Path(output) if output is not None else None
-    if path is not None and path.exists() and not overwrite:
-        raise FileError(f"{path} exists already. Give another name, or overwrite=True.")
     following = problem if isinstance(problem, NextMotion) else None
     model = following.model if following else problem
     assert isinstance(model, Problem)
+    read = [Path(prior) for prior in priors if isinstance(prior, str | Path)]
+    read += files_of_config(model.spec, model.folder)
+    refuse_inputs_as_outputs({"output": path}, read)
+    if path is not None and path.exists() and not overwrite:
+        raise FileError(f"{path} exists already. Give another name, or overwrite=True.")
     stacks: list[tuple[str, Result | Stack]] = []
     if following is not None:
         stacks.append(("the diagnosis", following.prior))
@@ -349,6 +354,8 @@ def save_fit(path: str | Path, problem: Problem | Case, found: Identification) -
     FileError
         It cannot be written.
     """
+    own = files_of_config(problem.spec, problem.folder)
+    refuse_inputs_as_outputs({"path": Path(path)}, own)
     config, folder = spec_as_yaml(problem.spec), str(problem.folder)
     write_fit(Path(path), found, config, folder, problem.robot.fingerprint())
 
@@ -375,6 +382,8 @@ def diagnose(
     ConfigError, FileError
         Config and data do not fit; order or signs of torques cannot be right; data too short.
     """
+    inputs = (*map(Path, data.sources), *files_of_config(problem.spec, problem.folder))
+    refuse_inputs_as_outputs({"output": Path(output) if output is not None else None}, inputs)
     found = diagnose_dataset(problem.robot, problem.base, data, problem.spec, sealed, progress)
     found = replace(
         found,
@@ -395,5 +404,7 @@ def save_config(path: str | Path, problem: Problem | Case, found: Diagnosis) -> 
     FileError
         It cannot be written.
     """
+    own = files_of_config(problem.spec, problem.folder)
+    refuse_inputs_as_outputs({"path": Path(path)}, own)
     text = found_config(problem.spec, problem.folder, found, Path(path))
     write_text_atomically(Path(path), text)

@@ -67,20 +67,24 @@ def compare_random(
     from excite_cli.cli.start_line import iterations_of, start_line
     from excite_cli.cli.tables import comparison_table, motion_data
     from excite_cli.cli.working import working
+    from excite_cli.config.inputs import files_of_config
     from excite_cli.config.load import parse_spec
     from excite_cli.errors import FileError
     from excite_cli.excitation.random_baseline import random_baseline
     from excite_cli.excitation.result import matches
     from excite_cli.excitation.run import continue_run, new_result
+    from excite_cli.given_files import refuse_inputs_as_outputs
     from excite_cli.store.result_file import read_result, write_result
     from excite_cli.store.versions import versions
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    path = output_path(output, config, overwrite) if output else None
+    inputs = [optimized] if optimized is not None else []
+    path = output_path(output, config, overwrite, inputs=inputs) if output else None
     extra = [f"sequence.motions={motions}"] if motions is not None else []
     extra += [f"seed={seed}"] if seed is not None else []
     with single_threaded(threads), working(terminal, workers, scheduler, threads) as place:
         problem = load_problem(terminal, config, overrides, extra)
+        refuse_inputs_as_outputs({"--output": path}, files_of_config(problem.spec, problem.folder))
         if optimized is not None:
             result = read_result(optimized)
             reason = matches(problem, result)

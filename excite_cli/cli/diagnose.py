@@ -52,16 +52,19 @@ def diagnose(
       excite diagnose ur10.yaml measured.h5 -o diagnosis.h5 --apply better.yaml
     """
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    check_outputs({"output": output, "apply": apply}, overwrite)
+    outputs = {"output": output, "apply": apply}
+    check_outputs(outputs, overwrite, (config, *data))
 
     from dataclasses import replace
 
     from excite_cli.cli.diagnose_tables import answer_of, tables_of
     from excite_cli.cli.setup import load_dataset, single_threaded
+    from excite_cli.config.inputs import files_of_config
     from excite_cli.config.load import load_spec, spec_as_yaml
     from excite_cli.diagnosis.diagnose import diagnose as run_diagnosis
     from excite_cli.diagnosis.next_motion import next_experiment
     from excite_cli.dynamics.base_parameters import find_base_parameters
+    from excite_cli.given_files import refuse_inputs_as_outputs
     from excite_cli.robot.model import build_robot
     from excite_cli.store.diagnosis_file import write_diagnosis
     from excite_cli.store.versions import versions
@@ -69,6 +72,7 @@ def diagnose(
     with single_threaded():
         spec = load_spec(config, overrides)
         folder = config.resolve().parent
+        refuse_inputs_as_outputs(outputs, files_of_config(spec, folder))
         robot = build_robot(spec.robot, folder)
         base = find_base_parameters(robot)
         dataset = load_dataset(terminal, robot, spec, data)

@@ -11,6 +11,7 @@ from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
 from excite_cli.cli.outputs import check_outputs
 from excite_cli.errors import ConfigError, FileError, nearest
+from excite_cli.given_files import refuse_inputs_as_outputs
 
 if TYPE_CHECKING:
     from excite_cli.export.motion_exporter import MotionExporter
@@ -121,7 +122,7 @@ def export(
     with single_threaded():
         chains = chains_of(terminal, file, Wanted(motion, periods, slow, entry, posture))
     paths = _paths(file, output, exporter, [each.name for each in chains])
-    _check_paths(paths, exporter, overwrite)
+    _check_paths(paths, exporter, overwrite, file)
     written = []
     for path, each in zip(paths, chains, strict=True):
         timed = timed_motion(
@@ -167,7 +168,10 @@ def _paths(
     return [base.with_name(f"{base.stem}_{number}{base.suffix}") for number in numbers]
 
 
-def _check_paths(paths: list[Path], exporter: "MotionExporter", overwrite: bool) -> None:
+def _check_paths(
+    paths: list[Path], exporter: "MotionExporter", overwrite: bool, file: Path
+) -> None:
+    refuse_inputs_as_outputs({f"--output ({path})": path for path in paths}, (file,))
     if not exporter.folder:
         check_outputs({f"output ({path})": path for path in paths}, overwrite)
         return
@@ -186,12 +190,13 @@ def _export_model(
 ) -> None:
     """A fit as URDF, MJCF or YAML, as `excite identify` writes them."""
     from excite_cli.cli.models import write_models
+    from excite_cli.config.inputs import files_of_config
     from excite_cli.config.load import parse_spec
     from excite_cli.robot.model import build_robot
     from excite_cli.store.fit_file import read_fit
 
     path = output or Path(f"{file.stem}{_MODELS[format_]}")
-    check_outputs({"output": path}, overwrite)
+    check_outputs({"output": path}, overwrite, (file,))
     stored = read_fit(file)
     spec = parse_spec(stored.config, f"the config stored in {file}")
     robot = build_robot(spec.robot, Path(stored.config_folder))
@@ -200,6 +205,8 @@ def _export_model(
             f"{file} was made with another robot than the URDF gives now ({spec.robot.urdf}). "
             "Identify again."
         )
+    folder = Path(stored.config_folder)
+    refuse_inputs_as_outputs({"--output": path}, files_of_config(spec, folder))
     option = "parameters" if format_ == "yaml" else format_
     for note in write_models(robot, stored.fit, **{option: path}):
         terminal.say(f"note: {note}")

@@ -52,19 +52,23 @@ def identify(
     from excite_cli.cli.identify_tables import answer_of, tables_of
     from excite_cli.cli.models import write_models
     from excite_cli.cli.setup import load_dataset, single_threaded, tell_findings
+    from excite_cli.config.inputs import files_of_config
     from excite_cli.config.load import load_spec, spec_as_yaml
     from excite_cli.diagnosis.plausibility import check_dataset
     from excite_cli.dynamics.base_parameters import find_base_parameters
+    from excite_cli.given_files import refuse_inputs_as_outputs
     from excite_cli.identification.identify import identify as run_identification
     from excite_cli.robot.model import build_robot
     from excite_cli.store.fit_file import write_fit
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     exports = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
-    check_outputs({"output": output, **exports}, overwrite)
+    outputs = {"output": output, **exports}
+    check_outputs(outputs, overwrite, (config, *data))
     with single_threaded():
         spec = load_spec(config, overrides)
         folder = config.resolve().parent
+        refuse_inputs_as_outputs(outputs, files_of_config(spec, folder))
         robot = build_robot(spec.robot, folder)
         base = find_base_parameters(robot)
         dataset = load_dataset(terminal, robot, spec, data)

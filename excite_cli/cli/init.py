@@ -71,7 +71,7 @@ def init(
         )
     name = robot.removeprefix(EXAMPLE_PREFIX) if robot is not None else (urdf or Path()).stem
     path = output or Path(f"{name}.yaml")
-    check_outputs({"output": path}, overwrite)
+    check_outputs({"output": path}, overwrite, [urdf] if urdf is not None else [])
     folder = path.resolve().parent
     source = f"{EXAMPLE_PREFIX}{name}" if robot is not None else _from(urdf or Path(), folder)
     load_description(source, relative_to=folder)  # a wrong name is told at once

@@ -88,10 +88,12 @@ def optimize(
         outlook_table,
     )
     from excite_cli.cli.working import tell_idle, working
+    from excite_cli.config.inputs import files_of_config
     from excite_cli.errors import ConfigError
     from excite_cli.excitation.result import Result
     from excite_cli.excitation.run import continue_run, new_result, resumed_result
     from excite_cli.excitation.sequence import Step
+    from excite_cli.given_files import refuse_inputs_as_outputs
     from excite_cli.store.result_file import read_result, write_result
     from excite_cli.store.versions import versions
 
@@ -100,7 +102,8 @@ def optimize(
         raise ConfigError("--resume goes on with the file, --overwrite replaces it: give one.")
     if after is not None and prior:
         raise ConfigError("--after brings the measured data with it: leave --prior out.")
-    path = output_path(output, config, overwrite, resume)
+    inputs = [each for each in (*(prior or ()), start, after) if each is not None]
+    path = output_path(output, config, overwrite, resume, inputs)
     extra = [f"sequence.motions={motions}"] if motions is not None else []
     extra += [f"seed={seed}"] if seed is not None else []
     extra += [f"optimizer.restarts={restarts}"] if restarts is not None else []
@@ -113,6 +116,7 @@ def optimize(
         else:
             problem = load_problem(terminal, config, overrides, extra)
             earlier = prior or []
+        refuse_inputs_as_outputs({"--output": path}, files_of_config(problem.spec, problem.folder))
         tell_idle(terminal, workers, problem.spec.optimizer.restarts)
         if resume and path.exists():
             result = resumed_result(problem, read_result(path), path, earlier)

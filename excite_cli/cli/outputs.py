@@ -1,13 +1,16 @@
 """Where a command writes: refused before the work begins, not after it; and claimed."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from excite_cli.claim import claim
 from excite_cli.errors import FileError
+from excite_cli.given_files import refuse_inputs_as_outputs
 
 
-def check_outputs(outputs: Mapping[str, Path | None], overwrite: bool) -> None:
+def check_outputs(
+    outputs: Mapping[str, Path | None], overwrite: bool, inputs: Iterable[Path] = ()
+) -> None:
     """See that every output (by the name of its option) can be written, and none twice.
 
     They are then claimed by this process: another run on the same output is refused until it ends.
@@ -15,10 +18,11 @@ def check_outputs(outputs: Mapping[str, Path | None], overwrite: bool) -> None:
     Raises
     ------
     FileError
-        An output is no regular file, or exists and may not be replaced; two have the same name; one
-        is being written by another run, or its folder cannot be written to.
+        An output is one of `inputs`, no regular file, or exists and may not be replaced; two have
+        the same name; one is being written by another run, or its folder cannot be written to.
     """
     given = {option: path for option, path in outputs.items() if path is not None}
+    refuse_inputs_as_outputs({f"--{option}": path for option, path in given.items()}, inputs)
     for path in given.values():
         claim_file(path)
         if path.exists() and not overwrite:

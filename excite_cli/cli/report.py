@@ -88,7 +88,7 @@ def report(
         raise FileError("--format is that of figures: give a folder for them with --figures.")
     page = output or (Path(f"{files[0].stem}-report.html") if figures is None else None)
     if page is not None:
-        _check_page(page, overwrite)
+        _check_page(page, overwrite, [*files, *([config] if config is not None else [])])
     with single_threaded():
         told = read_files(files)
         problems = {
@@ -108,13 +108,14 @@ def report(
     )
 
 
-def _check_page(page: Path, overwrite: bool) -> None:
+def _check_page(page: Path, overwrite: bool, inputs: Sequence[Path]) -> None:
     """See that the page can be written.
 
     Raises
     ------
     FileError
-        It exists and nothing says to replace it, or its name is that of another format.
+        It is one of `inputs`, exists and nothing says to replace it, or its name is that of another
+        format.
     """
     from excite_cli.cli.outputs import check_outputs
     from excite_cli.errors import FileError
@@ -122,7 +123,7 @@ def _check_page(page: Path, overwrite: bool) -> None:
     if page.suffix.lower() not in (".html", ".htm") and not page.is_dir():
         hint = " Figures and PDF are written by --figures."
         raise FileError(f"-o {page}: a report is a page, NAME.html.{hint}")
-    check_outputs({"output": page}, overwrite)
+    check_outputs({"output": page}, overwrite, inputs)
 
 
 def _page_text(

@@ -37,6 +37,7 @@ def write_figures(
     """
     from excite_cli.atomic import write_atomically
     from excite_cli.errors import FileError
+    from excite_cli.given_files import refuse_inputs_as_outputs
     from excite_cli.report.style import save_figure, save_pages
 
     target, kind, overwrite = asked
@@ -48,6 +49,7 @@ def write_figures(
     if not figures:
         raise FileError("--figures draws motions, and no result file was given. Leave it out.")
     paths = _paths(target, kind, list(figures), overwrite)
+    refuse_inputs_as_outputs({f"--figures ({p})": p for p in paths}, [each.path for each in told])
     with terminal.live("drawing", len(figures)) as show:
 
         def drawn() -> Iterator[Any]:

@@ -11,6 +11,7 @@ from excite_cli.cli.telling import tell_problem
 from excite_cli.config.load import load_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.store.fit_knowledge import fit_knowledge
 
 # Share of a joint's torque on sealed data from which a fit is doubted.
@@ -150,18 +151,25 @@ def tell_findings(terminal: Terminal, findings: "Sequence[Finding]") -> None:
         terminal.say(f"{severity}{f' ({listed})' if listed else ''}: {text}")
 
 
-def output_path(output: Path | None, config: Path, overwrite: bool, resume: bool = False) -> Path:
+def output_path(
+    output: Path | None,
+    config: Path,
+    overwrite: bool,
+    resume: bool = False,
+    inputs: Sequence[Path] = (),
+) -> Path:
     """Where the result goes.
 
     Raises
     ------
     FileError
-        It exists already and nothing says to replace or resume it, another run is writing it, or
-        it cannot be written.
+        It is one of `inputs`, exists already and nothing says to replace or resume it, another run
+        is writing it, or it cannot be written.
     """
     path = output or Path(f"{config.stem}.h5")
     if path.is_file() and config.is_file() and path.samefile(config):
         load_spec(config)  # tells that this is no config
+    refuse_inputs_as_outputs({"--output": path}, (config, *inputs))
     claim_file(path)
     if path.exists() and not overwrite and not resume:
         raise FileError(

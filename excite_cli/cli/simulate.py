@@ -156,10 +156,12 @@ def simulate(
     from excite_cli.cli.entry_program import playable, posture_from
     from excite_cli.cli.motions import load_motions
     from excite_cli.cli.setup import load_problem, single_threaded
+    from excite_cli.config.inputs import files_of_config
     from excite_cli.config.load import load_spec
     from excite_cli.effects.catalogue import declared_effects
     from excite_cli.errors import ConfigError
     from excite_cli.export.timed import repeated
+    from excite_cli.given_files import refuse_inputs_as_outputs
     from excite_cli.measurement.hdf5_writer import write_dataset
     from excite_cli.robot.model import build_robot
     from excite_cli.simulation.engine import load_mujoco
@@ -170,11 +172,13 @@ def simulate(
     from excite_cli.simulation.simulate import simulate as simulate_motions
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    check_outputs({"output": output}, overwrite)
+    check_outputs({"output": output}, overwrite, (config, file))
     if posture is not None and not entry:
         raise ConfigError("--from says where --entry starts: give both.")
     with single_threaded():
         spec = load_spec(config, overrides)
+        own = files_of_config(spec, config.resolve().parent)
+        refuse_inputs_as_outputs({"--output": output}, own)
         settings = SimulationSettings(
             seed=spec.seed if seed is None else seed,
             rate=rate,

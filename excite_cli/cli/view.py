@@ -131,7 +131,8 @@ def view(
         assert target is not None
         if not file.is_file():
             raise FileError(f"There is no file {file}.")
-        _check_target(target, ".png" if png is not None else ".gif", overwrite)
+        given = [each for each in (file, config) if each is not None]
+        _check_target(target, ".png" if png is not None else ".gif", overwrite, given)
         problem, segments = _motions(terminal, file, motion, config, overrides)
         segment = segments[0]
         if time is not None and time > segment.trajectory.duration:
@@ -237,12 +238,14 @@ def _motions(
     return problem, load_motions(terminal, file, problem.robot, problem.spec, chosen)
 
 
-def _check_target(target: Path, suffix: str, overwrite: bool) -> None:
+def _check_target(target: Path, suffix: str, overwrite: bool, inputs: list[Path]) -> None:
     from excite_cli.cli.outputs import claim_file
     from excite_cli.errors import FileError
+    from excite_cli.given_files import refuse_inputs_as_outputs
 
     if target.suffix.lower() != suffix:
         raise FileError(f"--{suffix[1:]} {target}: give a name that ends in {suffix}.")
+    refuse_inputs_as_outputs({f"--{suffix[1:]}": target}, inputs)
     claim_file(target)
     if target.exists() and not overwrite:
         raise FileError(f"{target} exists already. Give another name, or --overwrite.")
