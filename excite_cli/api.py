@@ -187,8 +187,9 @@ def plan(
     following = problem if isinstance(problem, NextMotion) else None
     model = following.model if following else problem
     assert isinstance(model, Problem)
-    named = [prior for prior in priors if isinstance(prior, str | Path)]
-    refuse_inputs_as_outputs({"output": path}, (*named, *files_of_config(model.spec, model.folder)))
+    read = [Path(prior) for prior in priors if isinstance(prior, str | Path)]
+    read += files_of_config(model.spec, model.folder)
+    refuse_inputs_as_outputs({"output": path}, read)
     if path is not None and path.exists() and not overwrite:
         raise FileError(f"{path} exists already. Give another name, or overwrite=True.")
     stacks: list[tuple[str, Result | Stack]] = []
@@ -381,7 +382,7 @@ def diagnose(
     ConfigError, FileError
         Config and data do not fit; order or signs of torques cannot be right; data too short.
     """
-    inputs = (*data.sources, *files_of_config(problem.spec, problem.folder))
+    inputs = (*map(Path, data.sources), *files_of_config(problem.spec, problem.folder))
     refuse_inputs_as_outputs({"output": Path(output) if output is not None else None}, inputs)
     found = diagnose_dataset(problem.robot, problem.base, data, problem.spec, sealed, progress)
     found = replace(

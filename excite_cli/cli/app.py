@@ -9,7 +9,7 @@ import typer
 from excite_cli import __version__
 from excite_cli.cli.check import check
 from excite_cli.cli.compare_random import compare_random
-from excite_cli.cli.console import INTERRUPTED, run_guarded
+from excite_cli.cli.console import INTERRUPTED, run_guarded, told_warnings
 from excite_cli.cli.diagnose import diagnose
 from excite_cli.cli.export import export
 from excite_cli.cli.help_page import HelpfulCommand, HelpfulGroup, split_docstring
@@ -113,5 +113,5 @@ def main() -> None:
             raise SystemExit(status)
 
     heed_signals()
-    with steady_streams():
+    with steady_streams(), told_warnings():
         sys.exit(run_guarded(act))

@@ -10,6 +10,7 @@ import os
 import platform
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -33,7 +34,7 @@ from rich.text import Text
 from excite_cli import __version__
 from excite_cli.claim import leave_claims
 from excite_cli.cli.stopping import stopped
-from excite_cli.errors import REFUSALS, ExciteError, refusal
+from excite_cli.errors import REFUSALS, ExciteError, ExciteWarning, refusal
 
 BUG, INTERRUPTED = 70, 130
 # Off a terminal rows stay whole, so that they can be searched and cut.
@@ -205,6 +206,22 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(inner) for inner in value]
     return value
+
+
+@contextmanager
+def told_warnings() -> Iterator[None]:
+    """Within it, warnings of ours are messages like all others."""
+    with warnings.catch_warnings():
+        otherwise = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            if not issubclass(category, ExciteWarning):
+                otherwise(message, category, *where)
+            elif not {"--quiet", "-q"} & set(sys.argv):
+                _tell(f"warning: {message}")
+
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield
 
 
 def run_guarded(action: Callable[[], None]) -> int:

@@ -48,7 +48,7 @@ def steady_streams() -> Iterator[None]:
     _fill_closed()
     before = sys.stdin, sys.stdout, sys.stderr
     if sys.stdin is None:
-        sys.stdin = open(os.devnull, encoding="utf-8")
+        sys.stdin = io.StringIO()
     sys.stdout = _steady(sys.stdout, lambda error: error.errno in _NOBODY_READS)
     sys.stderr = _steady(sys.stderr, lambda error: True)
     try:
@@ -72,7 +72,7 @@ def _fill_closed() -> None:
 def _steady(stream: Any, given_up: Callable[[OSError], bool]) -> Any:
     """The stream, if it has a descriptor, so that writing a text to it always works."""
     if stream is None:
-        return open(os.devnull, "w", encoding="utf-8")
+        return io.StringIO()
     try:
         descriptor = stream.fileno()
     except (OSError, ValueError):  # it is kept in memory

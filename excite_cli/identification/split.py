@@ -43,7 +43,6 @@ def units_of(dataset: Dataset) -> tuple[str, ...]:
     return tuple(dict.fromkeys(run.id.key for run in dataset.runs))
 
 
-
 def split(dataset: Dataset, sealed: str | None = None, block: float | None = None) -> Split:
     """Seal a recording (the last, unless `sealed` names one, or a stretch of one).
 
