@@ -9,7 +9,8 @@ import pytest
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
-from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.records import Assumption, Diagnosis
+from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.split import split
@@ -129,6 +130,19 @@ def test_a_sealed_run_is_used_for_the_errors_only(
     assert one.effects  # something was chosen and fitted
     assert set(differences(one, other)) == FREE
     assert other.after.mean_relative > 2 * one.after.mean_relative
+
+
+def test_what_is_assumed_of_the_sealed_run_is_told(baseline: Diagnosis) -> None:
+    """The payload is found from the second run on, so the sealed one has it too."""
+    (payload,) = [each for each in baseline.effects if each.effect.kind == "payload"]
+    assert payload.effect.runs == ("motion_2", "motion_3")
+    assumed = Assumption("payload", payload.effect.runs, ("motion_3",), present=True)
+    assert baseline.assumed == (assumed,)
+    told = [each.text for each in baseline.findings if each.kind == "assumed"]
+    assert told == [assumption_in_words(assumed)]
+    assert "is assumed that it is in the sealed motion_3" in told[0]
+    absent = replace(assumed, present=False)
+    assert "is assumed that it is not in the sealed motion_3" in assumption_in_words(absent)
 
 
 def test_a_run_sealed_by_name_is_used_for_the_errors_only(

@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from excite_cli.errors import FileError, MissingExtraError
 from excite_cli.measurement.dataset import Run
+from excite_cli.measurement.run_identity import Origin
 from tests.measurement.recordings import JOINTS, only, read, recorded
 
 EPOCH = 1_700_000_000_000_000_000
@@ -82,6 +83,9 @@ def test_rosbag2(tmp_path: Path, run: Run, storage: StoragePlugin, part: str) ->
     assert data.findings == ()
     assert data.runs[0].name == "log"
     same(data.runs[0], run)
+    origin = Origin(str(path if "folder" in part else file), "/joint_states")
+    assert data.runs[0].origin == origin
+    assert data.runs[0].epoch == pytest.approx(EPOCH * 1e-9 + run.t[0], abs=1e-6)
 
 
 def test_ros1(tmp_path: Path, run: Run) -> None:

@@ -12,6 +12,7 @@ from excite_cli.measurement import reader as reading
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.measurement.run_identity import Origin
 from tests.measurement.recordings import JOINTS, read, recorded, write_csv
 
 
@@ -39,6 +40,19 @@ def test_time_from_1970_keeps_its_digits(tmp_path: Path) -> None:
     data = read(path, time="ms")
     assert data.findings == ()
     np.testing.assert_allclose(data.runs[0].t, run.t, atol=1e-6)
+    assert data.runs[0].epoch == pytest.approx(1.7e9, abs=1e-6)
+
+
+def test_where_a_run_came_from_and_its_absolute_time_stay_with_it(tmp_path: Path) -> None:
+    path = tmp_path / "log.h5"
+    runs = (replace(recorded(name="A"), epoch=1.7e9), recorded(name="B", seed=1))
+    write_dataset(path, Dataset(JOINTS, runs), {})
+    first, second = read(path).runs
+    assert first.origin == Origin(str(path), "/runs/A")
+    assert (first.epoch, second.epoch) == (1.7e9, None)
+    (counted,) = read(write_csv(tmp_path / "late.csv", replace(runs[1], t=2e6 + runs[1].t))).runs
+    assert counted.epoch is None  # a clock that counts from its own start
+    assert counted.origin == Origin(str(tmp_path / "late.csv"))
 
 
 def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
