@@ -25,7 +25,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "diagnosis": read_diagnosis,
 }
 EVERY = 12  # mutant; the others are left to longer runs
-COMMANDS_FOR = 9  # mutants that the reader takes
+COMMANDS_FOR = 6  # mutants that the reader takes
 BRIEF = ("--motions", "1", "--set", "optimizer.max_iterations=1", "-q", "--overwrite")
 
 
