@@ -205,6 +205,10 @@ def _export_model(
             f"{file} was made with another robot than the URDF gives now ({spec.robot.urdf}). "
             "Identify again."
         )
+    if stored.fit.joint_names != robot.joint_names or len(stored.fit.phi) != 10 * robot.n_bodies:
+        raise FileError(
+            f"{file} holds parameters of other joints or bodies than its config. Identify again."
+        )
     folder = Path(stored.config_folder)
     refuse_inputs_as_outputs({"--output": path}, files_of_config(spec, folder))
     option = "parameters" if format_ == "yaml" else format_

@@ -81,8 +81,9 @@ def chains_of(terminal: Terminal, file: Path, wanted: Wanted) -> list[ExportedCh
 def _motions(file: Path, motion: str) -> "tuple[Result | None, tuple[str, ...], list[Segment]]":
     """The result that `file` is, if it is one; joint names, and the motions asked for."""
     from excite_cli.cli.motions import is_motion, motions_of_result
+    from excite_cli.export.own_samples import require_own_samples
     from excite_cli.measurement.motion_files import read_own_motion
-    from excite_cli.store.result_file import read_result
+    from excite_cli.store.result_file import read_result, read_samples
     from excite_cli.trajectory.chain import Segment
     from excite_cli.trajectory.sampled import through_samples
 
@@ -94,7 +95,9 @@ def _motions(file: Path, motion: str) -> "tuple[Result | None, tuple[str, ...], 
         return None, found.joint_names, [segment]
     result = read_result(file)
     chosen = None if motion == "all" else [int(motion)]
-    return result, result.joint_names, motions_of_result(file, result, chosen)
+    segments = motions_of_result(file, result, chosen)
+    require_own_samples(file, result, segments, read_samples(file))
+    return result, result.joint_names, segments
 
 
 def _joint_bounds(file: Path, result: "Result") -> "tuple[Constraint, ...]":

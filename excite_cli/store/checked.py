@@ -17,6 +17,7 @@ from excite_cli.config.spec import Spec
 from excite_cli.robot.model import Array
 
 Shape = tuple[int | None, ...]
+_BEYOND = 1e100  # whatever is squared stays finite
 
 
 def text(attributes: Any, name: str, default: str | None = None) -> str:
@@ -70,8 +71,8 @@ def flag(attributes: Any, name: str) -> bool:
 def array(dataset: Any, shape: Shape, finite: bool = True) -> Array:
     """Numbers of this shape (None: any length)."""
     found = _shaped(dataset, shape, "fiu").astype(float)
-    if finite and not np.isfinite(found).all():
-        raise ValueError(f"{dataset.name} has values that are not finite")
+    if finite and not (np.abs(found) < _BEYOND).all():
+        raise ValueError(f"{dataset.name} has values that are not finite, or beyond all measure")
     return found
 
 
