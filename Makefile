@@ -85,9 +85,9 @@ lock:                    ## pin all dependencies anew, for Python 3.11 and newer
 	  --custom-compile-command "make lock" --output-file requirements/ci.txt
 	rm -rf $(VENV)-lock
 
-FLOOR_TESTS := tests/test_library.py tests/kernels/test_library.py tests/config tests/criteria \
-  tests/dynamics tests/measurement tests/report/test_page.py tests/simulation tests/store \
-  tests/workers
+FLOOR_TESTS := tests/kernels/test_library.py tests/config tests/criteria tests/dynamics \
+  tests/measurement/test_bag_reader.py tests/measurement/test_hdf5_reader.py \
+  tests/report/test_page.py tests/simulation/test_mujoco_model.py tests/store tests/workers
 floors:                  ## the lowest versions that pyproject.toml allows: quick tests, a whole loop
 	$(PYTHON) -m venv --clear $(VENV)-floors
 	$(VENV)-floors/bin/python -m pip install --quiet "uv>=0.5"
