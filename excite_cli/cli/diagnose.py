@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from excite_cli.api.outputs import check_outputs
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
     from excite_cli.config.spec import Spec
@@ -56,8 +56,9 @@ def diagnose(
 
     from dataclasses import replace
 
+    from excite_cli.api.loading import load_case, load_data
     from excite_cli.cli.diagnose_tables import answer_of, tables_of
-    from excite_cli.cli.setup import load_dataset, single_threaded
+    from excite_cli.cli.setup import single_threaded
     from excite_cli.config.load import load_spec, spec_as_yaml
     from excite_cli.diagnosis.diagnose import diagnose as run_diagnosis
     from excite_cli.diagnosis.next_motion import next_experiment
@@ -71,7 +72,7 @@ def diagnose(
         folder = config.resolve().parent
         robot = build_robot(spec.robot, folder)
         base = find_base_parameters(robot)
-        dataset = load_dataset(terminal, robot, spec, data)
+        dataset = load_data(load_case(config, overrides or ()), data, terminal.tell)
         with terminal.live("diagnose", 10) as show:
             found = run_diagnosis(robot, base, dataset, spec, sealed, show)
         found = replace(

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from excite_cli.api.outputs import check_outputs
 from excite_cli.cli import options
 from excite_cli.cli.completion import complete_format
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.outputs import check_outputs
 from excite_cli.errors import ConfigError, FileError, nearest
 
 if TYPE_CHECKING:

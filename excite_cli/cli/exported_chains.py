@@ -80,7 +80,7 @@ def chains_of(terminal: Terminal, file: Path, wanted: Wanted) -> list[ExportedCh
 
 def _motions(file: Path, motion: str) -> "tuple[Result | None, tuple[str, ...], list[Segment]]":
     """The result that `file` is, if it is one; joint names, and the motions asked for."""
-    from excite_cli.cli.motions import is_motion, motions_of_result
+    from excite_cli.api.motions import is_motion, motions_of
     from excite_cli.measurement.motion_files import read_own_motion
     from excite_cli.store.result_file import read_result
     from excite_cli.trajectory.chain import Segment
@@ -93,8 +93,8 @@ def _motions(file: Path, motion: str) -> "tuple[Result | None, tuple[str, ...], 
         segment = Segment(found.name, *through_samples(found.t, found.q, found.v, found.a))
         return None, found.joint_names, [segment]
     result = read_result(file)
-    chosen = None if motion == "all" else [int(motion)]
-    return result, result.joint_names, motions_of_result(file, result, chosen)
+    chosen = [] if motion == "all" else [int(motion)]
+    return result, result.joint_names, motions_of(result, chosen, str(file))
 
 
 def _joint_bounds(file: Path, result: "Result") -> "tuple[Constraint, ...]":

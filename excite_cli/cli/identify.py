@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
+from excite_cli.api.outputs import check_outputs
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.outputs import check_outputs
 
 
 def identify(
@@ -49,9 +49,10 @@ def identify(
       excite identify ur10.yaml measured.h5 -o fit.h5
       excite identify ur10.yaml measured.h5 --sealed motion_1 --urdf identified.urdf
     """
+    from excite_cli.api.loading import load_case, load_data, tell_findings
     from excite_cli.cli.identify_tables import answer_of, tables_of
     from excite_cli.cli.models import write_models
-    from excite_cli.cli.setup import load_dataset, single_threaded, tell_findings
+    from excite_cli.cli.setup import single_threaded
     from excite_cli.config.load import load_spec, spec_as_yaml
     from excite_cli.diagnosis.plausibility import check_dataset
     from excite_cli.dynamics.base_parameters import find_base_parameters
@@ -67,7 +68,7 @@ def identify(
         folder = config.resolve().parent
         robot = build_robot(spec.robot, folder)
         base = find_base_parameters(robot)
-        dataset = load_dataset(terminal, robot, spec, data)
+        dataset = load_data(load_case(config, overrides or ()), data, terminal.tell)
         check_dataset(robot, dataset, spec)
         with terminal.live("identify") as show:
             found = run_identification(
@@ -81,7 +82,7 @@ def identify(
             fingerprint = robot.fingerprint()
             write_fit(output, found, spec_as_yaml(spec), str(folder), fingerprint, sources)
         notes += write_models(robot, found.fit, urdf, mjcf, parameters)
-    tell_findings(terminal, found.findings[len(dataset.findings) :])
+    tell_findings(found.findings[len(dataset.findings) :], terminal.tell)
     for note in notes:
         terminal.say(f"note: {note}")
     files = {"fit": output, **exports}

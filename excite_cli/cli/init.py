@@ -42,9 +42,9 @@ def init(
     """
     import sys
 
+    from excite_cli.api.outputs import check_outputs
     from excite_cli.atomic import write_text_atomically
     from excite_cli.cli.init_questions import ask
-    from excite_cli.cli.outputs import check_outputs
     from excite_cli.cli.setup import single_threaded
     from excite_cli.errors import ConfigError
     from excite_cli.proposal.propose import Request, propose

@@ -9,6 +9,8 @@ from collections.abc import Collection, Sequence
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from excite_cli.api import showing
+
 _GAP = 2
 
 
@@ -34,4 +36,14 @@ def table(
             no_wrap=name not in words,
             overflow="fold",
         )
+    return found
+
+
+def rendered(given: showing.Table) -> Table:
+    """A table of the library in this look."""
+    found = table(given.title, given.columns, given.left, given.words)
+    for number, row in enumerate(given.rows):
+        if number in given.parted:
+            found.add_section()
+        found.add_row(*row, style="bold" if number in given.bold else None)
     return found

@@ -71,7 +71,7 @@ def optimize(
     """
     from rich.table import Table
 
-    from excite_cli.cli.motions import load_motions
+    from excite_cli.api.motions import load_motions
     from excite_cli.cli.setup import (
         load_next_motion,
         load_priors,
@@ -124,9 +124,7 @@ def optimize(
                 else [(str(after), following.prior)]
             )
             result = new_result(problem, stacks, versions(), config.resolve().parent)
-        starts = (
-            load_motions(terminal, start, problem.robot, problem.spec) if start is not None else []
-        )
+        starts = load_motions(problem, start, tell=terminal.tell) if start is not None else []
         with terminal.live("", iterations_of(problem.spec)) as show:
             report = start_line(show, problem.spec)
 

@@ -116,7 +116,7 @@ def _check_page(page: Path, overwrite: bool) -> None:
     FileError
         It exists and nothing says to replace it, or its name is that of another format.
     """
-    from excite_cli.cli.outputs import check_outputs
+    from excite_cli.api.outputs import check_outputs
     from excite_cli.errors import FileError
 
     if page.suffix.lower() not in (".html", ".htm") and not page.is_dir():
@@ -146,7 +146,7 @@ def _picture(terminal: Terminal, each: "Told", problem: "Problem") -> "Picture |
     """The robot where it comes nearest to something in its first motion, if that can be drawn."""
     from typing import cast
 
-    from excite_cli.cli.motions import motions_of_result
+    from excite_cli.api.motions import motions_of
     from excite_cli.errors import MissingExtraError
     from excite_cli.report.page import Picture
 
@@ -154,7 +154,7 @@ def _picture(terminal: Terminal, each: "Told", problem: "Problem") -> "Picture |
         from excite_cli.view.pictures import View, still_png
 
         result = cast("Result", each.content)
-        segment = motions_of_result(each.path, result, [result.motions[0].index])[0]
+        segment = motions_of(result, [result.motions[0].index], str(each.path))[0]
         png = still_png(problem, segment, View(size=(600, 441), ghosts=3, caption=False))
     except (MissingExtraError, ImportError) as error:
         terminal.detail(f"no picture of the robot: {error}")

@@ -78,7 +78,7 @@ def _paths(target: Path, kind: Format | None, names: list[str], overwrite: bool)
         One exists and nothing says to replace it, another run is writing it, or `target` does not
         suit the format.
     """
-    from excite_cli.cli.outputs import claim_file
+    from excite_cli.api.outputs import claim_file
     from excite_cli.errors import FileError
 
     if target.suffix.lower() in (".png", ".svg") and not target.is_dir():

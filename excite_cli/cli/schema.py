@@ -33,8 +33,8 @@ def schema(
     """
     import json
 
+    from excite_cli.api.outputs import check_outputs
     from excite_cli.atomic import write_atomically
-    from excite_cli.cli.outputs import check_outputs
     from excite_cli.config.spec import Spec
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from excite_cli.api.outputs import check_outputs
 from excite_cli.cli import options
 from excite_cli.cli.completion import complete_effect
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -153,8 +153,9 @@ def simulate(
     """
     from dataclasses import replace
 
+    from excite_cli.api.loading import load_case
+    from excite_cli.api.motions import load_motions
     from excite_cli.cli.entry_program import playable, posture_from
-    from excite_cli.cli.motions import load_motions
     from excite_cli.cli.setup import load_problem, single_threaded
     from excite_cli.config.load import load_spec
     from excite_cli.effects.catalogue import declared_effects
@@ -188,7 +189,7 @@ def simulate(
         )
         load_mujoco()
         robot = build_robot(spec.robot, config.resolve().parent)
-        found = load_motions(terminal, file, robot, spec, motion)
+        found = load_motions(load_case(config, overrides or ()), file, motion or (), terminal.tell)
         motions: list[Planned]
         if entry:
             start, problem = posture_from(posture, robot), load_problem(terminal, config, overrides)

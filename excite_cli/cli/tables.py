@@ -10,7 +10,7 @@ from excite_cli.constraints.base import Constraint
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
-from excite_cli.proof.worst_margin import Worst
+from excite_cli.summary.margins import worst_data
 
 
 def motion_table(motions: Sequence[Motion]) -> Table:
@@ -112,16 +112,4 @@ def criterion_data(problem: Problem) -> dict[str, str]:
         "kind": problem.spec.criterion.kind,
         "row_weights": problem.weighting.row_name,
         "column_scaling": problem.weighting.column_name,
-    }
-
-
-def worst_data(worst: Worst) -> dict[str, Any]:
-    """A worst margin for `--json`."""
-    return {
-        "margin": worst.margin,
-        "share": worst.share,
-        "unit": worst.unit,
-        "where": worst.label,
-        "time": worst.time,
-        "violations": worst.violations,
     }

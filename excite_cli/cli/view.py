@@ -215,7 +215,7 @@ def _motions(
     FileError
         The file is missing, or is no result and no config says what moves.
     """
-    from excite_cli.cli.motions import load_motions, motions_of_result
+    from excite_cli.api.motions import load_motions, motions_of
     from excite_cli.cli.rebuilt import rebuilt_problem
     from excite_cli.cli.setup import load_problem
     from excite_cli.errors import ConfigError, FileError
@@ -223,22 +223,22 @@ def _motions(
 
     if not file.exists():
         raise FileError(f"There is no file {file}.")
-    chosen = [motion] if motion is not None else None
+    chosen = [motion] if motion is not None else []
     if is_result(file):
         if overrides:
             raise ConfigError("--set: a result file has its own config; leave it out.")
         result = read_result(file)
-        return rebuilt_problem(file, result, config), motions_of_result(file, result, chosen)
+        return rebuilt_problem(file, result, config), motions_of(result, chosen, str(file))
     if config is None:
         raise FileError(
             f"{file} is no result file, so the robot is not known: give --config CONFIG.yaml."
         )
     problem = load_problem(terminal, config, overrides)
-    return problem, load_motions(terminal, file, problem.robot, problem.spec, chosen)
+    return problem, load_motions(problem, file, chosen, terminal.tell)
 
 
 def _check_target(target: Path, suffix: str, overwrite: bool) -> None:
-    from excite_cli.cli.outputs import claim_file
+    from excite_cli.api.outputs import claim_file
     from excite_cli.errors import FileError
 
     if target.suffix.lower() != suffix:

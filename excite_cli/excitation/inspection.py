@@ -17,6 +17,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.mesh_check import MeshCheck
 from excite_cli.proof.certificate import Path, Verdict, certify
 from excite_cli.proof.worst_margin import Worst
+from excite_cli.shown.record import Shown
 
 MESHES = "mesh_collision"
 _OF_PAIRS = ("self_collision", "mesh_clearance", "surroundings")
@@ -32,8 +33,8 @@ class Look:
     seed: int = 0
 
 
-@dataclass(frozen=True)
-class Inspection:
+@dataclass(frozen=True, repr=False)
+class Inspection(Shown):
     """What was seen of one motion.
 
     `worst`, `verdicts`: by constraint, in their order. `meshes`: None where self-collision is no

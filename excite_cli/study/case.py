@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from excite_cli import api
+from excite_cli.api.diagnosing import diagnose
+from excite_cli.api.identifying import identify, save_fit
+from excite_cli.api.loading import load_case, load_data, load_problem
+from excite_cli.api.planning import plan
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Progress
@@ -95,12 +98,12 @@ def _check_unchanged(task: StudyTask, case: StudyCase) -> None:
 
 
 def _optimised(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Figures:
-    problem = api.load_problem(task.config, overrides_of(task, case))
+    problem = load_problem(task.config, overrides_of(task, case))
 
     def progress(index: int, state: Progress) -> None:
         tell(f"motion {index}, {state.figure}")
 
-    result: Result = api.plan(problem, output=folder / "motions.h5", progress=progress)
+    result: Result = plan(problem, output=folder / "motions.h5", progress=progress)
     last = result.motions[-1]
     proved = all(all(motion.certified.values()) for motion in result.motions)
     return {
@@ -113,17 +116,17 @@ def _optimised(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Fi
 
 
 def _traced(task: StudyTask, case: StudyCase, log: Path, folder: Path, tell: Tell) -> Figures:
-    model = api.load_case(task.config, overrides_of(task, case))
-    data = api.load_data(model, log)
-    fit = api.identify(model, data)
-    api.save_fit(folder / "fit.h5", model, fit)
+    model = load_case(task.config, overrides_of(task, case))
+    data = load_data(model, log)
+    fit = identify(model, data)
+    save_fit(folder / "fit.h5", model, fit)
     figures: dict[str, float | int | str | None] = {
         "sealed_run": fit.sealed_run,
         "parameters": len(fit.fit.names),
         "identified_error": fit.error.mean_relative_moving,
     }
     if task.diagnosed:
-        found = api.diagnose(
+        found = diagnose(
             model,
             data,
             output=folder / "diagnosis.h5",

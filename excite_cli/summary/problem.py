@@ -1,8 +1,8 @@
-"""What is worth saying about a problem before work begins."""
+"""A problem in words: what is worth saying before work begins, and its tables."""
 
 from collections import Counter
+from collections.abc import Iterator
 
-from excite_cli.cli.console import Terminal
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.mesh_clearance import MeshClearance
 from excite_cli.constraints.obstacle_clearance import Surroundings
@@ -11,39 +11,52 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.collision_pairs import ALWAYS, UNGUARDED, CollisionPairs
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs
+from excite_cli.shown.note import Level, Note
 
 
-def tell_problem(terminal: Terminal, problem: Problem) -> None:
-    """Say in two lines what was understood, and what a person must know; the rest is detail."""
+def problem_notes(problem: Problem) -> Iterator[Note]:
+    """In two lines what was understood, and what a person must know; the rest is detail."""
     robot = problem.robot
     criterion, weighting = problem.spec.criterion, problem.weighting
     extra = len(problem.extension.names)
     effects = f" and {extra} columns of effects" if extra else ""
-    terminal.say(
+    yield _said(
         f"{robot.name}: {robot.n} joints, {problem.base.rank} base parameters{effects}, "
         f"{problem.variables} variables; criterion: {criterion.kind}"
     )
     names = ", ".join(_counted_name(constraint) for constraint in problem.constraints) or "none"
-    terminal.say(f"constraints: {names}")
-    terminal.detail(
+    yield _said(f"constraints: {names}")
+    yield _detail(
         f"{len(problem.cost_basis.times)} cost and {len(problem.constraint_basis.times)} "
         f"constraint samples; row weights: {weighting.row_name}, column scaling: "
         f"{weighting.column_name}"
     )
-    _tell_effects(terminal, problem)
-    _tell_uncertainty(terminal, problem)
+    yield from _effects(problem)
+    yield from _uncertainty(problem)
     for constraint in problem.constraints:
         if isinstance(constraint, SelfCollision):
-            _tell_self_collision(terminal, constraint, _tabled(problem))
+            yield from _self_collision(constraint, _tabled(problem))
         elif isinstance(constraint, Surroundings):
-            _tell_surroundings(terminal, constraint)
+            yield from _surroundings(constraint)
     around = problem.spec.constraints.surroundings
     if around is not None and not any(isinstance(c, Surroundings) for c in problem.constraints):
-        terminal.say("surroundings: no link can come near any of them, so nothing is checked")
+        yield _said("surroundings: no link can come near any of them, so nothing is checked")
     if robot.payload is not None:
-        terminal.detail(f"payload: {robot.payload.in_words}, part of the predicted torque")
+        yield _detail(f"payload: {robot.payload.in_words}, part of the predicted torque")
     for name, words in zip(_symbols(problem), problem.base.in_words(), strict=True):
-        terminal.detail(f"  base parameter {name}: {words}")
+        yield _detail(f"  base parameter {name}: {words}")
+
+
+def _said(text: str) -> Note:
+    return Note(Level.INFO, text)
+
+
+def _detail(text: str) -> Note:
+    return Note(Level.DETAIL, text)
+
+
+def _warning(text: str) -> Note:
+    return Note(Level.WARNING, text)
 
 
 def _counted_name(constraint: Constraint) -> str:
@@ -55,47 +68,45 @@ def _counted_name(constraint: Constraint) -> str:
     return constraint.name
 
 
-def _tell_uncertainty(terminal: Terminal, problem: Problem) -> None:
+def _uncertainty(problem: Problem) -> Iterator[Note]:
     spec = problem.spec.uncertainty
     if spec is None:
         return
     held = [c.name for c in problem.constraints if getattr(c, "uncertainty", None) is not None]
     if not held:
-        terminal.say(
-            "warning: uncertainty bounds nothing: it concerns constraints.torque, balance and "
+        yield _warning(
+            "uncertainty bounds nothing: it concerns constraints.torque, balance and "
             "contact, and none of them is asked for"
         )
         return
     known = f", and within {spec.sigmas:g} standard deviations of {spec.fit}" if spec.fit else ""
-    terminal.detail(
+    yield _detail(
         f"{', '.join(held)}: for every inertia within {spec.mass:.3g} of the mass, "
         f"{spec.center_of_mass:.3g} m of the centre of mass and {spec.inertia:.3g} of the inertia "
         f"of each body{' (others for some)' if spec.bodies else ''}{known}"
     )
 
 
-def _tell_effects(terminal: Terminal, problem: Problem) -> None:
+def _effects(problem: Problem) -> Iterator[Note]:
     extension, spec = problem.extension, problem.spec
     if extension.names:
         counts = Counter(effect.kind for effect in extension.effects)
         listed = ", ".join(f"{kind} ({count})" for kind, count in counts.items())
-        terminal.detail(
+        yield _detail(
             f"effects in the regressor: {listed}; {len(extension.names)} columns, each scaled to "
             "the size of the median inertial column"
         )
     for reason in extension.left_out:
-        terminal.say(f"left out of the regressor: {reason}")
+        yield _said(f"left out of the regressor: {reason}")
     if extension.fine:
-        terminal.detail(
-            "cost samples are those of the constraints: an effect needs time derivatives"
-        )
+        yield _detail("cost samples are those of the constraints: an effect needs time derivatives")
     if spec.effects is None and declared_effects(None, problem.robot):
-        terminal.say(
+        yield _said(
             "the friction of the URDF's <dynamics> is not in the regressor; list it under effects "
             "to plan for it"
         )
     for name in extension.names:
-        terminal.detail(f"  effect column {name}")
+        yield _detail(f"  effect column {name}")
 
 
 def _tabled(problem: Problem) -> tuple[str, ...]:
@@ -103,16 +114,14 @@ def _tabled(problem: Problem) -> tuple[str, ...]:
     return next((c.labels for c in problem.constraints if isinstance(c, MeshClearance)), ())
 
 
-def _tell_self_collision(
-    terminal: Terminal, constraint: SelfCollision, tabled: tuple[str, ...]
-) -> None:
+def _self_collision(constraint: SelfCollision, tabled: tuple[str, ...]) -> Iterator[Note]:
     pairs = constraint.pairs
-    terminal.detail(
+    yield _detail(
         f"self-collision: {len(constraint.capsules)} capsules, {len(pairs.checked)} pairs "
         f"checked; not checked: {_reasons(pairs)}"
     )
     if tabled:
-        terminal.detail(
+        yield _detail(
             "kept apart by their meshes, since their capsules overlap whatever the posture: "
             f"{'; '.join(tabled)}"
         )
@@ -124,19 +133,19 @@ def _tell_self_collision(
         if not words.endswith("100%") and not any(words.startswith(label) for label in tabled)
     }
     if loose:
-        terminal.say(
-            "warning: not guarded, since their capsules overlap whatever the posture "
+        yield _warning(
+            "not guarded, since their capsules overlap whatever the posture "
             "(links and the share of postures in which their meshes are apart): "
             f"{'; '.join(sorted(loose))}. Look at these with `excite check`, or give slimmer "
             "capsules under constraints.self_collision.capsules."
         )
-    _tell_each(terminal, constraint)
+    yield from _each(constraint)
 
 
-def _tell_surroundings(terminal: Terminal, constraint: Surroundings) -> None:
+def _surroundings(constraint: Surroundings) -> Iterator[Note]:
     pairs = constraint.pairs
     things = ", ".join(obstacle.name for obstacle in constraint.obstacles)
-    terminal.detail(
+    yield _detail(
         f"surroundings: {things}; {len(pairs.checked)} pairs of a capsule and a thing checked; not "
         f"checked: {_reasons(pairs)}"
     )
@@ -147,7 +156,7 @@ def _tell_surroundings(terminal: Terminal, constraint: Surroundings) -> None:
         if kept < most
     ]
     if closer:
-        terminal.say(
+        yield _said(
             "these never get far from each other, so half of the farthest is kept instead of "
             f"{most:g} m: {'; '.join(closer)}"
         )
@@ -157,18 +166,18 @@ def _tell_surroundings(terminal: Terminal, constraint: Surroundings) -> None:
         if pair.reason.startswith(ALWAYS)
     ]
     if touching:
-        terminal.say(
-            f"warning: not guarded, since no motion parts them: {'; '.join(touching)}. Right for a "
+        yield _warning(
+            f"not guarded, since no motion parts them: {'; '.join(touching)}. Right for a "
             "robot that stands there; else correct constraints.surroundings."
         )
-    _tell_each(terminal, constraint)
+    yield from _each(constraint)
 
 
-def _tell_each(terminal: Terminal, constraint: SelfCollision | Surroundings) -> None:
+def _each(constraint: SelfCollision | Surroundings) -> Iterator[Note]:
     for label in constraint.labels:
-        terminal.detail(f"  checked  {label}")
+        yield _detail(f"  checked  {label}")
     for pair in constraint.pairs.dropped:
-        terminal.detail(f"  dropped  {pair.first} – {pair.second}: {pair.reason}")
+        yield _detail(f"  dropped  {pair.first} – {pair.second}: {pair.reason}")
 
 
 def _reasons(pairs: CollisionPairs | ObstaclePairs) -> str:

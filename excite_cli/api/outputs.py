@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from excite_cli.claim import claim
+from excite_cli.claim import leave_claims as leave_claims
 from excite_cli.errors import FileError
 
 
-def check_outputs(outputs: Mapping[str, Path | None], overwrite: bool) -> None:
+def check_outputs(outputs: Mapping[str, str | Path | None], overwrite: bool) -> None:
     """See that every output (by the name of its option) can be written, and none twice.
 
     They are then claimed by this process: another run on the same output is refused until it ends.
@@ -18,7 +19,7 @@ def check_outputs(outputs: Mapping[str, Path | None], overwrite: bool) -> None:
         An output is no regular file, or exists and may not be replaced; two have the same name; one
         is being written by another run, or its folder cannot be written to.
     """
-    given = {option: path for option, path in outputs.items() if path is not None}
+    given = {option: Path(path) for option, path in outputs.items() if path is not None}
     for path in given.values():
         claim_file(path)
         if path.exists() and not overwrite:

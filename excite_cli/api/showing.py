@@ -1,0 +1,6 @@
+"""What the library hands to whoever shows it: notes on the way, tables and sentences at the end."""
+
+from excite_cli.shown.answer import Answer as Answer
+from excite_cli.shown.note import Level as Level
+from excite_cli.shown.note import Note as Note
+from excite_cli.shown.table import Table as Table
