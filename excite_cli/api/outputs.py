@@ -5,7 +5,7 @@ from pathlib import Path
 
 from excite_cli.claim import claim
 from excite_cli.claim import leave_claims as leave_claims
-from excite_cli.errors import FileError
+from excite_cli.errors import ConfigError, FileError
 
 
 def check_outputs(outputs: Mapping[str, str | Path | None], overwrite: bool) -> None:
@@ -31,6 +31,38 @@ def check_outputs(outputs: Mapping[str, str | Path | None], overwrite: bool) -> 
         other = taken.setdefault(path.resolve(), option)
         if other != option:
             raise FileError(f"--{other} and --{option} both name {path}. Give two names.")
+
+
+def result_path(output: Path | None, config: Path, overwrite: bool, resume: bool = False) -> Path:
+    """Where the result of `config` goes; see `claim_result`."""
+    path = output or Path(f"{config.stem}.h5")
+    if path.is_file() and config.is_file() and path.samefile(config):
+        from excite_cli.config.load import load_spec  # `excite --help` needs none
+
+        load_spec(config)  # tells that this is no config
+    claim_result(path, overwrite, resume)
+    return path
+
+
+def claim_result(path: Path, overwrite: bool, resume: bool = False) -> None:
+    """Claim the file of a result, which may be gone on with.
+
+    Raises
+    ------
+    ConfigError
+        Both are asked for.
+    FileError
+        It exists already and nothing says to replace or resume it, another run is writing it, or
+        it cannot be written.
+    """
+    if resume and overwrite:
+        raise ConfigError("--resume goes on with the file, --overwrite replaces it: give one.")
+    claim_file(path)
+    if path.exists() and not overwrite and not resume:
+        raise FileError(
+            f"{path} exists already. Give another name with -o, go on with --resume, or replace "
+            "it with --overwrite."
+        )
 
 
 def claim_file(path: Path) -> None:

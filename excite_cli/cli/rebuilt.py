@@ -16,12 +16,12 @@ def rebuilt_problem(file: Path, result: "Result", config: Path | None) -> "Probl
     FileError
         The file holds no motion, its URDF is not found, or the robot is not the one it had.
     """
-    from excite_cli.cli.setup import fit_knowledge
     from excite_cli.config.load import load_spec, parse_spec
     from excite_cli.errors import FileError
     from excite_cli.excitation.problem import build_problem
     from excite_cli.excitation.result import matches
     from excite_cli.robot.description import EXAMPLE_PREFIX
+    from excite_cli.store.fit_knowledge import fit_knowledge
 
     if not result.motions:
         raise FileError(f"{file} holds no motion yet. Go on with `excite optimize --resume`.")

@@ -10,6 +10,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot
+from excite_cli.shown.record import Shown
 from excite_cli.simulation.build import make
 from excite_cli.simulation.controller import (
     Reference,
@@ -46,8 +47,8 @@ class Truth:
         }
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, repr=False)
+class Simulation(Shown):
     """Recorded runs, the truth behind them, and the RMS tracking error (n,) of every run [rad]."""
 
     dataset: Dataset
