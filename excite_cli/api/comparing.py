@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from excite_cli.api.outputs import check_outputs
+from excite_cli.api.outputs import held
 from excite_cli.api.planning import plan
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import FileError
@@ -65,26 +65,26 @@ def compare_random(
     NoAdmissibleMotionError
         No motion was found.
     """
-    check_outputs({"output": output}, overwrite)
-    if optimized is None:
-        result = plan(problem, workers=workers, tell=lambda note: None)
-    else:
-        result = optimized_for(problem, optimized)
-    baseline = random_baseline(
-        problem,
-        len(result.motions),
-        problem.spec.seed,
-        candidates,
-        sum(motion.seconds for motion in result.motions) if seconds is None else seconds,
-        drawn,
-        result.prior_stack,
-        workers,
-    )
-    result = replace(
-        result,
-        random=baseline.motions,
-        random_candidates=(baseline.candidates, baseline.admissible),
-    )
-    if output is not None:
-        write_result(Path(output), result, problem)
-    return Comparison(result, baseline)
+    with held({"output": output}, overwrite):
+        if optimized is None:
+            result = plan(problem, workers=workers, tell=lambda note: None)
+        else:
+            result = optimized_for(problem, optimized)
+        baseline = random_baseline(
+            problem,
+            len(result.motions),
+            problem.spec.seed,
+            candidates,
+            sum(motion.seconds for motion in result.motions) if seconds is None else seconds,
+            drawn,
+            result.prior_stack,
+            workers,
+        )
+        result = replace(
+            result,
+            random=baseline.motions,
+            random_candidates=(baseline.candidates, baseline.admissible),
+        )
+        if output is not None:
+            write_result(Path(output), result, problem)
+        return Comparison(result, baseline)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from excite_cli.api.loading import Case
 from excite_cli.api.motions import Motions, load_motions
-from excite_cli.api.outputs import claim_result
+from excite_cli.api.outputs import held_result
 from excite_cli.api.priors import Prior, load_prior, name_of
 from excite_cli.api.working import tell_idle
 from excite_cli.diagnosis.next_motion import NextMotion
@@ -74,28 +74,27 @@ def plan(
     ['iteration limit', 'iteration limit']
     """
     path = None if output is None else Path(output)
-    if path is not None:
-        claim_result(path, overwrite, resume)
     following = problem if isinstance(problem, NextMotion) else None
     model = problem.model if isinstance(problem, NextMotion) else problem
-    tell_idle(1 if workers is None else workers.count, model.spec.optimizer.restarts, tell)
-    result = _begun(model, following, priors, path if resume else None, tell)
-    segments = load_motions(model, starts, tell=tell)
 
     def store(step: Step, current: Result) -> None:
         if path is not None:
             write_result(path, current, model)
         tell(Note(Level.INFO, motion_sentence(step.motion)))
 
-    return continue_run(
-        following.problem if following else model,
-        result,
-        lambda index: lambda state: progress(index, state),
-        store,
-        following.model if following else None,
-        segments,
-        workers,
-    )
+    with held_result(path, overwrite, resume):
+        tell_idle(1 if workers is None else workers.count, model.spec.optimizer.restarts, tell)
+        result = _begun(model, following, priors, path if resume else None, tell)
+        segments = load_motions(model, starts, tell=tell)
+        return continue_run(
+            following.problem if following else model,
+            result,
+            lambda index: lambda state: progress(index, state),
+            store,
+            following.model if following else None,
+            segments,
+            workers,
+        )
 
 
 def _begun(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, cast
 
-from excite_cli.api.outputs import check_outputs
+from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError
 from excite_cli.proposal.joints import choose_joints
@@ -78,15 +78,15 @@ def save_proposal(
     known = str(robot).startswith(EXAMPLE_PREFIX)
     name = str(robot).removeprefix(EXAMPLE_PREFIX) if known else Path(robot).stem
     path = Path(f"{name}.yaml") if output is None else Path(output)
-    check_outputs({"output": path}, overwrite)
-    folder = path.resolve().parent
-    source = str(robot) if known else _from(Path(robot), folder)
-    load_description(source, relative_to=folder)  # a wrong name is told at once
-    text = f"looking at {name}: capsules and tables of its meshes take longest, once"
-    tell(Note(Level.INFO, text))
-    found = propose(source, folder, joints=joints, base=cast(Base, base))
-    write_text_atomically(path, found.text)
-    return proposal_answer(found, source, str(path))
+    with held({"output": path}, overwrite):
+        folder = path.resolve().parent
+        source = str(robot) if known else _from(Path(robot), folder)
+        load_description(source, relative_to=folder)  # a wrong name is told at once
+        text = f"looking at {name}: capsules and tables of its meshes take longest, once"
+        tell(Note(Level.INFO, text))
+        found = propose(source, folder, joints=joints, base=cast(Base, base))
+        write_text_atomically(path, found.text)
+        return proposal_answer(found, source, str(path))
 
 
 def limbs_of(robot: str) -> dict[str, tuple[str, ...]]:

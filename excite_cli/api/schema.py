@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from excite_cli.api.outputs import check_outputs
+from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
 from excite_cli.config.spec import Spec
 from excite_cli.shown.answer import Answer
@@ -22,7 +22,7 @@ def save_schema(path: str | Path, overwrite: bool = False) -> Answer:
     FileError
         The file exists, or cannot be written.
     """
-    check_outputs({"output": path}, overwrite)
-    write_text_atomically(Path(path), config_schema() + "\n")
+    with held({"output": path}, overwrite):
+        write_text_atomically(Path(path), config_schema() + "\n")
     hint = f"First line of a config: # yaml-language-server: $schema={path}"
     return Answer((str(path), hint), {"output": str(path)})

@@ -7,11 +7,10 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.dataset import Finding
-from excite_cli.shown.record import Shown
 
 
-@dataclass(frozen=True, repr=False)
-class StoredFit(Shown):
+@dataclass(frozen=True)
+class StoredFit:
     """A fit with its errors and what was noticed.
 
     `closed_loop_bias` is a sentence, `torque_units` per joint, `traces` torque over time; files of

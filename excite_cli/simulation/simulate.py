@@ -10,7 +10,6 @@ from excite_cli.effects.base import Effect
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot
-from excite_cli.shown.record import Shown
 from excite_cli.simulation.build import make
 from excite_cli.simulation.controller import (
     Reference,
@@ -47,8 +46,8 @@ class Truth:
         }
 
 
-@dataclass(frozen=True, repr=False)
-class Simulation(Shown):
+@dataclass(frozen=True)
+class Simulation:
     """Recorded runs, the truth behind them, and the RMS tracking error (n,) of every run [rad]."""
 
     dataset: Dataset
