@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.loading import Case, dataset_of
-from excite_cli.api.outputs import check_outputs
+from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.diagnosis.diagnose import diagnose as diagnose_dataset
@@ -48,20 +48,22 @@ def diagnose(
         Config and data do not fit; order or signs of torques cannot be right; data too short; a
         file exists already.
     """
-    check_outputs({"output": output, "apply": apply}, overwrite)
-    dataset = dataset_of(problem, data, tell)
-    found = diagnose_dataset(problem.robot, problem.base, dataset, problem.spec, sealed, progress)
-    found = replace(
-        found,
-        config=spec_as_yaml(problem.spec),
-        config_folder=str(problem.folder),
-        versions=versions(),
-    )
-    if output is not None:
-        write_diagnosis(Path(output), found)
-    if apply is not None:
-        save_config(apply, problem, found)
-    return found
+    with held({"output": output, "apply": apply}, overwrite):
+        dataset = dataset_of(problem, data, tell)
+        found = diagnose_dataset(
+            problem.robot, problem.base, dataset, problem.spec, sealed, progress
+        )
+        found = replace(
+            found,
+            config=spec_as_yaml(problem.spec),
+            config_folder=str(problem.folder),
+            versions=versions(),
+        )
+        if output is not None:
+            write_diagnosis(Path(output), found)
+        if apply is not None:
+            save_config(apply, problem, found)
+        return found
 
 
 def save_config(path: str | Path, problem: Problem | Case, found: Diagnosis) -> None:

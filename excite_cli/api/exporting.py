@@ -1,15 +1,16 @@
 """Motions for controllers, identified models for simulators: `excite export`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from excite_cli.api.entering import Start, durations_of
 from excite_cli.api.exported_chains import ExportedChain, Wanted, chains_of
 from excite_cli.api.models import write_models
-from excite_cli.api.outputs import check_outputs
+from excite_cli.api.outputs import held
 from excite_cli.api.paths import existing
-from excite_cli.claim import claim
+from excite_cli.claim import claim, leave
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.export.motion_exporter import MotionExporter
@@ -107,11 +108,11 @@ def export_file(
     exporter = MOTION_EXPORTERS[format]
     chains = chains_of(path, Wanted(chosen, periods, slow, start), tell)
     paths = _paths(path, target, exporter, [each.name for each in chains])
-    _check_paths(paths, exporter, overwrite)
-    motions = tuple(
-        _written(each, to, exporter, rate, equidistant)
-        for each, to in zip(chains, paths, strict=True)
-    )
+    with _held(paths, exporter, overwrite):
+        motions = tuple(
+            _written(each, to, exporter, rate, equidistant)
+            for each, to in zip(chains, paths, strict=True)
+        )
     if slow is not None:
         text = (
             "a slowed motion needs other torques: judge what was written, `excite check CONFIG "
@@ -170,15 +171,21 @@ def _paths(
     return [base.with_name(f"{base.stem}_{number}{base.suffix}") for number in numbers]
 
 
-def _check_paths(paths: list[Path], exporter: MotionExporter, overwrite: bool) -> None:
+@contextmanager
+def _held(paths: list[Path], exporter: MotionExporter, overwrite: bool) -> Iterator[None]:
+    """As `held`; a folder is replaced only by what is of its kind."""
     if not exporter.folder:
-        check_outputs({f"output ({path})": path for path in paths}, overwrite)
+        with held({f"output ({path})": path for path in paths}, overwrite):
+            yield
         return
-    for path in paths:
-        claim(path)
-        if path.exists() and not (overwrite and is_bag(path)):
-            replace = ", or replace it with --overwrite" if is_bag(path) else ""
-            raise FileError(f"{path} exists already. Give another name{replace}.")
+    with ExitStack() as claims:
+        for path in paths:
+            claim(path)
+            claims.callback(leave, path)
+            if path.exists() and not (overwrite and is_bag(path)):
+                replace = ", or replace it with --overwrite" if is_bag(path) else ""
+                raise FileError(f"{path} exists already. Give another name{replace}.")
+        yield
 
 
 def _export_model(
@@ -186,14 +193,14 @@ def _export_model(
 ) -> Exported:
     """A fit as URDF, MJCF or YAML, as `excite identify` writes them."""
     path = output or Path(f"{file.stem}{MODELS[format]}")
-    check_outputs({"output": path}, overwrite)
-    stored = read_fit(file)
-    spec = parse_spec(stored.config, f"the config stored in {file}")
-    robot = build_robot(spec.robot, Path(stored.config_folder))
-    if robot.fingerprint() != stored.fingerprint:
-        raise FileError(
-            f"{file} was made with another robot than the URDF gives now ({spec.robot.urdf}). "
-            "Identify again."
-        )
-    write_models(robot, stored.fit, {"parameters" if format == "yaml" else format: path}, tell)
+    with held({"output": path}, overwrite):
+        stored = read_fit(file)
+        spec = parse_spec(stored.config, f"the config stored in {file}")
+        robot = build_robot(spec.robot, Path(stored.config_folder))
+        if robot.fingerprint() != stored.fingerprint:
+            raise FileError(
+                f"{file} was made with another robot than the URDF gives now ({spec.robot.urdf}). "
+                "Identify again."
+            )
+        write_models(robot, stored.fit, {"parameters" if format == "yaml" else format: path}, tell)
     return Exported(format, (path,))

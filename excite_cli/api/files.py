@@ -2,17 +2,19 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
+from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.measurement import hdf5_writer
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.store import result_file
+from excite_cli.store import diagnosis_file, fit_file, result_file
 
-if TYPE_CHECKING:  # what fits and diagnoses are made of takes a second to import
-    from excite_cli.diagnosis.records import Diagnosis
-    from excite_cli.identification.stored_fit import StoredFit
+# How records that are read are shown.
+from excite_cli.summary import diagnosis as diagnosis
+from excite_cli.summary import identification as identification
 
 
 def read_result(path: str | Path) -> Result:
@@ -37,7 +39,7 @@ def write_result(path: str | Path, result: Result, problem: Problem) -> None:
     result_file.write_result(Path(path), result, problem)
 
 
-def read_fit(path: str | Path) -> "StoredFit":
+def read_fit(path: str | Path) -> StoredFit:
     """Read a fit file, as `excite identify` and `save_fit` write it.
 
     Raises
@@ -47,12 +49,10 @@ def read_fit(path: str | Path) -> "StoredFit":
     ConfigError
         An effect of it is not in the catalogue.
     """
-    from excite_cli.store import fit_file
-
     return fit_file.read_fit(Path(path))
 
 
-def read_diagnosis(path: str | Path) -> "Diagnosis":
+def read_diagnosis(path: str | Path) -> Diagnosis:
     """Read a diagnosis, as `excite diagnose` writes it.
 
     Raises
@@ -60,12 +60,10 @@ def read_diagnosis(path: str | Path) -> "Diagnosis":
     FileError
         The file is missing, unreadable, not a diagnosis, damaged, or of a newer schema.
     """
-    from excite_cli.store import diagnosis_file
-
     return diagnosis_file.read_diagnosis(Path(path))
 
 
-def write_diagnosis(path: str | Path, found: "Diagnosis") -> None:
+def write_diagnosis(path: str | Path, found: Diagnosis) -> None:
     """Write a diagnosis, for `read_diagnosis`, `plan_after` and `excite report`.
 
     Raises
@@ -73,8 +71,6 @@ def write_diagnosis(path: str | Path, found: "Diagnosis") -> None:
     FileError
         It cannot be written.
     """
-    from excite_cli.store import diagnosis_file
-
     diagnosis_file.write_diagnosis(Path(path), found)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from excite_cli.api.loading import Case, dataset_of, tell_findings
 from excite_cli.api.models import write_models
-from excite_cli.api.outputs import check_outputs
+from excite_cli.api.outputs import held
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.diagnosis.plausibility import check_dataset
 from excite_cli.excitation.problem import Problem
@@ -47,27 +47,25 @@ def identify(
         Config and data do not fit; a run is too short; order or signs of torques cannot be right;
         a file exists already.
     """
-    models = {"urdf": urdf, "mjcf": mjcf, "yaml": parameters}
-    check_outputs(
-        {"output": output, "urdf": urdf, "mjcf": mjcf, "parameters": parameters}, overwrite
-    )
-    dataset = dataset_of(problem, data, tell)
-    check_dataset(problem.robot, dataset, problem.spec)
-    found = identify_dataset(
-        problem.robot,
-        problem.base,
-        dataset,
-        problem.spec,
-        sealed,
-        lambda text: progress(text, 0),
-    )
-    for reason in found.processing.reasons:
-        tell(Note(Level.DETAIL, reason))
-    tell_findings(found.findings[len(dataset.findings) :], tell)
-    if output is not None:
-        save_fit(output, problem, found, dataset.sources)
-    write_models(problem.robot, found.fit, models, tell)
-    return found
+    models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
+    with held({"output": output, **models}, overwrite):
+        dataset = dataset_of(problem, data, tell)
+        check_dataset(problem.robot, dataset, problem.spec)
+        found = identify_dataset(
+            problem.robot,
+            problem.base,
+            dataset,
+            problem.spec,
+            sealed,
+            lambda text: progress(text, 0),
+        )
+        for reason in found.processing.reasons:
+            tell(Note(Level.DETAIL, reason))
+        tell_findings(found.findings[len(dataset.findings) :], tell)
+        if output is not None:
+            save_fit(output, problem, found, dataset.sources)
+        write_models(problem.robot, found.fit, models, tell)
+        return found
 
 
 def save_fit(

@@ -16,6 +16,7 @@ from excite_cli.measurement.quality import raise_for_errors
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.shown.record import Shown
+from excite_cli.store.fit_file import read_fit
 from excite_cli.store.fit_knowledge import fit_knowledge
 from excite_cli.summary.dataset import runs_in_words
 from excite_cli.summary.problem import problem_notes
@@ -99,8 +100,6 @@ def _built(spec: Spec, folder: Path, tell: Tell) -> Problem:
 
 def _doubt_fit(path: Path, tell: Tell) -> None:
     """Warn where a fit leaves much unexplained: its deviations say nothing of that."""
-    from excite_cli.store.fit_file import read_fit  # slow to import
-
     errors = read_fit(path).error.relative_moving
     much = {joint: error for joint, error in errors.items() if error > _MUCH_LEFT}
     if much:

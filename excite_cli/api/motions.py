@@ -11,9 +11,13 @@ from excite_cli.config.spec import Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
+from excite_cli.identification.prepare import prepare
+from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.motion_files import motion_reader_for, read_motion
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.store.diagnosis_file import is_diagnosis
+from excite_cli.store.fit_file import is_fit
 from excite_cli.store.result_file import is_result, read_result
 from excite_cli.trajectory.catalogue import build_trajectory
 from excite_cli.trajectory.chain import Segment
@@ -53,9 +57,6 @@ def load_motions(
     path = Path(motions)
     if is_result(path):
         return _of_result(robot, read_result(path), str(path), chosen)
-    from excite_cli.store.diagnosis_file import is_diagnosis  # slow to import
-    from excite_cli.store.fit_file import is_fit
-
     if path.is_file() and (is_fit(path) or is_diagnosis(path)):
         read_result(path)  # tells that these are no motions
     if chosen and list(chosen) != [1]:
@@ -164,10 +165,6 @@ def _refuse_degrees(path: Path, q: Array, robot: Robot) -> None:
 
 
 def _measured(problem: Problem | Case, path: Path, tell: Tell) -> list[Segment]:
-    # Signal processing takes a second to import.
-    from excite_cli.identification.prepare import prepare
-    from excite_cli.identification.processing import choose_processing
-
     data, spec = load_data(problem, path, tell), problem.spec
     processing = choose_processing(data.runs, spec.measurement.filter, spec.diagnosis.moving_speed)
     text = f"{path}: measured positions, filtered as for identification, taken as motions"

@@ -1,49 +1,57 @@
 """Motions one after the other, each with all earlier data stacked: `excite optimize`."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.loading import Case
-from excite_cli.diagnosis.measured_prior import measured_stack
+from excite_cli.api.motions import Motions, load_motions
+from excite_cli.api.outputs import held_result
+from excite_cli.api.priors import Prior, load_prior, name_of
+from excite_cli.api.working import tell_idle
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
 from excite_cli.diagnosis.records import Diagnosis
-from excite_cli.errors import FileError
-from excite_cli.excitation.motion import Progress
-from excite_cli.excitation.planned_prior import planned_stack
+from excite_cli.excitation.motion import Progress as Progress
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.run import continue_run, new_result
+from excite_cli.excitation.run import continue_run, new_result, resumed_result
 from excite_cli.excitation.sequence import Step
 from excite_cli.excitation.stack import Stack
-from excite_cli.measurement.dataset import Dataset
+from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.fit_knowledge import fit_knowledge
 from excite_cli.store.result_file import read_result, write_result
 from excite_cli.store.versions import versions
-from excite_cli.trajectory.chain import Segment
+from excite_cli.summary.motions import motion_sentence
+from excite_cli.summary.motions import plan_answer as plan_answer
+from excite_cli.summary.problem import problem_notes
 from excite_cli.workers.base import Workers
 
+Planned = Problem | NextMotion
 PlanProgress = Callable[[int, Progress], None]
-Prior = str | Path | Result | Dataset | Segment | Stack
 
 
 def plan(
-    problem: Problem | NextMotion,
+    problem: Planned,
     *,
     priors: Sequence[Prior] = (),
-    starts: Sequence[Segment] = (),
+    starts: Motions = (),
     output: str | Path | None = None,
     overwrite: bool = False,
+    resume: bool = False,
     progress: PlanProgress = lambda motion, progress: None,
     workers: Workers | None = None,
+    tell: Tell = log_note,
 ) -> Result:
     """Motions one after the other, each with all earlier data stacked: `excite optimize`.
 
     Their number is `sequence.motions` of the config. With a `NextMotion` (see `plan_after`) the
     measured data of the diagnosis come first. `priors` are earlier results (or their files),
     measured data, or motions; the search of motion k starts from the k-th of `starts`. With
-    `output` the result is on disk after every motion. `progress(k, state)` is called by the solver.
-    `workers` (`open_workers`) share the starts of a motion, with the same result.
+    `output` the result is on disk after every motion, and `resume` goes on with it.
+    `progress(k, state)` is called by the solver. `workers` (`open_workers`) share the starts of a
+    motion, with the same result.
 
     Returns
     -------
@@ -56,61 +64,84 @@ def plan(
     NoAdmissibleMotionError
         There is none, or none was found; the message names what stands in the way.
     FileError
-        A prior does not fit, or `output` exists.
+        A prior or a start does not fit, or `output` exists.
 
     Examples
     --------
+    >>> from excite_cli import load_problem, plan
     >>> problem = load_problem("configs/smoke.yaml", ["optimizer.max_iterations=20"])
     >>> [motion.status for motion in plan(problem).motions]
     ['iteration limit', 'iteration limit']
     """
-    path = Path(output) if output is not None else None
-    if path is not None and path.exists() and not overwrite:
-        raise FileError(f"{path} exists already. Give another name, or overwrite=True.")
+    path = None if output is None else Path(output)
     following = problem if isinstance(problem, NextMotion) else None
-    model = following.model if following else problem
-    assert isinstance(model, Problem)
-    stacks: list[tuple[str, Result | Stack]] = []
-    if following is not None:
-        stacks.append(("the diagnosis", following.prior))
-    stacks += [_stack_of(model, prior, k) for k, prior in enumerate(priors, start=1)]
+    model = problem.model if isinstance(problem, NextMotion) else problem
 
     def store(step: Step, current: Result) -> None:
         if path is not None:
             write_result(path, current, model)
+        tell(Note(Level.INFO, motion_sentence(step.motion)))
 
-    return continue_run(
-        following.problem if following else model,
-        new_result(model, stacks, versions(), model.folder),
-        lambda index: lambda state: progress(index, state),
-        store,
-        following.model if following else None,
-        starts,
-        workers,
-    )
-
-
-def _stack_of(problem: Problem, prior: Prior, number: int) -> tuple[str, Result | Stack]:
-    if isinstance(prior, str | Path):
-        return str(prior), read_result(Path(prior))
-    name = f"prior {number}"
-    if isinstance(prior, Dataset):
-        return name, measured_stack(problem, prior)[0]
-    if isinstance(prior, Segment):
-        return name, planned_stack(problem, prior)[0]
-    return name, prior
+    with held_result(path, overwrite, resume):
+        tell_idle(1 if workers is None else workers.count, model.spec.optimizer.restarts, tell)
+        result = _begun(model, following, priors, path if resume else None, tell)
+        segments = load_motions(model, starts, tell=tell)
+        return continue_run(
+            following.problem if following else model,
+            result,
+            lambda index: lambda state: progress(index, state),
+            store,
+            following.model if following else None,
+            segments,
+            workers,
+        )
 
 
-def plan_after(problem: Problem | Case, found: Diagnosis) -> NextMotion:
+def _begun(
+    model: Problem,
+    following: NextMotion | None,
+    priors: Sequence[Prior],
+    stored: Path | None,
+    tell: Tell,
+) -> Result:
+    """The result to go on with: that of the file `stored` if there is one, else what is earlier."""
+    names = [name_of(prior, number) for number, prior in enumerate(priors, start=1)]
+    earlier = [following.name, *names] if following else names
+    if stored is not None and stored.exists():
+        found = resumed_result(model, read_result(stored), stored, [Path(n) for n in earlier])
+        tell(Note(Level.INFO, f"resuming after motion {len(found.motions)} of {stored}"))
+        return found
+    stacks: list[tuple[str, Result | Stack]] = []
+    if following is not None:
+        stacks.append((following.name, following.prior))
+    for name, prior in zip(names, priors, strict=True):
+        stacks.append((name, load_prior(model, prior, name, tell)))
+    return new_result(model, stacks, versions(), model.folder)
+
+
+def plan_after(
+    problem: Problem | Case, found: Diagnosis | str | Path, tell: Tell = log_note
+) -> NextMotion:
     """The problem of the next motion after a diagnosis, for `plan`: `excite optimize --after`.
 
-    It separates effects that could not be told apart; if there are none, it excites the model with
-    all effects found. `messages` of what is returned say which, and why.
+    `found` is the diagnosis, or its file. The next motion separates effects that could not be told
+    apart; if there are none, it excites the model with all effects found. `messages` of what is
+    returned say which, and why.
 
     Raises
     ------
     FileError
-        The diagnosis belongs to another robot.
+        The file cannot be read; the diagnosis belongs to another robot.
     """
     spec, folder = problem.spec, problem.folder
-    return after_diagnosis(found, spec, folder, fit_knowledge(spec, folder))
+    if isinstance(found, Diagnosis):
+        following = after_diagnosis(found, spec, folder, fit_knowledge(spec, folder))
+    else:
+        read = read_diagnosis(Path(found))
+        following = after_diagnosis(read, spec, folder, fit_knowledge(spec, folder))
+        following = replace(following, name=str(found))
+    for note in problem_notes(following.model):
+        tell(note)
+    for message in following.messages:
+        tell(Note(Level.INFO, message))
+    return following

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from excite_cli.api.outputs import claim_file
+from excite_cli.api.outputs import held
 from excite_cli.api.report_files import Told
 from excite_cli.atomic import write_atomically
 from excite_cli.errors import FileError
@@ -41,19 +41,22 @@ def write_figures(
             figures |= _figures(each.content, problems[each.path], prefix)
     if not figures:
         raise FileError("--figures draws motions, and no result file was given. Leave it out.")
-    paths = _paths(target, kind, list(figures), overwrite)
+    paths = _paths(target, kind, list(figures))
 
     def drawn() -> Iterator[Any]:
         for done, (name, draw) in enumerate(figures.items()):
             progress(name, done, len(figures))
             yield draw()
 
-    if _is_single(target):
-        write_atomically(target, lambda temporary: save_pages(drawn(), temporary))
-    else:
-        for path, figure in zip(paths, drawn(), strict=True):
-            suffix = path.suffix.removeprefix(".")
-            write_atomically(path, partial(save_figure, figure, kind=suffix))
+    with held({str(path): path for path in paths}, overwrite=True):
+        if not overwrite:
+            _refuse_present(paths)
+        if _is_single(target):
+            write_atomically(target, lambda temporary: save_pages(drawn(), temporary))
+        else:
+            for path, figure in zip(paths, drawn(), strict=True):
+                suffix = path.suffix.removeprefix(".")
+                write_atomically(path, partial(save_figure, figure, kind=suffix))
     return tuple(paths)
 
 
@@ -62,14 +65,13 @@ def _is_single(target: Path) -> bool:
     return target.suffix.lower() == ".pdf" and not target.is_dir()
 
 
-def _paths(target: Path, kind: str | None, names: list[str], overwrite: bool) -> list[Path]:
+def _paths(target: Path, kind: str | None, names: list[str]) -> list[Path]:
     """The files that will be written.
 
     Raises
     ------
     FileError
-        One exists and nothing says to replace it, another run is writing it, or `target` does not
-        suit the format.
+        `target` does not suit the format.
     """
     if target.suffix.lower() in (".png", ".svg") and not target.is_dir():
         raise FileError(
@@ -87,15 +89,16 @@ def _paths(target: Path, kind: str | None, names: list[str], overwrite: bool) ->
         )
     else:
         paths = [target / f"{name}.{kind or 'png'}" for name in names]
-    for path in paths:
-        claim_file(path)
+    return paths
+
+
+def _refuse_present(paths: list[Path]) -> None:
     present = [path for path in paths if path.exists()]
-    if present and not overwrite:
+    if present:
         raise FileError(
             f"{present[0]} exists already. Give another place with --figures, or replace it with "
             "--overwrite."
         )
-    return paths
 
 
 def _figures(result: Result, problem: Problem, prefix: str = "") -> dict[str, Callable[[], Any]]:

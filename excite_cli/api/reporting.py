@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from excite_cli.api.motions import motions_of
-from excite_cli.api.outputs import check_outputs
+from excite_cli.api.outputs import held
 from excite_cli.api.rebuilt import rebuilt_problem
 from excite_cli.api.report_figures import write_figures
 from excite_cli.api.report_files import Told, read_files
@@ -76,19 +76,21 @@ def write_report(
     page = Path(output) if output is not None else None
     if page is None and figures is None:
         page = Path(f"{paths[0].stem}-report.html")
-    if page is not None:
-        _check_page(page, overwrite)
-    told = read_files(paths)
-    problems = {
-        each.path: rebuilt_problem(each.content, config, str(each.path))
-        for each in told
-        if isinstance(each.content, Result)
-    }
-    drawn: tuple[Path, ...] = ()
-    if figures is not None:
-        drawn = write_figures(told, problems, (Path(figures), format, overwrite), progress)
-    if page is not None:
-        write_text_atomically(page, _page_text(told, problems, picture, progress, tell))
+    if page is not None and page.suffix.lower() not in (".html", ".htm") and not page.is_dir():
+        hint = " Figures and PDF are written by --figures."
+        raise FileError(f"-o {page}: a report is a page, NAME.html.{hint}")
+    with held({"output": page}, overwrite):
+        told = read_files(paths)
+        problems = {
+            each.path: rebuilt_problem(each.content, config, str(each.path))
+            for each in told
+            if isinstance(each.content, Result)
+        }
+        drawn: tuple[Path, ...] = ()
+        if figures is not None:
+            drawn = write_figures(told, problems, (Path(figures), format, overwrite), progress)
+        if page is not None:
+            write_text_atomically(page, _page_text(told, problems, picture, progress, tell))
     return Report(page, drawn)
 
 
@@ -98,20 +100,6 @@ def report_answer(found: Report) -> Answer:
     page = None if found.page is None else str(found.page)
     parts = figures if page is None else (page, *figures)
     return Answer(parts, {"output": page, "figures": list(figures)})
-
-
-def _check_page(page: Path, overwrite: bool) -> None:
-    """See that the page can be written.
-
-    Raises
-    ------
-    FileError
-        It exists and nothing says to replace it, or its name is that of another format.
-    """
-    if page.suffix.lower() not in (".html", ".htm") and not page.is_dir():
-        hint = " Figures and PDF are written by --figures."
-        raise FileError(f"-o {page}: a report is a page, NAME.html.{hint}")
-    check_outputs({"output": page}, overwrite)
 
 
 def _page_text(

@@ -8,7 +8,7 @@ from pathlib import Path
 from excite_cli.api.entering import Start, entered, start_posture
 from excite_cli.api.loading import Case, problem_of
 from excite_cli.api.motions import Motions, load_motions
-from excite_cli.api.outputs import check_outputs
+from excite_cli.api.outputs import held
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.effects.catalogue import declared_effects
@@ -67,26 +67,26 @@ def simulate(
     NoAdmissibleMotionError
         No admissible way from `start` into a motion was found.
     """
-    check_outputs({"output": output}, overwrite)
-    load_mujoco()
-    segments = load_motions(problem, motions, chosen, tell)
-    planned, settings = _planned(problem, segments, settings, start, tell)
-    names = [name for takes in run_names(planned, settings.repeat) for name in takes]
-    planted = [each for text in effects for each in parse_planted(text, problem.robot, names)]
-    own = declared_effects(problem.spec.effects, problem.robot) if declared else ()
-    if output is not None:
-        _warn_of_conversion(problem.spec.measurement, tell)
-    found = simulate_motions(
-        problem.robot,
-        planned,
-        settings,
-        planted,
-        own,
-        lambda run, done: progress(run, done, len(names)),
-    )
-    if output is not None:
-        write_dataset(Path(output), found.dataset, _attributes(problem, found, settings))
-    return found
+    with held({"output": output}, overwrite):
+        load_mujoco()
+        segments = load_motions(problem, motions, chosen, tell)
+        planned, settings = _planned(problem, segments, settings, start, tell)
+        names = [name for takes in run_names(planned, settings.repeat) for name in takes]
+        planted = [each for text in effects for each in parse_planted(text, problem.robot, names)]
+        own = declared_effects(problem.spec.effects, problem.robot) if declared else ()
+        if output is not None:
+            _warn_of_conversion(problem.spec.measurement, tell)
+        found = simulate_motions(
+            problem.robot,
+            planned,
+            settings,
+            planted,
+            own,
+            lambda run, done: progress(run, done, len(names)),
+        )
+        if output is not None:
+            write_dataset(Path(output), found.dataset, _attributes(problem, found, settings))
+        return found
 
 
 def _planned(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from excite_cli.api.loading import load_problem
 from excite_cli.api.motions import Motions, load_motions, motions_of
-from excite_cli.api.outputs import check_outputs
+from excite_cli.api.outputs import held
 from excite_cli.api.paths import existing
 from excite_cli.api.rebuilt import rebuilt_problem
 from excite_cli.atomic import write_atomically
@@ -119,30 +119,55 @@ def draw_motion(
     suffix = path.suffix.lower()
     if suffix not in (".png", ".gif"):
         raise FileError(f"{path}: give a name that ends in .png or .gif.")
-    check_outputs({"output": path}, overwrite)
-    problem, segments = _on_their_robot(motions, config, overrides, chosen, tell)
-    segment = segments[0]
-    duration = segment.trajectory.duration
-    if time is not None and time > duration:
-        raise ConfigError(f"--time {time:g}: {segment.name} ends at {duration:g} s.")
-    if suffix == ".png":
-        content = still_png(problem, segment, look, time, saying(tell))
-        drawn = Drawing(path, segment.name, len(content))
-    else:
-        length = seconds or min(_SECONDS, duration)
-        count = frame_count(fps, length)
-        content = motion_gif(
+    with held({"output": path}, overwrite):
+        problem, segments = _on_their_robot(motions, config, overrides, chosen, tell)
+        segment = segments[0]
+        duration = segment.trajectory.duration
+        if time is not None and time > duration:
+            raise ConfigError(f"--time {time:g}: {segment.name} ends at {duration:g} s.")
+        film = None if suffix == ".png" else _Film(fps, seconds or min(_SECONDS, duration))
+        if film is None:
+            content = still_png(problem, segment, look, time, saying(tell))
+        else:
+            content = film.drawn(problem, segment, look, progress, tell)
+        write_atomically(path, lambda temporary: _fill(temporary, content))
+    return Drawing(
+        path,
+        segment.name,
+        len(content),
+        None if film is None else film.frames,
+        None if film is None else film.seconds,
+    )
+
+
+@dataclass(frozen=True)
+class _Film:
+    """The length [s] of a GIF, and its frames per second."""
+
+    fps: float
+    seconds: float
+
+    @property
+    def frames(self) -> int:
+        return frame_count(self.fps, self.seconds)
+
+    def drawn(
+        self,
+        problem: Problem,
+        segment: Segment,
+        look: View | None,
+        progress: Callable[[str, int, int], None],
+        tell: Tell,
+    ) -> bytes:
+        return motion_gif(
             problem,
             segment,
             look or View(size=_GIF_SIZE),
-            fps,
-            length,
-            lambda text, done: progress(text, done, count),
+            self.fps,
+            self.seconds,
+            lambda text, done: progress(text, done, self.frames),
             saying(tell),
         )
-        drawn = Drawing(path, segment.name, len(content), count, length)
-    write_atomically(path, lambda temporary: _fill(temporary, content))
-    return drawn
 
 
 def drawing_answer(found: Drawing) -> Answer:

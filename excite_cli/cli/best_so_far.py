@@ -1,6 +1,9 @@
 """The figure of a progress line: where the solver is, and its best within all limits so far."""
 
-from excite_cli.excitation.motion import Progress
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from excite_cli.api.planning import Progress
 
 _CONDITION = "cond "
 
@@ -11,7 +14,7 @@ class Best:
     def __init__(self) -> None:
         self._best = float("inf")
 
-    def words(self, progress: Progress) -> str:
+    def words(self, progress: "Progress") -> str:
         """`condition number 5.48 (best 5.31)`; another figure is told as it is."""
         if not progress.figure.startswith(_CONDITION):
             return progress.figure

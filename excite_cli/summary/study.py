@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
-from excite_cli.cli.layout import table as new_table
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.table import Table
 from excite_cli.study.records import TABLE, CaseRecord, row_of
 
 # Shares that are told in per cent; and columns that are words.
@@ -22,19 +21,20 @@ def study_table(records: Sequence[CaseRecord]) -> Table:
     names = list(dict.fromkeys(name for row in rows for name in row))
     names.sort(key=lambda name: name == "error")  # the last column
     words = [name for name in names if name in ("case", "effects", "error")]
-    table = new_table(
-        "Cases", [name.replace("_", " ") for name in names],
+    return Table(
+        "Cases",
+        tuple(name.replace("_", " ") for name in names),
+        tuple(tuple(row.get(name, "") for name in names) for row in rows),
         left=tuple(n.replace("_", " ") for n in names if n in _WORDS and n not in words),
         words=tuple(words),
-    )  # fmt: skip
-    for row in rows:
-        table.add_row(*(row.get(name, "") for name in names))
-    return table
+    )
 
 
-def answer_of(records: Sequence[CaseRecord], folder: Path) -> dict[str, Any]:
-    """The answer for `--json`."""
-    return {
+def study_answer(records: Sequence[CaseRecord], folder: Path) -> Answer:
+    """What `excite study` answers."""
+    failed = sum(record.failed for record in records)
+    words = f"{len(records)} cases" + (f", {failed} failed" if failed else "")
+    data = {
         "cases": [
             {
                 "name": record.name,
@@ -48,10 +48,12 @@ def answer_of(records: Sequence[CaseRecord], folder: Path) -> dict[str, Any]:
             }
             for record in records
         ],
-        "failed": sum(record.failed for record in records),
+        "failed": failed,
         "table": str(folder / TABLE),
         "output": str(folder),
     }
+    parts = (study_table(records), f"{words}; {folder / TABLE}")
+    return Answer(parts, data, good=not failed)
 
 
 def _shown(record: CaseRecord) -> dict[str, str]:

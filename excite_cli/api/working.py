@@ -1,13 +1,13 @@
-"""From --workers and --scheduler to workers; what is worth saying about them."""
+"""Workers, and what is worth saying about them."""
 
 import os
 
-from excite_cli.cli.console import Terminal
+from excite_cli.shown.note import Level, Note, Tell, saying
 from excite_cli.workers.base import Workers
 from excite_cli.workers.catalogue import open_workers
 
 
-def working(terminal: Terminal, workers: int, scheduler: str | None, threads: int = 1) -> Workers:
+def working(workers: int, scheduler: str | None, threads: int, tell: Tell) -> Workers:
     """Workers as asked for, to be closed.
 
     Raises
@@ -15,23 +15,25 @@ def working(terminal: Terminal, workers: int, scheduler: str | None, threads: in
     ConfigError, ClusterError, MissingExtraError
         See `open_workers`.
     """
-    place = open_workers(workers, scheduler, threads, terminal.say)
+    place = open_workers(workers, scheduler, threads, saying(tell))
     there = _processors()
     if scheduler is not None:
-        terminal.say(f"{scheduler}: {place.count} tasks at once")
+        tell(Note(Level.INFO, f"{scheduler}: {place.count} tasks at once"))
     elif workers > there:
-        terminal.say(
-            f"warning: {workers} workers share {there} processors, so {there} would be as fast; "
+        text = (
+            f"{workers} workers share {there} processors, so {there} would be as fast; "
             "with more of them, starts may end at optimizer.max_seconds"
         )
+        tell(Note(Level.WARNING, text))
     return place
 
 
-def tell_idle(terminal: Terminal, workers: int, starts: int) -> None:
+def tell_idle(workers: int, starts: int, tell: Tell) -> None:
     """A hint where a motion has fewer starts than there are workers."""
     if workers > starts:
         busy = "one start: one worker has" if starts == 1 else f"{starts} starts: {starts} have"
-        terminal.say(f"hint: {busy} something to do, of {workers} workers; see --starts")
+        text = f"{busy} something to do, of {workers} workers; see --starts"
+        tell(Note(Level.HINT, text))
 
 
 def _processors() -> int:
