@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from excite_cli.api.checking import check as check
     from excite_cli.api.diagnosing import diagnose as diagnose
     from excite_cli.api.diagnosing import save_config as save_config
+    from excite_cli.api.exporting import Exported as Exported
+    from excite_cli.api.exporting import export_file as export_file
     from excite_cli.api.files import read_diagnosis as read_diagnosis
     from excite_cli.api.files import read_fit as read_fit
     from excite_cli.api.files import read_result as read_result
@@ -28,7 +30,14 @@ if TYPE_CHECKING:
     from excite_cli.api.planning import plan as plan
     from excite_cli.api.planning import plan_after as plan_after
     from excite_cli.api.proposing import propose as propose
+    from excite_cli.api.reporting import Report as Report
+    from excite_cli.api.reporting import write_report as write_report
     from excite_cli.api.simulating import simulate as simulate
+    from excite_cli.api.viewing import Drawing as Drawing
+    from excite_cli.api.viewing import Serving as Serving
+    from excite_cli.api.viewing import View as View
+    from excite_cli.api.viewing import draw_motion as draw_motion
+    from excite_cli.api.viewing import view_motions as view_motions
     from excite_cli.config.spec import Spec as Spec
     from excite_cli.diagnosis.next_motion import NextMotion as NextMotion
     from excite_cli.diagnosis.records import Diagnosis as Diagnosis
@@ -60,6 +69,10 @@ _HOMES = {
         "diagnose",
         "save_config",
     ),
+    "api.exporting": (
+        "Exported",
+        "export_file",
+    ),
     "api.files": (
         "read_diagnosis",
         "read_fit",
@@ -87,7 +100,18 @@ _HOMES = {
         "plan_after",
     ),
     "api.proposing": ("propose",),
+    "api.reporting": (
+        "Report",
+        "write_report",
+    ),
     "api.simulating": ("simulate",),
+    "api.viewing": (
+        "Drawing",
+        "Serving",
+        "View",
+        "draw_motion",
+        "view_motions",
+    ),
     "config.spec": ("Spec",),
     "diagnosis.next_motion": ("NextMotion",),
     "diagnosis.records": ("Diagnosis",),

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from excite_cli.cli.report_files import Told, in_order
+from excite_cli.api.report_files import Told, in_order
 
 
 class Result:

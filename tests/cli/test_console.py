@@ -6,6 +6,7 @@ import sys
 import pytest
 import typer.main
 
+from excite_cli.api.exporting import MODELS
 from excite_cli.cli.app import app
 from excite_cli.cli.best_so_far import Best
 from excite_cli.cli.completion import (
@@ -17,7 +18,6 @@ from excite_cli.cli.completion import (
     complete_robot,
 )
 from excite_cli.cli.console import BUG, Terminal, run_guarded
-from excite_cli.cli.export import _MODELS
 from excite_cli.cli.layout import table
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Progress
@@ -96,7 +96,7 @@ def test_a_refusal_of_the_file_system_is_no_bug(capsys: pytest.CaptureFixture[st
 def test_completion_knows_robots_formats_kinds_and_keys() -> None:
     assert complete_format("r") == ["ros2", "rosbag2"]
     assert set(MOTION_FORMATS) == set(MOTION_EXPORTERS)
-    assert set(MODEL_FORMATS) == set(_MODELS)
+    assert set(MODEL_FORMATS) == set(MODELS)
     assert "ur10" in complete_robot("ur")
     assert complete_effect("spr") == ["spring@"]
     assert complete_key("optimizer.max_it") == ["optimizer.max_iterations="]

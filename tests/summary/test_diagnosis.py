@@ -1,17 +1,14 @@
 """What people and scripts see of a diagnosis: names apart from approximations."""
 
 from dataclasses import replace
-from io import StringIO
 
 import pytest
-from rich.console import Console
 
-from excite_cli.cli.diagnose_tables import answer_of, tables_of
 from excite_cli.diagnosis.records import Diagnosis
-from excite_cli.robot.model import build_robot
-from tests.diagnosis.synthetic_diagnosis import CONFIG, make_diagnosis, smoke_spec
+from excite_cli.shown.table import Table
+from excite_cli.summary.diagnosis import diagnosis_answer
+from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 
-NEXT = {"purpose": "excite", "command": "excite optimize", "pairs": []}
 REASON = "a function of v[elbow]"
 
 
@@ -27,7 +24,7 @@ def doubted() -> Diagnosis:
 
 
 def test_an_approximation_is_no_name_for_scripts(doubted: Diagnosis) -> None:
-    answer = answer_of(doubted, NEXT)
+    answer = diagnosis_answer(doubted, "arm.yaml", {}).data
     assert answer["effects"] == []
     (told,) = answer["approximations"]
     assert (told["kind"], told["stands_for"]) == ("viscous_friction", REASON)
@@ -42,11 +39,14 @@ def test_an_approximation_has_a_table_of_its_own(doubted: Diagnosis) -> None:
 
 
 def printed(found: Diagnosis) -> str:
-    robot = build_robot(smoke_spec().robot, CONFIG.parent)
-    console = Console(width=200, record=True, file=StringIO(), markup=False)
-    for part in tables_of(found, robot, NEXT, verbose=False):
-        console.print(part)
-    return console.export_text()
+    """Titles, columns and cells, a line each row, without a terminal."""
+    lines: list[str] = []
+    for part in diagnosis_answer(found, "arm.yaml", {}).parts:
+        if isinstance(part, Table):
+            lines += [part.title, " ".join(part.columns), *(" ".join(row) for row in part.rows)]
+        else:
+            lines.append(part)
+    return "\n".join(lines)
 
 
 def test_the_noise_floor_stands_beside_the_errors(doubted: Diagnosis) -> None:
@@ -59,9 +59,9 @@ def test_the_noise_floor_stands_beside_the_errors(doubted: Diagnosis) -> None:
     rows = text.partition("Error of the torque")[2].splitlines()
     unknown = next(line for line in rows if line.startswith(doubted.joint_names[-1]))
     assert unknown.split()[-1] == "-"
-    assert answer_of(found, NEXT)["noise_floor"] == floor
+    assert diagnosis_answer(found, "arm.yaml", {}).data["noise_floor"] == floor
 
 
 def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -> None:
     assert "noise" not in printed(doubted)
-    assert answer_of(doubted, NEXT)["noise_floor"] is None
+    assert diagnosis_answer(doubted, "arm.yaml", {}).data["noise_floor"] is None
