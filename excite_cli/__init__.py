@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from excite_cli.api.checking import check as check
+    from excite_cli.api.comparing import compare_random as compare_random
     from excite_cli.api.diagnosing import diagnose as diagnose
     from excite_cli.api.diagnosing import save_config as save_config
     from excite_cli.api.files import read_diagnosis as read_diagnosis
@@ -28,7 +29,11 @@ if TYPE_CHECKING:
     from excite_cli.api.planning import plan as plan
     from excite_cli.api.planning import plan_after as plan_after
     from excite_cli.api.proposing import propose as propose
+    from excite_cli.api.proposing import save_proposal as save_proposal
+    from excite_cli.api.robots import describe_robot as describe_robot
     from excite_cli.api.simulating import simulate as simulate
+    from excite_cli.api.studying import run_study as run_study
+    from excite_cli.api.verifying import verify_gradient as verify_gradient
     from excite_cli.config.spec import Spec as Spec
     from excite_cli.diagnosis.next_motion import NextMotion as NextMotion
     from excite_cli.diagnosis.records import Diagnosis as Diagnosis
@@ -37,6 +42,7 @@ if TYPE_CHECKING:
     from excite_cli.errors import FileError as FileError
     from excite_cli.errors import NoAdmissibleMotionError as NoAdmissibleMotionError
     from excite_cli.errors import RobotError as RobotError
+    from excite_cli.excitation.comparison import Comparison as Comparison
     from excite_cli.excitation.inspection import Inspection as Inspection
     from excite_cli.excitation.inspections import Inspections as Inspections
     from excite_cli.excitation.problem import Problem as Problem
@@ -56,10 +62,8 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "api.checking": ("check",),
-    "api.diagnosing": (
-        "diagnose",
-        "save_config",
-    ),
+    "api.comparing": ("compare_random",),
+    "api.diagnosing": ("diagnose", "save_config"),
     "api.files": (
         "read_diagnosis",
         "read_fit",
@@ -68,36 +72,20 @@ _HOMES = {
         "write_diagnosis",
         "write_result",
     ),
-    "api.identifying": (
-        "identify",
-        "save_fit",
-    ),
-    "api.loading": (
-        "Case",
-        "load_case",
-        "load_data",
-        "load_problem",
-    ),
-    "api.motions": (
-        "load_motions",
-        "motions_of",
-    ),
-    "api.planning": (
-        "plan",
-        "plan_after",
-    ),
-    "api.proposing": ("propose",),
+    "api.identifying": ("identify", "save_fit"),
+    "api.loading": ("Case", "load_case", "load_data", "load_problem"),
+    "api.motions": ("load_motions", "motions_of"),
+    "api.planning": ("plan", "plan_after"),
+    "api.proposing": ("propose", "save_proposal"),
+    "api.robots": ("describe_robot",),
     "api.simulating": ("simulate",),
+    "api.studying": ("run_study",),
+    "api.verifying": ("verify_gradient",),
     "config.spec": ("Spec",),
     "diagnosis.next_motion": ("NextMotion",),
     "diagnosis.records": ("Diagnosis",),
-    "errors": (
-        "ConfigError",
-        "ExciteError",
-        "FileError",
-        "NoAdmissibleMotionError",
-        "RobotError",
-    ),
+    "errors": ("ConfigError", "ExciteError", "FileError", "NoAdmissibleMotionError", "RobotError"),
+    "excitation.comparison": ("Comparison",),
     "excitation.inspection": ("Inspection",),
     "excitation.inspections": ("Inspections",),
     "excitation.problem": ("Problem",),
@@ -105,10 +93,7 @@ _HOMES = {
     "identification.identify": ("Identification",),
     "measurement.dataset": ("Dataset",),
     "proposal.propose": ("Proposal",),
-    "shown.note": (
-        "Level",
-        "Note",
-    ),
+    "shown.note": ("Level", "Note"),
     "simulation.settings": ("SimulationSettings",),
     "simulation.simulate": ("Simulation",),
     "trajectory.chain": ("Segment",),
