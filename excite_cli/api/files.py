@@ -12,6 +12,10 @@ from excite_cli.measurement import hdf5_writer
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.store import diagnosis_file, fit_file, result_file
 
+# How records that are read are shown.
+from excite_cli.summary import diagnosis as diagnosis
+from excite_cli.summary import identification as identification
+
 
 def read_result(path: str | Path) -> Result:
     """Read a result file, as `excite optimize` writes it.

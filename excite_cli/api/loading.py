@@ -8,6 +8,7 @@ from pathlib import Path
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Finding
@@ -18,6 +19,7 @@ from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.shown.record import Shown, show
 from excite_cli.store.fit_file import read_fit
 from excite_cli.store.fit_knowledge import fit_knowledge
+from excite_cli.summary.dataset import runs_in_words
 from excite_cli.summary.problem import problem_notes
 from excite_cli.summary.robots import robot_parts
 
@@ -88,6 +90,15 @@ def load_problem(
     45
     """
     spec, folder = load_spec(Path(config), list(overrides)), Path(config).resolve().parent
+    return _built(spec, folder, tell)
+
+
+def problem_of(case: Problem | Case, tell: Tell = log_note) -> Problem:
+    """The whole problem of a case, for what needs its constraints; see `load_problem`."""
+    return case if isinstance(case, Problem) else _built(case.spec, case.folder, tell)
+
+
+def _built(spec: Spec, folder: Path, tell: Tell) -> Problem:
     problem = build_problem(spec, folder, fit_knowledge(spec, folder))
     for note in problem_notes(problem):
         tell(note)
@@ -137,10 +148,30 @@ def load_data(
         (~robot.sliding).astype(float),
     )
     raise_for_errors(data)
-    runs = "1 run" if len(data.runs) == 1 else f"{len(data.runs)} runs"
-    seconds = sum(run.duration for run in data.runs)
-    tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs}, {seconds:.3g} s"))
+    tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs_in_words(data)}"))
     tell_findings(data.findings, tell)
+    return data
+
+
+def dataset_of(
+    problem: Problem | Case,
+    data: Dataset | str | Path | Sequence[str | Path],
+    tell: Tell = log_note,
+) -> Dataset:
+    """Measured data of the robot: those at hand, or as `load_data` reads them.
+
+    Raises
+    ------
+    FileError, ConfigError, MissingExtraError
+        The data are of other joints; see `load_data`.
+    """
+    if not isinstance(data, Dataset):
+        return load_data(problem, data, tell)
+    if data.joint_names != problem.robot.joint_names:
+        raise FileError(
+            f"the data are of other joints ({', '.join(data.joint_names)}) than the config "
+            f"({', '.join(problem.robot.joint_names)}). Read them with `load_data` and this config."
+        )
     return data
 
 

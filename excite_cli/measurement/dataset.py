@@ -10,6 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.shown.record import Shown
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Severity = Literal["note", "warning", "error"]
@@ -75,8 +77,8 @@ class Run:
         )
 
 
-@dataclass(frozen=True)
-class Dataset:
+@dataclass(frozen=True, repr=False)
+class Dataset(Shown):
     """Runs of one robot; columns are in the order of `joint_names`."""
 
     joint_names: tuple[str, ...]

@@ -1,67 +1,63 @@
 """Figures of motions as files: PNG, SVG or PDF in a folder, or the pages of one PDF."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from excite_cli.cli.console import Terminal
+from excite_cli.api.outputs import held
+from excite_cli.api.report_files import Told
+from excite_cli.atomic import write_atomically
+from excite_cli.errors import FileError
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.result import Result
+from excite_cli.report.condition_figure import draw_condition_numbers, draw_spectrum
+from excite_cli.report.motion_figure import draw_margins, draw_motion, watched_constraints
+from excite_cli.report.style import save_figure, save_pages
 
-if TYPE_CHECKING:
-    from excite_cli.cli.report_files import Told
-    from excite_cli.excitation.problem import Problem
-    from excite_cli.excitation.result import Result
-
-
-class Format(StrEnum):
-    """What a figure is written as."""
-
-    png = "png"
-    svg = "svg"
-    pdf = "pdf"
+Progress = Callable[[str, int, int], None]
 
 
 def write_figures(
-    terminal: Terminal,
-    told: "Sequence[Told]",
-    problems: "Mapping[Path, Problem]",
-    asked: tuple[Path, Format | None, bool],
-) -> list[str]:
+    told: Sequence[Told],
+    problems: Mapping[Path, Problem],
+    asked: tuple[Path, str | None, bool],
+    progress: Progress,
+) -> tuple[Path, ...]:
     """Write the figures of all result files to a folder or a PDF; returns the paths.
+
+    `asked`: where, the format (default: png), and whether files are replaced.
 
     Raises
     ------
     FileError
         There is no result file, the place does not suit the format, or something is there already.
     """
-    from excite_cli.atomic import write_atomically
-    from excite_cli.errors import FileError
-    from excite_cli.report.style import save_figure, save_pages
-
     target, kind, overwrite = asked
     figures: dict[str, Callable[[], Any]] = {}
     for each in told:
-        if each.path in problems:
+        if isinstance(each.content, Result):
             prefix = f"{each.path.stem}_" if len(problems) > 1 else ""
-            figures |= _figures(each.content, problems[each.path], prefix)  # type: ignore[arg-type]
+            figures |= _figures(each.content, problems[each.path], prefix)
     if not figures:
         raise FileError("--figures draws motions, and no result file was given. Leave it out.")
-    paths = _paths(target, kind, list(figures), overwrite)
-    with terminal.live("drawing", len(figures)) as show:
+    paths = _paths(target, kind, list(figures))
 
-        def drawn() -> Iterator[Any]:
-            for done, (name, draw) in enumerate(figures.items()):
-                show(name, done)
-                yield draw()
+    def drawn() -> Iterator[Any]:
+        for done, (name, draw) in enumerate(figures.items()):
+            progress(name, done, len(figures))
+            yield draw()
 
+    with held({str(path): path for path in paths}, overwrite=True):
+        if not overwrite:
+            _refuse_present(paths)
         if _is_single(target):
             write_atomically(target, lambda temporary: save_pages(drawn(), temporary))
         else:
             for path, figure in zip(paths, drawn(), strict=True):
                 suffix = path.suffix.removeprefix(".")
                 write_atomically(path, partial(save_figure, figure, kind=suffix))
-    return [str(path) for path in paths]
+    return tuple(paths)
 
 
 def _is_single(target: Path) -> bool:
@@ -69,18 +65,14 @@ def _is_single(target: Path) -> bool:
     return target.suffix.lower() == ".pdf" and not target.is_dir()
 
 
-def _paths(target: Path, kind: Format | None, names: list[str], overwrite: bool) -> list[Path]:
+def _paths(target: Path, kind: str | None, names: list[str]) -> list[Path]:
     """The files that will be written.
 
     Raises
     ------
     FileError
-        One exists and nothing says to replace it, another run is writing it, or `target` does not
-        suit the format.
+        `target` does not suit the format.
     """
-    from excite_cli.api.outputs import claim_file
-    from excite_cli.errors import FileError
-
     if target.suffix.lower() in (".png", ".svg") and not target.is_dir():
         raise FileError(
             f"--figures {target}: there are {len(names)} figures and {target.suffix} holds one. "
@@ -88,7 +80,7 @@ def _paths(target: Path, kind: Format | None, names: list[str], overwrite: bool)
             ".pdf."
         )
     if _is_single(target):
-        if kind not in (None, Format.pdf):
+        if kind not in (None, "pdf"):
             raise FileError(f"--figures {target} asks for a PDF and --format for {kind}. Drop one.")
         paths = [target]
     elif target.exists() and not target.is_dir():
@@ -96,25 +88,21 @@ def _paths(target: Path, kind: Format | None, names: list[str], overwrite: bool)
             f"--figures {target} is a file. Give a folder, or a name that ends in .pdf."
         )
     else:
-        paths = [target / f"{name}.{kind or Format.png}" for name in names]
-    for path in paths:
-        claim_file(path)
+        paths = [target / f"{name}.{kind or 'png'}" for name in names]
+    return paths
+
+
+def _refuse_present(paths: list[Path]) -> None:
     present = [path for path in paths if path.exists()]
-    if present and not overwrite:
+    if present:
         raise FileError(
             f"{present[0]} exists already. Give another place with --figures, or replace it with "
             "--overwrite."
         )
-    return paths
 
 
-def _figures(
-    result: "Result", problem: "Problem", prefix: str = ""
-) -> dict[str, Callable[[], Any]]:
+def _figures(result: Result, problem: Problem, prefix: str = "") -> dict[str, Callable[[], Any]]:
     """What draws each figure, by its name, in reading order."""
-    from excite_cli.report.condition_figure import draw_condition_numbers, draw_spectrum
-    from excite_cli.report.motion_figure import draw_margins, draw_motion, watched_constraints
-
     figures: dict[str, Callable[[], Any]] = {
         f"{prefix}condition_numbers": partial(draw_condition_numbers, result),
         f"{prefix}spectrum": partial(draw_spectrum, result, problem),

@@ -1,12 +1,11 @@
 """A diagnosis for people (tables and sentences) and for scripts (JSON)."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
-from excite_cli.cli.layout import table as new_table
-from excite_cli.cli.noise_floor_words import floor_cells, floor_columns
+from excite_cli.diagnosis.next_motion import next_experiment
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Round
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
@@ -17,17 +16,35 @@ from excite_cli.diagnosis.words import (
     value_in_words,
 )
 from excite_cli.identification.fit_words import above_the_floor
-from excite_cli.robot.model import Robot
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.noise_floor import floor_cells, floor_columns
 
 
-def tables_of(
-    found: Diagnosis, robot: Robot, experiment: dict[str, Any], verbose: bool
-) -> list[Table | str]:
-    """What is missing, absorbed or unexplained, before and after, what to do next.
+def diagnosis_answer(
+    found: Diagnosis,
+    config: str,
+    written: Mapping[str, str | Path | None],
+    verbose: bool = False,
+) -> Answer:
+    """What `excite diagnose` answers; `written` are the files that were asked for, by kind.
 
     With `verbose` also how the data were processed, every round's suspects, and small effects.
     """
-    parts: list[Table | str] = []
+    files = {kind: str(path) for kind, path in written.items() if path is not None}
+    experiment = next_experiment(found, config, files.get("diagnosis", "DIAGNOSIS.h5"))
+    parts = diagnosis_parts(found, verbose)
+    if not verbose:
+        rounds = counted(len(found.rounds), "round")
+        parts.append(f"({rounds} of tests; --verbose shows the suspects of each, and why not.)")
+    parts.append(_next(experiment))
+    return Answer(tuple(parts), {**_data(found, experiment), "output": files})
+
+
+def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
+    """What is missing, absorbed or unexplained, before and after."""
+    parts: Parts = []
     if verbose:
         parts.append(_data_in_words(found))
         parts += [_round_table(found, each) for each in found.rounds]
@@ -38,14 +55,10 @@ def tables_of(
     if not found.effects:
         parts.append("Nothing is missing: no effect of the catalogue passes.")
     parts += _absorbed(found) + _unexplained(found)
-    parts.append(_error_table(found, robot, verbose))
+    parts.append(_error_table(found, verbose))
     above = above_the_floor(found.after, found.noise_floor)
     parts += [above] if above else []
     parts.append(_verdict(found))
-    if not verbose:
-        rounds = counted(len(found.rounds), "round")
-        parts.append(f"({rounds} of tests; --verbose shows the suspects of each, and why not.)")
-    parts.append(_next(experiment))
     return parts
 
 
@@ -63,25 +76,27 @@ def _data_in_words(found: Diagnosis) -> str:
 
 def _round_table(found: Diagnosis, each: Round) -> Table:
     worst = max(each.residual, key=lambda joint: each.residual[joint])
-    table = new_table(
-        f"Round {each.index}: residual up to {each.residual[worst]:.3g} ({worst}); {each.verdict}",
-        ("suspect", "where", "p", "share", "gain", "verdict"),
-        words=("suspect", "where", "verdict"),
-    )
-    for suspect in each.suspects:
-        table.add_row(
+    rows = tuple(
+        (
             suspect.effect.kind,
             place_in_words(suspect.effect, len(found.joint_names)),
             p_in_words(suspect.p_value),
             f"{suspect.share_of_residual:.1%}",
             f"{suspect.gain:.1%}",
             suspect.verdict,
-            style="bold" if suspect.verdict == "accepted" else None,
         )
-    return table
+        for suspect in each.suspects
+    )
+    return Table(
+        f"Round {each.index}: residual up to {each.residual[worst]:.3g} ({worst}); {each.verdict}",
+        ("suspect", "where", "p", "share", "gain", "verdict"),
+        rows,
+        words=("suspect", "where", "verdict"),
+        bold=tuple(k for k, each in enumerate(each.suspects) if each.verdict == "accepted"),
+    )
 
 
-def _effects(found: Diagnosis, verbose: bool) -> list[Table | str]:
+def _effects(found: Diagnosis, verbose: bool) -> Parts:
     """The named effects, small ones in one line, and what each cannot be told from."""
     everything = len(found.joint_names)
     ranked = sorted(found.named, key=lambda each: -each.share_of_residual)
@@ -89,22 +104,24 @@ def _effects(found: Diagnosis, verbose: bool) -> list[Table | str]:
     if verbose or len(small) < 2:  # a line about one is no shorter than the one
         small = []
     shown = [each for each in ranked if not any(each is other for other in small)]
-    names = ("effect", "where", "size", *(["p"] if verbose else []), "share")
-    table = new_table(
-        "What the declared model lacks (share: of the residual)",
-        names,
-        left=("effect",),
-        words=("where", "size"),
-    )
-    for named in shown:
-        table.add_row(
+    rows = tuple(
+        (
             named.effect.kind,
             place_in_words(named.effect, everything),
             "\n".join(value_in_words(name, value) for name, value in named.parameters.items()),
             *([p_in_words(named.p_value)] if verbose else []),
             f"{named.share_of_residual:.2%}",
         )
-    parts: list[Table | str] = [table]
+        for named in shown
+    )
+    table = Table(
+        "What the declared model lacks (share: of the residual)",
+        ("effect", "where", "size", *(["p"] if verbose else []), "share"),
+        rows,
+        left=("effect",),
+        words=("where", "size"),
+    )
+    parts: Parts = [table]
     if small:
         listed = ", ".join(_what(each.effect, everything) for each in small)
         parts.append(
@@ -123,39 +140,47 @@ def _what(record: EffectRecord, everything: int) -> str:
 
 
 def _approximation_table(found: Diagnosis) -> Table:
-    table = new_table(
-        "Approximations: they lower the error, but something else is there",
-        ("effect", "where", "size", "share", "stands for"),
-        left=("effect",),
-        words=("where", "size", "stands for"),
-    )
-    for each in found.approximations:
-        table.add_row(
+    rows = tuple(
+        (
             each.effect.kind,
             place_in_words(each.effect, len(found.joint_names)),
             "\n".join(value_in_words(name, value) for name, value in each.parameters.items()),
             f"{each.share_of_residual:.2%}",
             each.approximates,
         )
-    return table
+        for each in found.approximations
+    )
+    return Table(
+        "Approximations: they lower the error, but something else is there",
+        ("effect", "where", "size", "share", "stands for"),
+        rows,
+        left=("effect",),
+        words=("where", "size", "stands for"),
+    )
 
 
-def _absorbed(found: Diagnosis) -> list[Table | str]:
+def _absorbed(found: Diagnosis) -> Parts:
     if not found.absorbed:
         return []
-    table = new_table(
+    rows = tuple(
+        (
+            each.kind,
+            ", ".join(each.joints) if len(each.joints) < 3 else "all joints",
+            ", ".join(each.by),
+        )
+        for each in found.absorbed
+    )
+    table = Table(
         "Not testable: these would show as other values of parameters",
         ("effect", "where", "absorbed by"),
+        rows,
         left=("effect", "where"),
         words=("absorbed by",),
     )
-    for each in found.absorbed:
-        where = ", ".join(each.joints) if len(each.joints) < 3 else "all joints"
-        table.add_row(each.kind, where, ", ".join(each.by))
     return [table]
 
 
-def _unexplained(found: Diagnosis) -> list[Table | str]:
+def _unexplained(found: Diagnosis) -> Parts:
     return [
         f"Unexplained: the residual of {each.joint} still depends on "
         f"{', '.join(each.depends_on)} ({each.share_of_residual:.1%} of it); no effect of the "
@@ -164,35 +189,38 @@ def _unexplained(found: Diagnosis) -> list[Table | str]:
     ]
 
 
-def _error_table(found: Diagnosis, robot: Robot, verbose: bool) -> Table:
+def _error_table(found: Diagnosis, verbose: bool) -> Table:
     """Errors where the joints move; with `verbose` over all samples, too."""
-    more = ("all, before", "all, after") if verbose else ()
-    names = ("joint", "before", "after", *more, "RMS before", "RMS after", "unit",
-             *floor_columns(found.noise_floor))  # fmt: skip
-    table = new_table(
-        f"Error of the torque on data never used ({found.sealed_run}), where joints move",
-        names,
-        left=("joint", "unit"),
-    )
     errors = (found.before, found.after)
-    for joint, sliding in zip(robot.joint_names, robot.sliding, strict=True):
-        table.add_row(
+    # Files of earlier versions do not say whether joints slide.
+    units = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
+    rows = [
+        (
             joint,
             *(f"{error.relative_moving[joint]:.2%}" for error in errors),
             *(f"{error.relative[joint]:.2%}" for error in errors if verbose),
             *(f"{error.rms[joint]:.4g}" for error in errors),
-            "N" if sliding else "N·m",
+            unit,
             *floor_cells(found.noise_floor, joint),
         )
-    table.add_section()
-    table.add_row(
+        for joint, unit in zip(found.joint_names, units, strict=True)
+    ]
+    more = ("all, before", "all, after") if verbose else ()
+    floor = floor_columns(found.noise_floor)
+    mean = (
         "mean",
         *(f"{error.mean_relative_moving:.2%}" for error in errors),
         *(f"{error.mean_relative:.2%}" for error in errors if verbose),
-        *[""] * (len(names) - 3 - len(more)),
-        style="bold",
+        *[""] * (3 + len(floor)),
     )
-    return table
+    return Table(
+        f"Error of the torque on data never used ({found.sealed_run}), where joints move",
+        ("joint", "before", "after", *more, "RMS before", "RMS after", "unit", *floor),
+        (*rows, mean),
+        left=("joint", "unit"),
+        bold=(len(rows),),
+        parted=(len(rows),),
+    )
 
 
 def _verdict(found: Diagnosis) -> str:
@@ -240,7 +268,7 @@ def _named(named: NamedEffect, runs: list[str]) -> dict[str, Any]:
     }
 
 
-def answer_of(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
+def _data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
     """The answer for `--json`."""
     runs = [str(name) for name in found.processing.get("runs", [])]
     return {
@@ -266,3 +294,14 @@ def answer_of(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
         "rounds": [asdict(each) for each in found.rounds],
         "seconds": found.seconds,
     }
+
+
+def _in_words(found: Diagnosis) -> str:
+    """What was found, and the errors before and after."""
+    everything = len(found.joint_names)
+    effects = ", ".join(_what(each.effect, everything) for each in found.named)
+    before, after = found.before.mean_relative_moving, found.after.mean_relative_moving
+    return f"{effects or 'nothing is missing'}; mean error {before:.2%} → {after:.2%}"
+
+
+show(Diagnosis, _in_words, diagnosis_parts)

@@ -1,12 +1,9 @@
 """What `excite identify` found, as tables and as data."""
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
-from excite_cli.cli.layout import table as new_table
-from excite_cli.cli.noise_floor_words import floor_cells, floor_columns
-from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.fit_words import (
     above_the_floor,
@@ -16,10 +13,22 @@ from excite_cli.identification.fit_words import (
     short_number,
 )
 from excite_cli.identification.identify import Identification
-from excite_cli.robot.model import Robot
+from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.noise_floor import floor_cells, floor_columns
 
 
-def tables_of(found: Identification, robot: Robot) -> list[Table | str]:
+def identification_answer(
+    found: Identification, written: Mapping[str, str | Path | None]
+) -> Answer:
+    """What `excite identify` answers; `written` are the files that were asked for, by kind."""
+    files = {kind: str(path) for kind, path in written.items() if path is not None}
+    return Answer(tuple(identification_parts(found)), {**_data(found), "output": files})
+
+
+def identification_parts(found: Identification) -> Parts:
     """Parameters, errors per joint, and sentences."""
     low, high = found.error.interval
     fit = found.fit
@@ -34,47 +43,51 @@ def tables_of(found: Identification, robot: Robot) -> list[Table | str]:
     above = above_the_floor(found.error, found.noise_floor)
     return [
         _parameter_table(fit),
-        error_table(found.error, found.training_error, robot, found.noise_floor),
+        _error_table(found),
         *([above] if above else []),
         *sentences,
     ]
 
 
 def _parameter_table(fit: Fit) -> Table:
-    names = ("parameter", "value", "std", "relative", "unit", "fixed by the data")
-    table = new_table("Parameters", names, left=("parameter", "unit", "fixed by the data"))
-    for i, name in enumerate(fit.names):
-        row = (
+    rows = tuple(
+        (
+            name,
             short_number(fit.values[i], 5),
             short_number(fit.std[i], 3),
             relative_in_words(fit.relative_std[i]),
+            fit.units[i],
+            fixed_by_data(fit, i),
         )
-        table.add_row(name, *row, fit.units[i], fixed_by_data(fit, i))
-    return table
+        for i, name in enumerate(fit.names)
+    )
+    names = ("parameter", "value", "std", "relative", "unit", "fixed by the data")
+    return Table("Parameters", names, rows, left=("parameter", "unit", "fixed by the data"))
 
 
-def error_table(
-    error: Errors, training: Errors, robot: Robot, floor: dict[str, float] | None = None
-) -> Table:
+def _error_table(found: Identification | StoredFit) -> Table:
     """Errors per joint on the sealed part, and the training part's and the noise floor beside."""
-    title = "Error of the torque on sealed data (raw: as recorded; training: where it was fitted)"
-    names = ("joint", "moving", "all", "RMS", *floor_columns(floor), "raw RMS", "unit", "training")
-    table = new_table(title, names, left=("joint", "unit"))
-    for joint, sliding in zip(robot.joint_names, robot.sliding, strict=True):
-        table.add_row(
+    error, floor, joints = found.error, found.noise_floor, found.fit.joint_names
+    units = found.torque_units or ("",) * len(joints)
+    rows = tuple(
+        (
             joint,
             f"{error.relative_moving[joint]:.2%}",
             f"{error.relative[joint]:.2%}",
             f"{error.rms[joint]:.4g}",
             *floor_cells(floor, joint),
             f"{error.rms_raw[joint]:.4g}",
-            "N" if sliding else "N·m",
-            f"{training.relative[joint]:.2%}",
+            unit,
+            f"{found.training_error.relative[joint]:.2%}",
         )
-    return table
+        for joint, unit in zip(joints, units, strict=True)
+    )
+    title = "Error of the torque on sealed data (raw: as recorded; training: where it was fitted)"
+    names = ("joint", "moving", "all", "RMS", *floor_columns(floor), "raw RMS", "unit", "training")
+    return Table(title, names, rows, left=("joint", "unit"))
 
 
-def answer_of(found: Identification) -> dict[str, Any]:
+def _data(found: Identification) -> dict[str, Any]:
     """The answer for `--json`."""
     fit = found.fit
     return {
@@ -132,3 +145,31 @@ def answer_of(found: Identification) -> dict[str, Any]:
         ],
         "processing": found.processing.as_data(),
     }
+
+
+def _fit_in_words(fit: Fit) -> str:
+    """`28 parameters (24 fixed by the data) of 5 joints; coulomb_friction@elbow`."""
+    known = int(sum(fit.identifiable))
+    effects = ", ".join(
+        f"{effect.kind}@{','.join(fit.joint_names[j] for j in effect.joints)}"
+        for effect in fit.effects
+    )
+    words = (
+        f"{len(fit.names)} parameters ({known} fixed by the data) of {len(fit.joint_names)} joints"
+    )
+    return words + (f"; {effects}" if effects else "")
+
+
+def _in_words(found: Identification | StoredFit) -> str:
+    """The fit, and its error on data that it did not see."""
+    error = f"mean relative error {found.error.mean_relative:.2%} on {found.sealed_run}"
+    return f"{_fit_in_words(found.fit)}; {error}"
+
+
+def _stored_parts(found: StoredFit) -> Parts:
+    return [_parameter_table(found.fit), _error_table(found)]
+
+
+show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)])
+show(Identification, _in_words, identification_parts)
+show(StoredFit, _in_words, _stored_parts)

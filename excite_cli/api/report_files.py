@@ -3,14 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import FileError
-
-if TYPE_CHECKING:
-    from excite_cli.diagnosis.records import Diagnosis
-    from excite_cli.excitation.result import Result
-    from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.excitation.result import Result
+from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
+from excite_cli.store.fit_file import is_fit, read_fit
+from excite_cli.store.own_file import PROGRAM
+from excite_cli.store.result_file import read_result
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class Told:
 
     path: Path
     name: str
-    content: "Result | StoredFit | Diagnosis"
+    content: Result | StoredFit | Diagnosis
 
     @property
     def earlier(self) -> frozenset[str]:
@@ -53,12 +54,7 @@ def read_files(paths: Sequence[Path]) -> tuple[Told, ...]:
     return in_order(found)
 
 
-def _read(path: Path) -> "Result | StoredFit | Diagnosis":
-    from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
-    from excite_cli.store.fit_file import is_fit, read_fit
-    from excite_cli.store.own_file import PROGRAM
-    from excite_cli.store.result_file import read_result
-
+def _read(path: Path) -> Result | StoredFit | Diagnosis:
     if path.is_dir():
         raise FileError(f"{path} is a folder. Give files: result, fit or diagnosis (.h5).")
     if is_fit(path):
