@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
 from excite_cli.cli.report_files import Told, in_order
 
 

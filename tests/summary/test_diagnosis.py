@@ -4,9 +4,9 @@ from dataclasses import replace
 from io import StringIO
 
 import pytest
+from excite_cli.cli.diagnose_tables import answer_of, tables_of
 from rich.console import Console
 
-from excite_cli.cli.diagnose_tables import answer_of, tables_of
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.robot.model import build_robot
 from tests.diagnosis.synthetic_diagnosis import CONFIG, make_diagnosis, smoke_spec
