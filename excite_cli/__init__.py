@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from excite_cli.api.checking import check as check
+    from excite_cli.api.comparing import compare_random as compare_random
     from excite_cli.api.diagnosing import diagnose as diagnose
     from excite_cli.api.diagnosing import save_config as save_config
     from excite_cli.api.exporting import Exported as Exported
@@ -30,9 +31,13 @@ if TYPE_CHECKING:
     from excite_cli.api.planning import plan as plan
     from excite_cli.api.planning import plan_after as plan_after
     from excite_cli.api.proposing import propose as propose
+    from excite_cli.api.proposing import save_proposal as save_proposal
     from excite_cli.api.reporting import Report as Report
     from excite_cli.api.reporting import write_report as write_report
+    from excite_cli.api.robots import describe_robot as describe_robot
     from excite_cli.api.simulating import simulate as simulate
+    from excite_cli.api.studying import run_study as run_study
+    from excite_cli.api.verifying import verify_gradient as verify_gradient
     from excite_cli.api.viewing import Drawing as Drawing
     from excite_cli.api.viewing import Serving as Serving
     from excite_cli.api.viewing import View as View
@@ -46,6 +51,7 @@ if TYPE_CHECKING:
     from excite_cli.errors import FileError as FileError
     from excite_cli.errors import NoAdmissibleMotionError as NoAdmissibleMotionError
     from excite_cli.errors import RobotError as RobotError
+    from excite_cli.excitation.comparison import Comparison as Comparison
     from excite_cli.excitation.inspection import Inspection as Inspection
     from excite_cli.excitation.inspections import Inspections as Inspections
     from excite_cli.excitation.problem import Problem as Problem
@@ -65,14 +71,9 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "api.checking": ("check",),
-    "api.diagnosing": (
-        "diagnose",
-        "save_config",
-    ),
-    "api.exporting": (
-        "Exported",
-        "export_file",
-    ),
+    "api.comparing": ("compare_random",),
+    "api.diagnosing": ("diagnose", "save_config"),
+    "api.exporting": ("Exported", "export_file"),
     "api.files": (
         "read_diagnosis",
         "read_fit",
@@ -81,47 +82,22 @@ _HOMES = {
         "write_diagnosis",
         "write_result",
     ),
-    "api.identifying": (
-        "identify",
-        "save_fit",
-    ),
-    "api.loading": (
-        "Case",
-        "load_case",
-        "load_data",
-        "load_problem",
-    ),
-    "api.motions": (
-        "load_motions",
-        "motions_of",
-    ),
-    "api.planning": (
-        "plan",
-        "plan_after",
-    ),
-    "api.proposing": ("propose",),
-    "api.reporting": (
-        "Report",
-        "write_report",
-    ),
+    "api.identifying": ("identify", "save_fit"),
+    "api.loading": ("Case", "load_case", "load_data", "load_problem"),
+    "api.motions": ("load_motions", "motions_of"),
+    "api.planning": ("plan", "plan_after"),
+    "api.proposing": ("propose", "save_proposal"),
+    "api.reporting": ("Report", "write_report"),
+    "api.robots": ("describe_robot",),
     "api.simulating": ("simulate",),
-    "api.viewing": (
-        "Drawing",
-        "Serving",
-        "View",
-        "draw_motion",
-        "view_motions",
-    ),
+    "api.studying": ("run_study",),
+    "api.verifying": ("verify_gradient",),
+    "api.viewing": ("Drawing", "Serving", "View", "draw_motion", "view_motions"),
     "config.spec": ("Spec",),
     "diagnosis.next_motion": ("NextMotion",),
     "diagnosis.records": ("Diagnosis",),
-    "errors": (
-        "ConfigError",
-        "ExciteError",
-        "FileError",
-        "NoAdmissibleMotionError",
-        "RobotError",
-    ),
+    "errors": ("ConfigError", "ExciteError", "FileError", "NoAdmissibleMotionError", "RobotError"),
+    "excitation.comparison": ("Comparison",),
     "excitation.inspection": ("Inspection",),
     "excitation.inspections": ("Inspections",),
     "excitation.problem": ("Problem",),
@@ -129,10 +105,7 @@ _HOMES = {
     "identification.identify": ("Identification",),
     "measurement.dataset": ("Dataset",),
     "proposal.propose": ("Proposal",),
-    "shown.note": (
-        "Level",
-        "Note",
-    ),
+    "shown.note": ("Level", "Note"),
     "simulation.settings": ("SimulationSettings",),
     "simulation.simulate": ("Simulation",),
     "trajectory.chain": ("Segment",),

@@ -49,6 +49,7 @@ def test_every_public_name_is_there_and_documented() -> None:
     for name in excite_cli.__all__:
         found = getattr(excite_cli, name)
         assert name == "__version__" or found.__doc__, name
+        assert not (ROOT / "excite_cli" / name).exists(), f"{name} is a room, which would hide it"
     assert set(excite_cli.__all__) <= set(dir(excite_cli))
 
 

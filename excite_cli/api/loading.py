@@ -13,13 +13,15 @@ from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.quality import raise_for_errors
+from excite_cli.robot.described import describe
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
-from excite_cli.shown.record import Shown
+from excite_cli.shown.record import Shown, show
 from excite_cli.store.fit_file import read_fit
 from excite_cli.store.fit_knowledge import fit_knowledge
 from excite_cli.summary.dataset import runs_in_words
 from excite_cli.summary.problem import problem_notes
+from excite_cli.summary.robots import robot_parts
 
 # Share of a joint's torque on sealed data from which a fit is doubted.
 _MUCH_LEFT = 0.1
@@ -42,6 +44,13 @@ class Case(Shown):
     def base(self) -> BaseParameters:
         """Base parameters of the robot."""
         return find_base_parameters(self.robot)
+
+
+show(
+    Case,
+    lambda case: f"{case.robot.name}: {case.robot.n} joints",
+    lambda case: robot_parts(describe(case.robot)),
+)
 
 
 def load_case(config: str | Path, overrides: Sequence[str] = ()) -> Case:

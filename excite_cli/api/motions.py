@@ -1,6 +1,6 @@
 """Motions of any origin: results, formats of controllers, measured data, trajectories at hand."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.identification.prepare import prepare
 from excite_cli.identification.processing import choose_processing
+from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.motion_files import motion_reader_for, read_motion
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
@@ -23,7 +24,7 @@ from excite_cli.trajectory.catalogue import build_trajectory
 from excite_cli.trajectory.chain import Segment
 from excite_cli.trajectory.sampled import through_samples
 
-Motions = Result | Segment | Sequence[Segment] | str | Path
+Motions = Result | Segment | Sequence[Segment] | Dataset | str | Path
 
 # Share of the position limits from which positions are taken for another unit.
 _FAR_BEYOND = 4.0
@@ -37,9 +38,9 @@ def load_motions(
 ) -> list[Segment]:
     """Motions of the problem's robot, joints in its order; `chosen` of a result's by their index.
 
-    `motions` are a result, trajectories with their coefficients, or a file: a result, a format of a
-    controller (CSV, .npz, ROS 2, MoveIt, rosbag2), or measured data, whose runs are taken, filtered
-    as for identification.
+    `motions` are a result, trajectories with their coefficients, measured data, whose runs are
+    taken, filtered as for identification, or a file: of these, or in a format of a controller (CSV,
+    .npz, ROS 2, MoveIt, rosbag2).
 
     Raises
     ------
@@ -52,8 +53,10 @@ def load_motions(
         return _of_result(robot, motions, "the result", chosen)
     if isinstance(motions, Segment):
         return [_fitting(robot, motions)]
+    if isinstance(motions, Dataset):
+        return _measured(problem, motions)
     if not isinstance(motions, str | Path):
-        return [_fitting(robot, each) for each in motions]
+        return [_fitting(robot, each) for each in _listed(motions)]
     path = Path(motions)
     if is_result(path):
         return _of_result(robot, read_result(path), str(path), chosen)
@@ -63,7 +66,10 @@ def load_motions(
         raise FileError(f"--motion {chosen[0]}: {path} is no result file; it holds one motion.")
     if is_motion(path, problem.spec):
         return [_motion(path, robot, tell)]
-    return _measured(problem, path, tell)
+    data = load_data(problem, path, tell)
+    text = f"{path}: measured positions, filtered as for identification, taken as motions"
+    tell(Note(Level.INFO, text))
+    return _measured(problem, data)
 
 
 def motions_of(
@@ -120,7 +126,13 @@ def _of_result(robot: Robot, result: Result, name: str, chosen: Sequence[int]) -
     return motions_of(result, chosen, name)
 
 
-def _fitting(robot: Robot, motion: Segment) -> Segment:
+def _listed(motions: object) -> list[object]:
+    if isinstance(motions, Iterable):
+        return list(motions)
+    return [motions]
+
+
+def _fitting(robot: Robot, motion: object) -> Segment:
     """The motion, once its coefficients are those of its trajectory and of the robot's joints."""
     if not isinstance(motion, Segment):
         raise FileError(
@@ -164,10 +176,8 @@ def _refuse_degrees(path: Path, q: Array, robot: Robot) -> None:
         )
 
 
-def _measured(problem: Problem | Case, path: Path, tell: Tell) -> list[Segment]:
-    data, spec = load_data(problem, path, tell), problem.spec
+def _measured(problem: Problem | Case, data: Dataset) -> list[Segment]:
+    spec = problem.spec
     processing = choose_processing(data.runs, spec.measurement.filter, spec.diagnosis.moving_speed)
-    text = f"{path}: measured positions, filtered as for identification, taken as motions"
-    tell(Note(Level.INFO, text))
     runs = [prepare(run, processing) for run in data.runs]
     return [Segment(run.name, *through_samples(run.t, run.q, run.v, run.a)) for run in runs]

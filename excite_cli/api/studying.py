@@ -22,13 +22,13 @@ from excite_cli.study.case import (
 from excite_cli.study.plan import planned_cases
 from excite_cli.study.records import CaseRecord
 from excite_cli.study.study import StudyNews as StudyNews
-from excite_cli.study.study import run_study
+from excite_cli.study.study import run_study as run_cases
 from excite_cli.study.vary import parse_vary
 from excite_cli.summary.study import study_answer as study_answer
 from excite_cli.workers.base import Tell, Workers
 
 
-def study(
+def run_study(
     config: str | Path,
     logs: Sequence[str | Path] = (),
     vary: Sequence[str] = (),
@@ -60,7 +60,7 @@ def study(
     task = StudyTask(Path(config).resolve(), tuple(overrides), diagnosed)
     cases = planned_cases(task, [Path(log) for log in logs], [parse_vary(text) for text in vary])
     folder = study_folder(config, output)
-    return run_study(task, cases, folder, do_case, workers, resume, progress, overwrite)
+    return run_cases(task, cases, folder, do_case, workers, resume, progress, overwrite)
 
 
 def study_folder(config: str | Path, output: str | Path | None) -> Path:

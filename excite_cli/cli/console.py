@@ -28,12 +28,13 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.segment import Segment
-from rich.table import Column, Table
+from rich.table import Column
 from rich.text import Text
 
 from excite_cli import __version__
 from excite_cli.api.outputs import leave_claims
-from excite_cli.api.showing import Answer, Level, Note
+from excite_cli.api.showing import Answer, Level, Note, Table
+from excite_cli.cli.layout import rendered
 from excite_cli.cli.stopping import stopped
 from excite_cli.errors import REFUSALS, ExciteError, refusal
 
@@ -81,20 +82,15 @@ class Terminal:
             self.say(note.sentence)
 
     def show(self, answer: Answer) -> None:
-        """The answer; with exit status 1 where it is bad."""
-        from excite_cli.cli.layout import rendered
-
-        parts = [part if isinstance(part, str) else rendered(part) for part in answer.parts]
-        self.answer(parts, answer.data)
+        """The answer, as JSON or as tables and sentences; exit status 1 where it is bad."""
+        if self.as_json:
+            print(json.dumps(_finite(answer.data), ensure_ascii=False))
+        else:
+            self._print(answer.parts)
         if not answer.good:
             raise typer.Exit(1)
 
-    def answer(self, table: Table | str | Sequence[Table | str], data: dict[str, Any]) -> None:
-        """The answer: JSON, or tables and sentences."""
-        if self.as_json:
-            print(json.dumps(_finite(data), ensure_ascii=False))
-            return
-        parts = [table] if isinstance(table, Table | str) else list(table)
+    def _print(self, parts: Sequence[Table | str]) -> None:
         with (out := self.out).capture() as printed:
             for before, part in zip([None, *parts], parts, strict=False):
                 if before is not None and not (isinstance(before, str) and isinstance(part, str)):
@@ -171,11 +167,9 @@ class _Remaining(TimeRemainingColumn):
 def _print(out: Console, part: Table | str) -> None:
     """A sentence, or a table whose title may be wider than its columns."""
     if isinstance(part, Table):
-        title, part.title = part.title, None
-        if title:
-            out.print(title, style="bold", soft_wrap=out.width >= _WHOLE_ROWS)
-        out.print(part)
-        part.title = title
+        if part.title:
+            out.print(part.title, style="bold", soft_wrap=out.width >= _WHOLE_ROWS)
+        out.print(rendered(part))
     else:
         out.print(part, soft_wrap=out.width >= _WHOLE_ROWS)
 

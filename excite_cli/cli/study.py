@@ -65,8 +65,7 @@ def study(
       excite study ur10.yaml measured.h5 --identify-only -o logs \\
         --vary identification.method=ols,wls
     """
-    from excite_cli.api.studying import StudyNews, study_answer, study_folder
-    from excite_cli.api.studying import study as run_study
+    from excite_cli.api.studying import StudyNews, run_study, study_answer, study_folder
     from excite_cli.api.threads import single_threaded
     from excite_cli.api.working import working
 

@@ -103,6 +103,7 @@ def view(
 
     Example:  excite view ur10.h5 --motion 2 --gif ur10.gif --duration 6
     """
+    from excite_cli.api.showing import Answer
     from excite_cli.api.threads import single_threaded
     from excite_cli.api.viewing import Serving, View, draw_motion, drawing_answer, view_motions
 
@@ -114,7 +115,8 @@ def view(
         if target is None:
 
             def ready(url: str, port: int) -> None:
-                terminal.answer(f"{url}   (Ctrl-C ends it)", {"url": url, "port": port})
+                words = f"{url}   (Ctrl-C ends it)"
+                terminal.show(Answer((words,), {"url": url, "port": port}))
                 sys.stdout.flush()
 
             view_motions(

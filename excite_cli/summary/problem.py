@@ -12,6 +12,8 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.collision_pairs import ALWAYS, UNGUARDED, CollisionPairs
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs
 from excite_cli.shown.note import Level, Note
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
 
 
 def problem_notes(problem: Problem) -> Iterator[Note]:
@@ -45,6 +47,18 @@ def problem_notes(problem: Problem) -> Iterator[Note]:
         yield _detail(f"payload: {robot.payload.in_words}, part of the predicted torque")
     for name, words in zip(_symbols(problem), problem.base.in_words(), strict=True):
         yield _detail(f"  base parameter {name}: {words}")
+
+
+def problem_parts(problem: Problem) -> Parts:
+    """What was understood, and the base parameters in words."""
+    names = ("base parameter", "in words")
+    rows = tuple(zip(_symbols(problem), problem.base.in_words(), strict=True))
+    return [*_heard(problem), Table("Base parameters", names, rows, names[:1], names[1:])]
+
+
+def _heard(problem: Problem) -> list[str]:
+    notes = problem_notes(problem)
+    return [note.sentence for note in notes if note.level is not Level.DETAIL]
 
 
 def _said(text: str) -> Note:
@@ -188,3 +202,6 @@ def _reasons(pairs: CollisionPairs | ObstaclePairs) -> str:
 
 def _symbols(problem: Problem) -> list[str]:
     return [problem.base.names[index] for index in problem.base.selection]
+
+
+show(Problem, lambda problem: "; ".join(_heard(problem)[:2]), problem_parts)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from excite_cli import (
+    Case,
     ConfigError,
     ExciteError,
     FileError,
     Note,
-    Problem,
     SimulationSettings,
     diagnose,
     identify,
@@ -27,24 +27,24 @@ from tests.api.conftest import SMOKE, Loop
 Take = Callable[..., object]
 
 
-def test_motions_of_another_robot_are_refused_in_any_form(loop: Loop, other: Problem) -> None:
+def test_motions_of_another_robot_are_refused_in_any_form(loop: Loop, other_joints: Case) -> None:
     with pytest.raises(FileError, match=r"arm\.h5 moves other joints than the config: elbow, sli"):
-        simulate(other, loop.result)
+        simulate(other_joints, loop.result)
     with pytest.raises(FileError, match="the result moves other joints than the config"):
-        simulate(other, read_result(loop.result))
+        simulate(other_joints, read_result(loop.result))
     with pytest.raises(FileError, match=r"There is no file none\.h5"):
         simulate(loop.problem, "none.h5")
 
 
 @pytest.mark.parametrize("take", [identify, diagnose])
 def test_data_of_other_joints_are_refused_in_any_form(
-    loop: Loop, other: Problem, take: Take
+    loop: Loop, other_joints: Case, take: Take
 ) -> None:
     with pytest.raises(ExciteError, match="there is no position of joint 'shoulder_yaw'"):
-        take(other, loop.data)
+        take(other_joints, loop.data)
     data = load_data(loop.problem, str(loop.data))
     with pytest.raises(FileError, match=r"of other joints \(elbow, slide\) than the config"):
-        take(other, data)
+        take(other_joints, data)
     with pytest.raises(FileError, match=r"There is no file none\.h5"):
         take(loop.problem, "none.h5")
 
