@@ -97,6 +97,8 @@ def export_file(
         )
     if not 0.0 < rate <= 1e6:
         raise ConfigError(f"--rate {rate:g}: give instants per second, above 0 and up to 1e6 Hz.")
+    if periods < 1:
+        raise ConfigError(f"--periods {periods}: a motion is played once or more.")
     path, target = existing(file), Path(output) if output is not None else None
     if is_fit(path) != (format in MODELS):
         what, own = ("a fit", MODELS) if is_fit(path) else ("no fit", MOTION_EXPORTERS)

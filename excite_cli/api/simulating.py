@@ -12,6 +12,7 @@ from excite_cli.api.outputs import held
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.effects.catalogue import declared_effects
+from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.export.timed import repeated
 from excite_cli.measurement.hdf5_writer import write_dataset
@@ -70,6 +71,8 @@ def simulate(
     with held({"output": output}, overwrite):
         load_mujoco()
         segments = load_motions(problem, motions, chosen, tell)
+        if not segments:
+            raise FileError("There is no motion to play.")
         planned, settings = _planned(problem, segments, settings, start, tell)
         names = [name for takes in run_names(planned, settings.repeat) for name in takes]
         planted = [each for text in effects for each in parse_planted(text, problem.robot, names)]

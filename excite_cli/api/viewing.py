@@ -27,6 +27,7 @@ from excite_cli.view.pictures import frame_count, motion_gif, still_png
 
 _SECONDS = 5.0  # of a GIF, unless the motion is shorter
 _GIF_SIZE = (640, 480)
+_SMALLEST, _LARGEST = 16, 4096  # pixels
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ def draw_motion(
     ------
     FileError, ConfigError
         The motions cannot be read, or are none; the robot is not known; `output` has another
-        suffix, or exists already; the motion ends before `time`.
+        suffix, or exists already; the motion ends before `time`; size, frames or length cannot be.
     MissingExtraError
         embreex or Pillow is not installed.
     """
@@ -119,6 +120,8 @@ def draw_motion(
     suffix = path.suffix.lower()
     if suffix not in (".png", ".gif"):
         raise FileError(f"{path}: give a name that ends in .png or .gif.")
+    if look is not None:
+        _check_size(look.size)
     with held({"output": path}, overwrite):
         problem, segments = _on_their_robot(motions, config, overrides, chosen, tell)
         segment = segments[0]
@@ -146,6 +149,13 @@ class _Film:
 
     fps: float
     seconds: float
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for what cannot be."""
+        if not 1.0 <= self.fps <= 50.0:
+            raise ConfigError(f"--fps {self.fps:g}: give 1 to 50 frames per second.")
+        if not 0.0 < self.seconds <= 120.0:
+            raise ConfigError(f"--duration {self.seconds:g}: give a length up to 120 s.")
 
     @property
     def frames(self) -> int:
@@ -178,6 +188,14 @@ def drawing_answer(found: Drawing) -> Answer:
     return Answer((str(found.path),), data)
 
 
+def _check_size(size: tuple[int, int]) -> None:
+    if not _SMALLEST <= min(size) <= max(size) <= _LARGEST:
+        raise ConfigError(
+            f"--size {size[0]}x{size[1]}: give WIDTHxHEIGHT in pixels, {_SMALLEST} to {_LARGEST}: "
+            "1280x960."
+        )
+
+
 def _fill(path: Path, content: bytes) -> None:
     path.write_bytes(content)
 
@@ -201,7 +219,10 @@ def _on_their_robot(
     if config is None:
         raise FileError(_unknown_robot(motions))
     problem = config if isinstance(config, Problem) else load_problem(config, overrides, tell)
-    return problem, load_motions(problem, motions, chosen, tell)
+    segments = load_motions(problem, motions, chosen, tell)
+    if not segments:
+        raise FileError("There is no motion to show.")
+    return problem, segments
 
 
 def _unknown_robot(motions: Motions) -> str:

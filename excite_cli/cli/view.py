@@ -11,8 +11,6 @@ from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.errors import ConfigError, FileError
 
-_LARGEST = 4096  # pixels
-
 
 def view(
     file: options.MotionFile,
@@ -165,9 +163,8 @@ def _size(text: str) -> tuple[int, int]:
     parts = text.lower().replace("×", "x").split("x")
     if len(parts) == 2 and all(part.strip().isdigit() for part in parts):
         width, height = (int(part) for part in parts)
-        if min(width, height) >= 16 and max(width, height) <= _LARGEST:
-            return width, height
-    raise ConfigError(f"--size {text}: give WIDTHxHEIGHT in pixels, 16 to {_LARGEST}: 1280x960.")
+        return width, height
+    raise ConfigError(f"--size {text}: give WIDTHxHEIGHT in pixels, 16 to 4096: 1280x960.")
 
 
 def _angles(text: str) -> tuple[float, float]:

@@ -21,6 +21,8 @@ def test_what_the_format_cannot_hold_is_one_sentence(loop: Loop, tmp_path: Path)
         export_file(loop.result, "cvs", target)
     with pytest.raises(FileError, match="has no motion 9"):
         export_file(loop.result, "csv", target, chosen=[9])
+    with pytest.raises(ConfigError, match="--periods 0: a motion is played once or more"):
+        export_file(loop.result, "csv", target, periods=0)
     assert not list(tmp_path.iterdir())
 
 

@@ -48,6 +48,14 @@ def test_pictures_have_names_that_say_what_they_are(loop: Loop, tmp_path: Path) 
         draw_motion(loop.result, str(tmp_path / "a.png"))
     with pytest.raises(ConfigError, match=r"--time 1000: motion_1 ends at"):
         draw_motion(loop.result, tmp_path / "b.png", time=1000.0)
+    with pytest.raises(ConfigError, match="--size 2x48: give WIDTHxHEIGHT in pixels, 16 to 4096"):
+        draw_motion(loop.result, tmp_path / "b.png", look=View(size=(2, 48)))
+    with pytest.raises(ConfigError, match="--fps 0: give 1 to 50"):
+        draw_motion(loop.result, tmp_path / "b.gif", fps=0.0)
+    with pytest.raises(ConfigError, match="--duration 1000: give a length up to 120 s"):
+        draw_motion(loop.result, tmp_path / "b.gif", seconds=1000.0)
+    with pytest.raises(FileError, match="There is no motion to show"):
+        draw_motion([], tmp_path / "b.png", loop.problem)
     with pytest.raises(FileError, match="has no motion 3"):
         draw_motion(loop.result, tmp_path / "b.png", chosen=[3])
 
