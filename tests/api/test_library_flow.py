@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from excite_cli import (
+    FileError,
     Level,
     Note,
     Problem,
@@ -73,6 +74,9 @@ def test_random_motions_stand_beside(problem: Problem, result: Result, tmp_path:
     found = compare_random(problem, result, candidates=2, seconds=0, output=path)
     assert found.baseline.candidates == 2
     assert read_result(path).random_candidates == (2, found.baseline.admissible)
+    with pytest.raises(FileError, match="exists already"):
+        compare_random(problem, result, candidates=2, seconds=0, output=path)
+    assert [each.name for each in tmp_path.iterdir()] == ["both.h5"]  # no claim is left
     assert found.seconds == pytest.approx(sum(m.seconds for m in result.motions))
 
 
