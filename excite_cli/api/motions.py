@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from excite_cli.api.loading import Case, load_data
+from excite_cli.api.loading import Case, dataset_of, load_data
 from excite_cli.config.load import parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.errors import FileError
@@ -54,7 +54,7 @@ def load_motions(
     if isinstance(motions, Segment):
         return [_fitting(robot, motions)]
     if isinstance(motions, Dataset):
-        return _measured(problem, motions)
+        return _measured(problem, dataset_of(problem, motions))
     if not isinstance(motions, str | Path):
         return [_fitting(robot, each) for each in _listed(motions)]
     path = Path(motions)

@@ -34,6 +34,8 @@ def test_motions_of_another_robot_are_refused_in_any_form(loop: Loop, other_join
         simulate(other_joints, read_result(loop.result))
     with pytest.raises(FileError, match=r"There is no file none\.h5"):
         simulate(loop.problem, "none.h5")
+    with pytest.raises(FileError, match=r"of other joints \(elbow, slide\) than the config"):
+        simulate(other_joints, load_data(loop.problem, loop.data))
     with pytest.raises(FileError, match="There is no motion to play"):
         simulate(loop.problem, [])
 
