@@ -18,7 +18,6 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.problems import CONFIGS
 from benchmarks.robust_replay import motion_of, spec_of
-from excite_cli.cli.setup import fit_knowledge
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.excitation.problem import Problem, build_problem
@@ -28,6 +27,7 @@ from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.store.fit_file import write_fit
+from excite_cli.store.fit_knowledge import fit_knowledge
 
 
 def taken(robust: Problem, plain: Problem, coefficients: Array) -> float:

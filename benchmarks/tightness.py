@@ -19,7 +19,6 @@ from scipy.sparse import csc_matrix
 from threadpoolctl import threadpool_limits
 
 from benchmarks.problems import CONFIGS
-from excite_cli.cli.setup import fit_knowledge
 from excite_cli.config.load import load_spec
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.uncertain_inertias import (
@@ -36,6 +35,7 @@ from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.store.fit_file import write_fit
+from excite_cli.store.fit_knowledge import fit_knowledge
 
 UNCERTAIN = "uncertainty={mass: 0.1, center_of_mass: 0.01, inertia: 0.1}"
 SIGMAS = 3.0

@@ -8,20 +8,41 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from excite_cli.api import Case as Case
-    from excite_cli.api import check as check
-    from excite_cli.api import diagnose as diagnose
-    from excite_cli.api import identify as identify
-    from excite_cli.api import load_case as load_case
-    from excite_cli.api import load_data as load_data
-    from excite_cli.api import load_problem as load_problem
-    from excite_cli.api import motions_of as motions_of
-    from excite_cli.api import plan as plan
-    from excite_cli.api import plan_after as plan_after
-    from excite_cli.api import propose as propose
-    from excite_cli.api import save_config as save_config
-    from excite_cli.api import save_fit as save_fit
-    from excite_cli.api import simulate as simulate
+    from excite_cli.api.checking import check as check
+    from excite_cli.api.comparing import compare_random as compare_random
+    from excite_cli.api.diagnosing import diagnose as diagnose
+    from excite_cli.api.diagnosing import save_config as save_config
+    from excite_cli.api.exporting import Exported as Exported
+    from excite_cli.api.exporting import export_file as export_file
+    from excite_cli.api.files import read_diagnosis as read_diagnosis
+    from excite_cli.api.files import read_fit as read_fit
+    from excite_cli.api.files import read_result as read_result
+    from excite_cli.api.files import write_dataset as write_dataset
+    from excite_cli.api.files import write_diagnosis as write_diagnosis
+    from excite_cli.api.files import write_result as write_result
+    from excite_cli.api.identifying import identify as identify
+    from excite_cli.api.identifying import save_fit as save_fit
+    from excite_cli.api.loading import Case as Case
+    from excite_cli.api.loading import load_case as load_case
+    from excite_cli.api.loading import load_data as load_data
+    from excite_cli.api.loading import load_problem as load_problem
+    from excite_cli.api.motions import load_motions as load_motions
+    from excite_cli.api.motions import motions_of as motions_of
+    from excite_cli.api.planning import plan as plan
+    from excite_cli.api.planning import plan_after as plan_after
+    from excite_cli.api.proposing import propose as propose
+    from excite_cli.api.proposing import save_proposal as save_proposal
+    from excite_cli.api.reporting import Report as Report
+    from excite_cli.api.reporting import write_report as write_report
+    from excite_cli.api.robots import describe_robot as describe_robot
+    from excite_cli.api.simulating import simulate as simulate
+    from excite_cli.api.studying import run_study as run_study
+    from excite_cli.api.verifying import verify_gradient as verify_gradient
+    from excite_cli.api.viewing import Drawing as Drawing
+    from excite_cli.api.viewing import Serving as Serving
+    from excite_cli.api.viewing import View as View
+    from excite_cli.api.viewing import draw_motion as draw_motion
+    from excite_cli.api.viewing import view_motions as view_motions
     from excite_cli.config.spec import Spec as Spec
     from excite_cli.diagnosis.next_motion import NextMotion as NextMotion
     from excite_cli.diagnosis.records import Diagnosis as Diagnosis
@@ -30,20 +51,18 @@ if TYPE_CHECKING:
     from excite_cli.errors import FileError as FileError
     from excite_cli.errors import NoAdmissibleMotionError as NoAdmissibleMotionError
     from excite_cli.errors import RobotError as RobotError
+    from excite_cli.excitation.comparison import Comparison as Comparison
     from excite_cli.excitation.inspection import Inspection as Inspection
+    from excite_cli.excitation.inspections import Inspections as Inspections
     from excite_cli.excitation.problem import Problem as Problem
     from excite_cli.excitation.result import Result as Result
     from excite_cli.identification.identify import Identification as Identification
     from excite_cli.measurement.dataset import Dataset as Dataset
-    from excite_cli.measurement.hdf5_writer import write_dataset as write_dataset
     from excite_cli.proposal.propose import Proposal as Proposal
+    from excite_cli.shown.note import Level as Level
+    from excite_cli.shown.note import Note as Note
     from excite_cli.simulation.settings import SimulationSettings as SimulationSettings
     from excite_cli.simulation.simulate import Simulation as Simulation
-    from excite_cli.store.diagnosis_file import read_diagnosis as read_diagnosis
-    from excite_cli.store.diagnosis_file import write_diagnosis as write_diagnosis
-    from excite_cli.store.fit_file import read_fit as read_fit
-    from excite_cli.store.result_file import read_result as read_result
-    from excite_cli.store.result_file import write_result as write_result
     from excite_cli.trajectory.chain import Segment as Segment
     from excite_cli.workers.base import Workers as Workers
     from excite_cli.workers.catalogue import open_workers as open_workers
@@ -51,44 +70,44 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "api.checking": ("check",),
+    "api.comparing": ("compare_random",),
+    "api.diagnosing": ("diagnose", "save_config"),
+    "api.exporting": ("Exported", "export_file"),
+    "api.files": (
+        "read_diagnosis",
+        "read_fit",
+        "read_result",
+        "write_dataset",
+        "write_diagnosis",
+        "write_result",
+    ),
+    "api.identifying": ("identify", "save_fit"),
+    "api.loading": ("Case", "load_case", "load_data", "load_problem"),
+    "api.motions": ("load_motions", "motions_of"),
+    "api.planning": ("plan", "plan_after"),
+    "api.proposing": ("propose", "save_proposal"),
+    "api.reporting": ("Report", "write_report"),
+    "api.robots": ("describe_robot",),
+    "api.simulating": ("simulate",),
+    "api.studying": ("run_study",),
+    "api.verifying": ("verify_gradient",),
+    "api.viewing": ("Drawing", "Serving", "View", "draw_motion", "view_motions"),
     "config.spec": ("Spec",),
     "diagnosis.next_motion": ("NextMotion",),
     "diagnosis.records": ("Diagnosis",),
-    "errors": (
-        "ConfigError",
-        "ExciteError",
-        "FileError",
-        "NoAdmissibleMotionError",
-        "RobotError",
-    ),
+    "errors": ("ConfigError", "ExciteError", "FileError", "NoAdmissibleMotionError", "RobotError"),
+    "excitation.comparison": ("Comparison",),
     "excitation.inspection": ("Inspection",),
+    "excitation.inspections": ("Inspections",),
     "excitation.problem": ("Problem",),
     "excitation.result": ("Result",),
     "identification.identify": ("Identification",),
-    "api": (
-        "Case",
-        "check",
-        "diagnose",
-        "identify",
-        "load_case",
-        "load_data",
-        "load_problem",
-        "motions_of",
-        "plan",
-        "plan_after",
-        "propose",
-        "save_config",
-        "save_fit",
-        "simulate",
-    ),
     "measurement.dataset": ("Dataset",),
-    "measurement.hdf5_writer": ("write_dataset",),
     "proposal.propose": ("Proposal",),
+    "shown.note": ("Level", "Note"),
     "simulation.settings": ("SimulationSettings",),
     "simulation.simulate": ("Simulation",),
-    "store.diagnosis_file": ("read_diagnosis", "write_diagnosis"),
-    "store.fit_file": ("read_fit",),
-    "store.result_file": ("read_result", "write_result"),
     "trajectory.chain": ("Segment",),
     "workers.base": ("Workers",),
     "workers.catalogue": ("open_workers",),

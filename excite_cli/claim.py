@@ -55,6 +55,11 @@ def claim(path: Path) -> None:
         )
 
 
+def leave(path: Path) -> None:
+    """Give up one claim of `path`."""
+    _leave(resolved(path))
+
+
 @contextmanager
 def claimed(path: Path) -> Iterator[None]:
     """As `claim`, but for a moment: waits up to 5 s for another that has it.

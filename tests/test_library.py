@@ -5,12 +5,13 @@ import doctest
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import excite_cli.api
+import excite_cli
 from excite_cli import (
     Case,
     ConfigError,
@@ -48,6 +49,7 @@ def test_every_public_name_is_there_and_documented() -> None:
     for name in excite_cli.__all__:
         found = getattr(excite_cli, name)
         assert name == "__version__" or found.__doc__, name
+        assert not (ROOT / "excite_cli" / name).exists(), f"{name} is a room, which would hide it"
     assert set(excite_cli.__all__) <= set(dir(excite_cli))
 
 
@@ -110,9 +112,10 @@ def test_a_proposal_can_be_loaded(tmp_path: Path) -> None:
 def test_examples_in_docstrings_are_right(monkeypatch: pytest.MonkeyPatch) -> None:
     """They are run where the repository is."""
     monkeypatch.chdir(ROOT)
-    failed, tried = doctest.testmod(excite_cli.api)
-    assert tried >= 5
-    assert not failed
+    modules = {home for home in excite_cli._HOME.values() if home.startswith("api.")}
+    found = [doctest.testmod(import_module(f"excite_cli.{home}")) for home in sorted(modules)]
+    assert sum(each.attempted for each in found) >= 5
+    assert not sum(each.failed for each in found)
 
 
 @pytest.mark.parametrize("name", ["exciting", "identifying", "diagnosing"])

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from benchmarks.peers.figaroh_races import ACCELERATION, JOINTS, LIMITS
 from benchmarks.peers.race import Race, States
-from excite_cli.api import load_problem
+from excite_cli import load_problem
 from excite_cli.constraints.base import Array
 from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.dynamics.regressor import Regressor

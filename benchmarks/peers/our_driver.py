@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from excite_cli.api import load_problem
+from excite_cli import load_problem
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.base_parameters import BaseParameters

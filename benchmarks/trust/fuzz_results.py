@@ -21,16 +21,16 @@ from benchmarks.trust.fuzz_mutations import (
     spoiled_tree,
 )
 from benchmarks.trust.fuzz_trial import Fuzzer
-from excite_cli.api import (
+from excite_cli import (
     diagnose,
     identify,
     load_problem,
+    motions_of,
     plan,
     save_fit,
     simulate,
 )
-from excite_cli.cli.motions import motions_of_result
-from excite_cli.cli.report_files import read_files
+from excite_cli.api.report_files import read_files
 from excite_cli.excitation.result import Result
 from excite_cli.store.result_file import read_samples, write_result
 
@@ -78,7 +78,7 @@ class ResultFuzzer(Fuzzer):
         content = read_files([path])[0].content
         if isinstance(content, Result):
             read_samples(path)
-            for motion in motions_of_result(path, content):
+            for motion in motions_of(content, name=str(path)):
                 motion.trajectory.states(np.linspace(0, 1, 5), motion.coefficients)
 
 

@@ -1,7 +1,11 @@
 """The figure of a progress line: where the solver is, and its best within all limits so far."""
 
-from excite_cli.excitation.progress import Measure, Progress
-from excite_cli.excitation.words import figure_in_words
+from typing import TYPE_CHECKING
+
+from excite_cli.api.showing import Measure, figure_in_words
+
+if TYPE_CHECKING:
+    from excite_cli.api.planning import Progress
 
 
 class Best:
@@ -10,7 +14,7 @@ class Best:
     def __init__(self) -> None:
         self._best = float("inf")
 
-    def words(self, progress: Progress) -> str:
+    def words(self, progress: "Progress") -> str:
         """`condition number 5.48 (best 5.31)`; another figure is told as it is."""
         figure = progress.figure
         if figure.measure is not Measure.CONDITION_NUMBER:

@@ -59,94 +59,35 @@ def compare_random(
       excite compare-random ur10.yaml --candidates 40 --seconds 0
       excite compare-random ur10.yaml --optimized ur10.h5 -o compared.h5
     """
-    from dataclasses import replace
-
-    from rich.table import Table
-
-    from excite_cli.cli.setup import load_problem, output_path, single_threaded
+    from excite_cli.api.comparing import compare_random as compare
+    from excite_cli.api.comparing import comparison_answer, optimized_for
+    from excite_cli.api.loading import load_problem
+    from excite_cli.api.outputs import check_outputs
+    from excite_cli.api.planning import plan
+    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import working
     from excite_cli.cli.start_line import iterations_of, start_line
-    from excite_cli.cli.tables import comparison_table, motion_data
-    from excite_cli.cli.working import working
-    from excite_cli.config.inputs import files_of_config
-    from excite_cli.config.load import parse_spec
-    from excite_cli.errors import FileError
-    from excite_cli.excitation.random_baseline import random_baseline
-    from excite_cli.excitation.result import matches
-    from excite_cli.excitation.run import continue_run, new_result
-    from excite_cli.given_files import refuse_inputs_as_outputs
-    from excite_cli.store.result_file import read_result, write_result
-    from excite_cli.store.versions import versions
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    inputs = [optimized] if optimized is not None else []
-    path = output_path(output, config, overwrite, inputs=inputs) if output else None
-    extra = [f"sequence.motions={motions}"] if motions is not None else []
-    extra += [f"seed={seed}"] if seed is not None else []
-    with single_threaded(threads), working(terminal, workers, scheduler, threads) as place:
-        problem = load_problem(terminal, config, overrides, extra)
-        refuse_inputs_as_outputs({"--output": path}, files_of_config(problem.spec, problem.folder))
+    check_outputs({"output": output}, overwrite)
+    changes = options.changes(overrides, seed=seed, motions=motions)
+    with single_threaded(threads), working(workers, scheduler, threads, terminal.tell) as place:
+        problem = load_problem(config, changes, terminal.tell)
         if optimized is not None:
-            result = read_result(optimized)
-            reason = matches(problem, result)
-            if reason:
-                raise FileError(f"--optimized {optimized} does not belong to {config}: {reason}.")
-            stored = parse_spec(result.config, f"the config stored in {optimized}")
-            if (stored.trajectory, stored.sampling) != (
-                problem.spec.trajectory,
-                problem.spec.sampling,
-            ):
-                raise FileError(
-                    f"--optimized {optimized} has another trajectory or sampling section than "
-                    f"{config}. Compare with the config it was made with."
-                )
+            result = optimized_for(problem, optimized)
         else:
-            with terminal.live("optimising", iterations_of(problem.spec)) as show:
-                result = continue_run(
-                    problem,
-                    new_result(problem, [], versions(), config.resolve().parent),
-                    start_line(show, problem.spec),
-                    lambda step, current: None,
-                    workers=place,
-                )
-        seconds = sum(motion.seconds for motion in result.motions)
-        with terminal.live("random motions", candidates) as show:
-            baseline = random_baseline(
+            with terminal.live("optimising", iterations_of(problem.spec)) as line:
+                progress = start_line(line, problem.spec)
+                result = plan(problem, progress=progress, workers=place, tell=lambda note: None)
+        with terminal.live("random motions", candidates) as line:
+            found = compare(
                 problem,
-                len(result.motions),
-                problem.spec.seed,
-                candidates,
-                seconds if budget is None else budget,
-                lambda drawn, best: show(f"{drawn} of {candidates} drawn, best {best:.1f}", drawn),
-                result.prior_stack,
-                place,
+                result,
+                candidates=candidates,
+                seconds=budget,
+                output=output,
+                overwrite=overwrite,
+                drawn=lambda n, best: line(f"{n} of {candidates} drawn, best {best:.1f}", n),
+                workers=place,
             )
-    result = replace(
-        result,
-        random=baseline.motions,
-        random_candidates=(baseline.candidates, baseline.admissible),
-    )
-    if path is not None:
-        write_result(path, result, problem)
-    summary = (
-        f"{baseline.candidates} candidates in {baseline.seconds:.1f} s, {baseline.admissible} "
-        f"admissible; the optimiser took {seconds:.1f} s"
-    )
-    answer: list[Table | str] = [comparison_table(result.motions, baseline.motions), summary]
-    terminal.answer(
-        [*answer, str(path)] if path is not None else answer,
-        {
-            "random": [
-                {
-                    "index": m.index,
-                    "condition_number": m.condition_number,
-                    "stacked_condition_number": m.stacked_condition_number,
-                }
-                for m in baseline.motions
-            ],
-            "optimized": [motion_data(m) for m in result.motions],
-            "candidates": baseline.candidates,
-            "admissible": baseline.admissible,
-            "seconds": {"optimized": seconds, "random": baseline.seconds},
-            "output": str(path) if path is not None else None,
-        },
-    )
+    terminal.show(comparison_answer(found, str(output) if output is not None else None))

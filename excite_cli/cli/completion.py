@@ -31,15 +31,15 @@ def complete_key(incomplete: str) -> list[str]:
 
 
 def _robots() -> list[str]:
-    from excite_cli.robot.description import example_robots
+    from excite_cli.api.offered import robot_names
 
-    return list(example_robots())
+    return robot_names()
 
 
 def _kinds() -> list[str]:
-    from excite_cli.effects.catalogue import catalogue
+    from excite_cli.api.offered import effect_kinds
 
-    return list(catalogue())
+    return effect_kinds()
 
 
 def _keys(incomplete: str) -> list[str]:

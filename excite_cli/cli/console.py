@@ -15,8 +15,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, Protocol, TextIO
 
+import typer
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     Progress,
@@ -28,11 +29,13 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.segment import Segment
-from rich.table import Column, Table
+from rich.table import Column
 from rich.text import Text
 
 from excite_cli import __version__
-from excite_cli.claim import leave_claims
+from excite_cli.api.outputs import leave_claims
+from excite_cli.api.showing import Answer, Level, Note, Table
+from excite_cli.cli.layout import rendered
 from excite_cli.cli.stopping import stopped
 from excite_cli.errors import REFUSALS, ExciteError, ExciteWarning, refusal
 
@@ -72,12 +75,24 @@ class Terminal:
         if self.verbose:
             self.err.print(text)
 
-    def answer(self, table: Table | str | Sequence[Table | str], data: dict[str, Any]) -> None:
-        """The answer: JSON, or tables and sentences."""
+    def tell(self, note: Note) -> None:
+        """What the library tells while it works."""
+        if note.level is Level.DETAIL:
+            self.detail(note.sentence)
+        else:
+            self.say(note.sentence)
+
+    def show(self, answer: Answer) -> None:
+        """The answer, as JSON or as tables and sentences; exit status 1 where it is bad."""
         if self.as_json:
-            print(json.dumps(_finite(data), ensure_ascii=not _is_unicode(sys.stdout)))
-            return
-        parts = [table] if isinstance(table, Table | str) else list(table)
+            out = json.dumps(_finite(answer.data), ensure_ascii=not _is_unicode(sys.stdout))
+            print(out)
+        else:
+            self._print(answer.parts)
+        if not answer.good:
+            raise typer.Exit(1)
+
+    def _print(self, parts: Sequence[Table | str]) -> None:
         with (out := self.out).capture() as printed:
             for before, part in zip([None, *parts], parts, strict=False):
                 if before is not None and not (isinstance(before, str) and isinstance(part, str)):
@@ -86,33 +101,44 @@ class Terminal:
         print("\n".join(line.rstrip() for line in printed.get().splitlines()))
 
     @contextmanager
-    def live(self, title: str, total: int | None = None) -> Iterator[Callable[[str, int], None]]:
-        """A progress line; call the yielded function with a text and the count done.
+    def live(self, title: str, total: int | None = None) -> Iterator["Line"]:
+        """A progress line; call what is yielded with a text, the count done, and that of all.
 
         On a terminal only; elsewhere a line every few seconds with `--verbose`, else nothing.
         """
         if self.quiet or not self.progress:
-            yield lambda text, done: None
+            yield _silent
             return
         if not _is_terminal(sys.stderr):
-            yield _sparse(title) if self.verbose else lambda text, done: None
+            yield _sparse(title) if self.verbose else _silent
             return
         columns: list[ProgressColumn] = [SpinnerColumn()]
         columns += [TextColumn("{task.description}")] if title else []
         columns += [TextColumn("{task.fields[text]}", table_column=Column(no_wrap=True))]
-        columns += [_Remaining() if total else TimeElapsedColumn()]
+        columns += [_Remaining()]
         with Progress(*columns, console=self.err, transient=True) as bar:
             task = bar.add_task(title, total=total, text="")
             started = 0
 
-            def show(text: str, done: int) -> None:
+            def show(text: str, done: int, total: int | None = None) -> None:
                 nonlocal started
                 if done < started:  # the next motion counts from zero again
                     bar.reset(task)
                 started = done
-                bar.update(task, completed=done, text=text)
+                bar.update(task, completed=done, total=total, text=text)
 
             yield show
+
+
+class Line(Protocol):
+    """A progress line: a text, how much is done, and how much there is, once that is known."""
+
+    def __call__(self, text: str, done: int, total: int | None = None) -> None:
+        """Show it."""
+
+
+def _silent(text: str, done: int, total: int | None = None) -> None:
+    """No line."""
 
 
 class _Console(Console):
@@ -143,11 +169,9 @@ class _Remaining(TimeRemainingColumn):
 def _print(out: Console, part: Table | str) -> None:
     """A sentence, or a table whose title may be wider than its columns."""
     if isinstance(part, Table):
-        title, part.title = part.title, None
-        if title:
-            out.print(title, style="bold", soft_wrap=out.width >= _WHOLE_ROWS)
-        out.print(part)
-        part.title = title
+        if part.title:
+            out.print(part.title, style="bold", soft_wrap=out.width >= _WHOLE_ROWS)
+        out.print(rendered(part))
     else:
         out.print(part, soft_wrap=out.width >= _WHOLE_ROWS)
 
@@ -182,13 +206,13 @@ def _console(file: TextIO) -> Console:
     )
 
 
-def _sparse(title: str) -> Callable[[str, int], None]:
+def _sparse(title: str) -> Line:
     """Progress for logs: a line every few seconds."""
     import time
 
     last = time.monotonic()
 
-    def tell(text: str, done: int) -> None:
+    def tell(text: str, done: int, total: int | None = None) -> None:
         nonlocal last
         if time.monotonic() - last >= 5.0:
             last = time.monotonic()

@@ -1,18 +1,13 @@
 """`excite diagnose`: what the declared model lacks, and the error before and after."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.outputs import check_outputs
-
-if TYPE_CHECKING:
-    from excite_cli.config.spec import Spec
-    from excite_cli.diagnosis.records import Diagnosis
 
 
 def diagnose(
@@ -51,56 +46,22 @@ def diagnose(
     Examples:
       excite diagnose ur10.yaml measured.h5 -o diagnosis.h5 --apply better.yaml
     """
+    from excite_cli.api.diagnosing import diagnose as diagnose_data
+    from excite_cli.api.diagnosing import diagnosis_answer
+    from excite_cli.api.loading import load_case
+    from excite_cli.api.threads import single_threaded
+
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    outputs = {"output": output, "apply": apply}
-    check_outputs(outputs, overwrite, (config, *data))
-
-    from dataclasses import replace
-
-    from excite_cli.cli.diagnose_tables import answer_of, tables_of
-    from excite_cli.cli.setup import load_dataset, single_threaded
-    from excite_cli.config.inputs import files_of_config
-    from excite_cli.config.load import load_spec, spec_as_yaml
-    from excite_cli.diagnosis.diagnose import diagnose as run_diagnosis
-    from excite_cli.diagnosis.next_motion import next_experiment
-    from excite_cli.dynamics.base_parameters import find_base_parameters
-    from excite_cli.given_files import refuse_inputs_as_outputs
-    from excite_cli.robot.model import build_robot
-    from excite_cli.store.diagnosis_file import write_diagnosis
-    from excite_cli.store.versions import versions
-
-    with single_threaded():
-        spec = load_spec(config, overrides)
-        folder = config.resolve().parent
-        refuse_inputs_as_outputs(outputs, files_of_config(spec, folder))
-        robot = build_robot(spec.robot, folder)
-        base = find_base_parameters(robot)
-        dataset = load_dataset(terminal, robot, spec, data)
-        with terminal.live("diagnose", 10) as show:
-            found = run_diagnosis(robot, base, dataset, spec, sealed, show)
-        found = replace(
-            found, config=spec_as_yaml(spec), config_folder=str(folder), versions=versions()
+    with single_threaded(), terminal.live("diagnose", 10) as line:
+        found = diagnose_data(
+            load_case(config, overrides or ()),
+            data,
+            sealed,
+            output=output,
+            apply=apply,
+            overwrite=overwrite,
+            progress=line,
+            tell=terminal.tell,
         )
-        if output is not None:
-            write_diagnosis(output, found)
-        if apply is not None:
-            _apply(spec, folder, found, apply)
-    experiment = next_experiment(found, str(config), str(output or "DIAGNOSIS.h5"))
-    written = {key: str(path) for key, path in (("diagnosis", output), ("config", apply)) if path}
-    terminal.answer(
-        tables_of(found, robot, experiment, verbose),
-        {**answer_of(found, experiment), "output": written},
-    )
-
-
-def _apply(spec: "Spec", folder: Path, found: "Diagnosis", path: Path) -> None:
-    """Write the config with declared and found effects, atomically."""
-    from excite_cli.atomic import write_atomically
-    from excite_cli.export.found_config import found_config
-
-    text = found_config(spec, folder, found, path)
-
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, encoding="utf-8")
-
-    write_atomically(path, write)
+    written = {"diagnosis": output, "config": apply}
+    terminal.show(diagnosis_answer(found, str(config), written, verbose))

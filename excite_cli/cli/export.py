@@ -1,7 +1,7 @@
 """`excite export`: motions for controllers, identified models for simulators."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -9,14 +9,8 @@ from excite_cli.cli import options
 from excite_cli.cli.completion import complete_format
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.outputs import check_outputs
-from excite_cli.errors import ConfigError, FileError, nearest
-from excite_cli.given_files import refuse_inputs_as_outputs
-
-if TYPE_CHECKING:
-    from excite_cli.export.motion_exporter import MotionExporter
-
-_MODELS = {"urdf": ".urdf", "mjcf": ".xml", "yaml": ".yaml"}
+from excite_cli.cli.posture import start_from
+from excite_cli.errors import ConfigError
 
 
 def export(
@@ -93,125 +87,29 @@ def export(
       excite export ur10.h5 --format csv --motion 1 --slow 0.3 -o slow.csv
       excite export fit.h5 --format mjcf -o identified.xml
     """
-    from excite_cli.cli.entry_program import durations_of
-    from excite_cli.cli.exported_chains import Wanted, chains_of
-    from excite_cli.cli.setup import single_threaded
-    from excite_cli.export.motions import MOTION_EXPORTERS
-    from excite_cli.export.timed import timed_motion
-    from excite_cli.store.fit_file import is_fit
+    from excite_cli.api.exporting import export_answer, export_file
+    from excite_cli.api.threads import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    formats = [*MOTION_EXPORTERS, *_MODELS]
-    if format_ not in formats:
-        raise ConfigError(
-            f"--format {format_}: unknown.{nearest(format_, formats)} Known: {', '.join(formats)}."
-        )
-    if not 0.0 < rate <= 1e6:
-        raise ConfigError(f"--rate {rate:g}: give instants per second, above 0 and up to 1e6 Hz.")
-    if not file.exists():
-        raise FileError(f"There is no file {file}.")
-    if is_fit(file) != (format_ in _MODELS):
-        what, own = ("a fit", _MODELS) if is_fit(file) else ("no fit", MOTION_EXPORTERS)
-        raise FileError(
-            f"{file} is {what}: it cannot be exported as {format_}. Its formats: {', '.join(own)}."
-        )
-    if format_ in _MODELS:
-        _export_model(terminal, file, format_, output, overwrite)
-        return
-    exporter = MOTION_EXPORTERS[format_]
     with single_threaded():
-        chains = chains_of(terminal, file, Wanted(motion, periods, slow, entry, posture))
-    paths = _paths(file, output, exporter, [each.name for each in chains])
-    _check_paths(paths, exporter, overwrite, file)
-    written = []
-    for path, each in zip(paths, chains, strict=True):
-        timed = timed_motion(
-            each.name, each.joint_names, each.chain, rate, equidistant, exporter.whole_nanoseconds
+        found = export_file(
+            file,
+            format_,
+            output,
+            chosen=_numbers(motion),
+            rate=rate,
+            equidistant=equidistant,
+            periods=periods,
+            slow=slow,
+            start=start_from(posture, entry),
+            overwrite=overwrite,
+            tell=terminal.tell,
         )
-        exporter.write(path, timed)
-        written.append(
-            {
-                "motion": each.name,
-                "output": str(path),
-                "instants": len(timed.t),
-                "duration": timed.duration,
-                "durations": durations_of(each.chain),
-                "pace": each.pace,
-            }
-        )
-    if slow is not None:
-        terminal.say(
-            "a slowed motion needs other torques: judge what was written, `excite check CONFIG "
-            f"{paths[0]}`, before it is played"
-        )
-    lines = [
-        f"{path}: {each.name}, {record['instants']} instants, {record['duration']:.6g} s"
-        + (f", at {100 * each.pace:.4g} % of its pace" if slow is not None else "")
-        for path, each, record in zip(paths, chains, written, strict=True)
-    ]
-    terminal.answer(lines, {"format": format_, "rate": rate, "motions": written})
+    terminal.show(export_answer(found))
 
 
-def _paths(
-    file: Path,
-    output: Path | None,
-    exporter: "MotionExporter",
-    names: list[str],
-) -> list[Path]:
-    """Where each motion goes; several get their numbers before the suffix."""
-    base = output or Path(f"{file.stem}_{names[0]}{exporter.suffix}")
-    if output is None and len(names) > 1:
-        base = Path(f"{file.stem}_motion{exporter.suffix}")
-    if len(names) == 1:
-        return [base]
-    numbers = (name.removeprefix("motion_") for name in names)
-    return [base.with_name(f"{base.stem}_{number}{base.suffix}") for number in numbers]
-
-
-def _check_paths(
-    paths: list[Path], exporter: "MotionExporter", overwrite: bool, file: Path
-) -> None:
-    refuse_inputs_as_outputs({f"--output ({path})": path for path in paths}, (file,))
-    if not exporter.folder:
-        check_outputs({f"output ({path})": path for path in paths}, overwrite)
-        return
-    from excite_cli.claim import claim
-    from excite_cli.export.motion_rosbag2 import is_bag
-
-    for path in paths:
-        claim(path)
-        if path.exists() and not (overwrite and is_bag(path)):
-            replace = ", or replace it with --overwrite" if is_bag(path) else ""
-            raise FileError(f"{path} exists already. Give another name{replace}.")
-
-
-def _export_model(
-    terminal: Terminal, file: Path, format_: str, output: Path | None, overwrite: bool
-) -> None:
-    """A fit as URDF, MJCF or YAML, as `excite identify` writes them."""
-    from excite_cli.cli.models import write_models
-    from excite_cli.config.inputs import files_of_config
-    from excite_cli.config.load import parse_spec
-    from excite_cli.robot.model import build_robot
-    from excite_cli.store.fit_file import read_fit
-
-    path = output or Path(f"{file.stem}{_MODELS[format_]}")
-    check_outputs({"output": path}, overwrite, (file,))
-    stored = read_fit(file)
-    spec = parse_spec(stored.config, f"the config stored in {file}")
-    robot = build_robot(spec.robot, Path(stored.config_folder))
-    if robot.fingerprint() != stored.fingerprint:
-        raise FileError(
-            f"{file} was made with another robot than the URDF gives now ({spec.robot.urdf}). "
-            "Identify again."
-        )
-    if stored.fit.joint_names != robot.joint_names or len(stored.fit.phi) != 10 * robot.n_bodies:
-        raise FileError(
-            f"{file} holds parameters of other joints or bodies than its config. Identify again."
-        )
-    folder = Path(stored.config_folder)
-    refuse_inputs_as_outputs({"--output": path}, files_of_config(spec, folder))
-    option = "parameters" if format_ == "yaml" else format_
-    for note in write_models(robot, stored.fit, **{option: path}):
-        terminal.say(f"note: {note}")
-    terminal.answer([str(path)], {"format": format_, "output": str(path)})
+def _numbers(motion: str) -> list[int]:
+    """The motion asked for; none stands for all."""
+    if motion != "all" and not (motion.isdecimal() and int(motion) > 0):
+        raise ConfigError(f"--motion {motion}: give the number of a motion, from 1, or all.")
+    return [] if motion == "all" else [int(motion)]

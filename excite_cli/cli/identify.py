@@ -8,7 +8,6 @@ import typer
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.outputs import check_outputs
 
 
 def identify(
@@ -49,45 +48,24 @@ def identify(
       excite identify ur10.yaml measured.h5 -o fit.h5
       excite identify ur10.yaml measured.h5 --sealed motion_1 --urdf identified.urdf
     """
-    from excite_cli.cli.identify_tables import answer_of, tables_of
-    from excite_cli.cli.models import write_models
-    from excite_cli.cli.setup import load_dataset, single_threaded, tell_findings
-    from excite_cli.config.inputs import files_of_config
-    from excite_cli.config.load import load_spec, spec_as_yaml
-    from excite_cli.diagnosis.plausibility import check_dataset
-    from excite_cli.dynamics.base_parameters import find_base_parameters
-    from excite_cli.given_files import refuse_inputs_as_outputs
-    from excite_cli.identification.identify import identify as run_identification
-    from excite_cli.robot.model import build_robot
-    from excite_cli.store.fit_file import write_fit
+    from excite_cli.api.identifying import identification_answer
+    from excite_cli.api.identifying import identify as identify_data
+    from excite_cli.api.loading import load_case
+    from excite_cli.api.threads import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    exports = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
-    outputs = {"output": output, **exports}
-    check_outputs(outputs, overwrite, (config, *data))
-    with single_threaded():
-        spec = load_spec(config, overrides)
-        folder = config.resolve().parent
-        refuse_inputs_as_outputs(outputs, files_of_config(spec, folder))
-        robot = build_robot(spec.robot, folder)
-        base = find_base_parameters(robot)
-        dataset = load_dataset(terminal, robot, spec, data)
-        check_dataset(robot, dataset, spec)
-        with terminal.live("identify") as show:
-            found = run_identification(
-                robot, base, dataset, spec, sealed, lambda text: show(text, 0)
-            )
-        for reason in found.processing.reasons:
-            terminal.detail(reason)
-        notes: list[str] = []
-        if output is not None:
-            sources = tuple(map(str, data))
-            fingerprint = robot.fingerprint()
-            write_fit(output, found, spec_as_yaml(spec), str(folder), fingerprint, sources)
-        notes += write_models(robot, found.fit, urdf, mjcf, parameters)
-    tell_findings(terminal, found.findings[len(dataset.findings) :])
-    for note in notes:
-        terminal.say(f"note: {note}")
-    files = {"fit": output, **exports}
-    written = {key: str(path) for key, path in files.items() if path is not None}
-    terminal.answer(tables_of(found, robot), {**answer_of(found), "output": written})
+    with single_threaded(), terminal.live("identify") as line:
+        found = identify_data(
+            load_case(config, overrides or ()),
+            data,
+            sealed,
+            output=output,
+            urdf=urdf,
+            mjcf=mjcf,
+            parameters=parameters,
+            overwrite=overwrite,
+            progress=line,
+            tell=terminal.tell,
+        )
+    written = {"fit": output, "urdf": urdf, "mjcf": mjcf, "parameters": parameters}
+    terminal.show(identification_answer(found, written))

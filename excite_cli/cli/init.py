@@ -1,5 +1,6 @@
 """`excite init`: a config that works, for a robot of which only the URDF is known."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -40,71 +41,33 @@ def init(
 
     Example:  excite init --robot ur10
     """
-    import sys
-
-    from excite_cli.atomic import write_text_atomically
-    from excite_cli.cli.init_questions import ask
-    from excite_cli.cli.outputs import check_outputs
-    from excite_cli.cli.setup import single_threaded
+    from excite_cli.api.proposing import EXAMPLE_PREFIX, save_proposal
+    from excite_cli.api.threads import single_threaded
+    from excite_cli.cli.init_questions import Answers, ask
     from excite_cli.errors import ConfigError
-    from excite_cli.proposal.propose import Request, propose
-    from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     if robot is not None and urdf is not None:
         raise ConfigError("--robot and --urdf both name a robot: give one of them.")
-    if base not in ("fixed", "floating"):
-        raise ConfigError(f"--base {base}: allowed are fixed and floating.")
     chosen = tuple(filter(None, (name.strip() for name in (joints or "").split(","))))
-    if robot is None and urdf is None:
-        if not (sys.stdin.isatty() and sys.stderr.isatty()) or as_json or quiet:
-            raise ConfigError(
-                "init needs a robot: --robot NAME (`excite robots` lists them) or --urdf FILE. At "
-                "a terminal it asks."
-            )
+    if robot is not None:
+        answers = Answers(f"{EXAMPLE_PREFIX}{robot.removeprefix(EXAMPLE_PREFIX)}", output, chosen)
+    elif urdf is not None:
+        answers = Answers(str(urdf), output, chosen)
+    elif sys.stdin.isatty() and sys.stderr.isatty() and not (as_json or quiet):
         answers = ask(output, chosen)
-        robot, urdf, output, chosen = (
-            answers.robot,
-            answers.urdf,
-            answers.output,
-            answers.joints,
+    else:
+        raise ConfigError(
+            "init needs a robot: --robot NAME (`excite robots` lists them) or --urdf FILE. At "
+            "a terminal it asks."
         )
-    name = robot.removeprefix(EXAMPLE_PREFIX) if robot is not None else (urdf or Path()).stem
-    path = output or Path(f"{name}.yaml")
-    check_outputs({"output": path}, overwrite, [urdf] if urdf is not None else [])
-    folder = path.resolve().parent
-    source = f"{EXAMPLE_PREFIX}{name}" if robot is not None else _from(urdf or Path(), folder)
-    load_description(source, relative_to=folder)  # a wrong name is told at once
-    terminal.say(f"looking at {name}: capsules and tables of its meshes take longest, once")
-    asked = Request(source, folder, chosen, "floating" if base == "floating" else "fixed")
     with single_threaded():
-        proposal = propose(asked)
-    write_text_atomically(path, proposal.text)
-    problem = proposal.settled.problem
-    lines = [
-        f"{problem.robot.name}: moves {len(proposal.joints)} joints, "
-        f"{problem.base.rank} base parameters, {problem.trajectory.duration:.4g} s",
-        *proposal.notes,
-        f"{path}",
-        f"next:  excite optimize {path}",
-    ]
-    terminal.answer(
-        lines,
-        {
-            "output": str(path),
-            "robot": source,
-            "joints": list(proposal.joints),
-            "left_out": {why: list(names) for why, names in proposal.left_out.items()},
-            "base_parameters": problem.base.rank,
-            "duration": problem.trajectory.duration,
-            "notes": list(proposal.notes),
-        },
-    )
-
-
-def _from(urdf: Path, folder: Path) -> str:
-    """The URDF's path as the config in `folder` says it: relative where it is near."""
-    import os
-
-    relative = os.path.relpath(urdf.resolve(), folder)
-    return str(urdf.resolve()) if relative.count("..") > 3 else relative
+        answer = save_proposal(
+            answers.robot,
+            answers.output,
+            joints=answers.joints,
+            base=base,
+            overwrite=overwrite,
+            tell=terminal.tell,
+        )
+    terminal.show(answer)

@@ -10,20 +10,16 @@ from excite_cli.errors import RobotError, nearest
 
 @dataclass(frozen=True)
 class Answers:
-    """A robot's name or URDF, where to write, and the joints to move (none: our choice)."""
+    """The robot (a name with its prefix, or a URDF), where to write, the joints (none: ours)."""
 
-    robot: str | None
-    urdf: Path | None
-    output: Path
+    robot: str
+    output: Path | None
     joints: tuple[str, ...]
 
 
 def ask(output: Path | None, joints: tuple[str, ...]) -> Answers:
     """Ask for the robot, the limbs to move and the file, each with a default."""
-    from excite_cli.proposal.joints import choose_joints
-    from excite_cli.proposal.limbs import limbs
-    from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots, load_description
-    from excite_cli.robot.urdf_joints import survey
+    from excite_cli.api.proposing import EXAMPLE_PREFIX, example_robots, limbs_of
 
     known = example_robots()
     while True:
@@ -33,16 +29,13 @@ def ask(output: Path | None, joints: tuple[str, ...]) -> Answers:
             break
         typer.echo(f"There is no robot and no file '{word}'.{nearest(name, known)}", err=True)
     is_file = name not in known
-    urdf = Path(word).expanduser() if is_file else None
-    source = str(urdf.resolve()) if urdf is not None else f"{EXAMPLE_PREFIX}{name}"
+    robot = str(Path(word).expanduser()) if is_file else f"{EXAMPLE_PREFIX}{name}"
     if not joints:
-        chosen = choose_joints(survey(load_description(source)).joints, source).chosen
-        groups = limbs(chosen)
+        groups = limbs_of(str(Path(robot).resolve()) if is_file else robot)
         if len(groups) > 1:
-            joints = _of_groups(groups, len(chosen))
-    default = output or Path(f"{urdf.stem if urdf is not None else name}.yaml")
-    written = Path(str(_asked("Write to", str(default))))
-    return Answers(None if is_file else name, urdf, written, joints)
+            joints = _of_groups(groups, sum(map(len, groups.values())))
+    default = output or Path(f"{Path(robot).stem if is_file else name}.yaml")
+    return Answers(robot, Path(str(_asked("Write to", str(default)))), joints)
 
 
 def _of_groups(groups: dict[str, tuple[str, ...]], count: int) -> tuple[str, ...]:

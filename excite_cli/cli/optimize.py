@@ -69,108 +69,35 @@ def optimize(
       excite optimize ur10.yaml -o more.h5 --prior ur10.h5
       excite optimize ur10.yaml -o next.h5 --after diagnosis.h5
     """
-    from rich.table import Table
-
-    from excite_cli.cli.motions import load_motions
-    from excite_cli.cli.setup import (
-        load_next_motion,
-        load_priors,
-        load_problem,
-        output_path,
-        single_threaded,
-    )
+    from excite_cli.api.loading import load_case, load_problem
+    from excite_cli.api.outputs import result_path
+    from excite_cli.api.planning import Planned, plan, plan_after, plan_answer
+    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import working
     from excite_cli.cli.start_line import iterations_of, start_line
-    from excite_cli.cli.tables import (
-        criterion_data,
-        margin_table,
-        motion_data,
-        motion_table,
-        outlook_table,
-    )
-    from excite_cli.cli.working import tell_idle, working
-    from excite_cli.config.inputs import files_of_config
     from excite_cli.errors import ConfigError
-    from excite_cli.excitation.progress import Status
-    from excite_cli.excitation.result import Result
-    from excite_cli.excitation.run import continue_run, new_result, resumed_result
-    from excite_cli.excitation.sequence import Step
-    from excite_cli.given_files import refuse_inputs_as_outputs
-    from excite_cli.store.result_file import read_result, write_result
-    from excite_cli.store.versions import versions
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    if resume and overwrite:
-        raise ConfigError("--resume goes on with the file, --overwrite replaces it: give one.")
     if after is not None and prior:
         raise ConfigError("--after brings the measured data with it: leave --prior out.")
-    inputs = [each for each in (*(prior or ()), start, after) if each is not None]
-    path = output_path(output, config, overwrite, resume, inputs)
-    extra = [f"sequence.motions={motions}"] if motions is not None else []
-    extra += [f"seed={seed}"] if seed is not None else []
-    extra += [f"optimizer.restarts={restarts}"] if restarts is not None else []
-    with single_threaded(threads), working(terminal, workers, scheduler, threads) as place:
-        following = None
-        if after is not None:
-            following = load_next_motion(terminal, config, after, [*(overrides or []), *extra])
-            problem = following.model
-            earlier: list[Path] = [after]
+    path = result_path(output, config, overwrite, resume)
+    changes = options.changes(overrides, seed=seed, motions=motions, restarts=restarts)
+    with single_threaded(threads), working(workers, scheduler, threads, terminal.tell) as place:
+        planned: Planned
+        if after is None:
+            planned = load_problem(config, changes, terminal.tell)
         else:
-            problem = load_problem(terminal, config, overrides, extra)
-            earlier = prior or []
-        refuse_inputs_as_outputs({"--output": path}, files_of_config(problem.spec, problem.folder))
-        tell_idle(terminal, workers, problem.spec.optimizer.restarts)
-        if resume and path.exists():
-            result = resumed_result(problem, read_result(path), path, earlier)
-            terminal.say(f"resuming after motion {len(result.motions)} of {path}")
-        else:
-            stacks = (
-                load_priors(terminal, problem, earlier)
-                if following is None
-                else [(str(after), following.prior)]
+            planned = plan_after(load_case(config, changes), after, terminal.tell)
+        with terminal.live("", iterations_of(planned.spec)) as line:
+            result = plan(
+                planned,
+                priors=prior or (),
+                starts=start or (),
+                output=path,
+                overwrite=overwrite,
+                resume=resume,
+                progress=start_line(line, planned.spec),
+                workers=place,
+                tell=terminal.tell,
             )
-            result = new_result(problem, stacks, versions(), config.resolve().parent)
-        starts = (
-            load_motions(terminal, start, problem.robot, problem.spec) if start is not None else []
-        )
-        with terminal.live("", iterations_of(problem.spec)) as show:
-            report = start_line(show, problem.spec)
-
-            def store(step: Step, current: Result) -> None:
-                write_result(path, current, problem)
-                motion = step.motion
-                note = "" if motion.improved else "; it brings no improvement"
-                note += (
-                    "; raise optimizer.max_seconds" if motion.status is Status.TIME_LIMIT else ""
-                )
-                note += f"; {motion.note}" if motion.note else ""
-                if motion.certified:
-                    loose = [name for name, proved in motion.certified.items() if not proved]
-                    told = "all constraints proved at every instant"
-                    note += f"; not proved: {', '.join(loose)}" if loose else f"; {told}"
-                terminal.say(
-                    f"motion {motion.index}: condition number {motion.condition_number:.2f}, "
-                    f"stacked {motion.stacked_condition_number:.2f} "
-                    f"({motion.seconds:.1f} s, {motion.status}{note})"
-                )
-
-            if following is None:
-                result = continue_run(problem, result, report, store, starts=starts, workers=place)
-            else:
-                result = continue_run(
-                    following.problem, result, report, store, following.model, starts, place
-                )
-    outlook = following.outlook([m.coefficients for m in result.motions]) if following else None
-    tables: list[Table | str] = [motion_table(result.motions), f"{path}"]
-    if outlook is not None and outlook["pairs"]:
-        tables.insert(0, outlook_table(outlook))
-    if problem.constraints:
-        tables.insert(-1, margin_table(result.motions, problem.constraints))
-    terminal.answer(
-        tables,
-        {
-            "motions": [motion_data(m) for m in result.motions],
-            "criterion": criterion_data(problem),
-            "output": str(path),
-            **({"next_experiment": outlook} if outlook is not None else {}),
-        },
-    )
+    terminal.show(plan_answer(planned, result, str(path)))

@@ -80,3 +80,16 @@ Scheduler = Annotated[
         rich_help_panel=WORK,
     ),
 ]
+
+
+def changes(
+    overrides: list[str] | None,
+    *,
+    seed: int | None = None,
+    motions: int | None = None,
+    restarts: int | None = None,
+) -> list[str]:
+    """What changes the config: --set, then the options that have names of their own."""
+    named = {"sequence.motions": motions, "seed": seed, "optimizer.restarts": restarts}
+    given = [f"{key}={value}" for key, value in named.items() if value is not None]
+    return [*(overrides or []), *given]

@@ -1,21 +1,22 @@
 """`excite report`: one page about motions, fits and diagnoses; figures of motions as files."""
 
-from collections.abc import Mapping, Sequence
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.report_figures import Format, write_figures
 
-if TYPE_CHECKING:
-    from excite_cli.cli.report_files import Told
-    from excite_cli.excitation.problem import Problem
-    from excite_cli.excitation.result import Result
-    from excite_cli.report.page import Picture
+
+class Format(StrEnum):
+    """What a figure is written as."""
+
+    png = "png"
+    svg = "svg"
+    pdf = "pdf"
 
 
 def report(
@@ -74,97 +75,20 @@ def report(
       excite report ur10.h5 more.h5 -o compared.html
       excite report ur10.h5 --figures ur10-figures --format svg
     """
-    from excite_cli.atomic import write_text_atomically
-    from excite_cli.cli.rebuilt import rebuilt_problem
-    from excite_cli.cli.report_files import read_files
-    from excite_cli.cli.setup import single_threaded
-    from excite_cli.errors import FileError
-    from excite_cli.excitation.result import Result
-    from excite_cli.report.style import matplotlib_part
+    from excite_cli.api.reporting import report_answer, write_report
+    from excite_cli.api.threads import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    matplotlib_part("")
-    if kind is not None and figures is None:
-        raise FileError("--format is that of figures: give a folder for them with --figures.")
-    page = output or (Path(f"{files[0].stem}-report.html") if figures is None else None)
-    if page is not None:
-        _check_page(page, overwrite, [*files, *([config] if config is not None else [])])
-    with single_threaded():
-        told = read_files(files)
-        problems = {
-            each.path: rebuilt_problem(each.path, each.content, config)
-            for each in told
-            if isinstance(each.content, Result)
-        }
-        written: list[str] = []
-        if figures is not None:
-            written = write_figures(terminal, told, problems, (figures, kind, overwrite))
-        if page is not None:
-            text = _page_text(terminal, told, problems, picture)
-            write_text_atomically(page, text)
-    terminal.answer(
-        [*([str(page)] if page is not None else []), *written],
-        {"output": None if page is None else str(page), "figures": written},
-    )
-
-
-def _check_page(page: Path, overwrite: bool, inputs: Sequence[Path]) -> None:
-    """See that the page can be written.
-
-    Raises
-    ------
-    FileError
-        It is one of `inputs`, exists and nothing says to replace it, or its name is that of another
-        format.
-    """
-    from excite_cli.cli.outputs import check_outputs
-    from excite_cli.errors import FileError
-
-    if page.suffix.lower() not in (".html", ".htm") and not page.is_dir():
-        hint = " Figures and PDF are written by --figures."
-        raise FileError(f"-o {page}: a report is a page, NAME.html.{hint}")
-    check_outputs({"output": page}, overwrite, inputs)
-
-
-def _page_text(
-    terminal: Terminal, told: "Sequence[Told]", problems: "Mapping[Path, Problem]", picture: bool
-) -> str:
-    from excite_cli.report.assembly import Source, page_of
-    from excite_cli.report.page import render
-
-    with terminal.live("drawing", len(told)) as show:
-        sources = []
-        for each in told:
-            problem, taken = problems.get(each.path), None
-            if picture and problem is not None:
-                show(f"{each.name}: the robot", 0)
-                taken = _picture(terminal, each, problem)
-            sources.append(Source(each.name, each.path.name, each.content, problem, taken))
-        return render(page_of(sources, show))
-
-
-def _picture(terminal: Terminal, each: "Told", problem: "Problem") -> "Picture | None":
-    """The robot where it comes nearest to something in its first motion, if that can be drawn."""
-    from typing import cast
-
-    from excite_cli.cli.motions import motions_of_result
-    from excite_cli.errors import MissingExtraError
-    from excite_cli.report.page import Picture
-
-    try:
-        from excite_cli.view.pictures import View, still_png
-
-        result = cast("Result", each.content)
-        segment = motions_of_result(each.path, result, [result.motions[0].index])[0]
-        png = still_png(problem, segment, View(size=(600, 441), ghosts=3, caption=False))
-    except (MissingExtraError, ImportError) as error:
-        terminal.detail(f"no picture of the robot: {error}")
-        return None
-    name = problem.robot.name
-    return Picture(
-        f"{name} in its first motion",
-        png,
-        f"{name} at the instant of its first motion at which it comes nearest to itself or to "
-        "something around it, with three other instants faintly behind.",
-        f"Where it comes nearest to something. `excite view {each.path.name}` plays all motions.",
-    )
+    with single_threaded(), terminal.live("drawing") as line:
+        found = write_report(
+            files,
+            output,
+            figures=figures,
+            format=kind,
+            config=config,
+            picture=picture,
+            overwrite=overwrite,
+            progress=line,
+            tell=terminal.tell,
+        )
+    terminal.show(report_answer(found))

@@ -31,24 +31,10 @@ def schema(
       excite schema -o excite.schema.json
       excite schema
     """
-    import json
+    from excite_cli.api.schema import config_schema, save_schema
 
-    from excite_cli.atomic import write_atomically
-    from excite_cli.cli.outputs import check_outputs
-    from excite_cli.config.spec import Spec
-
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    text = json.dumps(Spec.model_json_schema(), indent=2, ensure_ascii=False)
     if output is None:
-        print(text)
-        return
-    check_outputs({"output": output}, overwrite)
-
-    def write(path: Path) -> None:
-        path.write_text(text + "\n", encoding="utf-8")
-
-    write_atomically(output, write)
-    terminal.answer(
-        [str(output), f"First line of a config: # yaml-language-server: $schema={output}"],
-        {"output": str(output)},
-    )
+        print(config_schema())
+    else:
+        terminal = Terminal(as_json, quiet, verbose, not no_progress)
+        terminal.show(save_schema(output, overwrite))

@@ -1,7 +1,7 @@
 """`excite simulate`: planned motions, played on a robot that differs from its model."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -9,15 +9,7 @@ from excite_cli.cli import options
 from excite_cli.cli.completion import complete_effect
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.outputs import check_outputs
-
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from excite_cli.config.spec import Spec
-    from excite_cli.robot.model import Robot
-    from excite_cli.simulation.settings import SimulationSettings
-    from excite_cli.simulation.simulate import Simulation
+from excite_cli.cli.posture import start_from
 
 _PLAYED, _ROBOT, _MEASURED = "What is played", "The robot", "What is measured"
 
@@ -151,163 +143,38 @@ def simulate(
           --effect coulomb_friction@elbow_joint,wrist_1_joint=2 \\
           --effect 'payload@all=1.5;runs:motion_2'
     """
-    from dataclasses import replace
-
-    from excite_cli.cli.entry_program import playable, posture_from
-    from excite_cli.cli.motions import load_motions
-    from excite_cli.cli.setup import load_problem, single_threaded
-    from excite_cli.config.inputs import files_of_config
-    from excite_cli.config.load import load_spec
-    from excite_cli.effects.catalogue import declared_effects
-    from excite_cli.errors import ConfigError
-    from excite_cli.export.timed import repeated
-    from excite_cli.given_files import refuse_inputs_as_outputs
-    from excite_cli.measurement.hdf5_writer import write_dataset
-    from excite_cli.robot.model import build_robot
-    from excite_cli.simulation.engine import load_mujoco
-    from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
-    from excite_cli.simulation.planted import parse_planted
-    from excite_cli.simulation.settings import SimulationSettings
-    from excite_cli.simulation.simulate import simulate as simulate_motions
-    from excite_cli.simulation.simulate import takes_of
+    from excite_cli.api.loading import load_case
+    from excite_cli.api.simulating import SimulationSettings, simulation_answer
+    from excite_cli.api.simulating import simulate as simulate_motions
+    from excite_cli.api.threads import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    check_outputs({"output": output}, overwrite, (config, file))
-    if posture is not None and not entry:
-        raise ConfigError("--from says where --entry starts: give both.")
+    start = start_from(posture, entry)
     with single_threaded():
-        spec = load_spec(config, overrides)
-        own = files_of_config(spec, config.resolve().parent)
-        refuse_inputs_as_outputs({"--output": output}, own)
+        case = load_case(config, overrides or ())
         settings = SimulationSettings(
-            seed=spec.seed if seed is None else seed,
+            seed=case.spec.seed if seed is None else seed,
             rate=rate,
             torque_noise=torque_noise,
             noise_correlation=noise_correlation,
             encoder=encoder,
             inertia_error=inertia_error,
             repeat=repeat,
-            periods=1 if entry else periods,
+            periods=periods,
             torque_limits=torque_limits,
         )
-        load_mujoco()
-        robot = build_robot(spec.robot, config.resolve().parent)
-        found = load_motions(terminal, file, robot, spec, motion)
-        motions: list[Planned]
-        if entry:
-            start, problem = posture_from(posture, robot), load_problem(terminal, config, overrides)
-            chains = playable(terminal, problem, found, start, periods)
-            motions = [PlannedProgram(m.name, c) for m, c in zip(found, chains, strict=True)]
-        else:
-            motions = [PlannedMotion(m.name, m.trajectory, m.coefficients) for m in found]
-            if periods > 1 and not all(motion.periodic for motion in motions):
-                chains = [repeated(m, periods, robot.joint_names) for m in found]
-                motions = [PlannedProgram(m.name, c) for m, c in zip(found, chains, strict=True)]
-                settings = replace(settings, periods=1)
-        takes = takes_of(motions, repeat)
-        planted = [p for text in effect or [] for p in parse_planted(text, robot, takes)]
-        declared = () if no_declared else declared_effects(spec.effects, robot)
-        if _converts(spec):
-            terminal.say(
-                "warning: the config converts recorded positions or torques (measurement: …), but "
-                "this file holds rad and N·m at the joints. Read it with a config without that."
+        with terminal.live("simulating") as line:
+            found = simulate_motions(
+                case,
+                file,
+                effect or (),
+                settings,
+                chosen=motion or (),
+                start=start,
+                declared=not no_declared,
+                output=output,
+                overwrite=overwrite,
+                progress=line,
+                tell=terminal.tell,
             )
-        with terminal.live("simulating", len(motions) * repeat) as show:
-            simulation = simulate_motions(robot, motions, settings, planted, declared, show)
-        write_dataset(output, simulation.dataset, _attributes(simulation, settings, spec, robot))
-    records = [p.record(robot) for p in simulation.truth.effects]
-    runs = [
-        {
-            "name": run.name,
-            "samples": len(run.t),
-            "duration": run.duration,
-            "tracking_error": dict(
-                zip(robot.joint_names, map(float, simulation.tracking[run.name]), strict=True)
-            ),
-        }
-        for run in simulation.dataset.runs
-    ]
-    terminal.answer(
-        [_run_table(simulation), *([_effect_table(records)] if records else []), str(output)],
-        {"runs": runs, "effects": records, "output": str(output), "seed": settings.seed},
-    )
-
-
-def _converts(spec: "Spec") -> bool:
-    """Whether reading with this config changes positions or torques."""
-    from excite_cli.config.data_spec import MeasurementSpec
-
-    kept = {"filter", "topic", "rate"}
-    plain, given = MeasurementSpec(), spec.measurement
-    return any(
-        getattr(given, name) != getattr(plain, name)
-        for name in MeasurementSpec.model_fields
-        if name not in kept
-    )
-
-
-def _attributes(
-    simulation: "Simulation", settings: "SimulationSettings", spec: "Spec", robot: "Robot"
-) -> dict[str, object]:
-    """What the data file says about its making."""
-    import json
-    from dataclasses import asdict
-
-    from excite_cli.config.load import spec_as_yaml
-    from excite_cli.store.versions import versions
-
-    return {
-        "simulated": True,
-        "seed": settings.seed,
-        "settings": json.dumps(asdict(settings)),
-        "truth": json.dumps(simulation.truth.record(robot), ensure_ascii=False),
-        "config": spec_as_yaml(spec),
-        "versions": json.dumps(versions()),
-    }
-
-
-def _run_table(simulation: "Simulation") -> "Table":
-    import numpy as np
-
-    from excite_cli.cli.layout import table as new_table
-
-    names = ("run", "samples", "seconds", "tracking [mrad]", "worst", "joint")
-    table = new_table("Runs (tracking: RMS)", names, left=("run", "joint"))
-    for run in simulation.dataset.runs:
-        error = 1e3 * simulation.tracking[run.name]
-        worst = int(np.argmax(error))
-        table.add_row(
-            run.name,
-            str(len(run.t)),
-            f"{run.duration:.2f}",
-            f"{np.sqrt(np.mean(error**2)):.3f}",
-            f"{error[worst]:.3f}",
-            simulation.dataset.joint_names[worst],
-        )
-    return table
-
-
-def _effect_table(records: list[dict[str, object]]) -> "Table":
-    from excite_cli.cli.layout import table as new_table
-
-    names = ("effect", "joints", "parameters", "runs", "declared")
-    table = new_table(
-        "Effects in the robot", names, ("effect", "declared"), ("joints", "parameters", "runs")
-    )
-    for record in records:
-        parameters, joints = record["parameters"], record["joints"]
-        assert isinstance(parameters, dict)
-        assert isinstance(joints, list)
-        runs = record["runs"]
-        values = (
-            f"{key} {each['value']:.4g} {'' if each['unit'] == '1' else each['unit']}".strip()
-            for key, each in parameters.items()
-        )
-        table.add_row(
-            str(record["kind"]),
-            ", ".join(joints),
-            ", ".join(values),
-            ", ".join(runs) if isinstance(runs, list) and runs else "all",
-            "yes" if record["declared"] else "no",
-        )
-    return table
+    terminal.show(simulation_answer(found, str(output), settings.seed))

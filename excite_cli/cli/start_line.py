@@ -1,10 +1,15 @@
 """The progress line of motions that are being optimised, their starts one or many."""
 
+from collections import defaultdict
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from excite_cli.cli.best_so_far import Best
+from excite_cli.cli.console import Line
 from excite_cli.config.spec import Spec
-from excite_cli.excitation.progress import Progress, ProgressCallback
+
+if TYPE_CHECKING:
+    from excite_cli.api.planning import Progress
 
 
 def iterations_of(spec: Spec) -> int:
@@ -12,22 +17,18 @@ def iterations_of(spec: Spec) -> int:
     return spec.optimizer.max_iterations * spec.optimizer.restarts
 
 
-def start_line(show: Callable[[str, int], None], spec: Spec) -> Callable[[int], ProgressCallback]:
-    """What `continue_run` reports to, shown with `show(text, iterations done)`."""
+def start_line(show: Line, spec: Spec) -> Callable[[int, "Progress"], None]:
+    """What `plan` reports to, shown with `show(text, iterations done)`."""
     total, most = spec.sequence.motions, spec.optimizer.max_iterations
+    best: dict[int, Best] = defaultdict(Best)
 
-    def report(index: int) -> ProgressCallback:
-        best = Best()
+    def tell(index: int, progress: "Progress") -> None:
+        words = f"motion {index} of {total}: {best[index].words(progress)}, "
+        starts = progress.starts
+        if starts is None:
+            show(f"{words}iteration {progress.iteration} of {most}", progress.iteration)
+        else:
+            words += f"{starts.done} of {starts.total} starts done, {starts.running} running"
+            show(words, starts.iterations)
 
-        def tell(progress: Progress) -> None:
-            words = f"motion {index} of {total}: {best.words(progress)}, "
-            starts = progress.starts
-            if starts is None:
-                show(f"{words}iteration {progress.iteration} of {most}", progress.iteration)
-            else:
-                words += f"{starts.done} of {starts.total} starts done, {starts.running} running"
-                show(words, starts.iterations)
-
-        return tell
-
-    return report
+    return tell

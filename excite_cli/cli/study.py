@@ -65,42 +65,36 @@ def study(
       excite study ur10.yaml measured.h5 --identify-only -o logs \\
         --vary identification.method=ols,wls
     """
-    from excite_cli.cli.setup import single_threaded
-    from excite_cli.cli.study_tables import answer_of, study_table
-    from excite_cli.cli.working import working
-    from excite_cli.errors import ConfigError
-    from excite_cli.study.case import StudyTask
-    from excite_cli.study.plan import planned_cases
-    from excite_cli.study.records import TABLE
-    from excite_cli.study.study import StudyNews, run_study
-    from excite_cli.study.vary import parse_vary
+    from excite_cli.api.studying import StudyNews, run_study, study_answer, study_folder
+    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import working
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    if resume and overwrite:
-        raise ConfigError("--resume goes on with the folder, --overwrite replaces it: give one.")
-    varied = [parse_vary(text) for text in vary or []]
-    task = StudyTask(config.resolve(), tuple(overrides or []), not identify_only)
-    cases = planned_cases(task, logs or [], varied)
-    folder = output or Path(f"{config.stem}_study")
     with (
-        working(terminal, workers, scheduler, threads) as place,
+        working(workers, scheduler, threads, terminal.tell) as place,
         single_threaded(threads),
-        terminal.live("", len(cases)) as show,
+        terminal.live("") as line,
     ):
 
-        def report(news: StudyNews) -> None:
+        def progress(news: StudyNews) -> None:
             best = f", best {news.best:.4g}" if news.best < float("inf") else ""
-            show(
+            line(
                 f"{news.done} of {news.total} cases done, {news.running} running{best}; "
                 f"{news.told.splitlines()[0]}",
                 news.done,
+                news.total,
             )
 
-        records = run_study(task, cases, folder, place, resume, report, overwrite)
-    failed = sum(record.failed for record in records)
-    words = f"{len(records)} cases" + (f", {failed} failed" if failed else "")
-    terminal.answer(
-        [study_table(records), f"{words}; {folder / TABLE}"], answer_of(records, folder)
-    )
-    if failed:
-        raise typer.Exit(1)
+        records = run_study(
+            config,
+            logs or (),
+            vary or (),
+            output=output,
+            overrides=overrides or (),
+            diagnosed=not identify_only,
+            resume=resume,
+            overwrite=overwrite,
+            progress=progress,
+            workers=place,
+        )
+    terminal.show(study_answer(records, study_folder(config, output)))

@@ -1,20 +1,15 @@
 """`excite view`: motions on the robot, in the browser or as a picture."""
 
+import math
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
-
-if TYPE_CHECKING:
-    from excite_cli.excitation.problem import Problem
-    from excite_cli.trajectory.chain import Segment
-    from excite_cli.view.pictures import View
-
-_SECONDS = 5.0  # of a GIF, unless the motion is shorter
-_LARGEST = 4096  # pixels
+from excite_cli.errors import ConfigError, FileError
 
 
 def view(
@@ -106,169 +101,74 @@ def view(
 
     Example:  excite view ur10.h5 --motion 2 --gif ur10.gif --duration 6
     """
-    from excite_cli.cli.setup import single_threaded
-    from excite_cli.errors import ConfigError, FileError
+    from excite_cli.api.showing import Answer
+    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.viewing import Serving, View, draw_motion, drawing_answer, view_motions
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    target = _target(png, gif)
+    azimuth, elevation = _angles(angles)
+    chosen = [motion] if motion is not None else []
+    with single_threaded():
+        if target is None:
+
+            def ready(url: str, port: int) -> None:
+                words = f"{url}   (Ctrl-C ends it)"
+                terminal.show(Answer((words,), {"url": url, "port": port}))
+                sys.stdout.flush()
+
+            view_motions(
+                file,
+                config,
+                overrides or (),
+                chosen=chosen,
+                serving=Serving(host, port, azimuth, elevation, capsules, distance, mass),
+                browser=sys.stdout.isatty() and not as_json if browser is None else browser,
+                ready=ready,
+                tell=terminal.tell,
+            )
+            return
+        pixels = _size(size or ("1280x960" if png is not None else "640x480"))
+        look = View(pixels, azimuth, elevation, capsules, distance, mass, caption, ghosts)
+        with terminal.live("drawing") as line:
+            found = draw_motion(
+                file,
+                target,
+                config,
+                overrides or (),
+                chosen=chosen,
+                look=look,
+                time=time,
+                fps=fps,
+                seconds=duration,
+                overwrite=overwrite,
+                progress=line,
+                tell=terminal.tell,
+            )
+    terminal.show(drawing_answer(found))
+
+
+def _target(png: Path | None, gif: Path | None) -> Path | None:
+    """The picture that was asked for, with the suffix of its option."""
     if png is not None and gif is not None:
         raise ConfigError("--png and --gif: give one of them.")
-    azimuth, elevation = _angles(angles)
-    with single_threaded():
-        if png is None and gif is None:
-            from excite_cli.view.browser import Serving
-
-            problem, segments = _motions(terminal, file, motion, config, overrides)
-            serving = Serving(host, port, azimuth, elevation, capsules, distance, mass)
-            _serve(terminal, problem, segments, serving, browser)
-            return
-        from excite_cli.view.pictures import View
-
-        pixels = _size(size or ("1280x960" if png is not None else "640x480"))
-        look = View(
-            pixels, azimuth, elevation, capsules, distance, mass, caption, ghosts if png else 0
-        )
-        target = png or gif
-        assert target is not None
-        if not file.is_file():
-            raise FileError(f"There is no file {file}.")
-        given = [each for each in (file, config) if each is not None]
-        _check_target(target, ".png" if png is not None else ".gif", overwrite, given)
-        problem, segments = _motions(terminal, file, motion, config, overrides)
-        segment = segments[0]
-        if time is not None and time > segment.trajectory.duration:
-            raise ConfigError(
-                f"--time {time:g}: {segment.name} ends at {segment.trajectory.duration:g} s."
-            )
-        data = _draw(terminal, problem, segment, look, target, time, fps, duration)
-    terminal.answer(str(target), data)
-
-
-def _draw(
-    terminal: Terminal,
-    problem: "Problem",
-    segment: "Segment",
-    look: "View",
-    target: Path,
-    time: float | None,
-    fps: float,
-    duration: float | None,
-) -> dict[str, Any]:
-    from excite_cli.atomic import write_atomically
-    from excite_cli.view.pictures import frame_count, motion_gif, still_png
-
-    if target.suffix.lower() == ".png":
-        with terminal.live("drawing"):
-            content = still_png(problem, segment, look, time, terminal.say)
-        more: dict[str, Any] = {}
-    else:
-        seconds = duration or min(_SECONDS, segment.trajectory.duration)
-        with terminal.live("drawing", frame_count(fps, seconds)) as show:
-            content = motion_gif(problem, segment, look, fps, seconds, show, terminal.say)
-        more = {"frames": frame_count(fps, seconds), "seconds": seconds}
-
-    def write(path: Path) -> None:
-        path.write_bytes(content)
-
-    write_atomically(target, write)
-    return {"picture": str(target), "motion": segment.name, "bytes": len(content), **more}
-
-
-def _serve(
-    terminal: Terminal,
-    problem: "Problem",
-    segments: "list[Segment]",
-    serving: Any,
-    browser: bool | None,
-) -> None:
-    """Until Ctrl-C, which is the way to end it and no error."""
-    import sys
-    import webbrowser
-
-    from excite_cli.view.browser import play_in_browser
-
-    opens = browser if browser is not None else sys.stdout.isatty() and not terminal.as_json
-
-    def ready(url: str, port: int) -> None:
-        if port != serving.port:
-            terminal.say(f"Port {serving.port} is taken; {port} is the next free one.")
-        terminal.answer(f"{url}   (Ctrl-C ends it)", {"url": url, "port": port})
-        sys.stdout.flush()
-        if opens:
-            webbrowser.open(url)
-
-    try:
-        play_in_browser(problem, segments, serving, ready, say=terminal.say)
-    except KeyboardInterrupt:
-        terminal.say("Ended.")
-
-
-def _motions(
-    terminal: Terminal,
-    file: Path,
-    motion: int | None,
-    config: Path | None,
-    overrides: list[str] | None,
-) -> "tuple[Problem, list[Segment]]":
-    """The problem and the motions to be shown.
-
-    Raises
-    ------
-    FileError
-        The file is missing, or is no result and no config says what moves.
-    """
-    from excite_cli.cli.motions import load_motions, motions_of_result
-    from excite_cli.cli.rebuilt import rebuilt_problem
-    from excite_cli.cli.setup import load_problem
-    from excite_cli.errors import ConfigError, FileError
-    from excite_cli.store.result_file import is_result, read_result
-
-    if not file.exists():
-        raise FileError(f"There is no file {file}.")
-    chosen = [motion] if motion is not None else None
-    if is_result(file):
-        if overrides:
-            raise ConfigError("--set: a result file has its own config; leave it out.")
-        result = read_result(file)
-        return rebuilt_problem(file, result, config), motions_of_result(file, result, chosen)
-    if config is None:
-        raise FileError(
-            f"{file} is no result file, so the robot is not known: give --config CONFIG.yaml."
-        )
-    problem = load_problem(terminal, config, overrides)
-    return problem, load_motions(terminal, file, problem.robot, problem.spec, chosen)
-
-
-def _check_target(target: Path, suffix: str, overwrite: bool, inputs: list[Path]) -> None:
-    from excite_cli.cli.outputs import claim_file
-    from excite_cli.errors import FileError
-    from excite_cli.given_files import refuse_inputs_as_outputs
-
-    if target.suffix.lower() != suffix:
-        raise FileError(f"--{suffix[1:]} {target}: give a name that ends in {suffix}.")
-    refuse_inputs_as_outputs({f"--{suffix[1:]}": target}, inputs)
-    claim_file(target)
-    if target.exists() and not overwrite:
-        raise FileError(f"{target} exists already. Give another name, or --overwrite.")
+    for option, path in (("png", png), ("gif", gif)):
+        if path is not None and path.suffix.lower() != f".{option}":
+            raise FileError(f"--{option} {path}: give a name that ends in .{option}.")
+    return png or gif
 
 
 def _size(text: str) -> tuple[int, int]:
     """`640x480` as pixels across and down."""
-    from excite_cli.errors import ConfigError
-
     parts = text.lower().replace("×", "x").split("x")
     if len(parts) == 2 and all(part.strip().isdigit() for part in parts):
         width, height = (int(part) for part in parts)
-        if min(width, height) >= 16 and max(width, height) <= _LARGEST:
-            return width, height
-    raise ConfigError(f"--size {text}: give WIDTHxHEIGHT in pixels, 16 to {_LARGEST}: 1280x960.")
+        return width, height
+    raise ConfigError(f"--size {text}: give WIDTHxHEIGHT in pixels, 16 to 4096: 1280x960.")
 
 
 def _angles(text: str) -> tuple[float, float]:
     """`35,18` as degrees."""
-    import math
-
-    from excite_cli.errors import ConfigError
-
     try:
         azimuth, elevation = (float(part) for part in text.split(","))
     except ValueError:

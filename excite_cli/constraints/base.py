@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from excite_cli.constraints.drawing import Drawing, Nearest
 from excite_cli.constraints.joint_columns import JointColumns
-from excite_cli.constraints.remark import Remark
 from excite_cli.dynamics.states import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.geometry.link_meshes import Poses
@@ -22,6 +21,7 @@ from excite_cli.geometry.reasons import DroppedPair
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.worst_margin import Worst
 from excite_cli.robot.capsule import Capsule
+from excite_cli.shown.note import Note
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -113,7 +113,7 @@ class Constraint(ABC):
         return None
 
     @property
-    def remarks(self) -> tuple[Remark, ...]:
+    def remarks(self) -> tuple[Note, ...]:
         """What is worth saying about it before work begins."""
         return ()
 

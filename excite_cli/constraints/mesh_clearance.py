@@ -3,13 +3,13 @@
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.constraints.remark import Remark
 from excite_cli.dynamics.states import States
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.geometry.pair_tables import FAR
 from excite_cli.geometry.reasons import DroppedPair
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.taylor import Taylor
+from excite_cli.shown.note import Level, Note
 
 KEPT = 0.002
 """Distance kept [m]: meshes need less than capsules, and more would take too much of the range."""
@@ -34,10 +34,10 @@ class MeshClearance(Constraint):
         return ()
 
     @property
-    def remarks(self) -> tuple[Remark, ...]:
+    def remarks(self) -> tuple[Note, ...]:
         """Why there are such pairs."""
         count = f"mesh clearance: {len(self.labels)} pairs kept apart by their meshes"
-        return (Remark(f"{count}, since their capsules overlap whatever the posture"),)
+        return (Note(Level.DETAIL, f"{count}, since their capsules overlap whatever the posture"),)
 
     def margins(self, states: States) -> Array:
         """Distance less what is kept (T, m) [m], exact up to some centimetres."""

@@ -5,7 +5,7 @@ import numpy as np
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import Drawing, Nearest
 from excite_cli.constraints.nearest_bodies import nearest_obstacles
-from excite_cli.constraints.remark import Remark, counted_reasons
+from excite_cli.constraints.remark import counted_reasons
 from excite_cli.dynamics.states import States
 from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.geometry.link_meshes import Poses
@@ -19,6 +19,7 @@ from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_obstacles import least_clearances
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
+from excite_cli.shown.note import Level, Note
 
 # Distances beyond this many metres above the margin do not concern the optimiser.
 _NEAR = 0.1
@@ -59,13 +60,14 @@ class Surroundings(Constraint):
         return (self.capsules[self.pairs.checked[column][0]],)
 
     @property
-    def remarks(self) -> tuple[Remark, ...]:
+    def remarks(self) -> tuple[Note, ...]:
         """What is checked, what keeps less than the margin, and what touches at all times."""
         things = ", ".join(obstacle.name for obstacle in self.obstacles)
         said = [
-            Remark(
+            Note(
+                Level.DETAIL,
                 f"surroundings: {things}; {len(self.labels)} pairs of a capsule and a thing "
-                f"checked; not checked: {counted_reasons(self.pairs.dropped)}"
+                f"checked; not checked: {counted_reasons(self.pairs.dropped)}",
             )
         ]
         most = float(self.pairs.kept.max())
@@ -76,7 +78,7 @@ class Surroundings(Constraint):
         ]
         if closer:
             words = "these never get far from each other, so half of the farthest is kept instead"
-            said.append(Remark(f"{words} of {most:g} m: {'; '.join(closer)}", important=True))
+            said.append(Note(Level.INFO, f"{words} of {most:g} m: {'; '.join(closer)}"))
         touching = [
             f"{pair.first} – {pair.second} {reason_in_words(pair.reason)}"
             for pair in self.pairs.dropped
@@ -84,10 +86,10 @@ class Surroundings(Constraint):
         ]
         if touching:
             warning = (
-                f"warning: not guarded, since no motion parts them: {'; '.join(touching)}. Right "
+                f"not guarded, since no motion parts them: {'; '.join(touching)}. Right "
                 "for a robot that stands there; else correct constraints.surroundings."
             )
-            said.append(Remark(warning, important=True))
+            said.append(Note(Level.WARNING, warning))
         return tuple(said)
 
     @property

@@ -1,19 +1,10 @@
-"""What a constraint has to say about itself before work begins."""
+"""Pairs that a constraint leaves out, counted for what it has to say of itself."""
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from excite_cli.geometry.reasons import DroppedPair
 from excite_cli.geometry.words import why_in_words
-
-
-@dataclass(frozen=True)
-class Remark:
-    """A sentence; `important` if a person must know it, else a detail."""
-
-    words: str
-    important: bool = False
 
 
 def counted_reasons(dropped: Sequence[DroppedPair]) -> str:

@@ -5,7 +5,7 @@ import numpy as np
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import Drawing, Nearest
 from excite_cli.constraints.nearest_bodies import nearest_capsules
-from excite_cli.constraints.remark import Remark, counted_reasons
+from excite_cli.constraints.remark import counted_reasons
 from excite_cli.dynamics.states import States
 from excite_cli.geometry.clearance import Clearance
 from excite_cli.geometry.coal_distances import CoalDistances
@@ -16,6 +16,7 @@ from excite_cli.proof.enclosed_distances import EnclosedCapsules
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
+from excite_cli.shown.note import Level, Note
 
 # Distances beyond this many metres above the margin do not concern the optimiser; less for a robot
 # of thin links (this many times their radius), so that a hand need not open as far as an arm.
@@ -57,11 +58,12 @@ class SelfCollision(Constraint):
         return tuple(self.capsules[index] for index in self.pairs.checked[column])
 
     @property
-    def remarks(self) -> tuple[Remark, ...]:
+    def remarks(self) -> tuple[Note, ...]:
         """How many pairs are checked, and which are not that might meet."""
-        count = Remark(
+        count = Note(
+            Level.DETAIL,
             f"self-collision: {len(self.capsules)} capsules, {len(self.labels)} pairs checked; not "
-            f"checked: {counted_reasons(self.pairs.dropped)}"
+            f"checked: {counted_reasons(self.pairs.dropped)}",
         )
         loose = {
             f"{links.first} – {links.second} {links.percent}%"
@@ -72,12 +74,12 @@ class SelfCollision(Constraint):
         if not loose:
             return (count,)
         warning = (
-            "warning: not guarded, since their capsules overlap whatever the posture "
+            "not guarded, since their capsules overlap whatever the posture "
             "(links and the share of postures in which their meshes are apart): "
             f"{'; '.join(sorted(loose))}. Look at these with `excite check`, or give slimmer "
             "capsules under constraints.self_collision.capsules."
         )
-        return count, Remark(warning, important=True)
+        return count, Note(Level.WARNING, warning)
 
     @property
     def drawing(self) -> Drawing:

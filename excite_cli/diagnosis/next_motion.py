@@ -36,7 +36,8 @@ class NextMotion:
 
     `prior` are the measured data on the columns of `model`, which is `problem` unless that
     separates effects; then `problem` has the rivals' columns too. `purpose` is `separate` or
-    `excite`; `messages` say what is done and why.
+    `excite`; `messages` say what is done and why; `name` is the file of the diagnosis, if it was
+    read from one.
     """
 
     problem: Problem
@@ -44,6 +45,12 @@ class NextMotion:
     prior: Stack
     purpose: str
     messages: tuple[str, ...]
+    name: str = "the diagnosis"
+
+    @property
+    def spec(self) -> Spec:
+        """The resolved problem that the result is kept for."""
+        return self.model.spec
 
     def outlook(self, coefficients: Sequence[Array]) -> dict[str, Any]:
         """What the motions (coefficients (K, n) each) are expected to show, for `--json`.

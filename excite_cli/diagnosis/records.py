@@ -11,6 +11,7 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
+from excite_cli.shown.record import Shown
 
 
 @dataclass(frozen=True)
@@ -117,8 +118,8 @@ class Information:
     noise: Array
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Shown):
     """All that `excite diagnose` learned. `phi`: full standard parameters that fit the data.
 
     `effects`: all that were added to the declared model. `noise_floor` [N·m] (N): RMS per joint of

@@ -26,6 +26,7 @@ from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import random_direction
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.model import Array
+from excite_cli.shown.record import Shown
 
 ADJOINT_BLOCK_LIMIT = 1e-9
 CENTRAL_LIMIT = 1e-7
@@ -33,8 +34,8 @@ _STEPS_WITH_EFFECTS = (1e-4, FOURTH_ORDER_STEP, 1e-5, 3e-6)
 PAPER_FORWARD_ERROR = 1.3e-5
 
 
-@dataclass(frozen=True)
-class GradientCheck:
+@dataclass(frozen=True, repr=False)
+class GradientCheck(Shown):
     """Relative errors and seconds of the three ways, and whether the limits are kept."""
 
     variables: int

@@ -21,6 +21,7 @@ from excite_cli.excitation.second_path import SecondPath, second_paths
 from excite_cli.geometry.mesh_check import MeshCheck
 from excite_cli.proof.certificate import Path, Verdict, certify
 from excite_cli.proof.worst_margin import Worst
+from excite_cli.shown.record import Shown
 
 MESHES = "mesh_collision"
 _CHUNK = 2000
@@ -45,8 +46,8 @@ class Look:
             raise ConfigError(f"random: {self.random:,} instants; allowed: 0 to {_MOST_RANDOM:,}.")
 
 
-@dataclass(frozen=True)
-class Inspection:
+@dataclass(frozen=True, repr=False)
+class Inspection(Shown):
     """What was seen of one motion.
 
     `worst`, `verdicts`: by constraint, in their order. `second`: of those constraints that can be

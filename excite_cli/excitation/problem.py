@@ -28,12 +28,13 @@ from excite_cli.excitation.sampling import instants, with_sampling
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting, build_weighting
 from excite_cli.robot.model import Robot, build_robot
+from excite_cli.shown.record import Shown
 from excite_cli.trajectory.base import Basis, Trajectory
 from excite_cli.trajectory.catalogue import build_trajectory
 
 
-@dataclass(frozen=True)
-class Problem:
+@dataclass(frozen=True, repr=False)
+class Problem(Shown):
     """Everything that is fixed while motions are sought.
 
     `extension` holds the effects whose columns stand beside the base regressor. With a

@@ -11,10 +11,11 @@ from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.sequence import Step
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array
+from excite_cli.shown.record import Shown
 
 
-@dataclass(frozen=True)
-class Result:
+@dataclass(frozen=True, repr=False)
+class Result(Shown):
     """Motions of one problem so far, with the stack that includes them and the priors.
 
     `config` is the full resolved problem as YAML text, `config_folder` where its relative paths

@@ -29,6 +29,7 @@ from excite_cli.identification.regression import (
     signals_of,
 )
 from excite_cli.robot.model import Array, Robot
+from excite_cli.shown.record import Shown
 
 # A parameter is identifiable if the data fix it to this share of its value or usual size.
 _FIXED = 0.5
@@ -37,8 +38,8 @@ _REBUILDS, _SETTLED = 12, 1e-4
 _PROBE = 60
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, repr=False)
+class Fit(Shown):
     """What was identified.
 
     All of (p,): `names`, `units`, `values`, `std`, `relative_std`, `identifiable`, `essential`;

@@ -36,14 +36,15 @@ from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Robot
+from excite_cli.shown.record import Shown
 
 Tell = Callable[[str], None]
 # Parameters this many standard deviations below zero that cannot be negative are told.
 _SURELY = 3.0
 
 
-@dataclass(frozen=True)
-class Identification:
+@dataclass(frozen=True, repr=False)
+class Identification(Shown):
     """The fit, its errors on the sealed part and on the training part, and what was noticed.
 
     `noise_floor` [N·m] (N): RMS per joint of what changes from period to period in training runs;

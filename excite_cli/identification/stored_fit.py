@@ -7,10 +7,11 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.dataset import Finding
+from excite_cli.shown.record import Shown
 
 
-@dataclass(frozen=True)
-class StoredFit:
+@dataclass(frozen=True, repr=False)
+class StoredFit(Shown):
     """A fit with its errors and what was noticed.
 
     `closed_loop_bias` is a sentence, `torque_units` per joint, `traces` torque over time; files of

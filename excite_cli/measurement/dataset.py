@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.measurement.run_identity import Origin, Part, RunId
+from excite_cli.shown.record import Shown
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -93,8 +94,8 @@ class Run:
         )
 
 
-@dataclass(frozen=True)
-class Dataset:
+@dataclass(frozen=True, repr=False)
+class Dataset(Shown):
     """Runs of one robot; columns are in the order of `joint_names`."""
 
     joint_names: tuple[str, ...]

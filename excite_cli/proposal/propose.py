@@ -22,6 +22,7 @@ from excite_cli.robot.description import (
 from excite_cli.robot.package_search import package_folders
 from excite_cli.robot.reference_postures import reference_posture
 from excite_cli.robot.urdf_joints import UrdfSurvey, survey
+from excite_cli.shown.record import Shown
 
 _TORQUE_SHARE = 0.8
 _MARGIN = 0.01
@@ -42,8 +43,8 @@ class Request:
     base: Literal["fixed", "floating"] = "fixed"
 
 
-@dataclass(frozen=True)
-class Proposal:
+@dataclass(frozen=True, repr=False)
+class Proposal(Shown):
     """A config as text, and in words what was chosen and why.
 
     `joints` are the moved ones, `left_out` the others by reason, `notes` what was assumed.

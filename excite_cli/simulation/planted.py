@@ -7,6 +7,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -35,12 +36,12 @@ class Planted:
         }
         return {**self.effect.settings, **self.extra, **self.effect.shape, **linear}
 
-    def record(self, robot: Robot) -> dict[str, object]:
-        """As plain data, for files and answers."""
+    def record(self, joint_names: Sequence[str]) -> dict[str, Any]:
+        """As plain data, for files and answers; `joint_names` are the robot's."""
         nothing = np.zeros((len(self.values), len(self.values)))
         return {
             "kind": self.effect.kind,
-            "joints": [robot.joint_names[j] for j in self.effect.joints],
+            "joints": [joint_names[j] for j in self.effect.joints],
             "parameters": {
                 name: {"value": value.value, "unit": value.unit}
                 for name, value in self.effect.report(self.values, nothing).items()

@@ -11,6 +11,7 @@ from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
+from excite_cli.shown.record import Shown
 from excite_cli.simulation.build import assemble, make
 from excite_cli.simulation.controller import (
     Reference,
@@ -38,16 +39,16 @@ class Truth:
     phi: Array
     effects: tuple[Planted, ...]
 
-    def record(self, robot: Robot) -> dict[str, object]:
-        """As plain data."""
+    def record(self, joint_names: Sequence[str]) -> dict[str, object]:
+        """As plain data; `joint_names` are the robot's."""
         return {
-            "effects": [planted.record(robot) for planted in self.effects],
+            "effects": [planted.record(joint_names) for planted in self.effects],
             "phi": self.phi.tolist(),
         }
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, repr=False)
+class Simulation(Shown):
     """Recorded runs, the truth behind them, and the RMS tracking error (n,) of every run [rad]."""
 
     dataset: Dataset

@@ -6,6 +6,7 @@ from excite_cli.config.load import parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.uncertain_inertias import FitKnowledge
 from excite_cli.errors import FileError
+from excite_cli.store.fit_file import read_fit
 
 
 def fit_knowledge(spec: Spec, folder: Path) -> FitKnowledge | None:
@@ -20,8 +21,6 @@ def fit_knowledge(spec: Spec, folder: Path) -> FitKnowledge | None:
     """
     if spec.uncertainty is None or spec.uncertainty.fit is None:
         return None
-    from excite_cli.store.fit_file import read_fit  # slow to import
-
     path = folder / spec.uncertainty.fit
     if not path.is_file():
         raise FileError(

@@ -2,17 +2,12 @@
 
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from excite_cli import api
-from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import FileError
-from excite_cli.excitation.progress import Progress
-from excite_cli.excitation.result import Result
-from excite_cli.excitation.words import figure_in_words
 from excite_cli.study.request import request_of
 from excite_cli.workers.base import Tell
 
@@ -57,13 +52,17 @@ class DoneCase:
     seconds: float
 
 
+# Does a case: makes its files in a folder, tells how far it is, gives the key figures.
+Work = Callable[[StudyTask, StudyCase, Path, Tell], Figures]
+
+
 def overrides_of(task: StudyTask, case: StudyCase) -> list[str]:
     """Those of the study, then the varied values."""
     return [*task.overrides, *(f"{key}={value}" for key, value in case.values.items())]
 
 
-def do_case(task: StudyTask, case: StudyCase, tell: Tell) -> DoneCase:
-    """Optimise the case, or identify and diagnose its log.
+def do_with(task: StudyTask, case: StudyCase, tell: Tell, work: Work) -> DoneCase:
+    """Let `work` do the case in a folder of its own, and take what it made.
 
     Raises
     ------
@@ -75,10 +74,7 @@ def do_case(task: StudyTask, case: StudyCase, tell: Tell) -> DoneCase:
     began = time.perf_counter()
     _check_unchanged(task, case)
     with tempfile.TemporaryDirectory() as folder:
-        if case.log is None:
-            figures = _optimised(task, case, Path(folder), tell)
-        else:
-            figures = _traced(task, case, case.log, Path(folder), tell)
+        figures = work(task, case, Path(folder), tell)
         files = {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
     _check_unchanged(task, case)
     return DoneCase(figures, files, time.perf_counter() - began)
@@ -93,59 +89,6 @@ def _check_unchanged(task: StudyTask, case: StudyCase) -> None:
             f"{task.config}, a file that it names{log} was changed while the study ran, or is "
             "another one on the machine of this worker. Begin another study."
         )
-
-
-def _optimised(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Figures:
-    problem = api.load_problem(task.config, overrides_of(task, case))
-
-    def progress(index: int, state: Progress) -> None:
-        tell(f"motion {index}, {figure_in_words(state.figure)}")
-
-    result: Result = api.plan(problem, output=folder / "motions.h5", progress=progress)
-    last = result.motions[-1]
-    proved = all(all(motion.certified.values()) for motion in result.motions)
-    return {
-        "motions": len(result.motions),
-        "condition_number": last.stacked_condition_number,
-        "status": ", ".join(dict.fromkeys(motion.status for motion in result.motions)),
-        "proved": "yes" if proved and last.certified else "no",
-        "iterations": sum(motion.iterations for motion in result.motions),
-    }
-
-
-def _traced(task: StudyTask, case: StudyCase, log: Path, folder: Path, tell: Tell) -> Figures:
-    model = api.load_case(task.config, overrides_of(task, case))
-    data = api.load_data(model, log)
-    fit = api.identify(model, data)
-    api.save_fit(folder / "fit.h5", model, fit)
-    figures: dict[str, float | int | str | None] = {
-        "sealed_run": fit.sealed_run,
-        "parameters": len(fit.fit.names),
-        "identified_error": fit.error.mean_relative_moving,
-    }
-    if task.diagnosed:
-        found = api.diagnose(
-            model,
-            data,
-            output=folder / "diagnosis.h5",
-            progress=lambda text, done: tell(text),
-        )
-        figures |= _diagnosed(found)
-    return figures
-
-
-def _diagnosed(found: Diagnosis) -> Figures:
-    return {
-        "before": found.before.mean_relative_moving,
-        "after": found.after.mean_relative_moving,
-        "effects": _listed([(e.effect.kind, e.effect.joints) for e in found.named]),
-        "absorbed": _listed([(e.kind, e.joints) for e in found.absorbed]),
-        "unexplained": ", ".join(each.joint for each in found.unexplained),
-    }
-
-
-def _listed(effects: list[tuple[str, tuple[str, ...]]]) -> str:
-    return "; ".join(f"{kind} on {', '.join(joints)}" for kind, joints in effects)
 
 
 def as_data(value: Any) -> Any:

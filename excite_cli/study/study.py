@@ -9,7 +9,7 @@ from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import load_spec
 from excite_cli.errors import ExciteError, FileError, refusal
 from excite_cli.given_files import refuse_inputs_as_outputs
-from excite_cli.study.case import DoneCase, StudyCase, StudyTask, do_case
+from excite_cli.study.case import DoneCase, StudyCase, StudyTask
 from excite_cli.study.records import (
     TABLE,
     CaseRecord,
@@ -18,7 +18,7 @@ from excite_cli.study.records import (
     kept_case,
     write_table,
 )
-from excite_cli.workers.base import News, Workers
+from excite_cli.workers.base import News, Tell, Workers
 from excite_cli.workers.here import Here
 
 # Figures of which the lowest is the best, the first that a case has.
@@ -43,12 +43,15 @@ def run_study(
     task: StudyTask,
     cases: Sequence[StudyCase],
     folder: Path,
+    do_case: Callable[[StudyTask, StudyCase, Tell], DoneCase],
     workers: Workers | None = None,
     resume: bool = False,
     report: Callable[[StudyNews], None] = lambda news: None,
     overwrite: bool = False,
 ) -> list[CaseRecord]:
     """Do all cases, in `folder` a record and the files of each; a failure is a record too.
+
+    `do_case` does one; workers import it by its name.
 
     With `resume` cases that are there already are not done again, failed ones are; with `overwrite`
     all are. The table of all is written at the end; the folder is claimed by its name. Results do

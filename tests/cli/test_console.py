@@ -6,6 +6,8 @@ import sys
 import pytest
 import typer.main
 
+from excite_cli.api.exporting import MODELS
+from excite_cli.api.showing import Answer, Table
 from excite_cli.cli.app import app
 from excite_cli.cli.best_so_far import Best
 from excite_cli.cli.completion import (
@@ -17,8 +19,6 @@ from excite_cli.cli.completion import (
     complete_robot,
 )
 from excite_cli.cli.console import BUG, Terminal, run_guarded
-from excite_cli.cli.export import _MODELS
-from excite_cli.cli.layout import table
 from excite_cli.errors import FileError
 from excite_cli.excitation.progress import Figure, Measure, Progress, Stage
 from excite_cli.export.motions import MOTION_EXPORTERS
@@ -28,9 +28,10 @@ NAME = "a_very_long_name_of_a_joint_that_someone_wants_to_copy"
 
 
 def printed(capsys: pytest.CaptureFixture[str], quiet: bool = False, as_json: bool = False) -> str:
-    made = table("Title", ("joint", "figure", "words"), left=("joint",), words=("words",))
-    made.add_row(NAME, "1.5", "so many words that they need more than one line of eighty columns")
-    Terminal(as_json, quiet).answer([made, "a sentence [N·m]"], {"figure": float("inf")})
+    words = "so many words that they need more than one line of eighty columns"
+    columns = ("joint", "figure", "words")
+    made = Table("Title", columns, ((NAME, "1.5", words),), left=("joint",), words=("words",))
+    Terminal(as_json, quiet).show(Answer((made, "a sentence [N·m]"), {"figure": float("inf")}))
     return capsys.readouterr().out
 
 
@@ -96,7 +97,7 @@ def test_a_refusal_of_the_file_system_is_no_bug(capsys: pytest.CaptureFixture[st
 def test_completion_knows_robots_formats_kinds_and_keys() -> None:
     assert complete_format("r") == ["ros2", "rosbag2"]
     assert set(MOTION_FORMATS) == set(MOTION_EXPORTERS)
-    assert set(MODEL_FORMATS) == set(_MODELS)
+    assert set(MODEL_FORMATS) == set(MODELS)
     assert "ur10" in complete_robot("ur")
     assert complete_effect("spr") == ["spring@"]
     assert complete_key("optimizer.max_it") == ["optimizer.max_iterations="]
@@ -131,10 +132,9 @@ def test_a_terminal_does_not_obey_names_of_files(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "60")
     name = "el\x1b[2J\x1b]0;title\x07bo\x9b1mw\x00"
-    made = table("Title", ("joint", "figure"), left=("joint",))
-    made.add_row(name, "1.5")
+    made = Table("Title", ("joint", "figure"), ((name, "1.5"),), left=("joint",))
     terminal = Terminal(verbose=True)
-    terminal.answer([made, f"of {name}"], {})
+    terminal.show(Answer((made, f"of {name}")))
     terminal.say(name)
     terminal.detail(name)
 
@@ -146,5 +146,25 @@ def test_a_terminal_does_not_obey_names_of_files(
     seen = told.out + told.err
     assert seen.count("el[2J]0;titlebo1mw") == 5
     assert not [c for c in seen if (ord(c) < 0x20 or 0x7F <= ord(c) < 0xA0) and c != "\n"]
-    Terminal(as_json=True).answer(made, {"joint": name})
+    Terminal(as_json=True).show(Answer((made,), {"joint": name}))
     assert json.loads(capsys.readouterr().out) == {"joint": name}
+
+
+def test_a_bad_answer_is_exit_status_one(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(typer.Exit) as ended:
+        Terminal().show(Answer(("broken",), {}, good=False))
+    assert ended.value.exit_code == 1
+    assert capsys.readouterr().out == "broken\n"
+
+
+def test_rows_may_be_bold_and_set_apart(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    rows = (("first", "1"), ("second", "2"), ("mean", "1.5"))
+    made = Table("", ("name", "figure"), rows, left=("name",), bold=(2,), parted=(2,))
+    Terminal().show(Answer((made,)))
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-2].strip() == ""
+    assert lines[-1].split() == ["mean", "1.5"]
+    assert "second" in lines[-3]

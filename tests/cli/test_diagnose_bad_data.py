@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from excite_cli.cli.console import Terminal
-from excite_cli.cli.setup import load_dataset
+from excite_cli.api.loading import Case, load_data
 from excite_cli.config.load import load_spec
 from excite_cli.diagnosis.plausibility import check_dataset
 from excite_cli.effects.catalogue import kind_named
@@ -155,7 +154,7 @@ def test_every_mistake_has_its_message(
     write_dataset(tmp_path / "data.h5", damaged(recorded, damage), {})
     spec = load_spec(config)
     with pytest.raises(FileError) as told:  # noqa: PT012 - either may be the one that tells
-        data = load_dataset(Terminal(False, True), robot, spec, [tmp_path / "data.h5"])
+        data = load_data(Case(spec, config.parent, robot), tmp_path / "data.h5")
         check_dataset(robot, data, spec)
     assert all(word in str(told.value) for word in words), told.value
 

@@ -6,7 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from excite_cli.cli.entry_program import posture_from
+from excite_cli.api.entering import start_posture
+from excite_cli.cli.posture import start_from
 from excite_cli.config.load import load_spec
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import build_robot
@@ -81,10 +82,19 @@ def test_an_entered_motion_is_simulated_from_rest_to_rest(
 def test_postures_that_cannot_be(text: str, message: str) -> None:
     robot = build_robot(load_spec(SMOKE).robot, SMOKE.parent)
     with pytest.raises(ConfigError, match=message):
-        posture_from(text, robot)
+        start_posture(robot, start_from(text, True) or {})
 
 
 def test_joints_not_named_stay_at_the_posture() -> None:
     robot = build_robot(load_spec(SMOKE).robot, SMOKE.parent)
-    assert np.array_equal(posture_from(None, robot), POSTURE)
-    assert np.array_equal(posture_from(" elbow=0.5 ,slide=0", robot), [0, 0.6, 0.5, 0, 0])
+    assert start_from(None, True) == {}
+    assert np.array_equal(start_posture(robot, {}), POSTURE)
+    given = start_from(" elbow=0.5 ,slide=0", True)
+    assert given == {"elbow": 0.5, "slide": 0.0}
+    assert np.array_equal(start_posture(robot, given), [0, 0.6, 0.5, 0, 0])
+
+
+def test_without_entry_there_is_no_posture() -> None:
+    assert start_from(None, False) is None
+    with pytest.raises(ConfigError, match="--from says where --entry starts"):
+        start_from("elbow=0.5", False)

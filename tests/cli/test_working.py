@@ -5,9 +5,9 @@ import signal
 
 import pytest
 
+from excite_cli.api.working import tell_idle, working
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.stopping import stopped
-from excite_cli.cli.working import tell_idle, working
 
 
 def test_a_system_that_does_not_tell_its_affinity_has_all_processors(
@@ -15,7 +15,7 @@ def test_a_system_that_does_not_tell_its_affinity_has_all_processors(
 ) -> None:
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)
     monkeypatch.setattr(os, "cpu_count", lambda: 3)
-    working(Terminal(), 4, None).close()
+    working(4, None, 1, Terminal().tell).close()
     assert "4 workers share 3 processors" in capsys.readouterr().err
 
 
@@ -31,7 +31,7 @@ def test_a_system_that_does_not_tell_its_affinity_has_all_processors(
 def test_idle_workers_are_told(
     workers: int, starts: int, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    tell_idle(Terminal(), workers, starts)
+    tell_idle(workers, starts, Terminal().tell)
     told = capsys.readouterr().err
     assert said in told
     assert bool(said) == bool(told)

@@ -12,8 +12,11 @@ from pathlib import Path
 
 _IMPORTED = [
     "excite_cli.cli.app",
-    "excite_cli.cli.setup",
-    "excite_cli.api",
+    "excite_cli.api.checking",
+    "excite_cli.api.diagnosing",
+    "excite_cli.api.identifying",
+    "excite_cli.api.planning",
+    "excite_cli.api.simulating",
     "matplotlib.pyplot",
 ]
 

@@ -54,5 +54,12 @@ def test_formulas_are_mathml(site: Path) -> None:
 
 def test_public_functions_are_in_the_reference(site: Path) -> None:
     text = (site / "library.html").read_text(encoding="utf-8")
-    for name in ("load_problem", "plan", "diagnose", "identify", "simulate", "check"):
-        assert f'id="excite_cli.api.{name}"' in text
+    for module, name in (
+        ("loading", "load_problem"),
+        ("planning", "plan"),
+        ("diagnosing", "diagnose"),
+        ("identifying", "identify"),
+        ("simulating", "simulate"),
+        ("checking", "check"),
+    ):
+        assert f'id="excite_cli.api.{module}.{name}"' in text

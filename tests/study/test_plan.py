@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from excite_cli.api.studying import do_case
 from excite_cli.errors import ConfigError, FileError
-from excite_cli.study.case import StudyTask, do_case
+from excite_cli.study.case import StudyTask
 from excite_cli.study.plan import planned_cases
 from excite_cli.study.vary import Varied
 

@@ -32,15 +32,13 @@ class Done:
 
 
 @pytest.fixture
-def done(monkeypatch: pytest.MonkeyPatch) -> Done:
-    found = Done()
-    monkeypatch.setattr("excite_cli.study.study.do_case", found)
-    return found
+def done() -> Done:
+    return Done()
 
 
 def test_a_failing_case_is_a_row(done: Done, tmp_path: Path) -> None:
     heard: list[StudyNews] = []
-    records = run_study(TASK, CASES, tmp_path / "s", report=heard.append)
+    records = run_study(TASK, CASES, tmp_path / "s", done, report=heard.append)
     assert [record.failed for record in records] == [False, True, False]
     assert [news.done for news in heard] == [1, 2, 3]
     assert [news.best for news in heard] == [9.0, 9.0, 7.0]
@@ -53,48 +51,48 @@ def test_a_failing_case_is_a_row(done: Done, tmp_path: Path) -> None:
 
 def test_a_bug_in_a_case_says_that_it_is_one(done: Done, tmp_path: Path) -> None:
     done.broken = KeyError("shoulder")
-    assert "a bug of excite" in run_study(TASK, CASES, tmp_path)[1].message
+    assert "a bug of excite" in run_study(TASK, CASES, tmp_path, done)[1].message
 
 
 def test_resume_does_what_is_missing_or_failed(done: Done, tmp_path: Path) -> None:
-    run_study(TASK, CASES[:2], tmp_path)
+    run_study(TASK, CASES[:2], tmp_path, done)
     done.names.clear()
     done.broken = None
-    records = run_study(TASK, CASES, tmp_path, resume=True)
+    records = run_study(TASK, CASES, tmp_path, done, resume=True)
     assert done.names == ["seed-2", "seed-3"]
     assert [record.figures["condition_number"] for record in records] == [9.0, 8.0, 7.0]
     (tmp_path / "seed-1.motions.h5").unlink()
     done.names.clear()
-    run_study(TASK, CASES, tmp_path, resume=True)
+    run_study(TASK, CASES, tmp_path, done, resume=True)
     assert done.names == ["seed-1"], "a case without its file is not complete"
 
 
 def test_a_folder_is_not_written_over(done: Done, tmp_path: Path) -> None:
-    run_study(TASK, CASES[:1], tmp_path)
+    run_study(TASK, CASES[:1], tmp_path, done)
     other = [StudyCase("seed-1", {"seed": "1"}, None, "another config")]
     for left in ("study.csv", "seed-1.json", "seed-1.motions.h5"):
         for cases in (CASES, other):
             with pytest.raises(FileError, match=rf"^\S+{left} exists already.*--resume"):
-                run_study(TASK, cases, tmp_path)
+                run_study(TASK, cases, tmp_path, done)
         if left == "seed-1.json":
             with pytest.raises(FileError, match=r"^--resume: .*another config, robot or log"):
-                run_study(TASK, other, tmp_path, resume=True)
+                run_study(TASK, other, tmp_path, done, resume=True)
         (tmp_path / left).unlink()
-    run_study(TASK, CASES[:1], tmp_path)
+    run_study(TASK, CASES[:1], tmp_path, done)
 
 
 def test_with_overwrite_all_is_done_again(done: Done, tmp_path: Path) -> None:
-    run_study(TASK, CASES[:1], tmp_path)
+    run_study(TASK, CASES[:1], tmp_path, done)
 
     def stop(news: StudyNews) -> None:
         raise KeyboardInterrupt
 
     other = [StudyCase(c.name, c.values, None, f"another {c.request}") for c in CASES]
     with pytest.raises(KeyboardInterrupt):
-        run_study(TASK, other[2:], tmp_path, report=stop, overwrite=True)
+        run_study(TASK, other[2:], tmp_path, done, report=stop, overwrite=True)
     assert not (tmp_path / "study.csv").exists()
     done.names.clear()
-    run_study(TASK, other, tmp_path, overwrite=True)
+    run_study(TASK, other, tmp_path, done, overwrite=True)
     assert done.names == ["seed-1", "seed-2", "seed-3"]
 
 
@@ -104,14 +102,14 @@ def test_with_overwrite_all_is_done_again(done: Done, tmp_path: Path) -> None:
     ids=["cut", "list", "little", "figures", "files", "deep"],
 )
 def test_a_damaged_record_is_none(record: str, done: Done, tmp_path: Path) -> None:
-    run_study(TASK, CASES[:1], tmp_path)
+    run_study(TASK, CASES[:1], tmp_path, done)
     path = tmp_path / "seed-1.json"
     stored = json.loads(path.read_text())
     if record in ("FIGURES", "FILES"):
         record = json.dumps({**stored, record.lower(): [1]})
     path.write_text(record)
     done.names.clear()
-    run_study(TASK, CASES[:1], tmp_path, resume=True)
+    run_study(TASK, CASES[:1], tmp_path, done, resume=True)
     assert done.names == ["seed-1"]
     assert json.loads(path.read_text()) == stored
 
@@ -120,7 +118,7 @@ def test_two_studies_in_one_folder_are_refused(done: Done, tmp_path: Path) -> No
     with (tmp_path / ".study.csv.lock").open("w") as other:
         fcntl.flock(other, fcntl.LOCK_EX)
         with pytest.raises(FileError, match="another run"):
-            run_study(TASK, CASES, tmp_path)
+            run_study(TASK, CASES, tmp_path, done)
     assert done.names == []
 
 
@@ -129,7 +127,7 @@ def test_an_interrupted_study_keeps_what_was_done(done: Done, tmp_path: Path) ->
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_study(TASK, CASES, tmp_path, report=stop)
+        run_study(TASK, CASES, tmp_path, done, report=stop)
     done.names.clear()
-    run_study(TASK, CASES, tmp_path, resume=True)
+    run_study(TASK, CASES, tmp_path, done, resume=True)
     assert done.names == ["seed-2", "seed-3"]

@@ -1,0 +1,111 @@
+"""Judging motions before a robot plays them: `excite check`."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from excite_cli.api.motions import Motions, load_motions
+from excite_cli.config.load import parse_spec
+from excite_cli.errors import FileError
+from excite_cli.excitation.admissible import path_of
+from excite_cli.excitation.inspection import (
+    Look,
+    inspect,
+    largest_mismatch,
+    mesh_check_of,
+)
+from excite_cli.excitation.inspections import Difference, Inspections
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.result import Result
+from excite_cli.excitation.time_scaling import PaceLimits, slowing
+from excite_cli.proof.certificate import Path as MotionPath
+from excite_cli.robot.model import Array
+from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.store.result_file import is_result, read_result, read_samples
+from excite_cli.summary.inspections import check_answer as check_answer
+from excite_cli.trajectory.chain import Segment
+
+
+def check(
+    problem: Problem,
+    motions: Motions,
+    *,
+    rate: float = 1000.0,
+    random: int = 0,
+    meshes: bool = True,
+    slow: float | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    tell: Tell = log_note,
+) -> Inspections:
+    """Every motion against every constraint, proved where it can be: `excite check`.
+
+    `motions` are a result, what `motions_of` gives, or any file of motions. Margins are taken at
+    `rate` [Hz] and at `random` further instants; verdicts hold between them. With `slow` the
+    motions are judged slowed to that share of the limits of speed and acceleration.
+    `progress(done, total)` is called before every motion.
+
+    Returns
+    -------
+    Inspections
+        A mapping by the motion's name; `states` of each give (`proved` | `sampled` | `broken`,
+        reason) by constraint, `margins` the worst margin with unit, place and time, `violations`
+        their number.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read; the motions are of another robot or another trajectory.
+    """
+    segments = load_motions(problem, motions, tell=tell)
+    names = [each.name for each in segments]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise FileError(f"Two motions are called {twice}. Give each a name of its own.")
+    _require_same_trajectory(problem, motions)
+    checker = mesh_check_of(problem) if meshes else None
+    look = Look(rate, random, problem.spec.seed)
+    stored = _samples(motions) if slow is None else {}
+    found, differences = {}, {}
+    for index, segment in enumerate(segments, start=1):
+        progress(index - 1, len(segments))
+        played = _slowed(problem, segment, slow, tell)
+        path = path_of(problem, played.trajectory, played.coefficients)
+        found[segment.name] = inspect(problem, path, checker, look)
+        if index in stored:
+            differences[segment.name] = _difference(path, stored[index])
+    return Inspections(found, look, differences, slow)
+
+
+def _require_same_trajectory(problem: Problem, motions: Motions) -> None:
+    """A result must have been made with the trajectory section of the config."""
+    if isinstance(motions, Result):
+        name, result = "the result", motions
+    elif isinstance(motions, str | Path) and is_result(Path(motions)):
+        name, result = str(motions), read_result(Path(motions))
+    else:
+        return
+    stored = parse_spec(result.config, f"the config stored in {name}").trajectory
+    if stored != problem.spec.trajectory:
+        raise FileError(f"{name} has motions of another trajectory section than the config.")
+
+
+def _slowed(problem: Problem, segment: Segment, share: float | None, tell: Tell) -> Segment:
+    if share is None:
+        return segment
+    limits = PaceLimits.of(problem.constraints, problem.robot.n)
+    pace = slowing(limits, segment.trajectory, segment.coefficients, share)
+    tell(Note(Level.INFO, f"{segment.name}: judged at {100 * pace:.4g} % of its pace"))
+    return replace(segment, trajectory=segment.trajectory.slowed(pace))
+
+
+def _samples(motions: Motions) -> dict[int, tuple[Array, ...]]:
+    """The samples of a result file, by the motion's index."""
+    if isinstance(motions, str | Path) and is_result(Path(motions)):
+        return dict(read_samples(Path(motions)))
+    return {}
+
+
+def _difference(path: MotionPath, stored: tuple[Array, ...]) -> Difference:
+    """That of the samples t (T,), q, v, a (T, n)."""
+    t, *states = stored
+    return Difference(*largest_mismatch(path, t, states))

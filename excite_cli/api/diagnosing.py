@@ -1,0 +1,78 @@
+"""What the declared model lacks: `excite diagnose`."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from excite_cli.api.loading import Case, dataset_of
+from excite_cli.api.outputs import held
+from excite_cli.atomic import write_text_atomically
+from excite_cli.config.load import spec_as_yaml
+from excite_cli.diagnosis.diagnose import diagnose as diagnose_dataset
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.excitation.problem import Problem
+from excite_cli.export.found_config import found_config
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.shown.note import Tell, log_note
+from excite_cli.store.diagnosis_file import write_diagnosis
+from excite_cli.store.versions import versions
+from excite_cli.summary.diagnosis import diagnosis_answer as diagnosis_answer
+
+
+def diagnose(
+    problem: Problem | Case,
+    data: Dataset | str | Path | Sequence[str | Path],
+    sealed: str | None = None,
+    *,
+    output: str | Path | None = None,
+    apply: str | Path | None = None,
+    overwrite: bool = False,
+    progress: Callable[[str, int], None] = lambda text, done: None,
+    tell: Tell = log_note,
+) -> Diagnosis:
+    """What the declared model lacks: `excite diagnose`.
+
+    `data` are measured data or their files. Written to `output` (HDF5) if that is given, and the
+    config with what was found to `apply` (YAML).
+
+    Returns
+    -------
+    Diagnosis
+        `effects` (kind, joints, parameters with standard deviations, p-value, aliases), `absorbed`,
+        `unexplained`, and the errors `before` and `after` on the run `sealed` (default: the last),
+        which nothing else saw.
+
+    Raises
+    ------
+    ConfigError, FileError
+        Config and data do not fit; order or signs of torques cannot be right; data too short; a
+        file exists already.
+    """
+    with held({"output": output, "apply": apply}, overwrite):
+        dataset = dataset_of(problem, data, tell)
+        found = diagnose_dataset(
+            problem.robot, problem.base, dataset, problem.spec, sealed, progress
+        )
+        found = replace(
+            found,
+            config=spec_as_yaml(problem.spec),
+            config_folder=str(problem.folder),
+            versions=versions(),
+        )
+        if output is not None:
+            write_diagnosis(Path(output), found)
+        if apply is not None:
+            save_config(apply, problem, found)
+        return found
+
+
+def save_config(path: str | Path, problem: Problem | Case, found: Diagnosis) -> None:
+    """Write the config with the effects that a diagnosis found: `excite diagnose --apply`.
+
+    Raises
+    ------
+    FileError
+        It cannot be written.
+    """
+    text = found_config(problem.spec, problem.folder, found, Path(path))
+    write_text_atomically(Path(path), text)

@@ -1,0 +1,107 @@
+"""From a file to what is exported of it: motions repeated, entered from rest, slowed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from excite_cli.api.entering import Start, entered, start_posture
+from excite_cli.api.motions import is_motion, motions_of
+from excite_cli.config.constraints_spec import ConstraintsSpec, JointLimitsSpec
+from excite_cli.config.load import parse_spec
+from excite_cli.constraints.base import Constraint
+from excite_cli.constraints.catalogue import build_constraints
+from excite_cli.errors import FileError
+from excite_cli.excitation.problem import build_problem
+from excite_cli.excitation.result import Result
+from excite_cli.excitation.time_scaling import PaceLimits, slowed_chain
+from excite_cli.export.timed import repeated
+from excite_cli.measurement.motion_files import read_own_motion
+from excite_cli.robot.model import build_robot
+from excite_cli.shown.note import Tell
+from excite_cli.store.result_file import read_result
+from excite_cli.trajectory.chain import Chain, Segment
+from excite_cli.trajectory.sampled import through_samples
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which motions of a result (none: all), how often, how slow, and from which posture."""
+
+    chosen: Sequence[int] = ()
+    periods: int = 1
+    slow: float | None = None
+    start: Start | None = None
+
+
+@dataclass(frozen=True)
+class ExportedChain:
+    """What is written: `pace` is the share of its own pace at which the motion goes."""
+
+    name: str
+    joint_names: tuple[str, ...]
+    chain: Chain
+    pace: float
+
+
+def chains_of(file: Path, wanted: Wanted, tell: Tell) -> list[ExportedChain]:
+    """The motions asked for, ready to be sampled.
+
+    Raises
+    ------
+    FileError, ConfigError, NoAdmissibleMotionError
+        The file cannot be read, does not hold or know what is asked for, or no admissible entry
+        was found.
+    """
+    if is_motion(file):
+        joints, segment = _own_motion(file, wanted)
+        return [ExportedChain(segment.name, joints, repeated(segment, wanted.periods, joints), 1.0)]
+    result = read_result(file)
+    motions, joints = motions_of(result, wanted.chosen, str(file)), result.joint_names
+    if wanted.start is not None:
+        chains, constraints = _entered(file, result, motions, wanted, tell)
+    else:
+        chains = [repeated(segment, wanted.periods, joints) for segment in motions]
+        constraints = _joint_bounds(file, result) if wanted.slow else ()
+    paces = [1.0] * len(chains)
+    if wanted.slow is not None:
+        limits = PaceLimits.of(constraints, len(joints))
+        slowed = [slowed_chain(limits, chain, wanted.slow) for chain in chains]
+        chains, paces = [chain for chain, _ in slowed], [pace for _, pace in slowed]
+    return [
+        ExportedChain(segment.name, joints, chain, pace)
+        for segment, chain, pace in zip(motions, chains, paces, strict=True)
+    ]
+
+
+def _own_motion(file: Path, wanted: Wanted) -> tuple[tuple[str, ...], Segment]:
+    """Joint names and the motion of a file in a controller's format."""
+    others = [number for number in wanted.chosen if number != 1]
+    if others:
+        raise FileError(f"--motion {others[0]}: {file} holds one motion.")
+    found = read_own_motion(file)
+    segment = Segment(found.name, *through_samples(found.t, found.q, found.v, found.a))
+    if wanted.start is not None or wanted.slow is not None:
+        option = "--entry" if wanted.start is not None else "--slow"
+        raise FileError(
+            f"{option}: {file} does not say which robot and limits it was made for. A result file "
+            "does; give one."
+        )
+    return found.joint_names, segment
+
+
+def _joint_bounds(file: Path, result: Result) -> tuple[Constraint, ...]:
+    """Bounds of the joints by the robot and config that the result was made with."""
+    spec = parse_spec(result.config, f"the config stored in {file}")
+    robot = build_robot(spec.robot, Path(result.config_folder))
+    given = spec.constraints.joint_limits or JointLimitsSpec()
+    return build_constraints(ConstraintsSpec(joint_limits=given), robot)
+
+
+def _entered(
+    file: Path, result: Result, motions: Sequence[Segment], wanted: Wanted, tell: Tell
+) -> tuple[list[Chain], tuple[Constraint, ...]]:
+    """The motions from rest at a posture and back to it, and the constraints of their problem."""
+    spec = parse_spec(result.config, f"the config stored in {file}")
+    problem = build_problem(spec, Path(result.config_folder))
+    posture = start_posture(problem.robot, wanted.start or {})
+    return entered(problem, motions, posture, wanted.periods, tell), problem.constraints

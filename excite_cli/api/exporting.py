@@ -1,0 +1,208 @@
+"""Motions for controllers, identified models for simulators: `excite export`."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from excite_cli.api.entering import Start, durations_of
+from excite_cli.api.exported_chains import ExportedChain, Wanted, chains_of
+from excite_cli.api.models import write_models
+from excite_cli.api.outputs import held
+from excite_cli.api.paths import existing
+from excite_cli.claim import claim, leave
+from excite_cli.config.load import parse_spec
+from excite_cli.errors import ConfigError, FileError, nearest
+from excite_cli.export.motion_exporter import MotionExporter
+from excite_cli.export.motion_rosbag2 import is_bag
+from excite_cli.export.motions import MOTION_EXPORTERS
+from excite_cli.export.timed import timed_motion
+from excite_cli.robot.model import build_robot
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.store.fit_file import is_fit, read_fit
+
+# Formats of identified models, and the suffixes of their files.
+MODELS = {"urdf": ".urdf", "mjcf": ".xml", "yaml": ".yaml"}
+
+
+@dataclass(frozen=True)
+class ExportedMotion:
+    """A motion as it was written: `duration` [s] in all, `durations` of its parts.
+
+    `pace` is the share of its own pace at which it goes.
+    """
+
+    name: str
+    path: Path
+    instants: int
+    duration: float
+    durations: dict[str, float]
+    pace: float
+
+
+@dataclass(frozen=True)
+class Exported:
+    """The files that were written in `format`; of motions also what is in them.
+
+    `rate` [Hz], and `slow`: the share of the limits that was asked for.
+    """
+
+    format: str
+    paths: tuple[Path, ...]
+    motions: tuple[ExportedMotion, ...] = ()
+    rate: float = 0.0
+    slow: float | None = None
+
+
+def export_file(
+    file: str | Path,
+    format: str,
+    output: str | Path | None = None,
+    *,
+    chosen: Sequence[int] = (),
+    rate: float = 1000.0,
+    equidistant: bool = False,
+    periods: int = 1,
+    slow: float | None = None,
+    start: Start | None = None,
+    overwrite: bool = False,
+    tell: Tell = log_note,
+) -> Exported:
+    """Write motions as controllers take them, or a fit as a robot model: `excite export`.
+
+    `file` is a result, a motion in a controller's format, or a fit. Formats of motions are `csv`,
+    `ros2`, `rosbag2`, `mcap`, `moveit`, `npz`, of fits `urdf`, `mjcf`, `yaml`. `output` is by
+    default named after `file`; several motions get their numbers before the suffix.
+
+    Motions (`chosen` of a result's by their index) are sampled at `rate` [Hz], exact at every
+    instant [s, rad, rad/s, rad/s²; m for sliding joints]; `equidistant` stretches the step so that
+    all are equal up to the end. They are played `periods` times, slowed down until speeds and
+    accelerations keep the share `slow` of their limits, and with `start` (position by joint [rad,
+    m], the others at robot.posture) entered from rest there and left for it again.
+
+    Raises
+    ------
+    FileError
+        The file is missing, or holds what the format cannot; an output exists.
+    ConfigError, RobotError, MissingExtraError
+        The format is unknown; the motion cannot be repeated; the library of a format is missing.
+    NoAdmissibleMotionError
+        No admissible way from `start` into a motion was found.
+    """
+    formats = [*MOTION_EXPORTERS, *MODELS]
+    if format not in formats:
+        raise ConfigError(
+            f"--format {format}: unknown.{nearest(format, formats)} Known: {', '.join(formats)}."
+        )
+    if not 0.0 < rate <= 1e6:
+        raise ConfigError(f"--rate {rate:g}: give instants per second, above 0 and up to 1e6 Hz.")
+    if periods < 1:
+        raise ConfigError(f"--periods {periods}: a motion is played once or more.")
+    path, target = existing(file), Path(output) if output is not None else None
+    if is_fit(path) != (format in MODELS):
+        what, own = ("a fit", MODELS) if is_fit(path) else ("no fit", MOTION_EXPORTERS)
+        raise FileError(
+            f"{path} is {what}: it cannot be exported as {format}. Its formats: {', '.join(own)}."
+        )
+    if format in MODELS:
+        return _export_model(path, format, target, overwrite, tell)
+    exporter = MOTION_EXPORTERS[format]
+    chains = chains_of(path, Wanted(chosen, periods, slow, start), tell)
+    paths = _paths(path, target, exporter, [each.name for each in chains])
+    with _held(paths, exporter, overwrite):
+        motions = tuple(
+            _written(each, to, exporter, rate, equidistant)
+            for each, to in zip(chains, paths, strict=True)
+        )
+    if slow is not None:
+        text = (
+            "a slowed motion needs other torques: judge what was written, `excite check CONFIG "
+            f"{paths[0]}`, before it is played"
+        )
+        tell(Note(Level.INFO, text))
+    return Exported(format, tuple(paths), motions, rate, slow)
+
+
+def export_answer(found: Exported) -> Answer:
+    """What `excite export` answers: files, and what is in them."""
+    if not found.motions:
+        path = str(found.paths[0])
+        return Answer((path,), {"format": found.format, "output": path})
+    lines = tuple(
+        f"{each.path}: {each.name}, {each.instants} instants, {each.duration:.6g} s"
+        + (f", at {100 * each.pace:.4g} % of its pace" if found.slow is not None else "")
+        for each in found.motions
+    )
+    motions = [
+        {
+            "motion": each.name,
+            "output": str(each.path),
+            "instants": each.instants,
+            "duration": each.duration,
+            "durations": each.durations,
+            "pace": each.pace,
+        }
+        for each in found.motions
+    ]
+    return Answer(lines, {"format": found.format, "rate": found.rate, "motions": motions})
+
+
+def _written(
+    each: ExportedChain, path: Path, exporter: MotionExporter, rate: float, equidistant: bool
+) -> ExportedMotion:
+    timed = timed_motion(
+        each.name, each.joint_names, each.chain, rate, equidistant, exporter.whole_nanoseconds
+    )
+    exporter.write(path, timed)
+    return ExportedMotion(
+        each.name, path, len(timed.t), timed.duration, durations_of(each.chain), each.pace
+    )
+
+
+def _paths(
+    file: Path, output: Path | None, exporter: MotionExporter, names: list[str]
+) -> list[Path]:
+    """Where each motion goes; several get their numbers before the suffix."""
+    base = output or Path(f"{file.stem}_{names[0]}{exporter.suffix}")
+    if output is None and len(names) > 1:
+        base = Path(f"{file.stem}_motion{exporter.suffix}")
+    if len(names) == 1:
+        return [base]
+    numbers = (name.removeprefix("motion_") for name in names)
+    return [base.with_name(f"{base.stem}_{number}{base.suffix}") for number in numbers]
+
+
+@contextmanager
+def _held(paths: list[Path], exporter: MotionExporter, overwrite: bool) -> Iterator[None]:
+    """As `held`; a folder is replaced only by what is of its kind."""
+    if not exporter.folder:
+        with held({f"output ({path})": path for path in paths}, overwrite):
+            yield
+        return
+    with ExitStack() as claims:
+        for path in paths:
+            claim(path)
+            claims.callback(leave, path)
+            if path.exists() and not (overwrite and is_bag(path)):
+                replace = ", or replace it with --overwrite" if is_bag(path) else ""
+                raise FileError(f"{path} exists already. Give another name{replace}.")
+        yield
+
+
+def _export_model(
+    file: Path, format: str, output: Path | None, overwrite: bool, tell: Tell
+) -> Exported:
+    """A fit as URDF, MJCF or YAML, as `excite identify` writes them."""
+    path = output or Path(f"{file.stem}{MODELS[format]}")
+    with held({"output": path}, overwrite):
+        stored = read_fit(file)
+        spec = parse_spec(stored.config, f"the config stored in {file}")
+        robot = build_robot(spec.robot, Path(stored.config_folder))
+        if robot.fingerprint() != stored.fingerprint:
+            raise FileError(
+                f"{file} was made with another robot than the URDF gives now ({spec.robot.urdf}). "
+                "Identify again."
+            )
+        write_models(robot, stored.fit, {"parameters" if format == "yaml" else format: path}, tell)
+    return Exported(format, (path,))

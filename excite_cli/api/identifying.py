@@ -1,0 +1,87 @@
+"""The parameters of the declared model from measured data: `excite identify`."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from excite_cli.api.loading import Case, dataset_of, tell_findings
+from excite_cli.api.models import write_models
+from excite_cli.api.outputs import held
+from excite_cli.config.load import spec_as_yaml
+from excite_cli.diagnosis.plausibility import check_dataset
+from excite_cli.excitation.problem import Problem
+from excite_cli.identification.identify import Identification
+from excite_cli.identification.identify import identify as identify_dataset
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.store.fit_file import write_fit
+from excite_cli.summary.identification import identification_answer as identification_answer
+
+
+def identify(
+    problem: Problem | Case,
+    data: Dataset | str | Path | Sequence[str | Path],
+    sealed: str | None = None,
+    *,
+    output: str | Path | None = None,
+    urdf: str | Path | None = None,
+    mjcf: str | Path | None = None,
+    parameters: str | Path | None = None,
+    overwrite: bool = False,
+    progress: Callable[[str, int], None] = lambda text, done: None,
+    tell: Tell = log_note,
+) -> Identification:
+    """The parameters of the declared model: `excite identify`.
+
+    `data` are measured data or their files. The fit is written to `output` (HDF5), the model to
+    `urdf`, `mjcf` and `parameters` (YAML), where these are given.
+
+    Returns
+    -------
+    Identification
+        `fit` has `names`, `values` and `std` (P,), base parameters first, then those of effects;
+        `error` is that on the run `sealed` (default: the last), which no fit saw.
+
+    Raises
+    ------
+    ConfigError, FileError
+        Config and data do not fit; a run is too short; order or signs of torques cannot be right;
+        a file exists already.
+    """
+    models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
+    with held({"output": output, **models}, overwrite):
+        dataset = dataset_of(problem, data, tell)
+        check_dataset(problem.robot, dataset, problem.spec)
+        found = identify_dataset(
+            problem.robot,
+            problem.base,
+            dataset,
+            problem.spec,
+            sealed,
+            lambda text: progress(text, 0),
+        )
+        for reason in found.processing.reasons:
+            tell(Note(Level.DETAIL, reason))
+        tell_findings(found.findings[len(dataset.findings) :], tell)
+        if output is not None:
+            save_fit(output, problem, found, dataset.sources)
+        write_models(problem.robot, found.fit, models, tell)
+        return found
+
+
+def save_fit(
+    path: str | Path,
+    problem: Problem | Case,
+    found: Identification,
+    sources: Sequence[str] = (),
+) -> None:
+    """Write a fit file, for `read_fit`, `excite export` and `uncertainty.fit`.
+
+    `sources` name the files that the data came from.
+
+    Raises
+    ------
+    FileError
+        It cannot be written.
+    """
+    config, folder = spec_as_yaml(problem.spec), str(problem.folder)
+    write_fit(Path(path), found, config, folder, problem.robot.fingerprint(), tuple(sources))

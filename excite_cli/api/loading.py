@@ -1,0 +1,184 @@
+"""Configs, problems and measured data: what every command begins with."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from excite_cli.config.load import load_spec
+from excite_cli.config.spec import Spec
+from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.errors import FileError
+from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.measurement.catalogue import read_dataset
+from excite_cli.measurement.dataset import Dataset, Finding
+from excite_cli.measurement.quality import raise_for_errors
+from excite_cli.robot.described import describe
+from excite_cli.robot.model import Robot, build_robot
+from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.record import Shown, show
+from excite_cli.store.fit_file import read_fit
+from excite_cli.store.fit_knowledge import fit_knowledge
+from excite_cli.summary.dataset import runs_in_words
+from excite_cli.summary.problem import problem_notes
+from excite_cli.summary.robots import robot_parts
+
+# Share of a joint's torque on sealed data from which a fit is doubted.
+_MUCH_LEFT = 0.1
+_LEVELS = {"note": Level.NOTE, "warning": Level.WARNING}
+
+
+@dataclass(frozen=True, repr=False)
+class Case(Shown):
+    """What a config declares of a robot: enough for measured data, without anything to plan.
+
+    Relative paths of `spec` start from `folder`. A `Problem` has all of this too, and can be given
+    wherever a case is asked for.
+    """
+
+    spec: Spec
+    folder: Path
+    robot: Robot
+
+    @cached_property
+    def base(self) -> BaseParameters:
+        """Base parameters of the robot."""
+        return find_base_parameters(self.robot)
+
+
+show(
+    Case,
+    lambda case: f"{case.robot.name}: {case.robot.n} joints",
+    lambda case: robot_parts(describe(case.robot)),
+)
+
+
+def load_case(config: str | Path, overrides: Sequence[str] = ()) -> Case:
+    """The robot and declared model of a config, without capsules; `overrides` as with `--set`.
+
+    Raises
+    ------
+    ConfigError, RobotError
+        The file says what is not allowed; the URDF is missing or wrong.
+
+    Examples
+    --------
+    >>> load_case("configs/smoke.yaml").robot.joint_names[:2]
+    ('shoulder_yaw', 'shoulder_pitch')
+    """
+    spec, folder = load_spec(Path(config), list(overrides)), Path(config).resolve().parent
+    return Case(spec, folder, build_robot(spec.robot, folder))
+
+
+def load_problem(
+    config: str | Path, overrides: Sequence[str] = (), tell: Tell = log_note
+) -> Problem:
+    """The whole problem of a config: robot, trajectory, criterion, constraints, grids.
+
+    `overrides` are `key.path=value`, as with `--set`. Capsules of a robot that is new to this
+    machine are fitted first, which takes seconds to a minute, and kept in the cache. `tell` hears
+    what was understood, and what a person must know of it.
+
+    Raises
+    ------
+    ConfigError, RobotError, FileError
+        The config cannot be; the URDF is missing or wrong; the file of `uncertainty.fit` is.
+
+    Examples
+    --------
+    >>> load_problem("configs/smoke.yaml", ["sequence.motions=1"]).variables
+    45
+    """
+    spec, folder = load_spec(Path(config), list(overrides)), Path(config).resolve().parent
+    return _built(spec, folder, tell)
+
+
+def problem_of(case: Problem | Case, tell: Tell = log_note) -> Problem:
+    """The whole problem of a case, for what needs its constraints; see `load_problem`."""
+    return case if isinstance(case, Problem) else _built(case.spec, case.folder, tell)
+
+
+def _built(spec: Spec, folder: Path, tell: Tell) -> Problem:
+    problem = build_problem(spec, folder, fit_knowledge(spec, folder))
+    for note in problem_notes(problem):
+        tell(note)
+    if spec.uncertainty is not None and spec.uncertainty.fit is not None:
+        _doubt_fit(folder / spec.uncertainty.fit, tell)
+    return problem
+
+
+def _doubt_fit(path: Path, tell: Tell) -> None:
+    """Warn where a fit leaves much unexplained: its deviations say nothing of that."""
+    errors = read_fit(path).error.relative_moving
+    much = {joint: error for joint, error in errors.items() if error > _MUCH_LEFT}
+    if much:
+        worst = max(much, key=lambda joint: much[joint])
+        text = (
+            f"{path} leaves {100 * much[worst]:.0f} % of the torque of {worst} "
+            f"unexplained ({len(much)} joints above {100 * _MUCH_LEFT:.0f} %). Its standard "
+            "deviations do not cover an effect that the model lacks: run `excite diagnose` first."
+        )
+        tell(Note(Level.WARNING, text))
+
+
+def load_data(
+    problem: Problem | Case,
+    files: str | Path | Sequence[str | Path],
+    tell: Tell = log_note,
+) -> Dataset:
+    """Measured data of the robot, converted as `measurement` of the config says, and checked.
+
+    Files are HDF5, CSV or bags. Runs have t (T,) in s, q (T, n) in rad (m), tau (T, n) in N·m (N);
+    `findings` tell what was noticed (gaps, jitter, dead channels …), and so does `tell`.
+
+    Raises
+    ------
+    FileError
+        A file cannot be read, or holds what no fit should be made of.
+    ConfigError, MissingExtraError
+        The config names what the file lacks; the library for bags is not installed.
+    """
+    paths = [files] if isinstance(files, str | Path) else files
+    robot, limits = problem.robot, problem.robot.limits
+    data = read_dataset(
+        [Path(each) for each in paths],
+        problem.spec.measurement,
+        robot.joint_names,
+        (limits.lower, limits.upper, limits.velocity, limits.effort),
+        (~robot.sliding).astype(float),
+    )
+    raise_for_errors(data)
+    tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs_in_words(data)}"))
+    tell_findings(data.findings, tell)
+    return data
+
+
+def dataset_of(
+    problem: Problem | Case,
+    data: Dataset | str | Path | Sequence[str | Path],
+    tell: Tell = log_note,
+) -> Dataset:
+    """Measured data of the robot: those at hand, or as `load_data` reads them.
+
+    Raises
+    ------
+    FileError, ConfigError, MissingExtraError
+        The data are of other joints; see `load_data`.
+    """
+    if not isinstance(data, Dataset):
+        return load_data(problem, data, tell)
+    if data.joint_names != problem.robot.joint_names:
+        raise FileError(
+            f"the data are of other joints ({', '.join(data.joint_names)}) than the config "
+            f"({', '.join(problem.robot.joint_names)}). Read them with `load_data` and this config."
+        )
+    return data
+
+
+def tell_findings(findings: Iterable[Finding], tell: Tell) -> None:
+    """What was noticed; the same of several runs is told once."""
+    runs: dict[tuple[str, str], list[str]] = {}
+    for finding in findings:
+        runs.setdefault((finding.severity, finding.text), []).append(finding.run or "")
+    for (severity, text), names in runs.items():
+        tell(Note(_LEVELS[severity], text, ", ".join(name for name in names if name)))

@@ -1,0 +1,147 @@
+"""Motions one after the other, each with all earlier data stacked: `excite optimize`."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from excite_cli.api.loading import Case
+from excite_cli.api.motions import Motions, load_motions
+from excite_cli.api.outputs import held_result
+from excite_cli.api.priors import Prior, load_prior, name_of
+from excite_cli.api.working import tell_idle
+from excite_cli.diagnosis.next_motion import NextMotion
+from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import Progress as Progress
+from excite_cli.excitation.result import Result
+from excite_cli.excitation.run import continue_run, new_result, resumed_result
+from excite_cli.excitation.sequence import Step
+from excite_cli.excitation.stack import Stack
+from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.store.diagnosis_file import read_diagnosis
+from excite_cli.store.fit_knowledge import fit_knowledge
+from excite_cli.store.result_file import read_result, write_result
+from excite_cli.store.versions import versions
+from excite_cli.summary.motions import motion_sentence
+from excite_cli.summary.motions import plan_answer as plan_answer
+from excite_cli.summary.problem import problem_notes
+from excite_cli.workers.base import Workers
+
+Planned = Problem | NextMotion
+PlanProgress = Callable[[int, Progress], None]
+
+
+def plan(
+    problem: Planned,
+    *,
+    priors: Sequence[Prior] = (),
+    starts: Motions = (),
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    progress: PlanProgress = lambda motion, progress: None,
+    workers: Workers | None = None,
+    tell: Tell = log_note,
+) -> Result:
+    """Motions one after the other, each with all earlier data stacked: `excite optimize`.
+
+    Their number is `sequence.motions` of the config. With a `NextMotion` (see `plan_after`) the
+    measured data of the diagnosis come first. `priors` are earlier results (or their files),
+    measured data, or motions; the search of motion k starts from the k-th of `starts`. With
+    `output` the result is on disk after every motion, and `resume` goes on with it.
+    `progress(k, state)` is called by the solver. `workers` (`open_workers`) share the starts of a
+    motion, with the same result.
+
+    Returns
+    -------
+    Result
+        Its `motions` have `coefficients` (K, n), `condition_number`, `stacked_condition_number`,
+        `margins` and what is `certified`.
+
+    Raises
+    ------
+    NoAdmissibleMotionError
+        There is none, or none was found; the message names what stands in the way.
+    FileError
+        A prior or a start does not fit, or `output` exists.
+
+    Examples
+    --------
+    >>> from excite_cli import load_problem, plan
+    >>> problem = load_problem("configs/smoke.yaml", ["optimizer.max_iterations=20"])
+    >>> [motion.status for motion in plan(problem).motions]
+    ['iteration limit', 'iteration limit']
+    """
+    path = None if output is None else Path(output)
+    following = problem if isinstance(problem, NextMotion) else None
+    model = problem.model if isinstance(problem, NextMotion) else problem
+
+    def store(step: Step, current: Result) -> None:
+        if path is not None:
+            write_result(path, current, model)
+        tell(Note(Level.INFO, motion_sentence(step.motion)))
+
+    with held_result(path, overwrite, resume):
+        tell_idle(1 if workers is None else workers.count, model.spec.optimizer.restarts, tell)
+        result = _begun(model, following, priors, path if resume else None, tell)
+        segments = load_motions(model, starts, tell=tell)
+        return continue_run(
+            following.problem if following else model,
+            result,
+            lambda index: lambda state: progress(index, state),
+            store,
+            following.model if following else None,
+            segments,
+            workers,
+        )
+
+
+def _begun(
+    model: Problem,
+    following: NextMotion | None,
+    priors: Sequence[Prior],
+    stored: Path | None,
+    tell: Tell,
+) -> Result:
+    """The result to go on with: that of the file `stored` if there is one, else what is earlier."""
+    names = [name_of(prior, number) for number, prior in enumerate(priors, start=1)]
+    earlier = [following.name, *names] if following else names
+    if stored is not None and stored.exists():
+        found = resumed_result(model, read_result(stored), stored, [Path(n) for n in earlier])
+        tell(Note(Level.INFO, f"resuming after motion {len(found.motions)} of {stored}"))
+        return found
+    stacks: list[tuple[str, Result | Stack]] = []
+    if following is not None:
+        stacks.append((following.name, following.prior))
+    for name, prior in zip(names, priors, strict=True):
+        stacks.append((name, load_prior(model, prior, name, tell)))
+    return new_result(model, stacks, versions(), model.folder)
+
+
+def plan_after(
+    problem: Problem | Case, found: Diagnosis | str | Path, tell: Tell = log_note
+) -> NextMotion:
+    """The problem of the next motion after a diagnosis, for `plan`: `excite optimize --after`.
+
+    `found` is the diagnosis, or its file. The next motion separates effects that could not be told
+    apart; if there are none, it excites the model with all effects found. `messages` of what is
+    returned say which, and why.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read; the diagnosis belongs to another robot.
+    """
+    spec, folder = problem.spec, problem.folder
+    if isinstance(found, Diagnosis):
+        following = after_diagnosis(found, spec, folder, fit_knowledge(spec, folder))
+    else:
+        read = read_diagnosis(Path(found))
+        following = after_diagnosis(read, spec, folder, fit_knowledge(spec, folder))
+        following = replace(following, name=str(found))
+    for note in problem_notes(following.model):
+        tell(note)
+    for message in following.messages:
+        tell(Note(Level.INFO, message))
+    return following

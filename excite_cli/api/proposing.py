@@ -1,0 +1,100 @@
+"""A config for a robot of which only the URDF is known: `excite init`."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal, cast
+
+from excite_cli.api.outputs import held
+from excite_cli.atomic import write_text_atomically
+from excite_cli.errors import ConfigError
+from excite_cli.proposal.joints import choose_joints
+from excite_cli.proposal.limbs import limbs
+from excite_cli.proposal.propose import Proposal, Request
+from excite_cli.proposal.propose import propose as propose_config
+from excite_cli.robot.description import EXAMPLE_PREFIX as EXAMPLE_PREFIX
+from excite_cli.robot.description import example_robots as example_robots
+from excite_cli.robot.description import load_description
+from excite_cli.robot.urdf_joints import survey
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.summary.proposal import proposal_answer
+
+Base = Literal["fixed", "floating"]
+_FARTHEST = 3  # folders upwards, for which a path is still told as a relative one
+
+
+def propose(
+    urdf: str | Path,
+    folder: str | Path = ".",
+    *,
+    joints: Sequence[str] = (),
+    base: Base = "fixed",
+) -> Proposal:
+    """A config for a robot of which nothing but the URDF is known: `excite init`.
+
+    `urdf` is a path (relative to `folder`, where the config will lie) or
+    `example-robot-data:<name>`; `joints` those to move, none for a choice of ours. The `text` of
+    what is returned is the YAML file, `notes` say what was chosen and why.
+
+    Raises
+    ------
+    RobotError, ConfigError
+        The robot lacks what a plan needs; a joint is unknown.
+    NoAdmissibleMotionError
+        No posture of the robot is clear of its limits.
+
+    Examples
+    --------
+    >>> from excite_cli import propose
+    >>> propose("data/smoke_arm.urdf").joints[:2]
+    ('shoulder_yaw', 'shoulder_pitch')
+    """
+    return propose_config(Request(str(urdf), Path(folder), tuple(joints), base))
+
+
+def save_proposal(
+    robot: str | Path,
+    output: str | Path | None = None,
+    *,
+    joints: Sequence[str] = (),
+    base: str = "fixed",
+    overwrite: bool = False,
+    tell: Tell = log_note,
+) -> Answer:
+    """Write the config that `propose` gives for a robot to `output` (default: <robot>.yaml here).
+
+    `robot` is `example-robot-data:<name>` or a URDF file. What is returned says what was chosen.
+
+    Raises
+    ------
+    ConfigError, RobotError, NoAdmissibleMotionError
+        As `propose`; `base` is neither fixed nor floating.
+    FileError
+        `output` exists, or cannot be written.
+    """
+    if base not in ("fixed", "floating"):
+        raise ConfigError(f"--base {base}: allowed are fixed and floating.")
+    known = str(robot).startswith(EXAMPLE_PREFIX)
+    name = str(robot).removeprefix(EXAMPLE_PREFIX) if known else Path(robot).stem
+    path = Path(f"{name}.yaml") if output is None else Path(output)
+    with held({"output": path}, overwrite):
+        folder = path.resolve().parent
+        source = str(robot) if known else _from(Path(robot), folder)
+        load_description(source, relative_to=folder)  # a wrong name is told at once
+        text = f"looking at {name}: capsules and tables of its meshes take longest, once"
+        tell(Note(Level.INFO, text))
+        found = propose(source, folder, joints=joints, base=cast(Base, base))
+        write_text_atomically(path, found.text)
+        return proposal_answer(found, source, str(path))
+
+
+def limbs_of(robot: str) -> dict[str, tuple[str, ...]]:
+    """The joints that would be moved, by the limb they belong to."""
+    return limbs(choose_joints(survey(load_description(robot)).joints, robot).chosen)
+
+
+def _from(urdf: Path, folder: Path) -> str:
+    """The URDF's path as the config in `folder` says it: relative where it is near."""
+    relative = os.path.relpath(urdf.resolve(), folder)
+    return str(urdf.resolve()) if relative.count("..") > _FARTHEST else relative

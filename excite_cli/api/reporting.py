@@ -1,0 +1,139 @@
+"""One page about motions, fits and diagnoses, and figures of motions: `excite report`."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from excite_cli.api.motions import motions_of
+from excite_cli.api.outputs import held
+from excite_cli.api.rebuilt import rebuilt_problem
+from excite_cli.api.report_figures import write_figures
+from excite_cli.api.report_files import Told, read_files
+from excite_cli.atomic import write_text_atomically
+from excite_cli.errors import ConfigError, FileError, MissingExtraError
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.result import Result
+from excite_cli.report.assembly import Source, page_of
+from excite_cli.report.page import Picture, render
+from excite_cli.report.style import matplotlib_part
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.note import Level, Note, Tell, log_note
+
+FIGURE_FORMATS = ("png", "svg", "pdf")
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Report:
+    """The files that were written: the page, if one was asked for, and figures of motions."""
+
+    page: Path | None
+    figures: tuple[Path, ...] = ()
+
+
+def write_report(
+    files: str | Path | Sequence[str | Path],
+    output: str | Path | None = None,
+    *,
+    figures: str | Path | None = None,
+    format: str | None = None,
+    config: str | Path | None = None,
+    picture: bool = True,
+    overwrite: bool = False,
+    progress: Progress = lambda text, done, total: None,
+    tell: Tell = log_note,
+) -> Report:
+    """A page (HTML, one file) about motions, what was identified and diagnosed: `excite report`.
+
+    `files` are results, fits and diagnoses, in any order. The page is `output`, by default
+    `<first file>-report.html` in the working directory; with `figures` (a folder, or NAME.pdf) the
+    figures of motions are written there, in `format` (`png` | `svg` | `pdf`), and the page only to
+    an `output` that is given. The problem of a result is rebuilt from the config that it holds;
+    `config`, the YAML file, says where a relative URDF starts from. With `picture` the page shows
+    the robot.
+
+    Returns
+    -------
+    Report
+        The files that were written.
+
+    Raises
+    ------
+    FileError
+        A file is missing, given twice or none of ours; the robot is not found, or not the one of
+        the result; `output` is no name of a page, or a file exists already.
+    ConfigError, MissingExtraError
+        There is no such format of figures; matplotlib is not installed.
+    """
+    matplotlib_part("")
+    if format is not None and format not in FIGURE_FORMATS:
+        raise ConfigError(f"--format {format}: unknown. Known: {', '.join(FIGURE_FORMATS)}.")
+    if format is not None and figures is None:
+        raise FileError("--format is that of figures: give a folder for them with --figures.")
+    paths = [Path(files)] if isinstance(files, str | Path) else [Path(each) for each in files]
+    if not paths:
+        raise FileError("There is nothing to report: give results, fits or diagnoses.")
+    page = Path(output) if output is not None else None
+    if page is None and figures is None:
+        page = Path(f"{paths[0].stem}-report.html")
+    if page is not None and page.suffix.lower() not in (".html", ".htm") and not page.is_dir():
+        hint = " Figures and PDF are written by --figures."
+        raise FileError(f"-o {page}: a report is a page, NAME.html.{hint}")
+    with held({"output": page}, overwrite):
+        told = read_files(paths)
+        problems = {
+            each.path: rebuilt_problem(each.content, config, str(each.path))
+            for each in told
+            if isinstance(each.content, Result)
+        }
+        drawn: tuple[Path, ...] = ()
+        if figures is not None:
+            drawn = write_figures(told, problems, (Path(figures), format, overwrite), progress)
+        if page is not None:
+            write_text_atomically(page, _page_text(told, problems, picture, progress, tell))
+    return Report(page, drawn)
+
+
+def report_answer(found: Report) -> Answer:
+    """What `excite report` answers: the files."""
+    figures = tuple(map(str, found.figures))
+    page = None if found.page is None else str(found.page)
+    parts = figures if page is None else (page, *figures)
+    return Answer(parts, {"output": page, "figures": list(figures)})
+
+
+def _page_text(
+    told: Sequence[Told],
+    problems: Mapping[Path, Problem],
+    picture: bool,
+    progress: Progress,
+    tell: Tell,
+) -> str:
+    sources = []
+    for each in told:
+        problem, taken = problems.get(each.path), None
+        if picture and problem is not None and isinstance(each.content, Result):
+            progress(f"{each.name}: the robot", 0, len(told))
+            taken = _picture(each, each.content, problem, tell)
+        sources.append(Source(each.name, each.path.name, each.content, problem, taken))
+    return render(page_of(sources, lambda name, done: progress(name, done, len(told))))
+
+
+def _picture(each: Told, result: Result, problem: Problem, tell: Tell) -> Picture | None:
+    """The robot where it comes nearest to something in its first motion, if that can be drawn."""
+    segment = motions_of(result, [result.motions[0].index], str(each.path))[0]
+    try:
+        from excite_cli.view.pictures import View, still_png
+
+        png = still_png(problem, segment, View(size=(600, 441), ghosts=3, caption=False))
+    except (MissingExtraError, ImportError) as error:
+        tell(Note(Level.DETAIL, f"no picture of the robot: {error}"))
+        return None
+    name = problem.robot.name
+    return Picture(
+        f"{name} in its first motion",
+        png,
+        f"{name} at the instant of its first motion at which it comes nearest to itself or to "
+        "something around it, with three other instants faintly behind.",
+        f"Where it comes nearest to something. `excite view {each.path.name}` plays all motions.",
+    )

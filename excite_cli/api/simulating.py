@@ -1,0 +1,146 @@
+"""Motions played on a robot that differs from its model: `excite simulate`."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from excite_cli.api.entering import Start, entered, start_posture
+from excite_cli.api.loading import Case, problem_of
+from excite_cli.api.motions import Motions, load_motions
+from excite_cli.api.outputs import held
+from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.config.load import spec_as_yaml
+from excite_cli.effects.catalogue import declared_effects
+from excite_cli.errors import FileError
+from excite_cli.excitation.problem import Problem
+from excite_cli.export.timed import repeated
+from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.simulation.engine import load_mujoco
+from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
+from excite_cli.simulation.planted import parse_planted
+from excite_cli.simulation.settings import SimulationSettings as SimulationSettings
+from excite_cli.simulation.simulate import Simulation, takes_of
+from excite_cli.simulation.simulate import simulate as simulate_motions
+from excite_cli.store.versions import versions
+from excite_cli.summary.simulation import simulation_answer as simulation_answer
+from excite_cli.trajectory.chain import Segment
+
+# What of the config's measurement section changes neither positions nor torques when it is read.
+_KEPT = {"filter", "topic", "rate"}
+
+
+def simulate(
+    problem: Problem | Case,
+    motions: Motions,
+    effects: Sequence[str] = (),
+    settings: SimulationSettings = SimulationSettings(),
+    *,
+    chosen: Sequence[int] = (),
+    start: Start | None = None,
+    declared: bool = True,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    progress: Callable[[str, int, int], None] = lambda text, done, total: None,
+    tell: Tell = log_note,
+) -> Simulation:
+    """Play motions on a MuJoCo robot that differs from its model: `excite simulate`.
+
+    `effects` are put into the robot, as `kind@joint=value[,name:value…]`; with `declared` those of
+    the config too, in sizes of their own. `chosen` are motions of a result by their index. With
+    `start` (position by joint [rad, m], the others at robot.posture; {}: all of them) the robot
+    enters each motion from rest there and goes back, within all constraints. Written to `output`
+    (HDF5) if that is given. `progress(run, done, total)` is called before every run.
+
+    Returns
+    -------
+    Simulation
+        Its `dataset` is as if measured, `truth` what was in the robot, `tracking` the RMS error of
+        each run (n,) in rad (m).
+
+    Raises
+    ------
+    FileError
+        The motions are of another robot, or cannot be read; `output` exists.
+    ConfigError, RobotError, MissingExtraError
+        An effect cannot be read; the robot cannot be simulated; MuJoCo is missing.
+    NoAdmissibleMotionError
+        No admissible way from `start` into a motion was found.
+    """
+    with held({"output": output}, overwrite):
+        load_mujoco()
+        segments = load_motions(problem, motions, chosen, tell)
+        if not segments:
+            raise FileError("There is no motion to play.")
+        planned, settings = _planned(problem, segments, settings, start, tell)
+        takes = takes_of(planned, settings.repeat)
+        planted = [each for text in effects for each in parse_planted(text, problem.robot, takes)]
+        own = declared_effects(problem.spec.effects, problem.robot) if declared else ()
+        if output is not None:
+            _warn_of_conversion(problem.spec.measurement, tell)
+        found = simulate_motions(
+            problem.robot,
+            planned,
+            settings,
+            planted,
+            own,
+            lambda run, done: progress(run, done, sum(map(len, takes.values()))),
+        )
+        if output is not None:
+            write_dataset(Path(output), found.dataset, _attributes(problem, found, settings))
+        return found
+
+
+def _planned(
+    problem: Problem | Case,
+    segments: Sequence[Segment],
+    settings: SimulationSettings,
+    start: Start | None,
+    tell: Tell,
+) -> tuple[list[Planned], SimulationSettings]:
+    """What is played; periods of what is not periodic by itself are segments of a program."""
+    motions: list[Planned] = [
+        PlannedMotion(each.name, each.trajectory, each.coefficients) for each in segments
+    ]
+    if start is not None:
+        posture = start_posture(problem.robot, start)
+        whole = problem_of(problem, tell)
+        chains = entered(whole, segments, posture, settings.periods, tell)
+    elif settings.periods > 1 and not all(motion.periodic for motion in motions):
+        joints = problem.robot.joint_names
+        chains = [repeated(each, settings.periods, joints) for each in segments]
+    else:
+        return motions, settings
+    programs = [PlannedProgram(m.name, chain) for m, chain in zip(segments, chains, strict=True)]
+    return list(programs), replace(settings, periods=1)
+
+
+def _warn_of_conversion(measurement: MeasurementSpec, tell: Tell) -> None:
+    """Reading the file with this config would change positions or torques."""
+    plain = MeasurementSpec()
+    if any(
+        getattr(measurement, name) != getattr(plain, name)
+        for name in MeasurementSpec.model_fields
+        if name not in _KEPT
+    ):
+        text = (
+            "the config converts recorded positions or torques (measurement: …), but this file "
+            "holds rad and N·m at the joints. Read it with a config without that."
+        )
+        tell(Note(Level.WARNING, text))
+
+
+def _attributes(
+    problem: Problem | Case, found: Simulation, settings: SimulationSettings
+) -> dict[str, object]:
+    """What the data file says about its making."""
+    truth = found.truth.record(problem.robot.joint_names)
+    return {
+        "simulated": True,
+        "seed": settings.seed,
+        "settings": json.dumps(asdict(settings)),
+        "truth": json.dumps(truth, ensure_ascii=False),
+        "config": spec_as_yaml(problem.spec),
+        "versions": json.dumps(versions()),
+    }

@@ -1,0 +1,132 @@
+"""The same work for many settings and many logs: `excite study`."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from excite_cli.api.diagnosing import diagnose
+from excite_cli.api.identifying import identify, save_fit
+from excite_cli.api.loading import load_case, load_data, load_problem
+from excite_cli.api.planning import plan
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.errors import ConfigError
+from excite_cli.excitation.progress import Progress
+from excite_cli.excitation.words import figure_in_words
+from excite_cli.shown.note import Note
+from excite_cli.study.case import (
+    DoneCase,
+    Figures,
+    StudyCase,
+    StudyTask,
+    do_with,
+    overrides_of,
+)
+from excite_cli.study.plan import planned_cases
+from excite_cli.study.records import CaseRecord
+from excite_cli.study.study import StudyNews as StudyNews
+from excite_cli.study.study import run_study as run_cases
+from excite_cli.study.vary import parse_vary
+from excite_cli.summary.study import study_answer as study_answer
+from excite_cli.workers.base import Tell, Workers
+
+
+def run_study(
+    config: str | Path,
+    logs: Sequence[str | Path] = (),
+    vary: Sequence[str] = (),
+    *,
+    output: str | Path | None = None,
+    overrides: Sequence[str] = (),
+    diagnosed: bool = True,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Callable[[StudyNews], None] = lambda news: None,
+    workers: Workers | None = None,
+) -> list[CaseRecord]:
+    """Optimise, or identify and diagnose logs, for every combination of settings.
+
+    `vary` are `key.path=V1,V2,…`. Without `logs` the config is optimised for every combination;
+    with them every log is identified, and `diagnosed`. The folder `output` (see `study_folder`)
+    gets the files of every case, its key figures as JSON, and the table study.csv. A case that
+    fails is a record with its message. With `resume` cases that are there are not done again.
+
+    Raises
+    ------
+    ConfigError
+        Nothing is varied, a key or a value is wrong; both `resume` and `overwrite` are given.
+    FileError
+        A log is missing; the folder has files of a study already, or cannot be written to.
+    """
+    if resume and overwrite:
+        raise ConfigError("--resume goes on with the folder, --overwrite replaces it: give one.")
+    task = StudyTask(Path(config).resolve(), tuple(overrides), diagnosed)
+    cases = planned_cases(task, [Path(log) for log in logs], [parse_vary(text) for text in vary])
+    folder = study_folder(config, output)
+    return run_cases(task, cases, folder, do_case, workers, resume, progress, overwrite)
+
+
+def study_folder(config: str | Path, output: str | Path | None) -> Path:
+    """`output`, or <config name>_study here."""
+    return Path(f"{Path(config).stem}_study") if output is None else Path(output)
+
+
+def do_case(task: StudyTask, case: StudyCase, tell: Tell) -> DoneCase:
+    """One case, on whatever worker: optimise it, or identify and diagnose its log."""
+    return do_with(task, case, tell, _optimised if case.log is None else _traced)
+
+
+def _unheard(note: Note) -> None:
+    """A study shows figures of many cases, and no notes on each."""
+
+
+def _optimised(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Figures:
+    problem = load_problem(task.config, overrides_of(task, case), _unheard)
+
+    def progress(index: int, state: Progress) -> None:
+        tell(f"motion {index}, {figure_in_words(state.figure)}")
+
+    result = plan(problem, output=folder / "motions.h5", progress=progress, tell=_unheard)
+    last = result.motions[-1]
+    proved = all(all(motion.certified.values()) for motion in result.motions)
+    return {
+        "motions": len(result.motions),
+        "condition_number": last.stacked_condition_number,
+        "status": ", ".join(dict.fromkeys(motion.status for motion in result.motions)),
+        "proved": "yes" if proved and last.certified else "no",
+        "iterations": sum(motion.iterations for motion in result.motions),
+    }
+
+
+def _traced(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Figures:
+    assert case.log is not None
+    model = load_case(task.config, overrides_of(task, case))
+    data = load_data(model, case.log, _unheard)
+    fit = identify(model, data)
+    save_fit(folder / "fit.h5", model, fit)
+    figures: dict[str, float | int | str | None] = {
+        "sealed_run": fit.sealed_run,
+        "parameters": len(fit.fit.names),
+        "identified_error": fit.error.mean_relative_moving,
+    }
+    if task.diagnosed:
+        found = diagnose(
+            model,
+            data,
+            output=folder / "diagnosis.h5",
+            progress=lambda text, done: tell(text),
+        )
+        figures |= _diagnosed(found)
+    return figures
+
+
+def _diagnosed(found: Diagnosis) -> Figures:
+    return {
+        "before": found.before.mean_relative_moving,
+        "after": found.after.mean_relative_moving,
+        "effects": _listed([(e.effect.kind, e.effect.joints) for e in found.named]),
+        "absorbed": _listed([(e.kind, e.joints) for e in found.absorbed]),
+        "unexplained": ", ".join(each.joint for each in found.unexplained),
+    }
+
+
+def _listed(effects: list[tuple[str, tuple[str, ...]]]) -> str:
+    return "; ".join(f"{kind} on {', '.join(joints)}" for kind, joints in effects)

@@ -1,0 +1,43 @@
+"""Workers, and what is worth saying about them."""
+
+import os
+
+from excite_cli.shown.note import Level, Note, Tell, saying
+from excite_cli.workers.base import Workers
+from excite_cli.workers.catalogue import open_workers
+
+
+def working(workers: int, scheduler: str | None, threads: int, tell: Tell) -> Workers:
+    """Workers as asked for, to be closed.
+
+    Raises
+    ------
+    ConfigError, ClusterError, MissingExtraError
+        See `open_workers`.
+    """
+    place = open_workers(workers, scheduler, threads, saying(tell))
+    there = _processors()
+    if scheduler is not None:
+        tell(Note(Level.INFO, f"{scheduler}: {place.count} tasks at once"))
+    elif workers > there:
+        text = (
+            f"{workers} workers share {there} processors, so {there} would be as fast; "
+            "with more of them, starts may end at optimizer.max_seconds"
+        )
+        tell(Note(Level.WARNING, text))
+    return place
+
+
+def tell_idle(workers: int, starts: int, tell: Tell) -> None:
+    """A hint where a motion has fewer starts than there are workers."""
+    if workers > starts:
+        busy = "one start: one worker has" if starts == 1 else f"{starts} starts: {starts} have"
+        text = f"{busy} something to do, of {workers} workers; see --starts"
+        tell(Note(Level.HINT, text))
+
+
+def _processors() -> int:
+    """Those that this process may use; where the system does not tell, all."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,54 @@
+"""What is worth saying while work goes on: to a person at a terminal, or to a log.
+
+Mathematics does not print. Who calls the library gives a `Tell`; without one, notes go to the
+logger "excite", where Python shows warnings and keeps the rest for those who ask.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Level(Enum):
+    """How much a note matters; the value is the level of Python's logging."""
+
+    DETAIL = logging.DEBUG
+    INFO = logging.INFO
+    HINT = logging.INFO + 1
+    NOTE = logging.INFO + 2
+    WARNING = logging.WARNING
+
+
+# Levels that are told before the text.
+_TOLD = {Level.HINT: "hint", Level.NOTE: "note", Level.WARNING: "warning"}
+
+
+@dataclass(frozen=True)
+class Note:
+    """One sentence; `where` names what it is about, such as the runs of a recording."""
+
+    level: Level
+    text: str
+    where: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """`warning (motion_1): …`, or the text alone."""
+        if self.level not in _TOLD:
+            return self.text
+        return f"{_TOLD[self.level]}{f' ({self.where})' if self.where else ''}: {self.text}"
+
+
+Tell = Callable[[Note], None]
+
+
+def log_note(note: Note) -> None:
+    """Hand a note to Python's logger "excite"."""
+    about = f"{note.where}: " if note.where else ""
+    logging.getLogger("excite").log(note.level.value, "%s%s", about, note.text)
+
+
+def saying(tell: Tell, level: Level = Level.INFO) -> Callable[[str], None]:
+    """`tell` for those who have a text and no level."""
+    return lambda text: tell(Note(level, text))

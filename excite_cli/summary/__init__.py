@@ -1,0 +1,1 @@
+"""Records as tables, sentences and data: the same for terminals, notebooks and scripts."""

@@ -1,0 +1,77 @@
+"""The gradient in three ways: errors and times."""
+
+from excite_cli.excitation.gradient_check import (
+    ADJOINT_BLOCK_LIMIT,
+    CENTRAL_LIMIT,
+    PAPER_FORWARD_ERROR,
+    GradientCheck,
+)
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+
+_PAIRS = {
+    "adjoint_vs_block": ("adjoint – block form", f"{ADJOINT_BLOCK_LIMIT:.0e}"),
+    "adjoint_vs_central": ("adjoint – central differences, 5 points", f"{CENTRAL_LIMIT:.0e}"),
+    "block_vs_central": ("block form – central differences, 5 points", f"{CENTRAL_LIMIT:.0e}"),
+    "adjoint_vs_forward": (
+        "adjoint – forward differences, h = 1e-6",
+        f"the paper had {PAPER_FORWARD_ERROR:.1e}",
+    ),
+}
+_TIMES = {
+    "cost": "cost alone",
+    "adjoint": "cost and gradient, adjoint",
+    "block": "cost and gradient, block form",
+    "forward": "forward differences",
+    "central": "central differences, 5 points",
+}
+
+
+def gradient_answer(found: GradientCheck) -> Answer:
+    """What `excite verify-gradient` answers."""
+    data = {
+        "variables": found.variables,
+        "samples": found.samples,
+        "base_parameters": found.base_parameters,
+        "condition_number": found.condition_number,
+        "relative_error": found.relative_error,
+        "seconds": found.seconds,
+        "passed": found.passed,
+    }
+    return Answer(tuple(gradient_parts(found)), data, good=found.passed)
+
+
+def gradient_parts(found: GradientCheck) -> Parts:
+    """What was compared, errors, times, and the verdict."""
+    return [
+        f"{found.variables} variables, {found.samples} samples, {found.base_parameters} base "
+        f"parameters, at a random motion of condition number {found.condition_number:.1f}",
+        _errors(found),
+        _times(found),
+        _verdict(found),
+    ]
+
+
+def _errors(found: GradientCheck) -> Table:
+    rows = tuple(
+        (words, f"{found.relative_error[key]:.1e}", allowed)
+        for key, (words, allowed) in _PAIRS.items()
+    )
+    return Table("Relative error of the gradient", ("pair", "error", "allowed"), rows, ("pair",))
+
+
+def _times(found: GradientCheck) -> Table:
+    forward = found.seconds["forward"]
+    rows = tuple(
+        (words, f"{1e3 * found.seconds[key]:.2f}", f"{forward / found.seconds[key]:.3g} ×")
+        for key, words in _TIMES.items()
+    )
+    return Table("Time", ("what", "ms", "forward differences take"), rows, ("what",))
+
+
+def _verdict(found: GradientCheck) -> str:
+    return "The gradient is right." if found.passed else "The gradient is WRONG."
+
+
+show(GradientCheck, _verdict, gradient_parts)

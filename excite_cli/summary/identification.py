@@ -1,0 +1,175 @@
+"""What `excite identify` found, as tables and as data."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from excite_cli.identification.fit import Fit
+from excite_cli.identification.fit_words import (
+    above_the_floor,
+    consistency_in_words,
+    fixed_by_data,
+    relative_in_words,
+    short_number,
+)
+from excite_cli.identification.identify import Identification
+from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.noise_floor import floor_cells, floor_columns
+
+
+def identification_answer(
+    found: Identification, written: Mapping[str, str | Path | None]
+) -> Answer:
+    """What `excite identify` answers; `written` are the files that were asked for, by kind."""
+    files = {kind: str(path) for kind, path in written.items() if path is not None}
+    return Answer(tuple(identification_parts(found)), {**_data(found), "output": files})
+
+
+def identification_parts(found: Identification) -> Parts:
+    """Parameters, errors per joint, and sentences."""
+    low, high = found.error.interval
+    fit = found.fit
+    sentences = [
+        f"Mean relative error on {found.sealed_run}: {found.error.mean_relative:.2%} "
+        f"(95 % interval {low:.2%} to {high:.2%}), moving {found.error.mean_relative_moving:.2%}.",
+        f"{fit.count} samples carry the information of {fit.samples:.0f} independent ones.",
+        f"{found.hausman.sentence()[0].upper()}{found.hausman.sentence()[1:]}.",
+    ]
+    if fit.consistent is not None:
+        sentences.append(consistency_in_words(fit))
+    above = above_the_floor(found.error, found.noise_floor)
+    return [
+        _parameter_table(fit),
+        _error_table(found),
+        *([above] if above else []),
+        *sentences,
+    ]
+
+
+def _parameter_table(fit: Fit) -> Table:
+    rows = tuple(
+        (
+            name,
+            short_number(fit.values[i], 5),
+            short_number(fit.std[i], 3),
+            relative_in_words(fit.relative_std[i]),
+            fit.units[i],
+            fixed_by_data(fit, i),
+        )
+        for i, name in enumerate(fit.names)
+    )
+    names = ("parameter", "value", "std", "relative", "unit", "fixed by the data")
+    return Table("Parameters", names, rows, left=("parameter", "unit", "fixed by the data"))
+
+
+def _error_table(found: Identification | StoredFit) -> Table:
+    """Errors per joint on the sealed part, and the training part's and the noise floor beside."""
+    error, floor, joints = found.error, found.noise_floor, found.fit.joint_names
+    units = found.torque_units or ("",) * len(joints)
+    rows = tuple(
+        (
+            joint,
+            f"{error.relative_moving[joint]:.2%}",
+            f"{error.relative[joint]:.2%}",
+            f"{error.rms[joint]:.4g}",
+            *floor_cells(floor, joint),
+            f"{error.rms_raw[joint]:.4g}",
+            unit,
+            f"{found.training_error.relative[joint]:.2%}",
+        )
+        for joint, unit in zip(joints, units, strict=True)
+    )
+    title = "Error of the torque on sealed data (raw: as recorded; training: where it was fitted)"
+    names = ("joint", "moving", "all", "RMS", *floor_columns(floor), "raw RMS", "unit", "training")
+    return Table(title, names, rows, left=("joint", "unit"))
+
+
+def _data(found: Identification) -> dict[str, Any]:
+    """The answer for `--json`."""
+    fit = found.fit
+    return {
+        "parameters": [
+            {
+                "name": name,
+                "value": float(fit.values[i]),
+                "std": float(fit.std[i]),
+                "relative_std": float(fit.relative_std[i]),
+                "identifiable": bool(fit.identifiable[i]),
+                "essential": bool(fit.essential[i]),
+                "unit": fit.units[i],
+            }
+            for i, name in enumerate(fit.names)
+        ],
+        "effects": [
+            {
+                "kind": effect.kind,
+                "joints": [fit.joint_names[j] for j in effect.joints],
+                "parameters": {
+                    name: {"value": value.value, "std": value.std, "unit": value.unit}
+                    for name, value in fit.effect_report(i).items()
+                },
+            }
+            for i, effect in enumerate(fit.effects)
+        ],
+        "sealed_run": found.sealed_run,
+        "error": found.error.as_data(),
+        "training_error": found.training_error.as_data(),
+        "noise_floor": found.noise_floor,
+        "samples": {"count": fit.count, "independent": fit.samples},
+        "noise": dict(zip(fit.joint_names, map(float, fit.noise), strict=True)),
+        "consistent": None
+        if fit.consistent is None
+        else {
+            "solved": fit.consistent.solved,
+            "status": fit.consistent.status,
+            "cost": fit.consistent.cost,
+            "smallest_eigenvalue": float(fit.consistent.eigenvalues.min()),
+        },
+        "closed_loop_bias": {
+            "testable": found.hausman.testable,
+            "p_value": found.hausman.p_value,
+            "source": found.hausman.source,
+            "text": found.hausman.sentence(),
+        },
+        "findings": [
+            {
+                "kind": finding.kind,
+                "severity": finding.severity,
+                "run": finding.run,
+                "text": finding.text,
+            }
+            for finding in found.findings
+        ],
+        "processing": found.processing.as_data(),
+    }
+
+
+def _fit_in_words(fit: Fit) -> str:
+    """`28 parameters (24 fixed by the data) of 5 joints; coulomb_friction@elbow`."""
+    known = int(sum(fit.identifiable))
+    effects = ", ".join(
+        f"{effect.kind}@{','.join(fit.joint_names[j] for j in effect.joints)}"
+        for effect in fit.effects
+    )
+    words = (
+        f"{len(fit.names)} parameters ({known} fixed by the data) of {len(fit.joint_names)} joints"
+    )
+    return words + (f"; {effects}" if effects else "")
+
+
+def _in_words(found: Identification | StoredFit) -> str:
+    """The fit, and its error on data that it did not see."""
+    error = f"mean relative error {found.error.mean_relative:.2%} on {found.sealed_run}"
+    return f"{_fit_in_words(found.fit)}; {error}"
+
+
+def _stored_parts(found: StoredFit) -> Parts:
+    return [_parameter_table(found.fit), _error_table(found)]
+
+
+show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)])
+show(Identification, _in_words, identification_parts)
+show(StoredFit, _in_words, _stored_parts)

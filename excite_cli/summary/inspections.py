@@ -1,0 +1,162 @@
+"""Inspected motions: a table each, why something is not proved, and the data of it."""
+
+from typing import Any
+
+from excite_cli.excitation.inspection import Inspection
+from excite_cli.excitation.inspections import Inspections
+from excite_cli.geometry.words import standing_in_words
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.margins import worst_data
+
+_CAPTION = "A margin is what is left beyond what the config asks to keep."
+
+
+def check_answer(found: Inspections, file: str) -> Answer:
+    """What `excite check` answers about the motions of `file`."""
+    data = {
+        "file": file,
+        "ok": not found.violations,
+        "motions": [_data(found, k, name) for k, name in enumerate(found, start=1)],
+        "rate": found.look.rate,
+        "random": found.look.random,
+        "slow": found.slow,
+    }
+    return Answer(tuple(inspections_parts(found)), data, good=not found.violations)
+
+
+def inspections_parts(found: Inspections) -> Parts:
+    """A table for each motion, and sentences."""
+    look = found.look
+    title = f"margins at {look.rate:g} Hz"
+    title += f" and {look.random} random instants" if look.random else ""
+    tables = [_table(f"{name}: worst {title}", each) for name, each in found.items()]
+    notes = [note for name in found for note in _notes(found, name)]
+    alarms = [words for name in found for words in _alarms(name, found[name])]
+    summary = f"{found.violations} violations" if found.violations else "No violation."
+    return [*alarms, *tables, _CAPTION, *notes, *_agreement(found), summary]
+
+
+def _table(title: str, inspection: Inspection) -> Table:
+    rows = []
+    for key, (state, _) in inspection.states.items():
+        worst = inspection.margins[key]
+        figures = (f"{worst.margin:.5f}", worst.unit, worst.label, f"{worst.time:.4f}")
+        rows.append((key, *figures, "BROKEN" if state == "broken" else state))
+    names = ("constraint", "margin", "unit", "where", "time [s]", "verdict")
+    return Table(title, names, tuple(rows), ("constraint", "unit", "verdict"), ("where",))
+
+
+def _alarms(name: str, inspection: Inspection) -> list[str]:
+    """Constraints of which two computations differ."""
+    return [
+        f"{name}: BROKEN: {each.name} of {each.label} at {each.time:.4f} s: the program's own "
+        f"margin and that of Pinocchio and coal differ by {each.difference:.2g} {each.unit}. One "
+        "of them is wrong: trust neither, play nothing, and report this with the config."
+        for each in inspection.disagreeing
+    ]
+
+
+def _agreement(found: Inspections) -> list[str]:
+    """By how much the two computations of distances differ at most, over all motions."""
+    paths = [each for inspection in found.values() for each in inspection.second]
+    lines = []
+    for name in dict.fromkeys(each.name for each in paths):
+        of = [each for each in paths if each.name == name]
+        most = max(of, key=lambda each: each.difference)
+        lines.append(
+            f"{name}: margin by Pinocchio and coal at {sum(each.instants for each in of)} of "
+            f"{sum(each.of for each in of)} instants, the lowest among them; the program's own "
+            f"differs by at most {most.difference:.1g} {most.unit}."
+        )
+    return lines
+
+
+def _notes(found: Inspections, name: str) -> list[str]:
+    """Why something is not proved, and what else one should know."""
+    inspection, off = found[name], found.difference(name)
+    notes = [
+        f"{name}: {key} is not proved: {reason}."
+        for key, (state, reason) in inspection.states.items()
+        if state == "sampled"
+    ]
+    if inspection.meshes is not None:
+        notes += [
+            f"{name}: meshes of {gap.first} and {gap.second} touch; not judged "
+            f"({standing_in_words(gap.standing)})."
+            for gap in inspection.meshes.told
+        ]
+    if off.broken:
+        notes.append(
+            f"{name}: BROKEN: the samples stored in the file differ from its coefficients by "
+            f"{off.share:.2g} of the largest value at {off.time:.4f} s; someone changed one of "
+            "them."
+        )
+    return notes
+
+
+def _data(found: Inspections, index: int, name: str) -> dict[str, Any]:
+    inspection, off = found[name], found.difference(name)
+    margins = inspection.margins
+    data: dict[str, Any] = {
+        "index": index,
+        "name": name,
+        "margins": {key: worst.margin for key, worst in margins.items()},
+        "worst": {key: worst_data(worst) for key, worst in margins.items()},
+        "violations": found.violations_of(name),
+        "certified": inspection.certified,
+        "verdicts": {
+            key: {"state": state, "reason": reason}
+            for key, (state, reason) in inspection.states.items()
+        },
+        "samples_differ": {"share": off.share, "time": off.time},
+    }
+    data["second_path"] = {
+        each.name: {
+            "instants": each.instants,
+            "of": each.of,
+            "difference": each.difference,
+            "unit": each.unit,
+            "where": each.label,
+            "time": each.time,
+            "agrees": each.agrees,
+        }
+        for each in inspection.second
+    }
+    if inspection.meshes is not None:
+        gaps, times = inspection.meshes.gaps, inspection.meshes.times
+        data["meshes"] = {
+            "pairs": gaps.pairs,
+            "beyond": gaps.beyond,
+            "near": [
+                {
+                    "links": [gap.first, gap.second],
+                    "distance": gap.distance,
+                    "time": float(times[gap.index]),
+                    "touching": gap.touching,
+                    "not_judged": standing_in_words(gap.standing),
+                }
+                for gap in gaps.near
+            ],
+            "always_in_contact": [list(pair) for pair in gaps.always],
+        }
+    return data
+
+
+def _in_words(found: Inspections) -> str:
+    return ", ".join(f"{name}: {_counted(found.violations_of(name))}" for name in found)
+
+
+def _counted(violations: int) -> str:
+    return f"{violations} violations" if violations else "no violation"
+
+
+def _states(inspection: Inspection) -> str:
+    """`no violation; joint_position proved, …`."""
+    states = ", ".join(f"{key} {state}" for key, (state, _) in inspection.states.items())
+    return f"{_counted(inspection.violations)}; {states}"
+
+
+show(Inspections, _in_words, inspections_parts)
+show(Inspection, _states, lambda found: [_table("Worst margins", found)])

@@ -1,0 +1,136 @@
+"""Planned motions: condition numbers beside each other, worst margins, what comes after them."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from excite_cli.diagnosis.next_motion import NextMotion
+from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.progress import Status
+from excite_cli.excitation.result import Result
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.margins import worst_data
+
+
+def plan_answer(planned: Problem | NextMotion, result: Result, output: str) -> Answer:
+    """What `excite optimize` answers: the motions, and what they are expected to tell apart."""
+    following = planned if isinstance(planned, NextMotion) else None
+    model = planned.model if isinstance(planned, NextMotion) else planned
+    parts: Parts = [*result_parts(result), output]
+    data = {
+        "motions": [motion_data(m) for m in result.motions],
+        "criterion": criterion_data(model),
+        "output": output,
+    }
+    if following is not None:
+        outlook = following.outlook([m.coefficients for m in result.motions])
+        data["next_experiment"] = outlook
+        if outlook["pairs"]:
+            parts.insert(0, outlook_table(outlook))
+    return Answer(tuple(parts), data)
+
+
+def result_parts(result: Result) -> Parts:
+    """Condition numbers, and margins where something was asked to be kept."""
+    tables: Parts = [motion_table(result.motions)]
+    if result.motions and result.motions[0].margins:
+        tables.append(margin_table(result.motions))
+    return tables
+
+
+def motion_table(motions: Sequence[Motion]) -> Table:
+    """Condition numbers of each motion and of the stack (the paper's Table I), status, effort."""
+    rows = tuple(
+        (
+            str(motion.index),
+            f"{motion.condition_number:.2f}",
+            f"{motion.stacked_condition_number:.2f}",
+            motion.status if motion.improved else f"{motion.status}; no improvement",
+            str(motion.iterations),
+            f"{motion.seconds:.1f}",
+        )
+        for motion in motions
+    )
+    names = ("motion", "own", "stacked", "status", "iterations", "seconds")
+    return Table("Condition numbers", names, rows, left=("status",))
+
+
+def margin_table(motions: Sequence[Motion]) -> Table:
+    """The worst margin of every constraint over all motions, at controller rate."""
+    rows = []
+    for name in motions[0].margins:
+        motion = min(motions, key=lambda m: m.margins[name].margin)
+        worst = motion.margins[name]
+        figures = (f"{worst.margin:.4f}", worst.unit, worst.label, str(motion.index))
+        rows.append((name, *figures, f"{worst.time:.3f}"))
+    names = ("constraint", "margin", "unit", "where", "motion", "time [s]")
+    left, words = ("constraint", "unit"), ("where",)
+    return Table("Worst margins at 1 kHz", names, tuple(rows), left, words)
+
+
+def outlook_table(outlook: dict[str, Any]) -> Table:
+    """What the motions are expected to tell apart."""
+    title = f"Expected divergence ½Δ; from {outlook['told_apart_from']:g} on, told apart"
+    names = ("effect", "alias", "so far", "then", "motions needed")
+    rows = []
+    for pair in outlook["pairs"]:
+        needed = pair["motions_needed"]
+        figures = (f"{pair['kl_so_far']:.2g}", f"{pair['expected_kl']:.3g}")
+        count = "> 1000" if needed is None else str(needed)
+        rows.append((pair["effect"], pair["alias"], *figures, count))
+    return Table(title, names, tuple(rows), words=("effect", "alias"))
+
+
+def motion_sentence(motion: Motion) -> str:
+    """What is worth saying once a motion is done."""
+    note = "" if motion.improved else "; it brings no improvement"
+    note += "; raise optimizer.max_seconds" if motion.status is Status.TIME_LIMIT else ""
+    note += f"; {motion.note}" if motion.note else ""
+    if motion.certified:
+        loose = [name for name, proved in motion.certified.items() if not proved]
+        told = "all constraints proved at every instant"
+        note += f"; not proved: {', '.join(loose)}" if loose else f"; {told}"
+    return (
+        f"motion {motion.index}: condition number {motion.condition_number:.2f}, "
+        f"stacked {motion.stacked_condition_number:.2f} "
+        f"({motion.seconds:.1f} s, {motion.status}{note})"
+    )
+
+
+def motion_data(motion: Motion) -> dict[str, Any]:
+    """A motion for `--json`."""
+    return {
+        "index": motion.index,
+        "condition_number": motion.condition_number,
+        "stacked_condition_number": motion.stacked_condition_number,
+        "improved": motion.improved,
+        "status": motion.status,
+        "note": motion.note,
+        "seconds": motion.seconds,
+        "iterations": motion.iterations,
+        "evaluations": motion.evaluations,
+        "certified": motion.certified,
+        "margins": {name: worst_data(worst) for name, worst in motion.margins.items()},
+    }
+
+
+def criterion_data(problem: Problem) -> dict[str, str]:
+    """What was minimised and how it was weighted, for `--json`."""
+    return {
+        "kind": problem.spec.criterion.kind,
+        "row_weights": problem.weighting.row_name,
+        "column_scaling": problem.weighting.column_name,
+    }
+
+
+def _in_words(result: Result) -> str:
+    count, joints = len(result.motions), len(result.joint_names)
+    words = f"{count} motion{'s' * (count != 1)} of {joints} joints"
+    if not result.motions:
+        return words
+    return f"{words}, stacked condition number {result.motions[-1].stacked_condition_number:.2f}"
+
+
+show(Result, _in_words, result_parts)

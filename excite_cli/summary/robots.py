@@ -1,0 +1,89 @@
+"""Robots at hand, and the joints of one."""
+
+from collections.abc import Sequence
+
+from excite_cli.robot.described import DescribedJoint, DescribedRobot
+from excite_cli.robot.description import EXAMPLE_PREFIX
+from excite_cli.robot.glance import Glance
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+
+
+def robots_answer(found: Sequence[Glance], names: Sequence[str]) -> Answer:
+    """What `excite robots` answers; `names` are all short names, aliases included."""
+    rows = []
+    for each in found:
+        there = {"inertias": each.inertias, "visuals": each.visual, "collisions": each.collision}
+        lacks = ", ".join(word for word, is_there in there.items() if not is_there)
+        rows.append((each.name, each.kind, str(each.joints), lacks, ", ".join(each.others)))
+    columns = ("name", "kind", "joints", "lacks", "also called")
+    left, words = ("name", "kind"), ("lacks", "also called")
+    table = Table("Robots of example-robot-data", columns, tuple(rows), left, words)
+    hint = f"In a config: robot: {{urdf: {EXAMPLE_PREFIX}NAME}}. Joints: excite robots NAME"
+    data = {
+        "robots": [f"{EXAMPLE_PREFIX}{name}" for name in names],
+        "details": {
+            each.name: {
+                "kind": each.kind,
+                "joints": each.joints,
+                "inertias": each.inertias,
+                "visual": each.visual,
+                "collision": each.collision,
+                "also_called": list(each.others),
+                "file": str(each.path),
+            }
+            for each in found
+        },
+    }
+    return Answer((table, hint), data)
+
+
+def robot_answer(found: DescribedRobot) -> Answer:
+    """What `excite robots NAME` answers."""
+    data = {
+        "joints": {
+            joint.name: {
+                "kind": joint.kind,
+                "lower": joint.lower,
+                "upper": joint.upper,
+                "velocity": joint.velocity,
+                "effort": joint.effort,
+                "links": list(joint.links),
+            }
+            for joint in found.joints
+        },
+        "base_links": list(found.base_links),
+    }
+    return Answer(tuple(robot_parts(found)), data)
+
+
+def robot_parts(found: DescribedRobot) -> Parts:
+    """Joints with their limits, and the links of the base."""
+    sliding = any(joint.kind == "prismatic" for joint in found.joints)
+    unit = "rad, rad/s, N·m; prismatic: m, m/s, N" if sliding else "rad, rad/s, N·m"
+    names = ("joint", *(("kind",) * sliding), "lower", "upper", "speed", "effort", "links")
+    rows = tuple(
+        (
+            joint.name,
+            *((joint.kind,) * sliding),
+            *_limits(joint),
+            ", ".join(joint.links),
+        )
+        for joint in found.joints
+    )
+    left = ("joint", *(("kind",) * sliding))
+    table = Table(f"{_in_words(found)} ({unit})", names, rows, left, ("links",))
+    return [table, f"fixed to the base: {', '.join(found.base_links)}"]
+
+
+def _limits(joint: DescribedJoint) -> list[str]:
+    values = (joint.lower, joint.upper, joint.velocity, joint.effort)
+    return [f"{value:.4g}" if abs(value) < float("inf") else "-" for value in values]
+
+
+def _in_words(found: DescribedRobot) -> str:
+    return f"{found.name}: {len(found.joints)} joints"
+
+
+show(DescribedRobot, _in_words, robot_parts)

@@ -1,0 +1,98 @@
+"""Simulated runs and what was put into the robot, as tables and as data."""
+
+from typing import Any
+
+import numpy as np
+
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+from excite_cli.simulation.simulate import Simulation
+
+
+def simulation_answer(found: Simulation, output: str, seed: int) -> Answer:
+    """What `excite simulate` answers; `output` is the file of the data."""
+    joints = found.dataset.joint_names
+    data = {
+        "runs": [
+            {
+                "name": run.name,
+                "samples": len(run.t),
+                "duration": run.duration,
+                "tracking_error": dict(
+                    zip(joints, map(float, found.tracking[run.name]), strict=True)
+                ),
+            }
+            for run in found.dataset.runs
+        ],
+        "effects": _records(found),
+        "output": output,
+        "seed": seed,
+    }
+    return Answer((*simulation_parts(found), output), data)
+
+
+def simulation_parts(found: Simulation) -> Parts:
+    """The runs, and the effects in the robot."""
+    records = _records(found)
+    return [_run_table(found), *([_effect_table(records)] if records else [])]
+
+
+def _records(found: Simulation) -> list[dict[str, Any]]:
+    return [each.record(found.dataset.joint_names) for each in found.truth.effects]
+
+
+def _run_table(found: Simulation) -> Table:
+    rows = []
+    for run in found.dataset.runs:
+        error = 1e3 * found.tracking[run.name]
+        worst = int(np.argmax(error))
+        rows.append(
+            (
+                run.name,
+                str(len(run.t)),
+                f"{run.duration:.2f}",
+                f"{np.sqrt(np.mean(error**2)):.3f}",
+                f"{error[worst]:.3f}",
+                found.dataset.joint_names[worst],
+            )
+        )
+    names = ("run", "samples", "seconds", "tracking [mrad]", "worst", "joint")
+    return Table("Runs (tracking: RMS)", names, tuple(rows), left=("run", "joint"))
+
+
+def _effect_table(records: list[dict[str, Any]]) -> Table:
+    rows = []
+    for record in records:
+        values = (
+            f"{name} {each['value']:.4g} {'' if each['unit'] == '1' else each['unit']}".strip()
+            for name, each in record["parameters"].items()
+        )
+        rows.append(
+            (
+                record["kind"],
+                ", ".join(record["joints"]),
+                ", ".join(values),
+                ", ".join(record["runs"]) or "all",
+                "yes" if record["declared"] else "no",
+            )
+        )
+    return Table(
+        "Effects in the robot",
+        ("effect", "joints", "parameters", "runs", "declared"),
+        tuple(rows),
+        left=("effect", "declared"),
+        words=("joints", "parameters", "runs"),
+    )
+
+
+def _in_words(found: Simulation) -> str:
+    """`motion_1, motion_2; coulomb_friction@elbow`."""
+    runs = ", ".join(run.name for run in found.dataset.runs)
+    effects = ", ".join(
+        f"{record['kind']}@{','.join(record['joints'])}" for record in _records(found)
+    )
+    return f"{runs}; {effects or 'no effects'}"
+
+
+show(Simulation, _in_words, simulation_parts)

@@ -1,0 +1,57 @@
+"""Exports from Python."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli import ConfigError, FileError, export_file, motions_of, read_result
+from tests.api.conftest import Loop
+
+
+def test_what_the_format_cannot_hold_is_one_sentence(loop: Loop, tmp_path: Path) -> None:
+    target = tmp_path / "x.csv"
+    with pytest.raises(FileError, match=r"fit\.h5 is a fit: it cannot be exported as csv"):
+        export_file(loop.fit, "csv", target)
+    with pytest.raises(FileError, match=r"arm\.h5 is no fit: it cannot be exported as urdf"):
+        export_file(str(loop.result), "urdf", target)
+    with pytest.raises(FileError, match=r"There is no file none\.h5"):
+        export_file("none.h5", "csv", target)
+    with pytest.raises(ConfigError, match=r"--format cvs: unknown\. Did you mean 'csv'"):
+        export_file(loop.result, "cvs", target)
+    with pytest.raises(FileError, match="has no motion 9"):
+        export_file(loop.result, "csv", target, chosen=[9])
+    with pytest.raises(ConfigError, match="--periods 0: a motion is played once or more"):
+        export_file(loop.result, "csv", target, periods=0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_motions_are_written_with_their_numbers(loop: Loop, tmp_path: Path) -> None:
+    found = export_file(loop.result, "npz", str(tmp_path / "arm.npz"), rate=100.0)
+    assert found.paths == (tmp_path / "arm_1.npz", tmp_path / "arm_2.npz")
+    second = motions_of(read_result(loop.result))[1]
+    written = found.motions[1]
+    assert (written.name, written.pace) == ("motion_2", 1.0)
+    assert written.durations == {"motion": second.trajectory.duration}
+    with np.load(found.paths[1]) as stored:
+        q = second.trajectory.states(stored["t"], second.coefficients)[0]
+        assert written.instants == len(stored["t"])
+        assert np.array_equal(stored["q"], q)
+    with pytest.raises(FileError, match="exists already"):
+        export_file(loop.result, "npz", tmp_path / "arm.npz", rate=100.0)
+
+
+def test_a_motion_file_knows_neither_limits_nor_robot(loop: Loop, tmp_path: Path) -> None:
+    (path,) = export_file(loop.result, "csv", tmp_path / "one.csv", chosen=[1]).paths
+    for option, more in (("--slow", {"slow": 0.3}), ("--entry", {"start": {}})):
+        with pytest.raises(FileError, match=f"{option}: .*does not say which robot"):
+            export_file(path, "npz", tmp_path / "one.npz", **more)  # type: ignore[arg-type]
+    with pytest.raises(FileError, match=r"--motion 2: .*one\.csv holds one motion"):
+        export_file(path, "npz", tmp_path / "one.npz", chosen=[2])
+
+
+def test_a_fit_is_written_as_a_model(loop: Loop, tmp_path: Path) -> None:
+    found = export_file(loop.fit, "urdf", tmp_path / "arm.urdf")
+    assert found.paths == (tmp_path / "arm.urdf",)
+    assert not found.motions
+    assert "<robot" in found.paths[0].read_text(encoding="utf-8")

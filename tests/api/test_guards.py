@@ -1,0 +1,184 @@
+"""What the terminal refuses with a sentence, a script is refused with the same sentence."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from excite_cli import (
+    Case,
+    ConfigError,
+    ExciteError,
+    FileError,
+    Problem,
+    Result,
+    check,
+    compare_random,
+    load_data,
+    load_problem,
+    motions_of,
+    plan,
+    plan_after,
+    read_diagnosis,
+    read_fit,
+    read_result,
+    simulate,
+)
+from excite_cli.cli.check import check as check_command
+from excite_cli.cli.compare_random import compare_random as compare_command
+from excite_cli.cli.optimize import optimize as optimize_command
+from excite_cli.excitation.stack import Stack
+from tests.api.conftest import BRIEF, SMOKE, UR10
+
+Call = Callable[[Path, Any], object]
+OTHER_JOINTS = "moves other joints than the config: shoulder_yaw, shoulder_pitch, elbow"
+
+
+def test_paths_are_texts_too(stored: Path, result: Result) -> None:
+    assert read_result(str(stored)).motions[0].index == result.motions[0].index
+
+
+@pytest.mark.parametrize("read", [read_result, read_fit, read_diagnosis])
+def test_a_missing_file_is_one_sentence(read: object, tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"There is no file .*none\.h5"):
+        read(str(tmp_path / "none.h5"))  # type: ignore[operator]
+
+
+def test_a_result_of_another_robot_is_not_checked(
+    other: Problem, result: Result, stored: Path
+) -> None:
+    with pytest.raises(FileError, match=f"^the result {OTHER_JOINTS}"):
+        check(other, result)
+    with pytest.raises(FileError, match=f"{OTHER_JOINTS}"):
+        check(other, str(stored))
+    with pytest.raises(FileError, match=r"shape \(9, 5\).*6 joints of ur10.*\(9, 6\)"):
+        check(other, motions_of(result))
+
+
+def test_motions_of_another_robot_are_not_simulated(
+    other: Problem, other_case: Case, result: Result
+) -> None:
+    for model in (other, other_case):
+        with pytest.raises(FileError, match=OTHER_JOINTS):
+            simulate(model, result)
+        with pytest.raises(FileError, match=r"ask for \(9, 6\)"):
+            simulate(model, motions_of(result))
+
+
+def test_starts_of_another_shape_are_refused(problem: Problem, result: Result) -> None:
+    (start,) = motions_of(result)
+    narrow = replace(start, coefficients=start.coefficients[:, :3])
+    with pytest.raises(FileError, match=r"motion_1 has coefficients of the shape \(9, 3\)"):
+        plan(problem, starts=[narrow])
+    short = replace(start, coefficients=start.coefficients[:-1])
+    with pytest.raises(FileError, match=r"shape \(8, 5\)"):
+        plan(problem, starts=short)
+    with pytest.raises(FileError, match="ndarray is no motion"):
+        plan(problem, starts=np.zeros((2, 3)))  # type: ignore[arg-type]
+
+
+def test_what_is_no_motion_is_named(problem: Problem, stored: Path, tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="Case is no motion"):
+        check(problem, Case(problem.spec, problem.folder, problem.robot))  # type: ignore[arg-type]
+    with pytest.raises(FileError, match=r"There is no file .*none\.csv"):
+        check(problem, tmp_path / "none.csv")
+    with pytest.raises(FileError, match="holds no JointTrajectory"):
+        check(problem, SMOKE)
+
+
+def test_priors_that_do_not_fit_are_refused(
+    problem: Problem, other: Problem, result: Result, tmp_path: Path
+) -> None:
+    with pytest.raises(FileError, match="--prior prior 1 cannot be stacked: it was made for"):
+        plan(other, priors=[result])
+    with pytest.raises(FileError, match="it has 3 columns, the regressor of this problem 26"):
+        plan(problem, priors=[Stack.empty(3)])
+    with pytest.raises(FileError, match=r"no file .*none\.h5"):
+        plan(problem, priors=[str(tmp_path / "none.h5")])
+    with pytest.raises(FileError, match="Case is nothing to plan on top of"):
+        plan(problem, priors=[Case(problem.spec, problem.folder, problem.robot)])  # type: ignore[list-item]
+
+
+def test_a_motion_is_chosen_that_is_there(result: Result) -> None:
+    with pytest.raises(FileError, match=r"the result has no motion 7; it has 1 \(--motion\)"):
+        motions_of(result, [7])
+    with pytest.raises(FileError, match="the result holds no motion"):
+        motions_of(replace(result, motions=()))
+
+
+def test_two_motions_of_one_name_are_not_checked(problem: Problem, result: Result) -> None:
+    motion = motions_of(result)[0]
+    with pytest.raises(FileError, match="Two motions are called motion_1"):
+        check(problem, [motion, motion])
+
+
+def test_motions_of_another_trajectory_are_not_checked(result: Result) -> None:
+    wider = load_problem(SMOKE, [*BRIEF, "trajectory.harmonics=3"])
+    with pytest.raises(FileError, match="the result has motions of another trajectory section"):
+        check(wider, result)
+
+
+def test_a_diagnosis_is_read_or_missing(problem: Problem, stored: Path, tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"no file .*none\.h5"):
+        plan_after(problem, str(tmp_path / "none.h5"))
+    with pytest.raises(FileError, match=r"arm\.h5"):
+        plan_after(problem, stored)
+
+
+def test_an_existing_output_is_kept(problem: Problem, stored: Path) -> None:
+    before = stored.read_bytes()
+    with pytest.raises(FileError, match=r"exists already.*--resume.*--overwrite"):
+        plan(problem, output=stored)
+    with pytest.raises(ConfigError, match="give one"):
+        plan(problem, output=stored, resume=True, overwrite=True)
+    with pytest.raises(FileError, match="exists already"):
+        compare_random(problem, stored, candidates=1, seconds=0, output=str(stored))
+    assert stored.read_bytes() == before
+
+
+def test_measured_data_of_other_joints_are_refused(other: Problem, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,q0,tau0\n0,0,0\n0.1,0,0\n")
+    with pytest.raises(ExciteError, match=r"log\.csv"):
+        load_data(other, str(path))
+
+
+BARE = ["constraints={}", "sequence.motions=1"]
+# A command with a result of another robot, and the function that it calls.
+BOTH_DOORS: dict[str, tuple[Call, Call]] = {
+    "check": (
+        lambda stored, output: check_command(UR10, stored, overrides=BARE, quiet=True),
+        lambda stored, other: check(other, str(stored)),
+    ),
+    "optimize --start": (
+        lambda stored, output: optimize_command(
+            UR10, output, start=stored, overrides=BARE, quiet=True
+        ),
+        lambda stored, other: plan(other, starts=stored),
+    ),
+    "optimize --prior": (
+        lambda stored, output: optimize_command(
+            UR10, output, prior=[stored], overrides=BARE, quiet=True
+        ),
+        lambda stored, other: plan(other, priors=[stored]),
+    ),
+    "compare-random --optimized": (
+        lambda stored, output: compare_command(UR10, optimized=stored, overrides=BARE, quiet=True),
+        lambda stored, other: compare_random(other, stored),
+    ),
+}
+
+
+@pytest.mark.parametrize("command", BOTH_DOORS)
+def test_the_terminal_says_the_same(command: str, stored: Path, tmp_path: Path) -> None:
+    """The same sentence, whichever door was taken."""
+    typed, called = BOTH_DOORS[command]
+    with pytest.raises(ExciteError) as first:
+        typed(stored, tmp_path / "x.h5")
+    other = load_problem(UR10, BARE)
+    with pytest.raises(type(first.value)) as second:
+        called(stored, other)
+    assert str(second.value) == str(first.value)

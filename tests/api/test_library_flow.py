@@ -1,0 +1,121 @@
+"""What functions of the library do beside the mathematics: notes, files, claims."""
+
+import json
+import logging
+from pathlib import Path
+
+import pytest
+
+from excite_cli import (
+    FileError,
+    Level,
+    Note,
+    Problem,
+    Result,
+    check,
+    compare_random,
+    describe_robot,
+    load_motions,
+    load_problem,
+    motions_of,
+    plan,
+    read_result,
+    run_study,
+    save_proposal,
+    verify_gradient,
+)
+from excite_cli.api.schema import config_schema
+from excite_cli.claim import claim, leave
+from tests.api.conftest import BRIEF, ROOT, SMOKE
+
+
+def test_nothing_is_printed_and_notes_go_to_the_log(
+    capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.INFO, logger="excite"):
+        problem = load_problem(SMOKE, BRIEF)
+        result = plan(problem)
+        check(problem, result, meshes=False, rate=20.0)
+    assert capsys.readouterr() == ("", "")
+    assert any("26 base parameters" in text for text in caplog.messages)
+    assert any(text.startswith("motion 1: condition number") for text in caplog.messages)
+
+
+def test_who_listens_hears_notes_with_levels() -> None:
+    heard: list[Note] = []
+    load_problem(str(SMOKE), [*BRIEF, "uncertainty={mass: 0.1}", "constraints={}"], heard.append)
+    levels = {note.level for note in heard}
+    assert {Level.INFO, Level.DETAIL, Level.WARNING} <= levels
+    (doubt,) = [note for note in heard if note.level is Level.WARNING]
+    assert doubt.sentence.startswith("warning: uncertainty bounds nothing")
+
+
+def test_an_output_is_free_again_once_it_is_written(problem: Problem, tmp_path: Path) -> None:
+    path = tmp_path / "arm.h5"
+    plan(problem, output=str(path))
+    assert [each.name for each in tmp_path.iterdir()] == ["arm.h5"]
+    claim(path)
+    leave(path)
+
+
+def test_a_plan_is_gone_on_with(problem: Problem, stored: Path, tmp_path: Path) -> None:
+    path = tmp_path / "more.h5"
+    path.write_bytes(stored.read_bytes())
+    heard: list[Note] = []
+    more = load_problem(SMOKE, [*BRIEF[:1], "sequence.motions=2", *BRIEF[2:]])
+    result = plan(more, output=path, resume=True, tell=heard.append)
+    assert [motion.index for motion in result.motions] == [1, 2]
+    assert f"resuming after motion 1 of {path}" in [note.text for note in heard]
+    assert len(read_result(path).motions) == 2
+
+
+def test_random_motions_stand_beside(problem: Problem, result: Result, tmp_path: Path) -> None:
+    path = tmp_path / "both.h5"
+    found = compare_random(problem, result, candidates=2, seconds=0, output=path)
+    assert found.baseline.candidates == 2
+    assert read_result(path).random_candidates == (2, found.baseline.admissible)
+    with pytest.raises(FileError, match="exists already"):
+        compare_random(problem, result, candidates=2, seconds=0, output=path)
+    assert [each.name for each in tmp_path.iterdir()] == ["both.h5"]  # no claim is left
+    assert found.seconds == pytest.approx(sum(m.seconds for m in result.motions))
+
+
+def test_motions_of_any_origin_are_the_same(problem: Problem, result: Result, stored: Path) -> None:
+    expected = [motion.coefficients.tolist() for motion in motions_of(result)]
+    for given in (result, motions_of(result), motions_of(result)[0], stored, str(stored)):
+        found = load_motions(problem, given)
+        assert [motion.coefficients.tolist() for motion in found] == expected
+
+
+def test_inspections_are_a_mapping(problem: Problem, result: Result, stored: Path) -> None:
+    found = check(problem, result, rate=50.0, meshes=False)
+    assert list(found) == ["motion_1"]
+    assert found["motion_1"].violations == found.violations == 0
+    assert found.difference("motion_1").share == 0.0
+    seen: list[tuple[int, int]] = []
+    same = check(
+        problem, stored, rate=50.0, meshes=False, progress=lambda *counts: seen.append(counts)
+    )
+    assert seen == [(0, 1)]
+    assert same["motion_1"].margins == found["motion_1"].margins
+
+
+def test_a_robot_and_its_config(tmp_path: Path) -> None:
+    urdf = ROOT / "data" / "smoke_arm.urdf"
+    described = describe_robot(str(urdf))
+    assert [joint.kind for joint in described.joints].count("prismatic") == 1
+    answer = save_proposal(urdf, tmp_path / "arm.yaml", tell=lambda note: None)
+    assert answer.data["output"] == str(tmp_path / "arm.yaml")
+    assert load_problem(tmp_path / "arm.yaml").robot.joint_names == tuple(answer.data["joints"])
+
+
+def test_a_study_from_python(tmp_path: Path) -> None:
+    (record,) = run_study(SMOKE, vary=["seed=3"], output=str(tmp_path / "s"), overrides=BRIEF)
+    assert not record.failed, record.message
+    assert record.files == ("seed=3.motions.h5",)
+    assert read_result(tmp_path / "s" / "seed=3.motions.h5").seed == 3
+
+
+def test_the_gradient_and_the_schema() -> None:
+    assert verify_gradient(load_problem(SMOKE, BRIEF)).passed
+    assert "trajectory" in json.loads(config_schema())["properties"]

@@ -1,0 +1,49 @@
+"""Reports from Python."""
+
+from pathlib import Path
+
+import pytest
+
+from excite_cli import ConfigError, FileError, write_report
+from tests.api.conftest import SMOKE, Loop
+
+
+def test_what_is_no_report_is_one_sentence(loop: Loop, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    with pytest.raises(FileError, match=r"data\.h5.*A report is made of results"):
+        write_report(loop.data, page)
+    with pytest.raises(FileError, match=r"smoke\.yaml.*A report is made of results"):
+        write_report(str(SMOKE), page)
+    with pytest.raises(FileError, match=r"no file none\.h5"):
+        write_report("none.h5", page)
+    with pytest.raises(FileError, match="nothing to report"):
+        write_report([], page)
+    with pytest.raises(FileError, match="is given twice"):
+        write_report([loop.fit, str(loop.fit)], page)
+    with pytest.raises(FileError, match=r"a report is a page, NAME\.html"):
+        write_report(loop.fit, tmp_path / "page.pdf")
+    assert not list(tmp_path.iterdir())
+
+
+def test_figures_have_a_format_and_a_place(loop: Loop, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"--format gif: unknown\. Known: png, svg, pdf"):
+        write_report(loop.result, figures=tmp_path, format="gif")
+    with pytest.raises(FileError, match="give a folder for them"):
+        write_report(loop.result, tmp_path / "page.html", format="svg")
+    with pytest.raises(FileError, match="no result file was given"):
+        write_report(loop.fit, figures=tmp_path)
+
+
+def test_a_page_of_a_fit(loop: Loop, tmp_path: Path) -> None:
+    told: list[tuple[str, int, int]] = []
+    found = write_report(
+        [str(loop.fit)],
+        tmp_path / "page.html",
+        progress=lambda text, done, total: told.append((text, done, total)),
+    )
+    assert found.page == tmp_path / "page.html"
+    assert found.figures == ()
+    assert "Made by excite from fit.h5" in found.page.read_text(encoding="utf-8")
+    assert told == [("fit", 0, 1)]
+    with pytest.raises(FileError, match="exists already"):
+        write_report(loop.fit, str(found.page))

@@ -1,0 +1,98 @@
+"""Records read well in a console, and show the terminal's tables in a notebook."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from excite_cli import (
+    Problem,
+    Result,
+    check,
+    compare_random,
+    describe_robot,
+    load_case,
+    load_problem,
+    plan,
+    propose,
+    verify_gradient,
+)
+from excite_cli.api.checking import check_answer
+from excite_cli.api.comparing import comparison_answer
+from excite_cli.api.planning import plan_answer
+from excite_cli.cli.console import Terminal
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import Shown
+from excite_cli.shown.table import Table
+
+ROOT = Path(__file__).resolve().parents[2]
+SMOKE = ROOT / "configs" / "smoke.yaml"
+BRIEF = ["optimizer.max_iterations=6", "sequence.motions=1"]
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return load_problem(SMOKE, BRIEF)
+
+
+@pytest.fixture(scope="module")
+def result(problem: Problem) -> Result:
+    return plan(problem)
+
+
+@pytest.fixture(scope="module")
+def records(problem: Problem, result: Result) -> dict[str, Shown]:
+    inspections = check(problem, result, rate=50.0, meshes=False)
+    return {
+        "smoke_arm: 5 joints, 26 base parameters": problem,
+        "smoke_arm: 5 joints)": load_case(SMOKE),
+        "1 motion of 5 joints, stacked condition number": result,
+        "motion_1: no violation": inspections,
+        "no violation; joint_position proved": inspections["motion_1"],
+        "2 candidates": compare_random(problem, result, candidates=2, seconds=0),
+        "moves 5 joints": propose(str(ROOT / "data" / "smoke_arm.urdf")),
+        "smoke_arm: 5 joints (": describe_robot(ROOT / "data" / "smoke_arm.urdf"),
+        "The gradient is right.": verify_gradient(problem),
+    }
+
+
+def test_a_record_is_a_few_words(records: dict[str, Shown]) -> None:
+    for words, record in records.items():
+        told = repr(record)
+        assert told.startswith(f"{type(record).__name__}(")
+        assert words.removesuffix(" (") in told
+        assert len(told) < 400
+        assert "array(" not in told
+
+
+def test_a_notebook_shows_tables(records: dict[str, Shown]) -> None:
+    for record in records.values():
+        html = record._repr_html_()
+        assert html is not None
+        assert html.count("<p>") + html.count("<table>") >= 1
+
+
+def test_terminal_and_notebook_show_the_same_cells(
+    problem: Problem, result: Result, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Terminal().show(plan_answer(problem, result, "arm.h5"))
+    printed = capsys.readouterr().out
+    html = result._repr_html_()
+    assert html is not None
+    for answer in (plan_answer(problem, result, "arm.h5"),):
+        for part in answer.parts:
+            cells = [c for row in part.rows for c in row] if isinstance(part, Table) else []
+            assert all(cell in printed and cell in html for cell in cells)
+
+
+def test_answers_are_json(problem: Problem, result: Result) -> None:
+    found = check(problem, result, rate=50.0, meshes=False)
+    compared = compare_random(problem, result, candidates=2, seconds=0)
+    answers: list[Answer] = [
+        plan_answer(problem, result, "arm.h5"),
+        check_answer(found, "arm.h5"),
+        comparison_answer(compared, None),
+    ]
+    for answer in answers:
+        assert json.loads(json.dumps(answer.data)).keys() == answer.data.keys()
+        assert answer.good
