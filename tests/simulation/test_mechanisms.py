@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Parameter, Signals
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.robot.model import Array, Robot
+from excite_cli.simulation.build import assemble
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.simulate import Simulation, simulate
@@ -368,3 +370,38 @@ def test_every_kind_of_the_catalogue_can_be_planted(robot: Robot, clean: Simulat
         joints = tuple(range(robot.n)) if kind.scope == "robot" else kind.places(robot)[0]
         run = played(robot, plant(kind, joints, kind.parameters[0].high / 10)).dataset.runs[0]
         assert not np.array_equal(run.tau, clean.dataset.runs[0].tau), name
+
+
+# What of the simulated robot each kind changes; all others act through their own formula, which the
+# controller knows.
+CHANGED = {
+    "viscous_friction": {"damping", "compensated"},
+    "coulomb_friction": {"friction", "compensated"},
+    "armature": {"armature", "compensated"},
+    "spring": {"springs", "compensated"},
+    "coupled_friction": {"couplings", "looped", "compensated"},
+    "elasticity": {"soft"},
+    "backlash": {"soft"},
+    "base_tilt": {"gravity"},
+    "payload": {"phi"},
+    "encoder_offset": {"position_offset"},
+    "contact": {"pushes"},
+    "torque_offset": {"offset"},
+    "torque_gain": {"gain"},
+    "torque_delay": {"delay"},
+    "torque_saturation": {"reading"},
+}
+
+
+@pytest.mark.parametrize("name", list(catalogue()))
+def test_every_kind_goes_into_the_robot_by_its_own_part(robot: Robot, name: str) -> None:
+    kind = catalogue()[name]
+    joints = tuple(range(robot.n)) if kind.scope == "robot" else kind.places(robot)[0]
+    others = {"coulomb": 2.0} if name == "coupled_friction" else {}
+    phi = standard_parameters(robot)
+    bare, built = (
+        vars(assemble(robot, phi, "run", effects))
+        for effects in ((), (plant(kind, joints, 0.5, others),))
+    )
+    changed = {part for part in bare if not np.array_equal(bare[part], built[part])}
+    assert changed == CHANGED.get(name, {"looped", "compensated"})
