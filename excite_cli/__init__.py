@@ -53,7 +53,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "config.spec": ("Spec",),
     "diagnosis.next_motion": ("NextMotion",),
-    "diagnosis.result": ("Diagnosis",),
+    "diagnosis.records": ("Diagnosis",),
     "errors": (
         "ConfigError",
         "ExciteError",

@@ -7,6 +7,7 @@ from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, declared_effects, kind_named
 from excite_cli.errors import ConfigError
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Robot
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
@@ -114,7 +115,7 @@ def test_an_effect_is_silent_in_the_runs_it_does_not_name(robot: Robot) -> None:
     effect = kind((1,), {}, ("second",))
     first, second = (
         type(s)(**{**vars(s), "run": run})
-        for run in ("first", "second")
+        for run in (RunId("first"), RunId("second", 2))
         for s in [signals_of(robot, 4)]
     )
     assert not effect.torque(first, np.array([2.0])).any()
