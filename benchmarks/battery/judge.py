@@ -256,7 +256,7 @@ def _fill(outcome: Outcome, found: Diagnosis, result: Score) -> None:
         for each, verdict in zip(found.effects, result.names, strict=True)
     ]
     outcome.unexplained = [
-        {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
+        {**asdict(each), "depends_on": tuple(covariate.code for covariate in each.depends_on)}
         for each in found.unexplained
     ]
     kinds = {(p["kind"], tuple(p["joints"])) for p in outcome.planted}

@@ -13,6 +13,10 @@ class Status(StrEnum):
     TIME_LIMIT = "time limit"
     STALLED = "stalled"
 
+    def __repr__(self) -> str:
+        """As a text: lists of them are read by people."""
+        return repr(self.value)
+
     @property
     def is_limit(self) -> bool:
         """Whether the search was cut short."""

@@ -106,8 +106,8 @@ def test_an_effect_is_silent_in_the_runs_it_does_not_name(robot: Robot) -> None:
     kind = kind_named("torque_offset")
     effect = kind((1,), {}, ("second",))
     first, second = (
-        type(s)(**{**vars(s), "run": RunId(run)})
-        for run in ("first", "second")
+        type(s)(**{**vars(s), "run": run})
+        for run in (RunId("first"), RunId("second", 2))
         for s in [signals_of(robot, 4)]
     )
     assert not effect.torque(first, np.array([2.0])).any()
