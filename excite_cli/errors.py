@@ -40,6 +40,10 @@ class NoAdmissibleMotionError(ExciteError):
     exit_status = 1
 
 
+class ExciteWarning(UserWarning):
+    """Something outside the program is set aside, and the work goes on without it."""
+
+
 def nearest(word: str, allowed: Iterable[str], cutoff: float = 0.6) -> str:
     """Return ` Did you mean 'x'?` for the allowed word nearest to `word`, or an empty string.
 

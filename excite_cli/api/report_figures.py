@@ -11,6 +11,7 @@ from excite_cli.atomic import write_atomically
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
+from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.report.condition_figure import draw_condition_numbers, draw_spectrum
 from excite_cli.report.motion_figure import draw_margins, draw_motion, watched_constraints
 from excite_cli.report.style import save_figure, save_pages
@@ -48,6 +49,7 @@ def write_figures(
             progress(name, done, len(figures))
             yield draw()
 
+    refuse_inputs_as_outputs({f"--figures ({p})": p for p in paths}, [each.path for each in told])
     with held({str(path): path for path in paths}, overwrite=True):
         if not overwrite:
             _refuse_present(paths)

@@ -9,7 +9,7 @@ import typer
 from excite_cli import __version__
 from excite_cli.cli.check import check
 from excite_cli.cli.compare_random import compare_random
-from excite_cli.cli.console import INTERRUPTED, run_guarded
+from excite_cli.cli.console import INTERRUPTED, run_guarded, told_warnings
 from excite_cli.cli.diagnose import diagnose
 from excite_cli.cli.export import export
 from excite_cli.cli.help_page import HelpfulCommand, HelpfulGroup, split_docstring
@@ -21,6 +21,7 @@ from excite_cli.cli.robots import robots
 from excite_cli.cli.schema import schema
 from excite_cli.cli.simulate import simulate
 from excite_cli.cli.stopping import heed_signals
+from excite_cli.cli.streams import steady_streams
 from excite_cli.cli.study import study
 from excite_cli.cli.usage_errors import USAGE_ERROR, in_our_words
 from excite_cli.cli.verify_gradient import verify_gradient
@@ -112,4 +113,5 @@ def main() -> None:
             raise SystemExit(status)
 
     heed_signals()
-    sys.exit(run_guarded(act))
+    with steady_streams(), told_warnings():
+        sys.exit(run_guarded(act))

@@ -10,6 +10,7 @@ import os
 import platform
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -36,7 +37,7 @@ from excite_cli.api.outputs import leave_claims
 from excite_cli.api.showing import Answer, Level, Note, Table
 from excite_cli.cli.layout import rendered
 from excite_cli.cli.stopping import stopped
-from excite_cli.errors import REFUSALS, ExciteError, refusal
+from excite_cli.errors import REFUSALS, ExciteError, ExciteWarning, refusal
 
 BUG, INTERRUPTED = 70, 130
 # Off a terminal rows stay whole, so that they can be searched and cut.
@@ -84,7 +85,7 @@ class Terminal:
     def show(self, answer: Answer) -> None:
         """The answer, as JSON or as tables and sentences; exit status 1 where it is bad."""
         if self.as_json:
-            print(json.dumps(_finite(answer.data), ensure_ascii=False))
+            print(json.dumps(_finite(answer.data), ensure_ascii=not _is_unicode(sys.stdout)))
         else:
             self._print(answer.parts)
         if not answer.good:
@@ -178,6 +179,11 @@ def _is_terminal(file: TextIO) -> bool:
     return file.isatty() and os.environ.get("TERM") != "dumb"
 
 
+def _is_unicode(file: TextIO) -> bool:
+    """Whether every character can be written; JSON has another way to say those that cannot."""
+    return (file.encoding or "utf-8").lower().startswith("utf")
+
+
 def _console(file: TextIO) -> Console:
     """As wide as the terminal, or as COLUMNS says; elsewhere plain, with rows in one line each.
 
@@ -225,10 +231,30 @@ def _finite(value: Any) -> Any:
     return value
 
 
+@contextmanager
+def told_warnings() -> Iterator[None]:
+    """Within it, warnings of ours are messages like all others."""
+    with warnings.catch_warnings():
+        otherwise = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            if not issubclass(category, ExciteWarning):
+                otherwise(message, category, *where)
+            elif not {"--quiet", "-q"} & set(sys.argv):
+                _tell(f"warning: {message}")
+
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield
+
+
 def run_guarded(action: Callable[[], None]) -> int:
     """Run a command; return its exit status, with one message instead of a traceback."""
+    status: Any = 0
     try:
-        action()
+        try:
+            action()
+        except SystemExit as ended:
+            status = ended.code
         sys.stdout.flush()
     except ExciteError as error:
         _tell(f"error: {error}")
@@ -237,9 +263,6 @@ def run_guarded(action: Callable[[], None]) -> int:
         status, words = stopped(sys.argv[1:])
         _tell(words)
         return status
-    except BrokenPipeError:
-        _print_nowhere()
-        return 0
     except MemoryError:
         _tell("error: out of memory; take fewer samples, harmonics or joints.")
         return 2
@@ -249,7 +272,7 @@ def run_guarded(action: Callable[[], None]) -> int:
         return _bug(error)
     finally:
         leave_claims()
-    return 0
+    return status if isinstance(status, int) else 0
 
 
 # Nothing that a user could mend: the program looked for a file that it should have asked for.

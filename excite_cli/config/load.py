@@ -16,6 +16,7 @@ from excite_cli.config.lines import line_at
 from excite_cli.config.spec import Spec
 from excite_cli.config.strict_yaml import load_strict
 from excite_cli.errors import ConfigError, nearest
+from excite_cli.given_files import require_stored
 
 MAX_BYTES = 1_000_000
 # What is given by mistake for a config, by its suffix.
@@ -36,12 +37,16 @@ def load_spec(path: Path, overrides: list[str] | None = None) -> Spec:
     ------
     ConfigError
         The file is missing, too large, not YAML, or says something that is not allowed.
+    FileError
+        It is a named pipe, a socket or a device.
     """
     if path.is_dir():
         raise ConfigError(
             f"{path} is a folder, not a config. The config, a YAML file, comes first: "
             "excite COMMAND CONFIG FILE."
         )
+    if path.exists():
+        require_stored(path)
     if not path.is_file():
         raise ConfigError(f"There is no config file {path}.{_near(path)}")
     what = _KINDS.get(path.suffix.lower())

@@ -1,6 +1,7 @@
 """What a diagnosis looks for: every kind of the catalogue, at every place, with every shape."""
 
-from collections.abc import Iterable, Mapping, Sequence
+import warnings
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +9,8 @@ import numpy as np
 from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.effects.base import Effect, Signals
-from excite_cli.effects.catalogue import catalogue, kind_named
-from excite_cli.errors import ConfigError
+from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named
+from excite_cli.errors import ConfigError, ExciteWarning
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
 from excite_cli.robot.model import Array, Robot
@@ -72,18 +73,16 @@ def possible_effects(
         if name in spec.exclude:
             continue
         kind = catalogue()[name]
-        effects: list[Effect] = []
-        tests = 0
-        for place in kind.places(robot):
-            if (name, place) in known:
-                continue
-            if kind.per_run:
-                effects += _in_runs(kind, robot, place, signals, residuals, runs)
-                tests += len(set(runs)) * kind.tests_of_grid(robot, place, signals[:1])
-            else:
-                shapes = kind.tuned(robot, place, signals, residuals)
-                effects += [kind(place, shape) for shape in shapes]
-                tests += kind.tests_of_grid(robot, place, signals)
+        try:
+            effects, tests = _of_kind(kind, robot, known, signals, residuals, runs)
+            if is_of_a_package(kind):
+                require_columns(effects, signals)
+        except (Exception, SystemExit) as error:
+            if not is_of_a_package(kind):
+                raise
+            words = f"effect '{name}' of a package is set aside: {type(error).__name__}: {error}"
+            warnings.warn(words, ExciteWarning, stacklevel=2)
+            continue
         count = max(tests, len(effects)) * len(names)
         for known_place, near in around.items():
             if known_place[0] == name:
@@ -99,6 +98,42 @@ def possible_effects(
     if not found:
         raise ConfigError("diagnosis: every effect to be looked for is declared or excluded.")
     return found
+
+
+def _of_kind(
+    kind: type[Effect],
+    robot: Robot,
+    known: Container[tuple[str, tuple[int, ...]]],
+    signals: Sequence[Signals],
+    residuals: Sequence[Array],
+    runs: Sequence[str],
+) -> tuple[list[Effect], int]:
+    """All effects of a kind at places that are not `known`, and how many tests they stand for."""
+    effects: list[Effect] = []
+    tests = 0
+    for place in kind.places(robot):
+        if (kind.kind, place) in known:
+            continue
+        if kind.per_run:
+            effects += _in_runs(kind, robot, place, signals, residuals, runs)
+            tests += len(set(runs)) * kind.tests_of_grid(robot, place, signals[:1])
+        else:
+            shapes = kind.tuned(robot, place, signals, residuals)
+            effects += [kind(place, shape) for shape in shapes]
+            tests += kind.tests_of_grid(robot, place, signals)
+    return effects, tests
+
+
+def require_columns(effects: Sequence[Effect], signals: Sequence[Signals]) -> None:
+    """Raise ValueError where columns are not finite, or not (T, rows, parameters)."""
+    for effect in effects:
+        for seen in signals:
+            columns = np.asarray(effect.columns(seen))
+            shape = (len(seen.t), len(effect.rows(seen.q.shape[1])), len(effect.parameters))
+            if columns.shape != shape:
+                raise ValueError(f"its columns have the shape {columns.shape} instead of {shape}")
+            if columns.dtype.kind != "f" or not np.isfinite(columns).all():
+                raise ValueError("its columns are not finite numbers")
 
 
 def _in_runs(

@@ -3,9 +3,11 @@
 A package that declares, in the group `excite.effects`, a name for a subclass of `Effect` adds it.
 """
 
+import inspect
+import warnings
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.armature import Armature
@@ -31,7 +33,7 @@ from excite_cli.effects.torque_gain import TorqueGain
 from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.effects.torque_saturation import TorqueSaturation
 from excite_cli.effects.viscous_friction import ViscousFriction
-from excite_cli.errors import ConfigError, nearest
+from excite_cli.errors import ConfigError, ExciteWarning, nearest
 from excite_cli.robot.model import Robot
 
 GROUP = "excite.effects"
@@ -65,25 +67,40 @@ _OURS: tuple[type[Effect], ...] = (
 def catalogue() -> Mapping[str, type[Effect]]:
     """All kinds by name.
 
-    Raises
-    ------
-    ConfigError
-        An effect of a package cannot be loaded, is none, or takes a name that exists.
+    An effect of a package that cannot be used is set aside, with an `ExciteWarning` that says why.
     """
     kinds = {effect.kind: effect for effect in _OURS}
     for point in entry_points(group=GROUP):
-        try:
-            found = point.load()
-        except Exception as error:
-            raise ConfigError(
-                f"effect '{point.name}' ({point.value}) cannot be loaded: {error}."
-            ) from error
-        if not (isinstance(found, type) and issubclass(found, Effect)):
-            raise ConfigError(f"effect '{point.name}' ({point.value}) is not a subclass of Effect.")
-        if found.kind in kinds:
-            raise ConfigError(f"effect '{found.kind}' ({point.value}): there is one of this name.")
-        kinds[found.kind] = found
+        found, flaw = _loaded(point)
+        if found is not None and found.kind in kinds:
+            flaw = f"there is another effect '{found.kind}'"
+        if flaw or found is None:
+            words = f"effect '{point.name}' ({point.value}) of a package is set aside: {flaw}."
+            warnings.warn(words, ExciteWarning, stacklevel=2)
+        else:
+            kinds[found.kind] = found
     return kinds
+
+
+def is_of_a_package(kind: type[Effect]) -> bool:
+    """Whether it came through an entry point: it may do what effects of ours never do."""
+    return kind not in _OURS
+
+
+def _loaded(point: EntryPoint) -> tuple[type[Effect] | None, str]:
+    """What an entry point leads to, and why it cannot be used, if so."""
+    try:
+        found = point.load()
+    except (Exception, SystemExit) as error:
+        return None, f"it cannot be loaded ({type(error).__name__}: {error})"
+    if not (isinstance(found, type) and issubclass(found, Effect)):
+        return None, "it is not a subclass of Effect"
+    if inspect.isabstract(found):
+        return None, f"it lacks {', '.join(sorted(found.__abstractmethods__))}"
+    missing = [name for name in ("kind", "title", "parameters") if not getattr(found, name, None)]
+    if missing:
+        return None, f"it does not state its {', '.join(missing)}"
+    return found, ""
 
 
 def kind_named(name: str, where: str = "effects") -> type[Effect]:
@@ -96,8 +113,10 @@ def kind_named(name: str, where: str = "effects") -> type[Effect]:
     """
     kinds = catalogue()
     if name not in kinds:
+        aside = any(point.name == name for point in entry_points(group=GROUP))
+        told = " A package has one, which cannot be used: see the warning." if aside else ""
         raise ConfigError(
-            f"{where}: there is no effect '{name}'.{nearest(name, kinds)} "
+            f"{where}: there is no effect '{name}'.{told or nearest(name, kinds)} "
             f"Effects: {', '.join(kinds)}."
         )
     return kinds[name]

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from excite_cli.constraints.base import Array
+from excite_cli.errors import ConfigError
 from excite_cli.excitation.admissible import CONTROLLER_RATE
 from excite_cli.excitation.mesh_verdict import MeshVerdict, mesh_verdict
 from excite_cli.excitation.problem import Problem
@@ -22,6 +23,7 @@ from excite_cli.shown.record import Shown
 MESHES = "mesh_collision"
 _OF_PAIRS = ("self_collision", "mesh_clearance", "surroundings")
 _CHUNK = 2000
+_MOST_RATE, _MOST_RANDOM = 1e6, 10_000_000
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,15 @@ class Look:
     rate: float = CONTROLLER_RATE
     random: int = 0
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for more instants than fit in memory."""
+        if not 1.0 <= self.rate <= _MOST_RATE:
+            raise ConfigError(
+                f"rate: {self.rate:g} instants per second; allowed: 1 to {_MOST_RATE:g} Hz."
+            )
+        if not 0 <= self.random <= _MOST_RANDOM:
+            raise ConfigError(f"random: {self.random:,} instants; allowed: 0 to {_MOST_RANDOM:,}.")
 
 
 @dataclass(frozen=True, repr=False)

@@ -14,7 +14,7 @@ import numpy as np
 
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import condition_number, singular_values
-from excite_cli.errors import NoAdmissibleMotionError
+from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
@@ -30,6 +30,7 @@ _EXCHANGE_ROUNDS = 10
 _BATCH = 4
 # What tells the random numbers of candidates from those of starts.
 _STREAM = 16
+_MOST_CANDIDATES, _MOST_BYTES = 1_000_000, 8 * 10**9
 
 
 @dataclass(frozen=True)
@@ -70,9 +71,17 @@ def random_baseline(
 
     Raises
     ------
+    ConfigError
+        There would be more candidates than fit in memory.
     NoAdmissibleMotionError
         Not one candidate is admissible.
     """
+    most = min(_MOST_CANDIDATES, _MOST_BYTES // (8 * problem.columns**2))
+    if not 1 <= candidates <= most:
+        raise ConfigError(
+            f"candidates: {candidates:,} cannot be drawn; allowed: 1 to {most:,} for this robot, "
+            "so that all fit in memory."
+        )
     began = time.perf_counter()
     place = workers or Here()
     task = MotionTask(problem, stack)

@@ -7,7 +7,7 @@ from excite_cli.measurement.dataset import Array
 from excite_cli.measurement.timed_motion import TimedMotion
 from excite_cli.trajectory.chain import Chain, Segment
 
-MAX_INSTANTS = 2_000_000
+MAX_INSTANTS, MAX_PERIODS = 2_000_000, 10_000
 # How far q, v, a may be apart at both ends of a motion that is repeated [rad, rad/s, rad/s²].
 _CLOSED = 1e-6
 
@@ -56,8 +56,10 @@ def repeated(segment: Segment, periods: int, joint_names: tuple[str, ...]) -> Ch
     Raises
     ------
     ConfigError
-        It does not end as it starts.
+        It does not end as it starts, or there are more than ten thousand periods.
     """
+    if not 1 <= periods <= MAX_PERIODS:
+        raise ConfigError(f"--periods {periods}: give 1 to {MAX_PERIODS:,}.")
     if periods > 1:
         ends = np.array([0.0, segment.trajectory.duration])
         gaps = [np.abs(x[1] - x[0]) for x in segment.trajectory.states(ends, segment.coefficients)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import ConfigError, FileError, nearest
+from excite_cli.given_files import require_stored
 from excite_cli.measurement.arrange import arrange, check_names, listed
 from excite_cli.measurement.bag_reader import BagReader
 from excite_cli.measurement.csv_reader import CsvReader
@@ -97,8 +98,7 @@ def reader_for(path: Path) -> Reader:
     FileError
         There is no such file, or no reader for it.
     """
-    if not path.exists():
-        raise FileError(f"There is no file {path}.")
+    require_stored(path)
     for reader in READERS:
         if reader.recognises(path):
             if path.is_dir() and not isinstance(reader, BagReader):

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from excite_cli.errors import FileError
+from excite_cli.given_files import require_stored
 from excite_cli.measurement.motion_bag import MotionBag
 from excite_cli.measurement.motion_csv import MotionCsv
 from excite_cli.measurement.motion_moveit import MotionMoveit
@@ -28,8 +29,7 @@ def motion_reader_for(path: Path, torque: str = "tau") -> MotionReader | None:
     FileError
         There is no such file.
     """
-    if not path.exists():
-        raise FileError(f"There is no file {path}.")
+    require_stored(path)
     return next((reader for reader in MOTION_READERS if reader.recognises(path, torque)), None)
 
 

@@ -6,6 +6,7 @@ Every text is escaped by the template engine: names come from files that nobody 
 """
 
 import functools
+import hashlib
 import importlib
 from dataclasses import dataclass
 from importlib import resources
@@ -13,6 +14,8 @@ from typing import Any
 
 from excite_cli.errors import MissingExtraError
 from excite_cli.report.chart import PREFIX, Chart
+
+_SCRIPTS = ("early.js", "page.js")
 
 
 @dataclass(frozen=True)
@@ -136,12 +139,24 @@ def _environment() -> Any:
         undefined=jinja2.StrictUndefined,
     )
     safe = importlib.import_module("markupsafe").Markup
+    environment.globals["policy"] = _policy()
     environment.globals["asset"] = lambda name: safe(_asset(name))
     environment.filters["drawing"] = lambda chart, name: safe(chart.svg.replace(PREFIX, f"{name}-"))
     environment.filters["base64"] = _base64
     environment.filters["sentence"] = _sentence
     environment.tests["of_kind"] = lambda block, name: type(block).__name__ == name
     return environment
+
+
+@functools.cache
+def _policy() -> str:
+    """What a browser lets the page do: run its own two scripts, and load nothing."""
+    digests = (hashlib.sha256(_asset(name).encode()).digest() for name in _SCRIPTS)
+    own = " ".join(f"'sha256-{_base64(digest)}'" for digest in digests)
+    return (
+        f"default-src 'none'; script-src {own}; style-src 'unsafe-inline'; img-src data:; "
+        "base-uri 'none'; form-action 'none'"
+    )
 
 
 @functools.cache

@@ -16,6 +16,7 @@ from importlib import metadata
 from pathlib import Path
 
 from excite_cli.errors import RobotError, nearest
+from excite_cli.given_files import require_stored
 from excite_cli.robot.mesh_trial import try_meshes
 from excite_cli.robot.urdf_check import parsed
 
@@ -103,6 +104,8 @@ def load_description(
     ------
     RobotError
         Unknown name, missing or unreadable file, not a URDF, or larger than 20 MB.
+    FileError
+        It is a named pipe, a socket or a device.
     """
     root = relative_to or Path.cwd()
     extra = tuple(str((root / folder).resolve()) for folder in package_dirs)
@@ -120,6 +123,8 @@ def load_description(
         path = known[name]
     else:
         path = (root / urdf).resolve()
+        if path.exists():
+            require_stored(path)
         if not path.is_file():
             offered = [f"{EXAMPLE_PREFIX}{name}" for name in example_robots()]
             meant = "" if "/" in urdf else nearest(f"{EXAMPLE_PREFIX}{urdf}", offered, 0.93)

@@ -1,10 +1,14 @@
 """How a motion is played and recorded."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from excite_cli.errors import ConfigError
+
+MOST_REPEATED = 10_000
+_MOST_SAMPLES = 20_000_000
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,23 @@ class SimulationSettings:
         period = 1.0 / self.control_rate
         return period / np.ceil(period / self.step - 1e-9)
 
+    def require_room(self, durations: Iterable[float]) -> None:
+        """See that the recordings of motions of these durations [s] can be held in memory.
+
+        Raises
+        ------
+        ConfigError
+            They have more than twenty million instants.
+        """
+        longest = max(self.rate, self.control_rate)
+        samples = longest * self.periods * sum(durations)
+        if samples > _MOST_SAMPLES or self.repeat * samples > _MOST_SAMPLES:
+            raise ConfigError(
+                f"repeat {self.repeat:,}, periods {self.periods:,}: that is "
+                f"{self.repeat * samples:.3g} instants; up to {_MOST_SAMPLES:,} are played. Take "
+                "fewer, or shorter motions."
+            )
+
     def __post_init__(self) -> None:
         """Raise ConfigError for what cannot be."""
         if not 1.0 <= self.rate <= self.control_rate:
@@ -60,8 +81,11 @@ class SimulationSettings:
             if not getattr(self, name) >= 0.0:
                 raise ConfigError(f"{name.replace('_', ' ')}: it must not be negative.")
         for name in ("repeat", "periods"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"{name}: at least 1.")
+            if not 1 <= getattr(self, name) <= MOST_REPEATED:
+                raise ConfigError(
+                    f"{name}: {getattr(self, name)} cannot be played; allowed: 1 to "
+                    f"{MOST_REPEATED:,}."
+                )
         for name in ("step", "bandwidth", "lead_in", "control_rate"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name.replace('_', ' ')}: it must be positive.")

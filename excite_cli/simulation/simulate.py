@@ -83,6 +83,7 @@ def simulate(
     """
     if settings.periods > 1 and not all(motion.periodic for motion in motions):
         raise ConfigError("periods: only periodic motions (family: fourier) can go on.")
+    settings.require_room(motion.duration for motion in motions)
     phi = true_inertias(robot, settings.inertia_error, settings.seed)
     planted = (*sized(robot, declared, settings.seed), *effects)
     runs: list[Run] = []

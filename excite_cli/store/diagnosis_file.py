@@ -5,13 +5,11 @@ Reading trusts nothing: a foreign or damaged file gives one message.
 
 import json
 from dataclasses import asdict
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-from pydantic import TypeAdapter
 
 from excite_cli.atomic import write_atomically
 from excite_cli.diagnosis.records import (
@@ -27,7 +25,8 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_file import new_hdf5
 from excite_cli.measurement.memory_limit import limited_memory
-from excite_cli.robot.model import Array
+from excite_cli.store import checked
+from excite_cli.store.joint_errors import require_joints
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 from excite_cli.store.trace_groups import (
     read_torque_traces,
@@ -42,7 +41,7 @@ OWN = OwnFile(
     "a diagnosis", "Diagnoses are written by `excite diagnose`.", SCHEMA, ("content", CONTENT)
 )
 _ATTRIBUTES = ("config", "config_folder", "sealed_run")
-_ARRAYS = ("phi", "base_values", "base_std")
+_OF_BASE = ("base_values", "base_std")
 _RECORDS: dict[str, Any] = {
     "joint_names": tuple[str, ...],
     "base_names": tuple[str, ...],
@@ -79,7 +78,7 @@ def read_diagnosis(path: Path) -> Diagnosis:
         The file is missing, unreadable, not a diagnosis, damaged, or of a newer schema.
     """
     with opened(path, OWN) as file:
-        return _read(file)
+        return _read(file, path)
 
 
 def is_diagnosis(path: Path) -> bool:
@@ -109,7 +108,7 @@ def _write(path: Path, diagnosis: Diagnosis) -> None:
         )
         for name in (*_RECORDS, *_LATER):
             file[f"records/{name}"] = _text(getattr(diagnosis, name))
-        for name in _ARRAYS:
+        for name in ("phi", *_OF_BASE):
             file[name] = np.asarray(getattr(diagnosis, name), dtype=float)
         for name in _INFORMATION:
             file[f"information/{name}"] = _text(getattr(information, name))
@@ -121,36 +120,63 @@ def _write(path: Path, diagnosis: Diagnosis) -> None:
         write_torque_traces(file.create_group("sealed_traces"), diagnosis.sealed_traces)
 
 
-def _read(file: Any) -> Diagnosis:
+def _read(file: Any, path: Path) -> Diagnosis:
     attributes = file.attrs
-    fields: dict[str, Any] = {name: str(attributes[name]) for name in _ATTRIBUTES}
-    fields.update({name: np.asarray(file[name], dtype=float) for name in _ARRAYS})
+    fields: dict[str, Any] = {name: checked.text(attributes, name) for name in _ATTRIBUTES}
+    checked.stored_spec(fields["config"], str(path))
     fields.update({name: _record(file, f"records/{name}", _RECORDS[name]) for name in _RECORDS})
+    joints = checked.names(fields["joint_names"], "joint_names")
+    base = (len(fields["base_names"]),)
+    fields["phi"] = checked.array(file["phi"], (None,))
+    fields.update({name: checked.array(file[name], base, finite=False) for name in _OF_BASE})
     for name, kind in _LATER.items():
         stored = f"records/{name}" in file
         fields[name] = _record(file, f"records/{name}", kind) if stored else None
-    group = file["information"]
-    information = Information(
-        factor=_finite(group["factor"]),
-        rank=int(group.attrs["rank"]),
-        noise=_finite(group["noise"]),
-        **{name: _record(group, name, kind) for name, kind in _INFORMATION.items()},
-    )
     # Files of earlier versions have no traces.
-    fields["traces"] = read_traces(file["traces"]) if "traces" in file else None
+    fields["traces"] = read_traces(file["traces"], joints) if "traces" in file else None
     if "sealed_traces" in file:
-        fields["sealed_traces"] = read_torque_traces(file["sealed_traces"])
-    return Diagnosis(
-        fingerprint=str(attributes["robot_hash"]),
-        seconds=float(attributes["seconds"]),
-        information=information,
+        fields["sealed_traces"] = read_torque_traces(file["sealed_traces"], len(joints))
+    found = Diagnosis(
+        fingerprint=checked.text(attributes, "robot_hash"),
+        seconds=checked.number(attributes, "seconds"),
+        information=_information(file["information"], len(joints)),
         **fields,
     )
+    require_joints(joints, (found.before, found.after), found.noise_floor)
+    if not _named_joints(found) <= set(joints):
+        raise ValueError("it names joints that are not its own")
+    return found
 
 
-@cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
+def _information(group: Any, joints: int) -> Information:
+    factor = checked.array(group["factor"], (None, None))
+    rank = checked.count(group.attrs, "rank")
+    if rank > factor.shape[1]:
+        raise ValueError("its information has fewer columns than base parameters")
+    return Information(
+        factor=factor,
+        rank=rank,
+        noise=checked.array(group["noise"], (joints,)),
+        **{name: _record(group, name, kind) for name, kind in _INFORMATION.items()},
+    )
+
+
+def _named_joints(found: Diagnosis) -> set[str]:
+    """All that its records name."""
+    records: list[EffectRecord | Absorbed] = [
+        *found.declared,
+        *found.information.model,
+        *found.information.rivals,
+        *(each.effect for each in found.effects),
+        *(alias for each in found.effects for alias in each.aliases),
+        *(suspect.effect for each in found.rounds for suspect in each.suspects),
+        *found.absorbed,
+    ]
+    return {
+        *(joint for each in records for joint in each.joints),
+        *(each.joint for each in found.unexplained),
+        *(joint for each in found.rounds for joint in each.residual),
+    }
 
 
 def _text(value: Any) -> str:
@@ -171,13 +197,4 @@ def _plain(value: Any) -> Any:
 
 
 def _record(group: Any, name: str, kind: Any) -> Any:
-    text = group[name][()]
-    value = json.loads(text.decode() if isinstance(text, bytes) else str(text))
-    return _adapter(kind).validate_python(value)
-
-
-def _finite(dataset: Any) -> Array:
-    array = np.asarray(dataset, dtype=float)
-    if not np.isfinite(array).all():
-        raise ValueError(f"{dataset.name} has values that are not finite")
-    return array
+    return checked.record(group[name][()], kind)

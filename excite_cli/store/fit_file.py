@@ -5,7 +5,7 @@ kind, joints, shape and runs, from which the model is built again.
 """
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,8 @@ from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_file import new_hdf5
 from excite_cli.measurement.memory_limit import limited_memory
+from excite_cli.store import checked
+from excite_cli.store.joint_errors import require_joints
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 from excite_cli.store.trace_groups import read_torque_traces, write_torque_traces
 from excite_cli.store.versions import versions
@@ -31,6 +33,16 @@ SCHEMA = 1
 KIND = "fit"
 OWN = OwnFile("a fit", "Such files are written by `excite identify`.", SCHEMA, ("kind", KIND))
 _ARRAYS = ("values", "std", "relative_std", "identifiable", "essential")
+
+
+@dataclass(frozen=True)
+class _StoredEffect:
+    """An effect as the file has it: joints by their place."""
+
+    kind: str
+    joints: tuple[int, ...]
+    shape: dict[str, float]
+    runs: tuple[str, ...]
 
 
 def write_fit(
@@ -122,7 +134,7 @@ def read_fit(path: Path) -> StoredFit:
         An effect of it is not in the catalogue.
     """
     with opened(path, OWN) as file:
-        return _read(file)
+        return _read(file, path)
 
 
 def is_fit(path: Path) -> bool:
@@ -136,81 +148,95 @@ def is_fit(path: Path) -> bool:
         return False
 
 
-def _read(file: Any) -> StoredFit:
+def _read(file: Any, path: Path) -> StoredFit:
     attributes = file.attrs
-    return StoredFit(
-        config=str(attributes["config"]),
-        config_folder=str(attributes["config_folder"]),
-        fingerprint=str(attributes["robot_hash"]),
-        fit=_read_fit(file),
-        sealed_run=str(attributes["sealed_run"]),
-        error=_errors(attributes["error"]),
-        training_error=_errors(attributes["training_error"]),
-        findings=tuple(
-            Finding(**{**item, "joints": tuple(item["joints"])})
-            for item in json.loads(attributes["findings"])
-        ),
-        sources=tuple(str(name) for name in attributes["sources"]),
-        noise_floor=_floor(attributes.get("noise_floor", "null")),
-        closed_loop_bias=str(attributes.get("closed_loop_bias", "")),
-        processing=json.loads(attributes.get("processing", "{}")),
-        versions=json.loads(attributes.get("versions", "{}")),
-        torque_units=tuple(json.loads(attributes.get("torque_units", "[]"))),
-        traces=read_torque_traces(file["traces"]) if "traces" in file else (),
+    config = checked.text(attributes, "config")
+    checked.stored_spec(config, str(path))
+    joints = checked.names(attributes["joint_names"], "joint_names")
+    stored = StoredFit(
+        config=config,
+        config_folder=checked.text(attributes, "config_folder"),
+        fingerprint=checked.text(attributes, "robot_hash"),
+        fit=_read_fit(file, joints),
+        sealed_run=checked.text(attributes, "sealed_run"),
+        error=checked.record(attributes["error"], Errors),
+        training_error=checked.record(attributes["training_error"], Errors),
+        findings=checked.record(attributes["findings"], tuple[Finding, ...]),
+        sources=checked.texts(attributes["sources"], "sources"),
+        noise_floor=checked.record(attributes.get("noise_floor", "null"), dict[str, float] | None),
+        closed_loop_bias=checked.text(attributes, "closed_loop_bias", ""),
+        processing=checked.record(attributes.get("processing", "{}"), dict[str, Any]),
+        versions=checked.record(attributes.get("versions", "{}"), dict[str, str]),
+        torque_units=checked.record(attributes.get("torque_units", "[]"), tuple[str, ...]),
+        traces=read_torque_traces(file["traces"], len(joints)) if "traces" in file else (),
     )
+    require_joints(joints, (stored.error, stored.training_error), stored.noise_floor)
+    if len(stored.torque_units) not in (0, len(joints)):
+        raise ValueError("'torque_units' do not fit its joints")
+    return stored
 
 
-def _floor(text: str) -> dict[str, float] | None:
-    data = json.loads(text)
-    return None if data is None else {str(name): float(value) for name, value in data.items()}
-
-
-def _errors(text: str) -> Errors:
-    data = json.loads(text)
-    return Errors(**{**data, "interval": tuple(data["interval"])})
-
-
-def _read_fit(file: Any) -> Fit:
+def _read_fit(file: Any, joints: tuple[str, ...]) -> Fit:
     group = file["parameters"]
-    settings = group.attrs
-    texts: dict[str, Any] = {
-        name: tuple(text.decode() for text in group[name][()])
-        for name in ("names", "units", "words")
-    }
-    arrays: dict[str, Any] = {name: np.asarray(group[name]) for name in (*_ARRAYS, "covariance")}
-    size = len(texts["names"])
-    if any(len(array) != size for array in arrays.values()) or np.isnan(arrays["values"]).any():
-        raise ValueError("its arrays of parameters do not fit together")
+    settings, rank = group.attrs, checked.count(group.attrs, "rank")
+    names = checked.texts(group["names"][()], "parameters/names")
+    size = len(names)
     effects = tuple(
-        kind_named(item["kind"], str(file.filename))(
-            tuple(item["joints"]), dict(item["shape"]), tuple(item["runs"])
-        )
-        for item in json.loads(settings["effects"])
+        _effect(item, str(file.filename), len(joints))
+        for item in checked.record(settings["effects"], tuple[_StoredEffect, ...])
     )
+    if rank + sum(len(effect.parameters) for effect in effects) != size:
+        raise ValueError("its parameters are not those of its effects")
+    texts: dict[str, Any] = {
+        name: checked.texts(group[name][()], f"parameters/{name}") for name in ("units", "words")
+    }
+    arrays: dict[str, Any] = {
+        name: checked.flags(group[name], (size,)) for name in ("identifiable", "essential")
+    }
+    # What the data do not show has an infinite deviation, and one that is not known is NaN.
+    for name in ("std", "relative_std"):
+        arrays[name] = checked.array(group[name], (size,), finite=False)
+    if {len(each) for each in texts.values()} != {size}:
+        raise ValueError("its parameters lack units or words")
+    phi = checked.array(file["bodies/phi"], (None,))
     return Fit(
-        method=str(settings["method"]),
-        inertias=str(settings["inertias"]),
-        joint_names=tuple(str(name) for name in file.attrs["joint_names"]),
+        method=checked.text(settings, "method"),
+        inertias=checked.text(settings, "inertias"),
+        joint_names=joints,
         effects=effects,
-        rank=int(settings["rank"]),
-        noise=np.asarray(file["noise"]),
-        phi=np.asarray(file["bodies/phi"]),
-        count=int(settings["count"]),
-        samples=float(settings["samples"]),
-        consistent=_consistent(file["bodies"].get("consistent")),
+        rank=rank,
+        names=names,
+        values=checked.array(group["values"], (size,)),
+        covariance=checked.array(group["covariance"], (size, size), finite=False),
+        noise=checked.array(file["noise"], (len(joints),), finite=False),
+        phi=phi,
+        count=checked.count(settings, "count"),
+        samples=checked.number(settings, "samples"),
+        consistent=_consistent(file["bodies"].get("consistent"), len(phi), size - rank),
         **texts,
         **arrays,
     )
 
 
-def _consistent(group: Any) -> ConsistentParameters | None:
+def _effect(stored: _StoredEffect, path: str, joints: int) -> Effect:
+    """The effect, if its kind has such a shape and the robot such joints."""
+    kind = kind_named(stored.kind, path)
+    known = {parameter.name for parameter in kind.shapes}
+    if set(stored.shape) != known or not all(0 <= joint < joints for joint in stored.joints):
+        raise ValueError(f"the effect '{stored.kind}' has no such shape, or acts on no such joint")
+    if not stored.joints and kind.scope != "robot":
+        raise ValueError(f"the effect '{stored.kind}' acts on no joint")
+    return kind(stored.joints, stored.shape, stored.runs)
+
+
+def _consistent(group: Any, phi: int, effects: int) -> ConsistentParameters | None:
     if group is None:
         return None
     return ConsistentParameters(
-        phi=np.asarray(group["phi"]),
-        effects=np.asarray(group["effects"]),
-        eigenvalues=np.asarray(group["eigenvalues"]),
-        cost=float(group.attrs["cost"]),
-        status=str(group.attrs["status"]),
-        solved=bool(group.attrs["solved"]),
+        phi=checked.array(group["phi"], (phi,)),
+        effects=checked.array(group["effects"], (effects,)),
+        eigenvalues=checked.array(group["eigenvalues"], (None,)),
+        cost=checked.number(group.attrs, "cost"),
+        status=checked.text(group.attrs, "status"),
+        solved=checked.flag(group.attrs, "solved"),
     )

@@ -10,6 +10,7 @@ import h5py
 from pydantic import ValidationError
 
 from excite_cli.errors import ExciteError, FileError
+from excite_cli.given_files import require_stored
 from excite_cli.measurement.memory_limit import limited_memory
 
 PROGRAM = "excite"
@@ -37,6 +38,7 @@ def opened(path: Path, own: OwnFile) -> Iterator[Any]:
     FileError
         The file is missing, unreadable, not of this kind, damaged, or of a newer schema.
     """
+    require_stored(path)
     if not path.is_file():
         raise FileError(f"There is no file {path}.")
     try:

@@ -23,7 +23,9 @@ from excite_cli.excitation.stack import Stack
 from excite_cli.measurement.hdf5_file import new_hdf5
 from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.proof.worst_margin import Worst
+from excite_cli.store import checked
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
+from excite_cli.trajectory.catalogue import build_trajectory
 
 Matrix = NDArray[np.float64]
 
@@ -142,15 +144,13 @@ def read_samples(path: Path) -> dict[int, tuple[Matrix, Matrix, Matrix, Matrix]]
         As `read_result`.
     """
     with opened(path, OWN) as file:
-        return {
-            int(index): (
-                np.asarray(group["t"], dtype=float),
-                _finite_matrix(group["q"]),
-                _finite_matrix(group["v"]),
-                _finite_matrix(group["a"]),
-            )
-            for index, group in file["motions"].items()
-        }
+        return {int(index): _samples(group) for index, group in file["motions"].items()}
+
+
+def _samples(group: Any) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+    t = checked.array(group["t"], (None,))
+    q, v, a = (checked.array(group[name], (len(t), None)) for name in "qva")
+    return t, q, v, a
 
 
 def is_result(path: Path) -> bool:
@@ -172,71 +172,69 @@ def _read(file: Any, path: Path) -> Result:
             f"{path} holds a {content}, not motions. Motions are written by `excite optimize` and "
             "`excite compare-random`."
         )
+    config = checked.text(attributes, "config")
+    joint_names = checked.names(attributes["joint_names"], "joint_names")
+    trajectory = build_trajectory(checked.stored_spec(config, str(path)).trajectory)
+    shape = (trajectory.n_coefficients, len(joint_names))
     base = file["base_parameters"]
+    selection = checked.indices(base["selection"])
+    words = checked.texts(base["words"][()], "base_parameters/words")
+    columns = len(words)
+    if columns < len(selection):
+        raise ValueError("its base parameters do not fit together")
+    drawn = checked.record(json.dumps(attributes["random_candidates"].tolist()), tuple[int, int])
     return Result(
-        config=str(attributes["config"]),
-        config_folder=str(attributes["config_folder"]),
-        fingerprint=str(attributes["robot_hash"]),
-        seed=int(attributes["seed"]),
-        joint_names=tuple(str(name) for name in attributes["joint_names"]),
-        base_selection=np.asarray(base["selection"]),
-        base_words=tuple(text.decode() for text in base["words"][()]),
-        row_weights=np.asarray(base["row_weights"]),
-        column_scales=np.asarray(base["column_scales"]),
+        config=config,
+        config_folder=checked.text(attributes, "config_folder"),
+        fingerprint=checked.text(attributes, "robot_hash"),
+        seed=checked.count(attributes, "seed"),
+        joint_names=joint_names,
+        base_selection=selection,
+        base_words=words,
+        row_weights=checked.array(base["row_weights"], (None,)),
+        column_scales=checked.array(base["column_scales"], (columns,)),
         motions=tuple(
-            _read_motion(file[f"motions/{index}"], index)
+            _read_motion(file[f"motions/{index}"], index, shape)
             for index in range(1, len(file.get("motions", {})) + 1)
         ),
-        stack=_read_stack(file["stack/R"], int(file["stack"].attrs["rows"])),
-        prior_stack=_read_stack(file["stack/R_0"], int(file["stack/R_0"].attrs["rows"])),
+        stack=_read_stack(file["stack/R"], file["stack"], columns),
+        prior_stack=_read_stack(file["stack/R_0"], file["stack/R_0"], columns),
         random=tuple(
             RandomMotion(
                 index,
-                _finite_matrix(file[f"random/{index}/coefficients"]),
-                float(file[f"random/{index}"].attrs["condition_number"]),
-                float(file[f"random/{index}"].attrs["stacked_condition_number"]),
+                checked.array(file[f"random/{index}/coefficients"], shape),
+                checked.number(file[f"random/{index}"].attrs, "condition_number"),
+                checked.number(file[f"random/{index}"].attrs, "stacked_condition_number"),
             )
             for index in sorted(int(name) for name in file.get("random", {}))
         ),
-        random_candidates=(
-            int(attributes["random_candidates"][0]),
-            int(attributes["random_candidates"][1]),
-        ),
-        priors=tuple(str(name) for name in attributes["priors"]),
-        versions=json.loads(attributes["versions"]),
-        checked_pairs=tuple(text.decode() for text in file["collision_pairs/checked"][()]),
-        dropped_pairs=tuple(text.decode() for text in file["collision_pairs/dropped"][()]),
+        random_candidates=drawn,
+        priors=checked.texts(attributes["priors"], "priors"),
+        versions=checked.record(attributes["versions"], dict[str, str]),
+        checked_pairs=checked.texts(file["collision_pairs/checked"][()], "collision_pairs/checked"),
+        dropped_pairs=checked.texts(file["collision_pairs/dropped"][()], "collision_pairs/dropped"),
     )
 
 
-def _read_stack(dataset: Any, rows: int) -> Stack:
-    factor = _finite_matrix(dataset)
-    if factor.shape[0] != factor.shape[1]:
-        raise ValueError(f"{dataset.name} is not square")
-    return Stack(factor, rows)
+def _read_stack(dataset: Any, counted: Any, columns: int) -> Stack:
+    """The factor (columns, columns) and the rows it stands for, an attribute of `counted`."""
+    factor = checked.array(dataset, (columns, columns))
+    return Stack(factor, checked.count(counted.attrs, "rows"))
 
 
-def _finite_matrix(dataset: Any) -> NDArray[np.float64]:
-    matrix = np.asarray(dataset, dtype=float)
-    if matrix.ndim != 2 or not np.isfinite(matrix).all():
-        raise ValueError(f"{dataset.name} is not a matrix of finite numbers")
-    return matrix
-
-
-def _read_motion(group: Any, index: int) -> Motion:
+def _read_motion(group: Any, index: int, shape: tuple[int, int]) -> Motion:
     attributes = group.attrs
-    margins = json.loads(attributes["margins"])
     return Motion(
         index=index,
-        coefficients=_finite_matrix(group["coefficients"]),
-        condition_number=float(attributes["condition_number"]),
-        stacked_condition_number=float(attributes["stacked_condition_number"]),
-        improved=bool(attributes["improved"]),
-        note=str(attributes["note"]),
-        status=str(attributes["status"]),
-        seconds=float(attributes["seconds"]),
-        iterations=int(attributes["iterations"]),
-        evaluations=int(attributes["evaluations"]),
-        margins={name: Worst(**worst) for name, worst in margins.items()},
-        certified=json.loads(attributes.get("certified", "{}")),
+        coefficients=checked.array(group["coefficients"], shape),
+        condition_number=checked.number(attributes, "condition_number"),
+        stacked_condition_number=checked.number(attributes, "stacked_condition_number"),
+        improved=checked.flag(attributes, "improved"),
+        note=checked.text(attributes, "note"),
+        status=checked.text(attributes, "status"),
+        seconds=checked.number(attributes, "seconds"),
+        iterations=checked.count(attributes, "iterations"),
+        evaluations=checked.count(attributes, "evaluations"),
+        margins=checked.record(attributes["margins"], dict[str, Worst]),
+        certified=checked.record(attributes.get("certified", "{}"), dict[str, bool]),
     )

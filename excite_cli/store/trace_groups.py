@@ -9,6 +9,7 @@ import numpy as np
 from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.robot.model import Array
+from excite_cli.store import checked
 
 _TORQUE = ("q", "v", "a", "load", "measured", "predicted")
 _EFFECT = ("x", "own", "partial")
@@ -26,30 +27,32 @@ def write_torque_traces(group: Any, traces: Sequence[TorqueTrace]) -> None:
         _write(own, "counted", np.asarray(trace.counted, dtype=bool))
 
 
-def read_torque_traces(group: Any) -> tuple[TorqueTrace, ...]:
-    """The traces in their order.
+def read_torque_traces(group: Any, joints: int) -> tuple[TorqueTrace, ...]:
+    """The traces in their order, of a robot with so many joints.
 
     Raises
     ------
     ValueError
         Arrays do not fit together.
     """
-    found = []
-    for number in range(len(group)):
-        own = group[str(number)]
-        t = _array(own["t"])
-        arrays: dict[str, Any] = {name: _array(own[name]) for name in _TORQUE}
-        before = _array(own["before"]) if "before" in own else None
-        counted = np.asarray(own["counted"], dtype=bool)
-        every = [*arrays.values(), counted, *([] if before is None else [before])]
-        shapes = {x.shape for x in every}
-        if len(shapes) != 1 or arrays["q"].shape[:1] != t.shape or arrays["q"].ndim != 2:
-            raise ValueError(f"the arrays of {own.name} do not fit together")
-        run, sealed = str(own.attrs["run"]), bool(own.attrs["sealed"])
-        found.append(
-            TorqueTrace(run=run, sealed=sealed, t=t, counted=counted, before=before, **arrays)
-        )
-    return tuple(found)
+    return tuple(_torque_trace(group[str(number)], joints) for number in range(len(group)))
+
+
+def _torque_trace(own: Any, joints: int) -> TorqueTrace:
+    t = checked.array(own["t"], (None,))
+    shape = (len(t), joints)
+    arrays: dict[str, Any] = {
+        name: checked.array(own[name], shape, finite=False) for name in _TORQUE
+    }
+    stored = "before" in own
+    return TorqueTrace(
+        run=checked.text(own.attrs, "run"),
+        sealed=checked.flag(own.attrs, "sealed"),
+        t=t,
+        counted=checked.flags(own["counted"], shape),
+        before=checked.array(own["before"], shape, finite=False) if stored else None,
+        **arrays,
+    )
 
 
 def write_traces(group: Any, traces: Traces) -> None:
@@ -70,42 +73,46 @@ def write_traces(group: Any, traces: Traces) -> None:
     dependence["shares"] = np.asarray(traces.dependence.shares, dtype=float)
 
 
-def read_traces(group: Any) -> Traces:
-    """What `write_traces` wrote.
+def read_traces(group: Any, joints: Sequence[str]) -> Traces:
+    """What `write_traces` wrote, of a robot with these joints.
 
     Raises
     ------
     ValueError
-        Arrays do not fit together.
+        Arrays do not fit together, or joints are others.
     """
-    effects = group["effects"]
-    dependence = group["dependence"]
-    joints, quantities = (_names(dependence, name) for name in ("joints", "quantities"))
-    shares = _array(dependence["shares"])
-    if shares.shape != (len(joints), len(quantities)):
-        raise ValueError("the map of dependences does not fit its names")
-    return Traces(
+    effects, dependence = group["effects"], group["dependence"]
+    rows, quantities = (_names(dependence, name) for name in ("joints", "quantities"))
+    found = Traces(
         torque_units=_names(group, "torque_units"),
-        runs=read_torque_traces(group["runs"]),
+        runs=read_torque_traces(group["runs"], len(joints)),
         effects=tuple(_effect(effects[str(number)]) for number in range(len(effects))),
-        dependence=Dependence(joints, quantities, shares),
+        dependence=Dependence(
+            rows,
+            quantities,
+            checked.array(dependence["shares"], (len(rows), len(quantities)), finite=False),
+        ),
     )
+    named = {joint for each in found.effects for joint in (*each.joints, *each.rows)}
+    if not named | set(rows) <= set(joints) or len(found.torque_units) != len(joints):
+        raise ValueError("its traces are those of other joints")
+    return found
 
 
 def _effect(own: Any) -> EffectTrace:
-    rows, part, t = _names(own, "rows"), _array(own["part"]), _array(own["t"])
-    arrays: dict[str, Any] = {name: _array(own[name]) for name in _EFFECT}
-    period = float(own.attrs["period"])
-    if {x.shape for x in arrays.values()} != {(len(t), len(rows))} or part.shape != t.shape:
-        raise ValueError(f"the arrays of {own.name} do not fit together")
-    texts: dict[str, Any] = {n: str(own.attrs[n]) for n in ("kind", "quantity", "unit")}
+    rows, t = _names(own, "rows"), checked.array(own["t"], (None,))
+    arrays: dict[str, Any] = {
+        name: checked.array(own[name], (len(t), len(rows)), finite=False) for name in _EFFECT
+    }
+    period = checked.number(own.attrs, "period")
+    texts: dict[str, Any] = {n: checked.text(own.attrs, n) for n in ("kind", "quantity", "unit")}
     return EffectTrace(
         **texts,
         joints=_names(own, "joints"),
         runs=_names(own, "runs"),
         rows=rows,
         period=None if np.isnan(period) else period,
-        part=part,
+        part=checked.array(own["part"], t.shape),
         t=t,
         **arrays,
     )
@@ -121,9 +128,5 @@ def _write(group: Any, name: str, data: Any) -> None:
     group.create_dataset(name, data=data, **packed)
 
 
-def _array(dataset: Any) -> Array:
-    return np.asarray(dataset, dtype=float)
-
-
 def _names(group: Any, name: str) -> tuple[str, ...]:
-    return tuple(str(each) for each in json.loads(str(group.attrs[name])))
+    return tuple(checked.record(group.attrs[name], tuple[str, ...]))

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from excite_cli.errors import ConfigError, FileError
+from excite_cli.given_files import require_stored
 from excite_cli.study.case import StudyCase, StudyTask
 from excite_cli.study.request import contents_of, request_of
 from excite_cli.study.vary import Varied, combinations
@@ -51,8 +52,7 @@ def planned_cases(
 def _check_logs(logs: Sequence[Path]) -> None:
     seen: set[Path] = set()
     for log in logs:
-        if not log.exists():
-            raise FileError(f"There is no file {log}.")
+        require_stored(log)
         if log.resolve() in seen:
             raise FileError(f"{log} is given twice.")
         seen.add(log.resolve())

@@ -20,6 +20,7 @@ from excite_cli.errors import ConfigError, MissingExtraError
 from excite_cli.excitation.problem import Problem
 from excite_cli.trajectory.chain import Segment
 from excite_cli.view.camera import fitted_camera
+from excite_cli.view.guarded_server import guarded
 from excite_cli.view.instants import Instants, instants_of
 from excite_cli.view.readout import joints_html, margins_html, nearest_html
 from excite_cli.view.scene import build_scene
@@ -196,7 +197,7 @@ def _viser() -> Any:
 def _server(viser: Any, serving: Serving, title: str) -> Any:
     """A server that says nothing of its own and is shared with nobody outside."""
     port = _free_port(serving.host, serving.port)
-    with contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.redirect_stdout(io.StringIO()), guarded(serving.host):
         server = viser.ViserServer(serving.host, port, label=title, verbose=False)
     server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
     server.request_share_url = lambda *_, **__: None

@@ -6,6 +6,8 @@ from excite_cli.errors import ConfigError
 from excite_cli.workers.base import Workers
 from excite_cli.workers.here import Here
 
+MOST_WORKERS = 256
+
 
 def open_workers(
     count: int = 1,
@@ -20,12 +22,15 @@ def open_workers(
     Raises
     ------
     ConfigError
-        Both are asked for, or less than one.
+        Both are asked for, or less than one, or more than `MOST_WORKERS`.
     ClusterError, MissingExtraError
         See `Cluster`.
     """
-    if count < 1:
-        raise ConfigError(f"workers: {count} cannot do anything. Take 1 or more.")
+    if not 1 <= count <= MOST_WORKERS:
+        raise ConfigError(
+            f"workers: {count} cannot be started. Allowed are 1 to {MOST_WORKERS}; on more "
+            "processors, take a cluster (--scheduler)."
+        )
     if scheduler is not None:
         from excite_cli.workers.cluster import Cluster
 

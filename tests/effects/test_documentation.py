@@ -12,7 +12,6 @@ from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import GROUP, catalogue, declared_effects
 from excite_cli.effects.sign import sign_of_width
-from excite_cli.errors import ConfigError
 from excite_cli.excitation.differences import central_differences, relative_error
 from excite_cli.robot.model import Array
 from tests.effects.motions import signals_at, signals_of, states
@@ -97,25 +96,3 @@ def test_example_is_a_kind_of_the_catalogue_once_installed(
         reference = central_differences(value, np.array(state))
     assert back.a is None
     assert relative_error(np.stack([back.q, back.v, 0 * back.q]), reference) < 1e-7
-
-
-@pytest.mark.parametrize(
-    ("code", "point", "message"),
-    [
-        ("", "broken_effects:Missing", "effect 'mine' .* cannot be loaded: "),
-        ("Thing = 3", "broken_effects:Thing", "effect 'mine' .* is not a subclass of Effect"),
-        (
-            "from excite_cli.effects.spring import Spring as Thing",
-            "broken_effects:Thing",
-            "effect 'spring' .*: there is one of this name",
-        ),
-    ],
-)
-def test_effect_that_cannot_be_used_is_named(
-    code: str, point: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    _install(tmp_path, code, {"mine": point}, "broken_effects")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(__import__("sys").modules, "broken_effects", raising=False)
-    with pytest.raises(ConfigError, match=message):
-        catalogue()

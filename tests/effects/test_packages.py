@@ -1,0 +1,114 @@
+"""Effects of other packages: what cannot be used is named and set aside, and all else works."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from excite_cli import api
+from excite_cli.effects.catalogue import GROUP, catalogue, kind_named
+from excite_cli.errors import ConfigError, ExciteWarning
+from tests.trust.conftest import SMOKE
+from tests.trust.in_process import excite
+
+OURS = 22
+GOOD = """
+import numpy as np
+from excite_cli.effects.spring import Spring
+
+class Mine(Spring):
+    kind = "mine"
+    title = "mine"
+"""
+COLUMNS = """
+    def columns(self, signals):
+        {}
+"""
+UNUSABLE = {
+    "missing": ("", "Missing", "cannot be loaded"),
+    "raises": ("raise RuntimeError('no licence')", "Mine", "RuntimeError: no licence"),
+    "exits": ("import sys; sys.exit(3)", "Mine", "SystemExit: 3"),
+    "not one": ("Mine = 3", "Mine", "is not a subclass of Effect"),
+    "abstract": (
+        "from excite_cli.effects.base import Effect\nclass Mine(Effect):\n    kind = 'mine'",
+        "Mine",
+        "it lacks columns",
+    ),
+    "nameless": (GOOD.replace('"mine"', '""'), "Mine", "does not state its kind, title"),
+    "taken": ("from excite_cli.effects.spring import Spring as Mine", "Mine", "another effect"),
+}
+FAILING = {
+    "raises": "raise ZeroDivisionError('of mine')",
+    "exits": "raise SystemExit(4)",
+    "of a wrong shape": "return np.zeros((3, 3))",
+    "not finite": "return super().columns(signals) * np.nan",
+    "words": "return np.full((len(signals.t), 1, 1), 'x')",
+}
+
+
+@pytest.fixture(autouse=True)
+def _catalogue_read_anew(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    catalogue.cache_clear()
+    yield
+    catalogue.cache_clear()
+
+
+def install(folder: Path, code: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package with one module, that declares the effect `mine`."""
+    (folder / "foreign_effects.py").write_text(code, encoding="utf-8")
+    info = folder / "foreign_effects-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: foreign_effects\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[{GROUP}]\nmine = foreign_effects:{name}\n")
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.delitem(sys.modules, "foreign_effects", raising=False)
+
+
+@pytest.mark.parametrize("case", UNUSABLE)
+def test_an_effect_that_cannot_be_used_is_set_aside(
+    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code, name, message = UNUSABLE[case]
+    install(tmp_path, code, name, monkeypatch)
+    with pytest.warns(ExciteWarning, match=f"'mine'.*set aside.*{message}"):
+        kinds = catalogue()
+    assert len(kinds) == OURS
+    with pytest.raises(ConfigError, match="A package has one, which cannot be used"):
+        kind_named("mine")
+
+
+def test_the_program_works_on_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path, "import sys; sys.exit(3)", "Mine", monkeypatch)
+    config = tmp_path / "arm.yaml"
+    urdf = SMOKE.parent.parent / "data" / "smoke_arm.urdf"
+    text = SMOKE.read_text().replace("../data/smoke_arm.urdf", str(urdf))
+    config.write_text(f"{text}effects: [{{kind: viscous_friction}}]\n")
+    options = ("--set", "optimizer.max_iterations=1", "--motions", "1", "-o", tmp_path / "arm.h5")
+    ended = excite("optimize", config, *options)
+    assert ended.status == 0, ended
+    assert "warning: effect 'mine' (foreign_effects:Mine) of a package is set aside" in ended.err
+    assert (tmp_path / "arm.h5").is_file()
+
+
+@pytest.mark.parametrize("case", FAILING)
+def test_columns_that_fail_are_set_aside_by_the_diagnosis(
+    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from excite_cli.diagnosis.candidates import possible_effects
+    from excite_cli.effects.base import Signals
+    from tests.effects.motions import signals_of
+    from tests.robot.random_robots import random_robot
+
+    install(tmp_path, GOOD + COLUMNS.format(FAILING[case]), "Mine", monkeypatch)
+    robot = random_robot(9, joints=3, branches=False)
+    signals: list[Signals] = [signals_of(robot, 30)]
+    spec = api.load_case(SMOKE).spec.diagnosis.model_copy(update={"kinds": ("mine", "spring")})
+    with pytest.warns(ExciteWarning, match="'mine' of a package is set aside"):
+        found = possible_effects(spec, robot, (), signals, [signals[0].load], ["run"], {})
+    assert {effect.kind for effect, _ in found} == {"spring"}
+
+
+def test_a_sound_effect_is_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path, GOOD, "Mine", monkeypatch)
+    assert len(catalogue()) == OURS + 1

@@ -1,0 +1,125 @@
+"""What would wait for ever, or take all memory, is refused with a sentence that names the limit."""
+
+import os
+import socket
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from excite_cli import api
+from excite_cli.errors import ExciteError
+from excite_cli.export.timed import repeated
+from excite_cli.given_files import require_stored
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.workers.catalogue import open_workers
+from tests.trust.conftest import SMOKE, Loop
+from tests.trust.in_process import refused
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".h5", ".mcap", ".db3", ".npz", ".yaml", ".json"])
+@pytest.mark.parametrize("command", ["identify", "check", "--prior", "report"])
+def test_a_named_pipe_is_refused(tmp_path: Path, suffix: str, command: str) -> None:
+    pipe = tmp_path / f"log{suffix}"
+    os.mkfifo(pipe)
+    arguments: dict[str, list[str | Path]] = {
+        "--prior": ["optimize", SMOKE, "--prior", pipe, "-o", tmp_path / "o.h5"],
+        "report": ["report", pipe, "-o", tmp_path / "p.html"],
+    }
+    told = refused(*arguments.get(command, [command, SMOKE, pipe]))
+    assert f"{pipe} is a named pipe, no regular file" in told
+
+
+def test_pipes_as_config_urdf_and_in_a_bag(tmp_path: Path) -> None:
+    pipe, bag = tmp_path / "arm.yaml", tmp_path / "bag"
+    os.mkfifo(pipe)
+    assert "is a named pipe" in refused("optimize", pipe, "-o", tmp_path / "o.h5")
+    urdf = f"robot.urdf={pipe}"
+    assert "is a named pipe" in refused("check", SMOKE, SMOKE, "--set", urdf)
+    bag.mkdir()
+    (bag / "metadata.yaml").touch()
+    os.mkfifo(bag / "log.db3")
+    assert "log.db3 is a named pipe" in refused("identify", SMOKE, bag)
+    with pytest.raises(ExciteError, match="is a named pipe"):
+        api.load_data(api.load_case(SMOKE), bag)
+
+
+def test_devices_and_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # the path of a socket is short
+    with socket.socket(socket.AF_UNIX) as bound:
+        bound.bind("log.csv")
+        with pytest.raises(ExciteError, match=r"log\.csv is a socket"):
+            require_stored(Path("log.csv"))
+    assert stat.S_ISCHR(os.stat("/dev/zero").st_mode)
+    with pytest.raises(ExciteError, match="/dev/zero is a device"):
+        require_stored(Path("/dev/zero"))
+
+
+HUGE = 10**12
+COUNTS: dict[str, tuple[Callable[[Loop], list[str | Path]], str]] = {
+    "repeat": (lambda f: ["simulate", SMOKE, f.result, "--repeat", str(10**9)], "1 to 10,000"),
+    "periods": (lambda f: ["simulate", SMOKE, f.result, "--periods", str(HUGE)], "1 to 10,000"),
+    "long": (
+        lambda f: ["simulate", SMOKE, f.result, "--repeat", "9999", "--periods", "9999"],
+        "up to 20,000,000",
+    ),
+    "candidates": (
+        lambda f: [
+            "compare-random", SMOKE, "--optimized", f.result, "--candidates", str(HUGE),
+            "--set", "optimizer.max_iterations=4",
+        ],
+        "allowed: 1 to 1,000,000",
+    ),
+    "starts": (lambda f: ["optimize", SMOKE, "--starts", str(HUGE)], "10000"),
+    "motions": (lambda f: ["optimize", SMOKE, "--motions", str(HUGE)], "1000"),
+    "workers": (lambda f: ["optimize", SMOKE, "--workers", str(HUGE)], "1 to 256"),
+    "random": (lambda f: ["check", SMOKE, f.result, "--random", str(HUGE)], "0 to 10,000,000"),
+    "rate": (lambda f: ["check", SMOKE, f.result, "--rate", "1e12"], "1 to 1e+06 Hz"),
+    "export": (
+        lambda f: ["export", f.result, "-f", "csv", "--periods", str(HUGE)],
+        "give 1 to 10,000",
+    ),
+    "harmonics": (lambda f: ["optimize", SMOKE, "--set", f"trajectory.harmonics={HUGE}"], "100"),
+    "samples": (
+        lambda f: ["optimize", SMOKE, "--set", "sampling.cost.samples=1000000"],
+        "up to 2,000,000",
+    ),
+    "control points": (
+        lambda f: [
+            "optimize", SMOKE, "--set",
+            f"trajectory={{family: bspline, duration: 5, control_points: {HUGE}}}",
+        ],
+        "500",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_absurd_counts(
+    name: str, loop: Loop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments, allowed = COUNTS[name]
+    given = arguments(loop)
+    if given[0] in ("simulate", "optimize", "export"):
+        given += ["-o", "new.h5"]
+    assert allowed in refused(*given)
+    assert not list(tmp_path.glob("new*"))
+
+
+def test_the_library_refuses_counts_too(loop: Loop) -> None:
+    problem = api.load_problem(SMOKE)
+    result = api.read_result(loop.result)
+    (motion, *_) = api.motions_of(result)
+    calls: list[Callable[[], object]] = [
+        lambda: SimulationSettings(repeat=HUGE),
+        lambda: api.simulate(problem, result, (), SimulationSettings(repeat=9999, periods=99)),
+        lambda: api.check(problem, result, rate=1e12),
+        lambda: api.check(problem, result, random=HUGE),
+        lambda: open_workers(HUGE),
+        lambda: repeated(motion, HUGE, result.joint_names),
+    ]
+    for call in calls:
+        with pytest.raises(ExciteError, match=r"allowed|Allowed|up to|give 1 to"):
+            call()
