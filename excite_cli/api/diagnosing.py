@@ -4,14 +4,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from excite_cli.api.loading import Case, dataset_of
+from excite_cli.api.loading import Case, dataset_of, sources_of
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
+from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.diagnosis.diagnose import diagnose as diagnose_dataset
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.excitation.problem import Problem
 from excite_cli.export.found_config import found_config
+from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Tell, log_note
 from excite_cli.store.diagnosis_file import write_diagnosis
@@ -48,7 +50,11 @@ def diagnose(
         Config and data do not fit; order or signs of torques cannot be right; data too short; a
         file exists already.
     """
-    with held({"output": output, "apply": apply}, overwrite):
+    inputs: list[str | Path] = [
+        *sources_of(data),
+        *files_of_config(problem.spec, problem.folder),
+    ]
+    with held({"output": output, "apply": apply}, overwrite, inputs):
         dataset = dataset_of(problem, data, tell)
         found = diagnose_dataset(
             problem.robot, problem.base, dataset, problem.spec, sealed, progress
@@ -74,5 +80,7 @@ def save_config(path: str | Path, problem: Problem | Case, found: Diagnosis) -> 
     FileError
         It cannot be written.
     """
+    own = files_of_config(problem.spec, problem.folder)
+    refuse_inputs_as_outputs({"path": Path(path)}, own)
     text = found_config(problem.spec, problem.folder, found, Path(path))
     write_text_atomically(Path(path), text)

@@ -14,11 +14,12 @@ from excite_cli.errors import FileError
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.time_scaling import PaceLimits, slowed_chain
+from excite_cli.export.own_samples import require_own_samples
 from excite_cli.export.timed import repeated
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.note import Tell
-from excite_cli.store.result_file import read_result
+from excite_cli.store.result_file import read_result, read_samples
 from excite_cli.trajectory.chain import Chain, Segment
 from excite_cli.trajectory.sampled import through_samples
 
@@ -57,6 +58,7 @@ def chains_of(file: Path, wanted: Wanted, tell: Tell) -> list[ExportedChain]:
         return [ExportedChain(segment.name, joints, repeated(segment, wanted.periods, joints), 1.0)]
     result = read_result(file)
     motions, joints = motions_of(result, wanted.chosen, str(file)), result.joint_names
+    require_own_samples(file, result, motions, read_samples(file))
     if wanted.start is not None:
         chains, constraints = _entered(file, result, motions, wanted, tell)
     else:

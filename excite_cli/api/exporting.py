@@ -11,12 +11,14 @@ from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import existing
 from excite_cli.claim import claim, leave
+from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.export.motion_exporter import MotionExporter
 from excite_cli.export.motion_rosbag2 import is_bag
 from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.export.timed import timed_motion
+from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note
@@ -110,6 +112,7 @@ def export_file(
     exporter = MOTION_EXPORTERS[format]
     chains = chains_of(path, Wanted(chosen, periods, slow, start), tell)
     paths = _paths(path, target, exporter, [each.name for each in chains])
+    refuse_inputs_as_outputs({f"--output ({to})": to for to in paths}, (path,))
     with _held(paths, exporter, overwrite):
         motions = tuple(
             _written(each, to, exporter, rate, equidistant)
@@ -195,7 +198,7 @@ def _export_model(
 ) -> Exported:
     """A fit as URDF, MJCF or YAML, as `excite identify` writes them."""
     path = output or Path(f"{file.stem}{MODELS[format]}")
-    with held({"output": path}, overwrite):
+    with held({"output": path}, overwrite, (file,)):
         stored = read_fit(file)
         spec = parse_spec(stored.config, f"the config stored in {file}")
         robot = build_robot(spec.robot, Path(stored.config_folder))
@@ -204,5 +207,15 @@ def _export_model(
                 f"{file} was made with another robot than the URDF gives now ({spec.robot.urdf}). "
                 "Identify again."
             )
+        if (
+            stored.fit.joint_names != robot.joint_names
+            or len(stored.fit.phi) != 10 * robot.n_bodies
+        ):
+            raise FileError(
+                f"{file} holds parameters of other joints or bodies than its config. Identify "
+                "again."
+            )
+        own = files_of_config(spec, Path(stored.config_folder))
+        refuse_inputs_as_outputs({"--output": path}, own)
         write_models(robot, stored.fit, {"parameters" if format == "yaml" else format: path}, tell)
     return Exported(format, (path,))

@@ -3,12 +3,14 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from excite_cli.api.loading import Case, dataset_of, tell_findings
+from excite_cli.api.loading import Case, dataset_of, sources_of, tell_findings
 from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
+from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.diagnosis.plausibility import check_dataset
 from excite_cli.excitation.problem import Problem
+from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.identify import Identification
 from excite_cli.identification.identify import identify as identify_dataset
 from excite_cli.measurement.dataset import Dataset
@@ -48,7 +50,11 @@ def identify(
         a file exists already.
     """
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
-    with held({"output": output, **models}, overwrite):
+    inputs: list[str | Path] = [
+        *sources_of(data),
+        *files_of_config(problem.spec, problem.folder),
+    ]
+    with held({"output": output, **models}, overwrite, inputs):
         dataset = dataset_of(problem, data, tell)
         check_dataset(problem.robot, dataset, problem.spec)
         found = identify_dataset(
@@ -83,5 +89,7 @@ def save_fit(
     FileError
         It cannot be written.
     """
+    own = files_of_config(problem.spec, problem.folder)
+    refuse_inputs_as_outputs({"path": Path(path)}, (*sources, *own))
     config, folder = spec_as_yaml(problem.spec), str(problem.folder)
     write_fit(Path(path), found, config, folder, problem.robot.fingerprint(), tuple(sources))

@@ -153,6 +153,13 @@ def load_data(
     return data
 
 
+def sources_of(data: Dataset | str | Path | Sequence[str | Path]) -> tuple[str, ...]:
+    """The files that data come from."""
+    if isinstance(data, Dataset):
+        return data.sources
+    return (str(data),) if isinstance(data, str | Path) else tuple(map(str, data))
+
+
 def dataset_of(
     problem: Problem | Case,
     data: Dataset | str | Path | Sequence[str | Path],

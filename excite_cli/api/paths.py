@@ -16,3 +16,9 @@ def existing(path: str | Path) -> Path:
     if not Path(path).exists():
         raise FileError(f"There is no file {path}.")
     return Path(path)
+
+
+def paths_in(*given: object) -> list[Path]:
+    """Those of `given` that are files, also in lists: what a function reads by its path."""
+    listed = [x for each in given for x in (each if isinstance(each, list | tuple) else [each])]
+    return [Path(each) for each in listed if isinstance(each, str | Path)]

@@ -7,8 +7,10 @@ from pathlib import Path
 from excite_cli.api.loading import Case
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.api.outputs import held_result
+from excite_cli.api.paths import paths_in
 from excite_cli.api.priors import Prior, load_prior, name_of
 from excite_cli.api.working import tell_idle
+from excite_cli.config.inputs import files_of_config
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
 from excite_cli.diagnosis.records import Diagnosis
@@ -82,7 +84,9 @@ def plan(
             write_result(path, current, model)
         tell(Note(Level.INFO, motion_sentence(step.motion)))
 
-    with held_result(path, overwrite, resume):
+    read = paths_in(priors, starts, following.name if following else None)
+    read += files_of_config(model.spec, model.folder)
+    with held_result(path, overwrite, resume, read):
         tell_idle(1 if workers is None else workers.count, model.spec.optimizer.restarts, tell)
         result = _begun(model, following, priors, path if resume else None, tell)
         segments = load_motions(model, starts, tell=tell)

@@ -78,7 +78,7 @@ def save_proposal(
     known = str(robot).startswith(EXAMPLE_PREFIX)
     name = str(robot).removeprefix(EXAMPLE_PREFIX) if known else Path(robot).stem
     path = Path(f"{name}.yaml") if output is None else Path(output)
-    with held({"output": path}, overwrite):
+    with held({"output": path}, overwrite, () if known else (robot,)):
         folder = path.resolve().parent
         source = str(robot) if known else _from(Path(robot), folder)
         load_description(source, relative_to=folder)  # a wrong name is told at once

@@ -43,13 +43,13 @@ def write_figures(
     if not figures:
         raise FileError("--figures draws motions, and no result file was given. Leave it out.")
     paths = _paths(target, kind, list(figures))
-    refuse_inputs_as_outputs({f"--figures ({p})": p for p in paths}, [each.path for each in told])
 
     def drawn() -> Iterator[Any]:
         for done, (name, draw) in enumerate(figures.items()):
             progress(name, done, len(figures))
             yield draw()
 
+    refuse_inputs_as_outputs({f"--figures ({p})": p for p in paths}, [each.path for each in told])
     with held({str(path): path for path in paths}, overwrite=True):
         if not overwrite:
             _refuse_present(paths)

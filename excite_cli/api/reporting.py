@@ -6,6 +6,7 @@ from pathlib import Path
 
 from excite_cli.api.motions import motions_of
 from excite_cli.api.outputs import held
+from excite_cli.api.paths import paths_in
 from excite_cli.api.rebuilt import rebuilt_problem
 from excite_cli.api.report_figures import write_figures
 from excite_cli.api.report_files import Told, read_files
@@ -79,7 +80,7 @@ def write_report(
     if page is not None and page.suffix.lower() not in (".html", ".htm") and not page.is_dir():
         hint = " Figures and PDF are written by --figures."
         raise FileError(f"-o {page}: a report is a page, NAME.html.{hint}")
-    with held({"output": page}, overwrite):
+    with held({"output": page}, overwrite, paths_in(paths, config)):
         told = read_files(paths)
         problems = {
             each.path: rebuilt_problem(each.content, config, str(each.path))

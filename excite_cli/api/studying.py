@@ -7,10 +7,13 @@ from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.identifying import identify, save_fit
 from excite_cli.api.loading import load_case, load_data, load_problem
 from excite_cli.api.planning import plan
+from excite_cli.config.inputs import files_of_config
+from excite_cli.config.load import load_spec
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.progress import Progress
 from excite_cli.excitation.words import figure_in_words
+from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.shown.note import Note
 from excite_cli.study.case import (
     DoneCase,
@@ -21,7 +24,7 @@ from excite_cli.study.case import (
     overrides_of,
 )
 from excite_cli.study.plan import planned_cases
-from excite_cli.study.records import CaseRecord
+from excite_cli.study.records import TABLE, CaseRecord, files_of
 from excite_cli.study.study import StudyNews as StudyNews
 from excite_cli.study.study import run_study as run_cases
 from excite_cli.study.vary import parse_vary
@@ -61,7 +64,19 @@ def run_study(
     task = StudyTask(Path(config).resolve(), tuple(overrides), diagnosed)
     cases = planned_cases(task, [Path(log) for log in logs], [parse_vary(text) for text in vary])
     folder = study_folder(config, output)
+    _refuse_inputs(task, cases, folder)
     return run_cases(task, cases, folder, do_case, workers, resume, progress, overwrite)
+
+
+def _refuse_inputs(task: StudyTask, cases: Sequence[StudyCase], folder: Path) -> None:
+    """No file of the study may be the config, a log, or what the config names."""
+    settings = [f"{key}={value}" for key, value in cases[0].values.items()]
+    spec = load_spec(task.config, [*task.overrides, *settings])
+    own = files_of_config(spec, task.config.parent)
+    logs = {case.log for case in cases if case.log is not None}
+    written = (folder / TABLE, *(path for case in cases for path in files_of(folder, case)))
+    present = {f"{path.name}:": path for path in written if path.exists()}
+    refuse_inputs_as_outputs(present, (task.config, *own, *sorted(logs)))
 
 
 def study_folder(config: str | Path, output: str | Path | None) -> Path:

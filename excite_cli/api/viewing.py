@@ -8,7 +8,7 @@ from pathlib import Path
 from excite_cli.api.loading import load_problem
 from excite_cli.api.motions import Motions, load_motions, motions_of
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import existing
+from excite_cli.api.paths import existing, paths_in
 from excite_cli.api.rebuilt import rebuilt_problem
 from excite_cli.atomic import write_atomically
 from excite_cli.errors import ConfigError, FileError
@@ -122,7 +122,7 @@ def draw_motion(
         raise FileError(f"{path}: give a name that ends in .png or .gif.")
     if look is not None:
         _check_size(look.size)
-    with held({"output": path}, overwrite):
+    with held({suffix[1:]: path}, overwrite, paths_in(motions, config)):
         problem, segments = _on_their_robot(motions, config, overrides, chosen, tell)
         segment = segments[0]
         duration = segment.trajectory.duration

@@ -69,7 +69,8 @@ def compare_random(
     from excite_cli.cli.start_line import iterations_of, start_line
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    check_outputs({"output": output}, overwrite)
+    inputs = (config,) if optimized is None else (config, optimized)
+    check_outputs({"output": output}, overwrite, inputs)
     changes = options.changes(overrides, seed=seed, motions=motions)
     with single_threaded(threads), working(workers, scheduler, threads, terminal.tell) as place:
         problem = load_problem(config, changes, terminal.tell)

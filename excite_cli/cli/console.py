@@ -85,8 +85,7 @@ class Terminal:
     def show(self, answer: Answer) -> None:
         """The answer, as JSON or as tables and sentences; exit status 1 where it is bad."""
         if self.as_json:
-            out = json.dumps(_finite(answer.data), ensure_ascii=not _is_unicode(sys.stdout))
-            print(out)
+            print(json.dumps(_finite(answer.data), ensure_ascii=not _is_unicode(sys.stdout)))
         else:
             self._print(answer.parts)
         if not answer.good:

@@ -51,9 +51,12 @@ def identify(
     from excite_cli.api.identifying import identification_answer
     from excite_cli.api.identifying import identify as identify_data
     from excite_cli.api.loading import load_case
+    from excite_cli.api.outputs import check_outputs
     from excite_cli.api.threads import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
+    check_outputs({"output": output, **models}, overwrite, (config, *data))
     with single_threaded(), terminal.live("identify") as line:
         found = identify_data(
             load_case(config, overrides or ()),
@@ -67,5 +70,4 @@ def identify(
             progress=line,
             tell=terminal.tell,
         )
-    written = {"fit": output, "urdf": urdf, "mjcf": mjcf, "parameters": parameters}
-    terminal.show(identification_answer(found, written))
+    terminal.show(identification_answer(found, {"fit": output, **models}))

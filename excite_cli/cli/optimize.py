@@ -80,7 +80,8 @@ def optimize(
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     if after is not None and prior:
         raise ConfigError("--after brings the measured data with it: leave --prior out.")
-    path = result_path(output, config, overwrite, resume)
+    inputs = [each for each in (*(prior or ()), start, after) if each is not None]
+    path = result_path(output, config, overwrite, resume, inputs)
     changes = options.changes(overrides, seed=seed, motions=motions, restarts=restarts)
     with single_threaded(threads), working(workers, scheduler, threads, terminal.tell) as place:
         planned: Planned

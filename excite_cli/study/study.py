@@ -5,10 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from excite_cli.claim import claim
-from excite_cli.config.inputs import files_of_config
-from excite_cli.config.load import load_spec
 from excite_cli.errors import ExciteError, FileError, refusal
-from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.study.case import DoneCase, StudyCase, StudyTask
 from excite_cli.study.records import (
     TABLE,
@@ -63,7 +60,6 @@ def run_study(
         Files of a study are in the folder, and neither `resume` nor `overwrite` is asked for; or,
         with `resume`, of other cases. Another run is writing it, or it cannot be written to.
     """
-    _refuse_inputs(task, cases, folder)
     claim(folder / TABLE)
     if overwrite:
         _forget(cases, folder)
@@ -92,17 +88,6 @@ def run_study(
     found = [records[index] for index in range(len(cases))]
     write_table(folder, found)
     return found
-
-
-def _refuse_inputs(task: StudyTask, cases: Sequence[StudyCase], folder: Path) -> None:
-    """No file of the study may be the config, a log, or what the config names."""
-    settings = [f"{key}={value}" for key, value in cases[0].values.items()]
-    spec = load_spec(task.config, [*task.overrides, *settings])
-    own = files_of_config(spec, task.config.parent)
-    logs = {case.log for case in cases if case.log is not None}
-    written = (folder / TABLE, *(path for case in cases for path in files_of(folder, case)))
-    present = {f"{path.name}:": path for path in written if path.exists()}
-    refuse_inputs_as_outputs(present, (task.config, *own, *sorted(logs)))
 
 
 def _check_free(cases: Sequence[StudyCase], folder: Path) -> None:

@@ -128,14 +128,18 @@ def test_a_diagnosis_is_read_or_missing(problem: Problem, stored: Path, tmp_path
         plan_after(problem, stored)
 
 
-def test_an_existing_output_is_kept(problem: Problem, stored: Path) -> None:
+def test_an_existing_output_is_kept(problem: Problem, result: Result, stored: Path) -> None:
     before = stored.read_bytes()
     with pytest.raises(FileError, match=r"exists already.*--resume.*--overwrite"):
         plan(problem, output=stored)
     with pytest.raises(ConfigError, match="give one"):
         plan(problem, output=stored, resume=True, overwrite=True)
     with pytest.raises(FileError, match="exists already"):
-        compare_random(problem, stored, candidates=1, seconds=0, output=str(stored))
+        compare_random(problem, result, candidates=1, seconds=0, output=str(stored))
+    with pytest.raises(FileError, match=r"would replace .*arm\.h5, which is read here"):
+        compare_random(problem, str(stored), output=stored, overwrite=True)
+    with pytest.raises(FileError, match=r"would replace .*arm\.h5, which is read here"):
+        plan(problem, starts=stored, output=stored, overwrite=True)
     assert stored.read_bytes() == before
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli import api
+import excite_cli as api
 from excite_cli.effects.catalogue import GROUP, catalogue, kind_named
 from excite_cli.errors import ConfigError, ExciteWarning
 from tests.trust.conftest import SMOKE

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.api import diagnose, identify, load_problem, plan, save_fit, simulate
+from excite_cli import diagnose, identify, load_problem, plan, save_fit, simulate
 from excite_cli.measurement.hdf5_writer import write_dataset
 
 SMOKE = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"

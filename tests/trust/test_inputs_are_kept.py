@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli import api
+import excite_cli as api
 from excite_cli.errors import FileError
 from excite_cli.given_files import refuse_inputs_as_outputs
 from tests.trust.conftest import SMOKE, Loop

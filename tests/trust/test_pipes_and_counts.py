@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli import api
+import excite_cli as api
 from excite_cli.errors import ExciteError
 from excite_cli.export.timed import repeated
 from excite_cli.given_files import require_stored
