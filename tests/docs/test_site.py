@@ -61,5 +61,9 @@ def test_public_functions_are_in_the_reference(site: Path) -> None:
         ("identifying", "identify"),
         ("simulating", "simulate"),
         ("checking", "check"),
+        ("reporting", "write_report"),
+        ("viewing", "view_motions"),
+        ("viewing", "draw_motion"),
+        ("exporting", "export_file"),
     ):
         assert f'id="excite_cli.api.{module}.{name}"' in text
