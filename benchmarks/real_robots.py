@@ -176,7 +176,7 @@ def tiago(answers: Sequence[Answer]) -> str:
              for each in answer.content["effects"]]  # fmt: skip
     unexplained = [each["joint"] for each in answer.content["unexplained"]]
     return (
-        f"{told(named)}; residuals of {told(unexplained)} told as unexplained. "
+        f"{told(named)}; residuals of {told(unexplained)} reported as unexplained. "
         f"{told(list(known))}, whose torque constants are known, stay at "
         f"{told(list(known.values()))}"
     )

@@ -118,7 +118,7 @@ __all__ = ["__version__", *_HOME]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> Any:
-    """The public object `name`, imported from its room (PEP 562)."""
+    """The public object `name`, imported from its package (PEP 562)."""
     if name not in _HOME:
         raise AttributeError(f"module 'excite_cli' has no attribute '{name}'")
     return getattr(import_module(f"excite_cli.{_HOME[name]}"), name)

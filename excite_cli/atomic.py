@@ -26,13 +26,13 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     Raises
     ------
     FileError
-        The folder cannot be written to, `path` is no regular file, the disk is full, or another
+        The folder cannot be written to, `path` is not a regular file, the disk is full, or another
         run is writing it.
     """
     with _refusals(path), claimed(path):
         target = resolved(path)
         if target.exists() and not target.is_file():
-            what = "a folder" if target.is_dir() else "no regular file"
+            what = "a folder" if target.is_dir() else "not a regular file"
             raise FileError(f"{path} is {what}. Give a file name.")
         handle, name = tempfile.mkstemp(".part", part_prefix(target), target.parent)
         os.close(handle)

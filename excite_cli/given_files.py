@@ -17,7 +17,7 @@ _KINDS = {
 
 
 def require_stored(path: Path) -> None:
-    """See that `path` is a file, or a folder of files: who reads a pipe may wait for ever.
+    """See that `path` is a file, or a folder of files: who reads a pipe may wait forever.
 
     Raises
     ------
@@ -30,7 +30,9 @@ def require_stored(path: Path) -> None:
         raise FileError(f"There is no file {path}.") from error
     what = next((words for is_kind, words in _KINDS.items() if is_kind(mode)), None)
     if what is not None:
-        raise FileError(f"{path} is {what}, no regular file. Store what it gives, and give that.")
+        raise FileError(
+            f"{path} is {what}, not a regular file. Store what it delivers, and give that file."
+        )
     if stat.S_ISDIR(mode):
         with suppress(PermissionError):
             for inside in path.iterdir():

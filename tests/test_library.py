@@ -49,12 +49,12 @@ def test_every_public_name_is_there_and_documented() -> None:
     for name in excite_cli.__all__:
         found = getattr(excite_cli, name)
         assert name == "__version__" or found.__doc__, name
-        assert not (ROOT / "excite_cli" / name).exists(), f"{name} is a room, which would hide it"
+        assert not (ROOT / "excite_cli" / name).exists(), f"package {name} would hide it"
     assert set(excite_cli.__all__) <= set(dir(excite_cli))
 
 
 def test_types_are_those_of_the_names() -> None:
-    """What mypy and editors see are the names that there are, from the same rooms."""
+    """What mypy and editors see are the names that there are, from the same packages."""
     tree = ast.parse((ROOT / "excite_cli" / "__init__.py").read_text(encoding="utf-8"))
     guarded = next(node for node in tree.body if isinstance(node, ast.If))
     seen = {}

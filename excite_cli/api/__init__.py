@@ -1,4 +1,4 @@
-"""What the commands do, for scripts and notebooks; the only door to the rooms below.
+"""What the commands do, for scripts and notebooks; the only front door to the packages below.
 
 Every function takes what an earlier one gave and returns a frozen record; nothing is kept. Paths
 may be `str` or `Path`; bad input is an `ExciteError` with one sentence. What is worth saying on the

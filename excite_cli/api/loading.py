@@ -183,7 +183,7 @@ def dataset_of(
 
 
 def tell_findings(findings: Iterable[Finding], tell: Tell) -> None:
-    """What was noticed; the same of several runs is told once."""
+    """What was noticed; the same of several runs is reported once."""
     runs: dict[tuple[str, str], list[str]] = {}
     for finding in findings:
         runs.setdefault((finding.severity, finding.text), []).append(finding.run or "")

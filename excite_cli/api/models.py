@@ -23,7 +23,7 @@ def write_models(
 ) -> None:
     """Write `fit` to the paths that are given: `urdf`, `mjcf`, `parameters` (YAML).
 
-    What a format cannot hold is told.
+    What a format cannot hold is reported.
     """
     count = range(len(fit.effects))
     values = tuple(fit.consistent_effect_values(i) for i in count)

@@ -63,7 +63,7 @@ def load_motions(
     if path.is_file() and (is_fit(path) or is_diagnosis(path)):
         read_result(path)  # tells that these are no motions
     if chosen and list(chosen) != [1]:
-        raise FileError(f"--motion {chosen[0]}: {path} is no result file; it holds one motion.")
+        raise FileError(f"--motion {chosen[0]}: {path} is not a result file; it holds one motion.")
     if is_motion(path, problem.spec):
         return [_motion(path, robot, tell)]
     data = load_data(problem, path, tell)
@@ -136,8 +136,8 @@ def _fitting(robot: Robot, motion: object) -> Segment:
     """The motion, once its coefficients are those of its trajectory and of the robot's joints."""
     if not isinstance(motion, Segment):
         raise FileError(
-            f"{type(motion).__name__} is no motion. Motions are a result, what motions_of(result) "
-            "gives, Segments, or a file."
+            f"{type(motion).__name__} is not a motion. Motions are a result, what "
+            "motions_of(result) gives, Segments, or a file."
         )
     shape = (motion.trajectory.n_coefficients, robot.n)
     given = np.shape(motion.coefficients)

@@ -122,5 +122,5 @@ def claim_file(path: Path) -> None:
     if path.is_dir():
         raise FileError(f"{path} is a folder. Give a file name.")
     if path.exists() and not path.is_file():
-        raise FileError(f"{path} is no regular file. Give a file name.")
+        raise FileError(f"{path} is not a regular file. Give a file name.")
     claim(path)

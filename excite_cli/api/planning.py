@@ -64,7 +64,7 @@ def plan(
     Raises
     ------
     NoAdmissibleMotionError
-        There is none, or none was found; the message names what stands in the way.
+        There is none, or none was found; the message names the constraint that prevents it.
     FileError
         A prior or a start does not fit, or `output` exists.
 

@@ -51,7 +51,7 @@ def load_prior(problem: Problem, prior: Prior, name: str, tell: Tell) -> Result 
     elif isinstance(prior, Dataset):
         stack, words = measured_stack(problem, prior)
     else:
-        raise FileError(f"--prior {name}: {type(prior).__name__} is nothing to plan on top of.")
+        raise FileError(f"--prior {name}: {type(prior).__name__} cannot be planned on top of.")
     tell(Note(Level.INFO, f"--prior {name}: {words}"))
     return stack
 

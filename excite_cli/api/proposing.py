@@ -81,7 +81,7 @@ def save_proposal(
     with held({"output": path}, overwrite, () if known else (robot,)):
         folder = path.resolve().parent
         source = str(robot) if known else _from(Path(robot), folder)
-        load_description(source, relative_to=folder)  # a wrong name is told at once
+        load_description(source, relative_to=folder)  # a wrong name is reported at once
         text = f"looking at {name}: capsules and tables of its meshes take longest, once"
         tell(Note(Level.INFO, text))
         found = propose(source, folder, joints=joints, base=cast(Base, base))

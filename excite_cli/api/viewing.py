@@ -231,4 +231,4 @@ def _unknown_robot(motions: Motions) -> str:
     path = Path(motions)
     if path.is_file() and (is_fit(path) or is_diagnosis(path)):
         read_result(path)  # tells that these are no motions
-    return f"{path} is no result file, so the robot is not known: give --config CONFIG.yaml."
+    return f"{path} is not a result file, so the robot is not known: give --config CONFIG.yaml."

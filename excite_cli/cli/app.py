@@ -57,11 +57,11 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "schema": schema,
 }
 _GROUPS = {
-    "Begin": ("robots", "init", "schema"),
+    "Get started": ("robots", "init", "schema"),
     "Plan motions": ("optimize", "check", "compare-random", "verify-gradient"),
-    "Look at them, hand them on": ("report", "view", "export"),
+    "Inspect and export": ("report", "view", "export"),
     "From measured data": ("simulate", "identify", "diagnose"),
-    "Much of it": ("study",),
+    "Many cases": ("study",),
 }
 _ORDER = [name for names in _GROUPS.values() for name in names]
 _ORDER += [name for name in _COMMANDS if name not in _ORDER]

@@ -15,7 +15,7 @@ class Best:
         self._best = float("inf")
 
     def words(self, progress: "Progress") -> str:
-        """`condition number 5.48 (best 5.31)`; another figure is told as it is."""
+        """`condition number 5.48 (best 5.31)`; another figure is reported as it is."""
         figure = progress.figure
         if figure.measure is not Measure.CONDITION_NUMBER:
             return figure_in_words(figure)

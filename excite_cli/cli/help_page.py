@@ -13,8 +13,8 @@ from typing import Any, get_args
 
 from typer.core import TyperCommand, TyperGroup
 
-# Groups of options are told in this order; those of no group come first, as "Options".
-WORK, OUTPUT, MESSAGES = "Who does the work", "What is written", "What is said"
+# Groups of options are reported in this order; those of no group come first, as "Options".
+WORK, OUTPUT, MESSAGES = "Workers", "Output files", "Messages"
 _LAST = (WORK, OUTPUT, MESSAGES)
 _INDENT = 2
 _NARROWEST, _WIDEST_NAMES = 50, 26

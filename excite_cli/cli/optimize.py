@@ -56,7 +56,7 @@ def optimize(
     Every stored motion keeps all constraints. With --after, the motion tells apart the effects that
     the diagnosis could not; if there are none, it excites the model with all effects found, on top
     of the measured data. Exit status 1: no admissible motion exists or was found, and the message
-    names what stands in the way.
+    names the constraint that prevents it.
 
     With --starts each motion is the best of many starts, which --workers processes or a dask
     cluster share; the result is the same to the last digit whoever does them.

@@ -11,7 +11,7 @@ from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
 from excite_cli.cli.posture import start_from
 
-_PLAYED, _ROBOT, _MEASURED = "What is played", "The robot", "What is measured"
+_PLAYED, _ROBOT, _MEASURED = "Playback", "Simulated robot", "Recording"
 
 
 def simulate(

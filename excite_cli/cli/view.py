@@ -21,7 +21,7 @@ def view(
     config: Annotated[
         Path | None,
         typer.Option(
-            "--config", help="The YAML file: for motions that are no result, or a relative URDF."
+            "--config", help="The YAML file: for motions without a result file, or a relative URDF."
         ),
     ] = None,
     overrides: options.Set = None,
@@ -66,11 +66,11 @@ def view(
     mass: Annotated[
         bool | None,
         typer.Option(
-            "--mass/--no-mass", help="Show the centre of mass. Default: if balance is asked for."
+            "--mass/--no-mass", help="Show the centre of mass. Default: if balance is constrained."
         ),
     ] = None,
     caption: Annotated[
-        bool, typer.Option("--caption/--no-caption", help="Words in pictures.")
+        bool, typer.Option("--caption/--no-caption", help="Captions in pictures.")
     ] = True,
     port: Annotated[
         int, typer.Option("--port", min=1, max=65535, help="Port, or the next free one.")

@@ -141,7 +141,7 @@ class SurroundingsSpec(Section):
     boxes: dict[str, BoxSpec] = Field(default_factory=dict)
     margin: NonNegative = Field(0.02, description="distance kept [m]")
     ignore: tuple[tuple[str, str], ...] = Field(
-        (), description="pairs of a link and a thing not to check: [[base_link, floor]]"
+        (), description="pairs of a link and an obstacle not to check: [[base_link, floor]]"
     )
 
     @model_validator(mode="after")

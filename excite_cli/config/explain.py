@@ -1,8 +1,8 @@
 """What pydantic found wrong with a config, in words for the person who wrote it.
 
 Errors carry a location in the model, with labels of union branches mixed into the keys. The path
-that is told is that of the file: labels are dropped by walking the given tree along it. Branches
-of one union that all fail are told as one list of what is allowed.
+reported is that of the file: labels are dropped by walking the given tree along it. Branches of one
+union that all fail are reported as one list of what is allowed.
 """
 
 import math

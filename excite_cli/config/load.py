@@ -61,8 +61,8 @@ def load_spec(path: Path, overrides: list[str] | None = None) -> Spec:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(
-            f"{path} cannot be read as text, so it is no config ({error}). The config comes first: "
-            "excite COMMAND CONFIG FILE."
+            f"{path} cannot be read as text, so it is not a config ({error}). The config comes "
+            "first: excite COMMAND CONFIG FILE."
         ) from error
     return parse_spec(text, str(path), overrides)
 
@@ -97,7 +97,7 @@ def parsed_spec(
     source: str = "config",
     line_of: Callable[[Place], int | None] = lambda place: None,
 ) -> Spec:
-    """The checked problem of plain values; `source` and the lines of places are told in messages.
+    """The checked problem of plain values; messages name `source` and the line.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 """YAML of configs: plain values within limits, so that a foreign file can neither run code nor
-fill memory nor take for ever.
+fill memory nor take forever.
 
 Aliases are refused (they make small files huge), and so are merge keys (<<), tags beyond the safe
 ones, keys given twice, deep nesting and numbers of more digits than any number has: Python turns

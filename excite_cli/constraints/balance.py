@@ -5,7 +5,7 @@ quadratic form has no gradient at the centre. The polygon has 16 sides and gives
 radius.
 
 With uncertain inertias the margin (offset M − normal·Σ m c) / M is the least over all admitted φ:
-numerator and mass are linear in φ (`robot.least_ratio`).
+numerator and mass are linear in φ (`dynamics.least_ratio`).
 """
 
 import numpy as np

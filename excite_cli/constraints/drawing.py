@@ -26,7 +26,7 @@ class GroundRegion:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """What is there at all times: bodies that distances are taken of, things around, a region."""
+    """What is there at all times: bodies that distances are taken of, obstacles, a region."""
 
     capsules: tuple[Capsule, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
@@ -35,7 +35,7 @@ class Drawing:
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """The nearest two bodies at each of T instants, of the robot or one of them a thing around.
+    """The nearest two bodies at each of T instants, of the robot or one of them an obstacle.
 
     distances (T,) [m], negative where they overlap; ends (T, 2, 3) [m], the points between which
     the distance is; capsules: the one or two of the robot; labels: T texts.

@@ -34,7 +34,7 @@ class Surroundings(Constraint):
     """
 
     name = "surroundings"
-    title = "Nearest link and thing around, less the margin"
+    title = "Nearest link and obstacle, less the margin"
     unit = "m"
 
     def __init__(
@@ -52,11 +52,11 @@ class Surroundings(Constraint):
 
     @property
     def left_out(self) -> tuple[DroppedPair, ...]:
-        """Pairs of a capsule and a thing."""
+        """Pairs of a capsule and an obstacle."""
         return self.pairs.dropped
 
     def capsules_of(self, column: int) -> tuple[Capsule, ...]:
-        """The one that keeps away from a thing."""
+        """The one that keeps away from an obstacle."""
         return (self.capsules[self.pairs.checked[column][0]],)
 
     @property
@@ -66,7 +66,7 @@ class Surroundings(Constraint):
         said = [
             Note(
                 Level.DETAIL,
-                f"surroundings: {things}; {len(self.labels)} pairs of a capsule and a thing "
+                f"surroundings: {things}; {len(self.labels)} pairs of a capsule and an obstacle "
                 f"checked; not checked: {counted_reasons(self.pairs.dropped)}",
             )
         ]
@@ -94,11 +94,11 @@ class Surroundings(Constraint):
 
     @property
     def drawing(self) -> Drawing:
-        """All capsules and all things."""
+        """All capsules and all obstacles."""
         return Drawing(self.capsules, self.obstacles)
 
     def nearest(self, poses: Poses, margins: Array) -> Nearest:
-        """The nearest capsule and thing."""
+        """The nearest capsule and obstacle."""
         distances, bodies = margins + self.pairs.kept, (self.capsules, self.obstacles)
         return nearest_obstacles(poses, distances, self.labels, *bodies, self.pairs.checked)
 
@@ -130,11 +130,11 @@ class Surroundings(Constraint):
     def gradients(
         self, states: States, times: Indices, columns: Indices
     ) -> tuple[Array | None, Array | None, Array | None]:
-        """Normal of the thing times the Jacobian of the witness point on the capsule's axis."""
+        """Normal of the obstacle times the Jacobian of the witness point on the capsule's axis."""
         return self._distances.gradients(states, times, columns), None, None
 
     def why_not(self, states: States) -> str:
-        """Which capsules are inside a thing, and how deep, deepest first."""
+        """Which capsules are inside an obstacle, and how deep, deepest first."""
         distances = self._distances.distances(states)[0]
         inside = [int(k) for k in np.argsort(distances) if distances[k] < 0]
         if not inside:

@@ -156,7 +156,7 @@ class Judgement:
         return float(np.sqrt(largest))
 
     def too_small(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        """Whether nobody would miss it."""
+        """Whether it may go without loss."""
         return self.size(chosen, added) < _SMALLEST
 
     def _leftover(self, chosen: Sequence[int], added: Sequence[int]) -> bool:

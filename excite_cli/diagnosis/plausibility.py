@@ -1,9 +1,9 @@
 """Could these be the robot's torques and positions? Order and signs, judged with the URDF.
 
 A mistake in the file is not an effect of the robot, and a diagnosis of such data would be wrong
-from the start. So mistakes are tried out (`rearranged`): one is told if, undone, it leaves clearly
-less of the torques (`torque_shares`) than the data as they are, and no joint fits clearly worse.
-Whatever no such mistake explains is left to the diagnosis.
+from the start. So mistakes are tried out (`rearranged`): one is reported if, undone, it leaves
+clearly less of the torques (`torque_shares`) than the data as they are, and no joint fits clearly
+worse. Whatever no such mistake explains is left to the diagnosis.
 """
 
 from collections.abc import Sequence
@@ -200,4 +200,4 @@ def _order(names: Sequence[str], columns: Order, what: str) -> str:
     if what == "columns":
         mapping = ", ".join(f"{names[order[j]]}: {names[j]}" for j in moved)
         return f"{words} (set measurement.names: {{{mapping}}})"
-    return f"{words} (mend the names of these columns in the file)"
+    return f"{words} (correct the names of these columns in the file)"

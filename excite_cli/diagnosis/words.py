@@ -1,4 +1,4 @@
-"""A diagnosis in words, the same ones wherever it is told."""
+"""A diagnosis in words, the same ones wherever it is reported."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Pull-back of the regressor by inverse dynamics with fictitious inertias (production path).
+"""Vector–Jacobian product of the regressor by inverse dynamics with fictitious inertias.
 
 For one sample and one pair (u, φ), uᵀ Y(x) φ = uᵀ ID(x; φ): the regressor times a vector is the
 inverse dynamics of a robot with inertias φ. So the derivative of Σ_k u_kᵀ Y φ_k needs no derivative
@@ -25,7 +25,7 @@ _REFERENCE = np.array([1.0, 0, 0, 0, 1.0, 0, 1.0, 0, 0, 1.0])
 
 
 class FictitiousInertiaAdjoint:
-    """Pull-back for few pairs (the condition number has two); not to be shared between threads."""
+    """Few singular pairs (the condition number has two); not to be shared between threads."""
 
     def __init__(self, robot: Robot, silent: Array | None = None) -> None:
         """`silent`: a direction (P,) with Y d = 0 (`BaseParameters.silent_direction`), if any."""

@@ -3,7 +3,7 @@
 With Y P = Q [R₁ R₂; 0 0] over random states, the r leading columns are independent and
 Y φ = Y_B φ_B with Y_B = Y X (X selects those columns) and φ_B = φ₁ + R₁⁻¹ R₂ φ₂.
 
-Columns that are rounding dust (a rotation by 180° leaves 1e-16 where 0 is meant) are zeroed first:
+Columns that are rounding errors (a rotation by 180° leaves 1e-16 instead of 0) are zeroed first:
 scaled to unit norm, they would count as parameters. The rest is scaled to unit norm to find the
 rank. Which column stands for a group decides the condition number of Y_B (by up to twenty times):
 of the orders found with and without scaling, the one with better conditioned columns is taken.

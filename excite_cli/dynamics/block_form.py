@@ -1,4 +1,4 @@
-"""The regressor and its pull-back in the paper's block form: an independent reference.
+"""The regressor and its vector–Jacobian product in the paper's block form, as a reference.
 
 Row block i (joint), column block j (body) of Y, for bodies j in the subtree of joint i
 (Eqs. 18–23, 𝒴 and 𝒜 in Eqs. 57–59):

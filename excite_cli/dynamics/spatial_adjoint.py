@@ -1,4 +1,4 @@
-"""Pull-back of the regressor for an arbitrary weight Z, batched over samples.
+"""Vector–Jacobian product of the regressor for any weight Z, batched over samples.
 
 Smooth criteria need many singular pairs, and one inverse-dynamics pass for each is slow. Here all
 pairs are taken at once. By virtual power, with S_i the motion column of row i and f_j(·) the force
@@ -87,7 +87,7 @@ def _force_cross(a: Array, f: Array) -> Array:
 
 
 class SpatialAdjoint:
-    """Pull-back for any number of pairs at the cost of one."""
+    """Vector–Jacobian product for any number of pairs at the cost of one."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -119,7 +119,7 @@ class SpatialAdjoint:
     def regressor(self, q: Array, v: Array, a: Array, kept: Indices) -> Array:
         """Columns `kept` (r,) of the regressor for the measured rows, (T, R, r); compiled only.
 
-        As `Regressor`, which goes through Pinocchio, by the recursion of the pull-back: row i of a
+        As `Regressor`, which goes through Pinocchio, by the recursion of `pull_back`: row i of a
         body that joint i carries is its column S_i, seen from the body, times Y_j.
         """
         assert KERNELS is not None

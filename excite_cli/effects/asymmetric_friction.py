@@ -1,4 +1,4 @@
-"""Dry friction that differs between the directions.
+"""Dry asymmetric friction (differs between the directions).
 
 τ_j = f⁺ for v_j > 0 and −f⁻ for v_j < 0. It *is* Coulomb friction plus an offset:
 f_c = (f⁺ + f⁻)/2 and b = (f⁺ − f⁻)/2, the same two columns in another basis.
@@ -17,7 +17,7 @@ class AsymmetricFriction(Effect):
     """τ_j = f⁺ (1 + sgn v_j)/2 − f⁻ (1 − sgn v_j)/2, both ≥ 0."""
 
     kind: ClassVar = "asymmetric_friction"
-    title: ClassVar = "friction that differs between the directions"
+    title: ClassVar = "asymmetric friction (differs between the directions)"
     signature: ClassVar = "the residual jumps when the joint reverses, to levels of unequal height"
     function_of: ClassVar = ("speed",)
     parameters: ClassVar = (

@@ -1,4 +1,4 @@
-"""Play in a gear: while the motor crosses it, the load is not carried; then the flanks meet.
+"""Backlash of a gear: while the motor crosses it, the load is not carried; then the flanks meet.
 
 When the rigid-body torque of the joint changes sign, the link leaves its flank and flies freely.
 With the load computed from the motor's motion, the angle δ between motor and link follows
@@ -41,10 +41,10 @@ _PORTION = 2**17  # values of columns that are searched at once
 
 
 class Backlash(Effect):
-    """`share` (1: clean play) of the load that a gap of `gap` rad takes away and gives back."""
+    """`share` (1: a clean gap) of the load that a gap of `gap` rad takes away and gives back."""
 
     kind: ClassVar = "backlash"
-    title: ClassVar = "play in the gear (backlash)"
+    title: ClassVar = "backlash of the gear"
     signature: ClassVar = "when the load changes sign it is missing for a while, then comes a blow"
     parameters: ClassVar = (whole_share("share"),)
     shapes: ClassVar = (Parameter("gap", "rad", *_GAPS),)
@@ -81,7 +81,7 @@ class Backlash(Effect):
                     columns = _smooth(motion.columns(gaps[some]), s)
                     product[some] += np.einsum("gtr,tr->g", columns, left * weights)
                     square[some] += np.einsum("gtr,gtr->gr", columns, columns) @ weights
-            fitted = np.maximum(product, 0.0)  # a negative share is no play
+            fitted = np.maximum(product, 0.0)  # a negative share is no backlash
             return float(gaps[int(np.argmax(fitted**2 / (square + 1e-300)))])
 
         return [{"gap": best(best(np.geomspace(*_GAPS, 48)) * np.geomspace(0.93, 1.07, 21))}]

@@ -5,8 +5,8 @@
 An effect acts on some joints (`joints`, indices of moved joints) and touches some rows (`rows`).
 Its columns may depend on time, on q, v, a and, for friction that grows with load, gains and delays,
 on the torque of the model found so far; its non-linear parameters (`shape`) are numbers chosen from
-a grid. The same class serves planning (columns and their pull-back), identification, diagnosis and
-simulation (torque for given values).
+a grid. The same class serves planning (columns and their vector–Jacobian product,
+`pull_back`), identification, diagnosis and simulation (torque for given values).
 
 Beside its columns, an effect states what is known of it: by which rules a diagnosis names it, how
 it gets into a simulated robot, and how it is drawn. No other part of the program asks for a kind by
@@ -88,7 +88,7 @@ class Effect(ABC):
     defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
-    excitable: ClassVar[bool] = True  # has columns for a planned motion, with a pull-back
+    excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
     why_not_excitable: ClassVar[str] = ""
 
     # How a diagnosis judges it. Surprise: χ² that it must save beyond what chance makes of all

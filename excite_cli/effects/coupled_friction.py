@@ -46,7 +46,7 @@ class CoupledFriction(Effect):
 
     @property
     def completes(self) -> bool:
-        """Small friction of a joint of its own would be told as that of the shaft."""
+        """Small friction of a joint of its own would be taken for that of the shaft."""
         return True
 
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:

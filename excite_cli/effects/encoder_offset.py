@@ -1,4 +1,4 @@
-"""A wrong zero of an encoder: q_true = q_measured + offset.
+"""Encoder offset (a wrong zero): q_true = q_measured + offset.
 
 To first order the torque of all joints changes by offset · ∂τ/∂q_j at the measured position.
 """
@@ -18,7 +18,7 @@ class EncoderOffset(Effect):
     """q_true = q_measured + offset on one joint; shows in all rows."""
 
     kind: ClassVar = "encoder_offset"
-    title: ClassVar = "wrong zero of an encoder"
+    title: ClassVar = "offset of an encoder"
     signature: ClassVar = "residuals on many joints as if one of them stood elsewhere"
     parameters: ClassVar = (Parameter("offset", "rad", 1e-3, 0.2, believed=(-0.2, 0.2)),)
     usual: ClassVar = True

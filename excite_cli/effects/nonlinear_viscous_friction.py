@@ -17,7 +17,7 @@ class NonlinearViscousFriction(Effect):
     """τ_j = f sgn(v_j) |v_j|^power, f ≥ 0."""
 
     kind: ClassVar = "nonlinear_viscous_friction"
-    title: ClassVar = "friction that bends over speed"
+    title: ClassVar = "nonlinear viscous friction"
     signature: ClassVar = "the residual is odd in the joint's speed and bends"
     function_of: ClassVar = ("speed",)
     parameters: ClassVar = (

@@ -20,7 +20,7 @@ _ROTOR_SHARE = 0.5  # of the link's inertia, for a rotor whose size nobody said
 
 @dataclass(frozen=True)
 class Transmission:
-    """Between a motor and its link: rotor [kg·m²], stiffness [N·m/rad], damping, play [rad].
+    """Between a motor and its link: rotor [kg·m²], stiffness [N·m/rad], damping, backlash [rad].
 
     `sensed_before`: the recorded torque is that of the motor, which also turns the rotor; otherwise
     that which enters the gear.

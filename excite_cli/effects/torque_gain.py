@@ -1,4 +1,4 @@
-"""A wrong scale of the measured torque: τ_measured = (1 + g) τ.
+"""A wrong gain of the measured torque: τ_measured = (1 + g) τ.
 
 A wrong torque constant or gear ratio of one joint. The same gain on all joints is absorbed by the
 inertial parameters, which then are all wrong by it. The gain of the joint's friction is absorbed by
@@ -17,7 +17,7 @@ class TorqueGain(Effect):
     """τ_j grows by g · (rigid-body torque)."""
 
     kind: ClassVar = "torque_gain"
-    title: ClassVar = "wrong scale of the measured torque"
+    title: ClassVar = "wrong gain of the measured torque"
     signature: ClassVar = "the residual has the shape of the torque itself"
     function_of: ClassVar = ("load",)
     parameters: ClassVar = (Parameter("gain", "1", 0.005, 0.5, believed=(-0.5, 0.5)),)

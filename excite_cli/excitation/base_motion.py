@@ -1,7 +1,7 @@
 """The motion about which a start is drawn: standing at a clear posture, or going from end to end.
 
 Where postures are given they stay as they are. The straight motion between them is taken if it is
-admissible, then the nearest admissible one to first order. Otherwise a way round is searched, run
+admissible, then the nearest admissible one to first order. Otherwise a path around is searched, run
 through with the same profile of time, and projected onto the family of trajectories:
 
     min over x  Σ_t |q_x(t) − way(s(t))|² + λ Σ_t |a_x(t)|² T⁴
@@ -59,11 +59,12 @@ def base_motion(task: MotionTask, seed: int) -> Start:
         raise NoAdmissibleMotionError(
             f"No admissible motion from trajectory.start to trajectory.end: {broken} does not "
             f"allow it within {task.problem.trajectory.duration:g} s, although every posture on "
-            "the straight way is clear. Take a longer trajectory.duration."
+            "the straight path is clear. Take a longer trajectory.duration."
         )
     found = _way_round(task, start, end, seed, block)
     note = (
-        f"the straight way from start to end is blocked ({block}); the search began on a way round"
+        f"the straight path from start to end is blocked ({block}); "
+        "the search began on a path around"
     )
     return Start(found, start, True, note)
 
@@ -89,7 +90,7 @@ def require_clear(problem: Problem, posture: Array, name: str) -> None:
 
 
 def straight_block(problem: Problem, start: Array, end: Array) -> str | None:
-    """What first stands in the straight way, and where; None if all postures on it are clear."""
+    """What first blocks the straight path, and where; None if all postures on it are clear."""
     shares = np.linspace(0.0, 1.0, _INSTANTS + 1)
     postures = start + shares[:, None] * (end - start)
     first, words = _INSTANTS + 1, ""
@@ -109,7 +110,7 @@ def straight_block(problem: Problem, start: Array, end: Array) -> str | None:
 
 
 def _way_round(task: MotionTask, start: Array, end: Array, seed: int, block: str) -> Array:
-    """Free variables of an admissible motion that follows a way round what is in between."""
+    """Free variables of an admissible motion that follows a path around what is in between."""
     for attempt in range(_WAYS):
         search = find_way(task.problem, start, end, seed + 1000 * attempt)
         if search.way is None:
@@ -124,19 +125,19 @@ def _way_round(task: MotionTask, start: Array, end: Array, seed: int, block: str
             return max(mended, key=lambda x: _room(task, x))
     broken = _broken_in_motion(task, tried[0])
     raise NoAdmissibleMotionError(
-        f"No admissible motion from trajectory.start to trajectory.end: the straight way is "
-        f"blocked ({block}). There is a way round, but no motion of this "
-        f"trajectory follows it closely enough; {broken} is in the way. Take a longer "
+        "No admissible motion from trajectory.start to trajectory.end: the straight path is "
+        f"blocked ({block}). A path around it exists, but no motion of this "
+        f"trajectory follows it closely enough; {broken} prevents it. Take a longer "
         "trajectory.duration, or more control_points."
     )
 
 
 def disconnected(block: str, reached: str) -> str:
-    """The message that no way was found between two postures."""
+    """The message that no path was found between two postures."""
     return (
-        "no admissible way from the start to the end was found. The straight way is blocked "
-        f"({block}), and a search for a way round did not get through: {reached}. The postures may "
-        "be disconnected. Give other postures, or loosen that constraint."
+        "no admissible path from the start to the end was found. The straight path is blocked "
+        f"({block}), and a search for a path around did not get through: {reached}. The postures "
+        "may be disconnected. Give other postures, or loosen that constraint."
     )
 
 

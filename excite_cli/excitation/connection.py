@@ -2,7 +2,7 @@
 
 A piece is a polynomial of degree five (`PointToPoint`) of the shortest duration, of a geometric
 sequence, that a judge accepts. Between postures it is straight; where something is in between, it
-is one piece after the other along a way round, at rest at every corner.
+is one piece after the other along a path around what is in between, at rest at every corner.
 """
 
 from collections.abc import Callable, Iterator
@@ -140,7 +140,7 @@ def resting_way(
         return [joined_states(problem, judge, name, one, two) for one, two in pairwise(corners)]
     except NoAdmissibleMotionError as error:
         raise NoAdmissibleMotionError(
-            f"the straight way is blocked ({block}); there is a way round, but on a piece of it "
+            f"the straight path is blocked ({block}); a path around exists, but on a piece of it "
             f"{error}"
         ) from error
 

@@ -1,4 +1,4 @@
-"""Columns of effects beside the base regressor, with their pull-back.
+"""Columns of effects beside the base regressor, with their vector–Jacobian product.
 
 An effect's column may depend on q, v, a, on the torque of the rigid bodies, or on entries of the
 regressor (`Cotangents`). Its derivative reaches q, v, a

@@ -8,8 +8,8 @@ as a whole:
    speed, its mean, its first posture, robot.posture);
 2. a periodic motion swells over some periods from rest at such a posture (`Fade`).
 
-Between postures it goes straight, or along a way round what is in between; this is all there is to
-do where the motion starts at rest.
+Between postures it goes straight, or along a path around what is in between; this is all there is
+to do where the motion starts at rest.
 
 The return is the same at the other end. Segments join with continuous q, v and a.
 """

@@ -100,7 +100,7 @@ def _best_of_starts(
 ) -> tuple[Outcome, str]:
     """The outcome with the lowest criterion, with iterations and evaluations of all starts.
 
-    Also what is to be told of it. Of equal ones the first is taken, so that it does not matter who
+    Also what to report of it. Of equal ones the first is taken, so that it does not matter who
     was ready first. A start that fails is passed over; the last error is raised only if all fail.
     """
     restarts = task.problem.spec.optimizer.restarts

@@ -28,7 +28,7 @@ from excite_cli.trajectory.base import Basis
 
 # Beyond this condition number the Gram matrix loses more than 1e-10 and QR + SVD take over.
 GRAM_LIMIT = 1e3
-# Uncompiled, with more pairs than this the batched pull-back is faster than one pass per pair.
+# Uncompiled, with more pairs than this the batched product is faster than one pass per pair.
 FEW_PAIRS = 5
 _NEGLIGIBLE = 1e-12
 

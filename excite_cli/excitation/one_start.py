@@ -46,7 +46,7 @@ class OneStart:
 
 @dataclass(frozen=True)
 class FoundMotion:
-    """What a start led to: the criterion of that, what is told of it, how long it took [s]."""
+    """What a start led to: the criterion of that, what is reported of it, how long it took [s]."""
 
     value: float
     figure: Figure

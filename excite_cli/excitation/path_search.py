@@ -67,7 +67,7 @@ class FreeSpace:
         return start + np.linspace(0.0, 1.0, count + 1)[1:, None] * (end - start)
 
     def is_clear(self, start: Array, end: Array) -> bool:
-        """Whether the straight way is free; a few postures spread over it are looked at first."""
+        """Whether the straight path is free; a few postures spread over it are looked at first."""
         postures = self.between(start, end)
         coarse = postures[len(postures) // 16 :: 8]
         if len(postures) > 16 and not self.free(coarse).all():
@@ -78,7 +78,7 @@ class FreeSpace:
         )
 
     def furthest(self, start: Array, end: Array) -> tuple[Array, bool]:
-        """How far the straight way from `start` to `end` is free, and whether that is all of it."""
+        """How far the straight path from `start` to `end` is free, and whether that is all."""
         postures = self.between(start, end)
         begin, size = 0, _FIRST_BATCH
         while begin < len(postures):

@@ -1,4 +1,4 @@
-"""Constraints as an optimiser wants them: dimensionless, guarded, and fast to pull back.
+"""Constraints as an optimiser wants them: dimensionless, guarded, and fast to differentiate.
 
 A residual is (margin − guard) / scale, admissible where not negative. The guard keeps what lies
 between the instants of the grid: exact for bounds on a Fourier series (its sampling factor), an

@@ -104,7 +104,7 @@ def clear_posture(task: MotionTask, seed: int, tries: int = _TRIES) -> Start:
     ------
     NoAdmissibleMotionError
         No real robot can stand as configured, or none was found; the message names the constraint
-        that stands in the way.
+        that prevents it.
     """
     configured = task.problem.robot.posture
     refuse_impossible(task, configured, "robot.posture")
@@ -124,7 +124,7 @@ def clear_posture(task: MotionTask, seed: int, tries: int = _TRIES) -> Start:
     values = task.values(_still(task, best))
     raise NoClearPostureError(
         f"No admissible motion: no posture found that is clear of all constraints "
-        f"({tries} tried from robot.posture). In the way: {blocking(task, values)}. At the best "
+        f"({tries} tried from robot.posture). Blocked by {blocking(task, values)}. At the best "
         f"of them: {_all_broken(task, best)}. Give a clear robot.posture or loosen the constraint "
         "(pairs that always touch: constraints.self_collision.ignore, "
         "constraints.surroundings.ignore).",

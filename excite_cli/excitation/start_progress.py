@@ -1,4 +1,4 @@
-"""What is told while the starts of a motion run, by one or several workers."""
+"""What is reported while the starts of a motion run, by one or several workers."""
 
 from dataclasses import replace
 

@@ -70,7 +70,7 @@ def _body(parent: ElementTree.Element, joint: TreeJoint, ten: Array) -> ElementT
     if mass <= 0 or moments[0] <= 0 or moments[0] + moments[1] < moments[2]:
         raise RobotError(
             f"The body carried by '{joint.name}' (mass {mass:.3g} kg, principal moments "
-            f"{', '.join(f'{moment:.3g}' for moment in moments)} kg·m²) is none that MuJoCo "
+            f"{', '.join(f'{moment:.3g}' for moment in moments)} kg·m²) is not one that MuJoCo "
             "accepts. Identify with identification.consistent: true."
         )
     place = {"pos": vector(joint.position), "quat": vector(_quaternion(joint.rotation))}

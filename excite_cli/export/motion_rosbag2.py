@@ -30,7 +30,7 @@ class Rosbag2Exporter(MotionExporter):
         """Write the bag beside, then put it in place of an earlier one."""
         _require_rosbags()
         if path.exists() and not is_bag(path):
-            raise FileError(f"{path} is there and is no bag. Give another name.")
+            raise FileError(f"{path} exists and is not a bag. Give another name.")
         write_folder_atomically(path, lambda temporary: self._write(temporary, motion))
 
     def _write(self, path: Path, motion: TimedMotion) -> None:

@@ -1,4 +1,4 @@
-"""Distances of capsules from each other or from things around, by coal through Pinocchio.
+"""Distances of capsules from each other or from obstacles, by coal through Pinocchio.
 
 One instant at a time, with Pinocchio's kinematics and coal's algorithms: an independent
 computation of what `PairDistances` and `ObstacleDistances` give for all instants at once. coal's
@@ -88,4 +88,4 @@ def _of_capsule(number: int, capsule: Capsule) -> pin.GeometryObject:
 
 def _of_obstacle(obstacle: Obstacle) -> pin.GeometryObject:
     shape, rotation, position = obstacle.as_coal(_SCALE)
-    return pin.GeometryObject(f"thing:{obstacle.name}", 0, pin.SE3(rotation, position), shape)
+    return pin.GeometryObject(f"obstacle:{obstacle.name}", 0, pin.SE3(rotation, position), shape)

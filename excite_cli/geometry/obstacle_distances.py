@@ -1,7 +1,7 @@
-"""Distances of capsules from things that stand still, along a motion, and their derivatives.
+"""Distances of capsules from obstacles that stand still, along a motion, and their derivatives.
 
-The distance is that of the capsule's axis less its radius. With n the unit normal of the thing and
-p the witness point on the axis, dd/dq_k = n·(v_k + ω_k × p) for every joint k that carries the
+The distance is that of the capsule's axis less its radius. With n the unit normal of the obstacle
+and p the witness point on the axis, dd/dq_k = n·(v_k + ω_k × p) for every joint k that carries the
 capsule, (v_k, ω_k) its twist about the world origin.
 """
 

@@ -1,12 +1,12 @@
-"""Which capsules are checked against which things, and why the others are not.
+"""Which capsules are checked against which obstacles, and why the others are not.
 
-What stands still is not looked at: no motion parts it from a thing or brings it there. The other
+What stands still is not checked: no motion parts it from an obstacle or brings it there. The other
 pairs are checked, unless a bound on the robot's reach proves that they never meet, or no motion
 parts them: the first moved link of a robot that stands on a table touches the table. Such a pair is
 known by its distance in a sample of postures: below the margin and the same in all of them, or
 never above zero for a link that one joint moves. Other pairs that always overlap stay: they tell of
-a table in the wrong place. Where a link never gets far from a thing (the upper arm passes the table
-close by whatever it does), half of the farthest is kept instead of the margin.
+a table in the wrong place. Where a link never gets far from an obstacle (the upper arm passes the
+table close by whatever it does), half of the farthest is kept instead of the margin.
 """
 
 from dataclasses import dataclass
@@ -43,12 +43,12 @@ class ObstaclePairs:
 
 
 def ignored_pairs(robot: Robot, spec: SurroundingsSpec) -> frozenset[tuple[str, str]]:
-    """Pairs (link, thing) of `spec.ignore`, in whichever order they were written.
+    """Pairs (link, obstacle) of `spec.ignore`, in whichever order they were written.
 
     Raises
     ------
     ConfigError
-        A name is neither a link of the robot nor a thing.
+        A name is neither a link of the robot nor an obstacle.
     """
     links = link_names(robot)
     things = [*([FLOOR] if spec.floor is not None else []), *spec.walls, *spec.boxes]
@@ -59,16 +59,16 @@ def ignored_pairs(robot: Robot, spec: SurroundingsSpec) -> frozenset[tuple[str, 
         if first not in links:
             _unknown("link", first, links)
         if second not in things:
-            _unknown("thing", second, things)
+            _unknown("obstacle", second, things)
         found.add((first, second))
     return frozenset(found)
 
 
 def _unknown(kind: str, name: str, known: list[str]) -> None:
-    whose = "the robot has no link" if kind == "link" else "there is no thing"
+    whose = "the robot has no link" if kind == "link" else "there is no obstacle"
     raise ConfigError(
         f"constraints.surroundings.ignore: {whose} '{name}'.{nearest(name, known)} Write pairs of "
-        f"a link and a thing. {kind.capitalize()}s: {', '.join(sorted(known))}."
+        f"a link and an obstacle. {kind.capitalize()}s: {', '.join(sorted(known))}."
     )
 
 

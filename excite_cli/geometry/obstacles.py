@@ -1,4 +1,4 @@
-"""Things that stand in the world: half-spaces (a floor, walls) and boxes."""
+"""Obstacles that stand in the world: half-spaces (a floor, walls) and boxes."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ FLOOR = "floor"
 
 
 class Obstacle(ABC):
-    """A solid thing that does not move. Segments are start + λ along, λ in [0, 1], (3, ...) [m]."""
+    """A solid body that does not move. Segments are start + λ along, λ in [0, 1], (3, ...) [m]."""
 
     name: str
 

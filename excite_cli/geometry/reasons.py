@@ -42,7 +42,7 @@ class LinksApart:
 
     @property
     def percent(self) -> int:
-        """The share as it is told and judged: postures are few."""
+        """The share as it is reported and judged: postures are few."""
         return round(100 * self.share)
 
 

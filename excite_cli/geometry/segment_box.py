@@ -23,7 +23,7 @@ _PARALLEL = 1e-9  # sine of the angle below which a segment has the direction of
 
 
 class Contact(NamedTuple):
-    """Signed distance (K,) [m], unit normal (3, K) away from the thing, share (K,) of the axis.
+    """Signed distance (K,) [m], unit normal (3, K) away from the obstacle, share (K,) of the axis.
 
     The distance changes as the point at the share of the axis moves along the normal.
     """

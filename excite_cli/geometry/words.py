@@ -1,4 +1,4 @@
-"""Pairs that are not checked, in words, the same ones wherever they are told."""
+"""Pairs that are not checked, in words, the same ones wherever they are reported."""
 
 from excite_cli.geometry.reasons import DroppedPair, Reason, Standing, Why
 

@@ -1,4 +1,4 @@
-"""A fit in words, the same ones wherever it is told."""
+"""A fit in words, the same ones wherever it is reported."""
 
 import math
 from collections.abc import Mapping

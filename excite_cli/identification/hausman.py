@@ -59,7 +59,7 @@ class Hausman:
         if self.p_value >= SIGNIFICANT:
             return f"closed-loop bias: not found ({figures})"
         return (
-            f"closed-loop bias: what the model leaves over goes with the robot's deviation from "
+            f"closed-loop bias: the residual is correlated with the robot's deviation from "
             f"{origin} ({figures}); the controller feeds noise back, or the model lacks something"
         )
 

@@ -39,7 +39,7 @@ from excite_cli.robot.model import Robot
 from excite_cli.shown.record import Shown
 
 Tell = Callable[[str], None]
-# Parameters this many standard deviations below zero that cannot be negative are told.
+# Parameters this many standard deviations below zero that cannot be negative are reported.
 _SURELY = 3.0
 
 
@@ -193,7 +193,7 @@ def _noticed(found: Fit, hausman: Hausman) -> list[Finding]:
     negative = np.flatnonzero(signed & (values < -_SURELY * std))
     if len(negative):
         names = ", ".join(found.names[found.rank + i] for i in negative)
-        text = f"{names}: negative beyond doubt, which they cannot be."
+        text = f"{names}: significantly negative, which is physically impossible."
         if len(negative) == signed.sum() > 1:
             text += " The sign of the torque may be flipped (measurement.sign)."
         else:

@@ -26,7 +26,7 @@ from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 
 _FEWEST = 8  # phases at which a joint must have been seen twice
-# Misalignment of this share of the floor must be told.
+# Misalignment of this share of the floor must be reported.
 _UNEVEN = 0.5
 
 

@@ -1,6 +1,6 @@
 """What a compiled function takes, and the checks before it is entered.
 
-Shapes are written in the sizes that C is told, one letter each: `("T", "B", 3)` is an array of
+Shapes are written in the sizes that C is given, one letter each: `("T", "B", 3)` is an array of
 T × B × 3. A size is what the first array that names it has there; every later array must agree.
 """
 
@@ -42,7 +42,7 @@ class Sum:
 
 @dataclass(frozen=True)
 class Size:
-    """A size that C is told; it comes from the arrays, not from the caller."""
+    """A size that C is given; it comes from the arrays, not from the caller."""
 
     letter: str
     c_type = ctypes.c_int64

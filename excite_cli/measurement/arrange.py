@@ -10,7 +10,7 @@ from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.measurement.dataset import Array, Finding, Run
 from excite_cli.measurement.reader import CHANNELS, RawRun
 
-_LISTED, _LONGEST = 40, 60  # names that are told; characters of each
+_LISTED, _LONGEST = 40, 60  # names that are reported; characters of each
 _CHANNEL_WORDS = {"q": "position", "tau": "torque", "dq": "speed"}
 
 
@@ -19,12 +19,12 @@ def check_names(names: Mapping[str, str], joints: Sequence[str]) -> None:
     for column, joint in names.items():
         if joint not in joints:
             raise ConfigError(
-                f"measurement.names: '{column}' is led to '{joint}', which the robot does not "
+                f"measurement.names: '{column}' is mapped to '{joint}', which the robot does not "
                 f"move.{nearest(joint, joints)} Moved joints: {', '.join(joints)}."
             )
     twice = sorted(joint for joint, count in Counter(names.values()).items() if count > 1)
     if twice:
-        raise ConfigError(f"measurement.names leads twice to '{twice[0]}'; each joint once.")
+        raise ConfigError(f"measurement.names maps two columns to '{twice[0]}'; each joint once.")
 
 
 def arrange(

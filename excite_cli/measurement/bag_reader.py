@@ -52,7 +52,7 @@ class BagReader(Reader):
         if pending.is_file() and pending.stat().st_size:
             text = (
                 f"{pending.name} lies beside the bag: the recorder was not closed, and its last "
-                "messages are not read. `ros2 bag reindex` mends it"
+                "messages are not read. `ros2 bag reindex` repairs it"
             )
             found = Finding("truncated", "warning", text)
             run = replace(run, findings=(*run.findings, found))
@@ -60,7 +60,7 @@ class BagReader(Reader):
 
 
 def check_bag(path: Path) -> None:
-    """Refuse what the library would take for ever for, or fill memory with: size and metadata.
+    """Refuse what the library would take forever for, or fill memory with: size and metadata.
 
     Raises
     ------
@@ -170,5 +170,5 @@ def _damaged(path: Path, error: Exception) -> str:
     reason = str(error).strip().splitlines()[0][:200] if str(error).strip() else ""
     return (
         f"{path} is a damaged or cut off bag ({type(error).__name__}"
-        f"{': ' if reason else ''}{reason.rstrip('.')}). {mend} may mend it.{beside}"
+        f"{': ' if reason else ''}{reason.rstrip('.')}). {mend} may repair it.{beside}"
     )

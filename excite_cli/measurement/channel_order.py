@@ -28,7 +28,7 @@ def check_order(runs: Sequence[Run], joints: tuple[str, ...]) -> list[Finding]:
             f"the speed of {joints[i]} follows {joints[best[i]]}" for i in swapped.nonzero()[0]
         ]
         text = (
-            f"columns of positions and speeds are in different orders: {', '.join(pairs)}. Mend "
+            f"columns of positions and speeds are in different orders: {', '.join(pairs)}. Correct "
             "the names in the file; if torques are in the order of the positions, leave the "
             "speeds out (measurement.channels: {dq: null})"
         )

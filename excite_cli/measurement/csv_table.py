@@ -208,7 +208,7 @@ def _careful(path: Path, layout: _Layout) -> tuple[dict[str, Array], list[Findin
         if len(row) != width:
             raise FileError(
                 f"{path}, line {number}: {len(row)} fields, but the header names {width} columns. "
-                "Mend or delete that line."
+                "Correct or delete that line."
             )
     if not fields:
         raise FileError(f"{path} has a header and no whole rows.")

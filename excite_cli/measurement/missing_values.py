@@ -2,7 +2,7 @@
 
 What is larger than anything measured (`BEYOND`) counts as infinite: recorders write such numbers
 where they have none, and arithmetic with them overflows. Stamps may be larger, so that a clock in
-another unit than declared is told by its steps and not lost here.
+another unit than declared is recognised by its steps and not lost here.
 """
 
 from dataclasses import replace

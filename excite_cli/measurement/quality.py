@@ -53,5 +53,5 @@ def raise_for_errors(dataset: Dataset) -> None:
 
 
 def sentence(finding: Finding) -> str:
-    """`run: text.`, as it is told to a person."""
+    """`run: text.`, as it is reported to a person."""
     return f"{finding.run}: {finding.text}." if finding.run else f"{finding.text}."

@@ -24,7 +24,7 @@ SINCE_1970 = 1e9  # s: no clock that counts from its own start has come so far
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What a reader is told: the YAML's hints on where things stand in a file.
+    """What a reader is given: the YAML's hints on where things stand in a file.
 
     `channels`: the file's name of t, q, dq, tau where it differs; None leaves a channel out.
     `rate` [Hz] of files without time stamps; `topic` of a bag; `joints` the robot's names with

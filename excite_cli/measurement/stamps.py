@@ -1,6 +1,6 @@
 """Time stamps: put in order, freed of duplicates, split at gaps, and made equidistant.
 
-Everything after this room takes equidistant samples. Stamps that are so already (within 5 % of a
+Everything above this package takes equidistant samples. Stamps that are so already (within 5 % of a
 step) stay untouched, and so do their samples; else positions are interpolated by a cubic spline,
 all other channels linearly. What was bridged is marked as not valid.
 """

@@ -41,7 +41,7 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...]) -> None:
         for name in names:
             if name not in joints:
                 raise ConfigError(
-                    f"measurement.{key}: '{name}' is no joint that moves."
+                    f"measurement.{key}: '{name}' is not a moved joint."
                     f"{nearest(name, joints)} Moved joints: {', '.join(joints)}."
                 )
     ratios = _per_joint(spec.gear_ratio, joints)

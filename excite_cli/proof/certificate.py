@@ -59,7 +59,7 @@ class Verdict:
     """What is known of one constraint along a whole motion.
 
     `lacking` (m,): by how much each column falls short at the worst instant seen (a trifle where
-    that could not be told), zero where it holds. `label`, `time` and `margin` tell the worst
+    that could not be decided), zero where it holds. `label`, `time` and `margin` tell the worst
     instant of a constraint that is not proved, `reason` says in words why it is not; without
     `bounded` no bound between instants is known.
     """

@@ -1,6 +1,6 @@
 """Where all bodies of a robot can be, and how they can move, over whole intervals of time.
 
-The recursion of rigid-body kinematics in world axes, on enclosures (`enclosure.taylor`): with z the
+The recursion of rigid-body kinematics in world axes, on enclosures (`proof.taylor`): with z the
 axis of joint i in the world, λ its parent, r the way from the parent's origin,
 
     R = R_λ P (1 + sin q [w] + (1 − cos q) [w]²)                      revolute

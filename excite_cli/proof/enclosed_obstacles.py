@@ -1,7 +1,7 @@
-"""Lower bounds on distances between capsules and things that stand, over whole intervals of time.
+"""Lower bounds on distances between capsules and obstacles, over whole intervals of time.
 
-As for two capsules (`robot.enclosed_distances`): along any direction n(s) = n₀ + n₁ s from the
-thing to the capsule, with e the ends of its axis and h(n) the support of the thing,
+As for two capsules (`proof.enclosed_distances`): along any direction n(s) = n₀ + n₁ s from the
+obstacle to the capsule, with e the ends of its axis and h(n) the support of the obstacle,
 
     d ≥ min over ends of (n·e − h(n)) / |n| − r,
 
@@ -30,7 +30,7 @@ Indices = NDArray[np.intp]
 def least_clearances(
     axes: EnclosedCapsules, obstacle: Obstacle, capsules: Indices, enough: float
 ) -> Array:
-    """Lower bounds (T, K) on the signed distances [m] of K capsules from one thing.
+    """Lower bounds (T, K) on the signed distances [m] of K capsules from one obstacle.
 
     Bounds above `enough` may be less tight than they could be.
     """
@@ -46,7 +46,7 @@ def least_clearances(
 
 
 def _separated(ends: Taylor, obstacle: Obstacle) -> Array:
-    """Lower bounds (K,) on the distance of axes with ends (K, 2, 3) from a thing."""
+    """Lower bounds (K,) on the distance of axes with ends (K, 2, 3) from an obstacle."""
     if isinstance(obstacle, Plane):
         along = ends.through(obstacle.normal[None])[..., 0]
         return np.asarray(along.lower().min(axis=1) - obstacle.offset)

@@ -1,9 +1,9 @@
 """Settling a proposed problem: a clear posture, and what must yield so that there is one.
 
-The optimiser's own search is asked for a posture. Where it finds none, what stands in the way at
+The optimiser's own search is asked for a posture. Where it finds none, what prevents one at
 the best posture yields: torque limits that do not hold the robot up, the distance kept between
 capsules, and capsules of neighbours, whose meshes are kept apart instead. Links whose meshes touch
-where the robot stands are told and left out, as the check of the meshes leaves them out.
+where the robot stands are reported and left out, as the check of the meshes leaves them out.
 """
 
 from dataclasses import dataclass, replace
@@ -96,7 +96,7 @@ def _at(tree: Tree, comments: Comments, problem: Problem, start: Start) -> Settl
 
 
 def _yielded(tree: Tree, comments: Comments, task: MotionTask, posture: Array) -> bool:
-    """Loosen what stands in the way at `posture` (n,); False if nothing is left to loosen.
+    """Loosen what is violated at `posture` (n,); False if nothing is left to loosen.
 
     In this order: torque limits, the distance between capsules, capsules of links that touch.
     """

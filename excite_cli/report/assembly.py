@@ -66,7 +66,7 @@ def _campaigns(sources: Sequence[Source]) -> dict[str, Campaign]:
     count = sum(isinstance(source.content, Result) for source in sources)
     for source in sources:
         if isinstance(source.content, Result):
-            assert source.problem is not None, "a result is told with its problem"
+            assert source.problem is not None, "a result is reported with its problem"
             number, alone = len(found) + 1, count == 1
             campaign = Campaign(source.name, source.content, source.problem, number, alone)
             found[source.name] = campaign

@@ -1,4 +1,4 @@
-"""One result file, ready to be told: its motions, and the problem they were made for."""
+"""One result file, ready to be reported: its motions, and the problem they were made for."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Parameters of a fit with their intervals; how well the data fix each is told by form."""
+"""Parameters of a fit with their intervals; the marker says how well the data fix each."""
 
 from collections.abc import Sequence
 from functools import partial

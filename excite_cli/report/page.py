@@ -2,7 +2,7 @@
 
 The page needs no network and no other file; style and script lie inside it. It reads on a phone
 and on paper, in light and in dark, and without a script (which only adds choosing and sorting).
-Every text is escaped by the template engine: names come from files that nobody checked.
+Every text is escaped by the template engine: names come from unchecked files.
 """
 
 import functools

@@ -40,7 +40,7 @@ _IDLE = 10.0  # s without a question after which the process ends
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong with a mesh; `harms`: reading it ends the process or takes for ever."""
+    """What is wrong with a mesh; `harms`: reading it ends the process or takes forever."""
 
     words: str
     harms: bool = False

@@ -129,7 +129,7 @@ def _end(path: Path, joint: ElementTree.Element, end: str, known: set[str]) -> s
     link = "" if found is None else found.get("link", "")
     if link not in known:
         name = _short(joint.get("name", ""))
-        _refuse(path, f"joint '{name}' has the {end} '{_short(link)}', which is none of its links")
+        _refuse(path, f"joint '{name}' has the {end} '{_short(link)}', which is not a link of it")
     return link
 
 

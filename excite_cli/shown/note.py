@@ -20,7 +20,7 @@ class Level(Enum):
     WARNING = logging.WARNING
 
 
-# Levels that are told before the text.
+# Levels that are reported before the text.
 _TOLD = {Level.HINT: "hint", Level.NOTE: "note", Level.WARNING: "warning"}
 
 

@@ -1,7 +1,7 @@
 """Records that can be read: a few words in a console, tables in a notebook.
 
 A record says only that it is shown (it inherits from `Shown`, with `@dataclass(repr=False)`); the
-words and tables of each are written down in one room above all of them, which `show` connects.
+words and tables of each are written down in one package above all of them, which `show` connects.
 """
 
 from collections.abc import Callable

@@ -2,7 +2,7 @@
 
 A joint between motor and link that is not stiff (elasticity, backlash) becomes two coordinates on
 one axis, θ of the motor and δ of the transmission: the link stands at θ + δ, the rotor's inertia
-sits on θ alone, the spring or the play acts on δ.
+sits on θ alone, the spring or the backlash acts on δ.
 """
 
 from collections.abc import Sequence

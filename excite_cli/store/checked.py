@@ -24,7 +24,7 @@ def text(attributes: Any, name: str, default: str | None = None) -> str:
     """An attribute that is one text."""
     value = attributes[name] if default is None else attributes.get(name, default)
     if not isinstance(value, str):
-        raise ValueError(f"attribute '{name}' is no text")
+        raise ValueError(f"attribute '{name}' is not text")
     return value
 
 
@@ -32,7 +32,7 @@ def texts(value: Any, what: str) -> tuple[str, ...]:
     """A list of texts, of an attribute or a dataset; h5py stores an empty one as numbers."""
     array = np.asarray(value)
     if array.ndim != 1 or (array.size and array.dtype.kind not in "OSU"):
-        raise ValueError(f"{what} is no list of texts")
+        raise ValueError(f"{what} is not a list of texts")
     return tuple(x.decode() if isinstance(x, bytes) else _word(x, what) for x in array.tolist())
 
 
@@ -48,7 +48,7 @@ def number(attributes: Any, name: str) -> float:
     """An attribute that is one number; infinity and NaN are left to who reads it."""
     value = np.asarray(attributes[name])
     if value.shape != () or value.dtype.kind not in "fiu":
-        raise ValueError(f"attribute '{name}' is no number")
+        raise ValueError(f"attribute '{name}' is not a number")
     return float(value)
 
 
@@ -56,7 +56,7 @@ def count(attributes: Any, name: str) -> int:
     """An attribute that is a whole number, not below 0."""
     value = number(attributes, name)
     if not (0 <= value < 2**53 and value == int(value)):
-        raise ValueError(f"attribute '{name}' is no count")
+        raise ValueError(f"attribute '{name}' is not a count")
     return int(attributes[name])
 
 
@@ -80,7 +80,7 @@ def indices(dataset: Any) -> NDArray[np.intp]:
     """Whole numbers (k,), each once."""
     found = _shaped(dataset, (None,), "iu").astype(np.intp)
     if len(set(found.tolist())) != len(found) or (found < 0).any():
-        raise ValueError(f"{dataset.name} is no choice of places")
+        raise ValueError(f"{dataset.name} is not a valid choice of indices")
     return found
 
 
@@ -93,7 +93,7 @@ def record(value: Any, kind: Any, known: Callable[[Any], Any] = lambda data: dat
     """A record of `kind` from its JSON text; `known` makes what stands in it as text a record."""
     words = value.decode() if isinstance(value, bytes) else value
     if not isinstance(words, str):
-        raise ValueError("a record is no text")
+        raise ValueError("a record is not text")
     return _adapter(kind).validate_python(known(json.loads(words)))
 
 
@@ -130,5 +130,5 @@ def _shaped(dataset: Any, shape: Shape, kinds: str) -> NDArray[Any]:
 
 def _word(value: Any, what: str) -> str:
     if not isinstance(value, str):
-        raise ValueError(f"{what} is no list of texts")
+        raise ValueError(f"{what} is not a list of texts")
     return value

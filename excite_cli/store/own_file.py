@@ -31,7 +31,7 @@ class OwnFile:
 
 @contextmanager
 def opened(path: Path, own: OwnFile) -> Iterator[Any]:
-    """The open file, checked to be of this kind; whatever goes wrong while it is read is told.
+    """The open file, checked to be of this kind; whatever goes wrong while it is read is reported.
 
     Raises
     ------

@@ -8,7 +8,7 @@ from excite_cli.shown.answer import Answer
 from excite_cli.shown.table import Table
 from excite_cli.study.records import TABLE, CaseRecord, row_of
 
-# Shares that are told in per cent; and columns that are words.
+# Shares that are reported in per cent; and columns that are words.
 _SHARES = ("identified_error", "before", "after")
 _WORDS = ("case", "log", "status", "proved", "sealed_run", "effects", "absorbed", "unexplained")
 # Told by the name of the case already, or too much for a row.

@@ -2,7 +2,7 @@
 
 A page of any other site may open a websocket to this machine (its `Origin` is then foreign), and a
 name that an attacker owns may be made to lead here (its `Host` is then foreign). Both are refused
-before viser sees the request. Programs send no `Origin`; they are nobody's page.
+before viser sees the request. Programs send no `Origin`; they are not a web page.
 """
 
 import http
@@ -38,7 +38,7 @@ def foreign(headers: Mapping[str, str], serving_host: str) -> str | None:
     host = headers.get("Host", "")
     name = _hostname(host)
     if name is None or not _known(name, serving_host):
-        return f"Host '{host}' is no name of this server"
+        return f"Host '{host}' is not a name of this server"
     origin = headers.get("Origin")
     if origin is None:
         return None

@@ -9,7 +9,7 @@ from excite_cli.robot.model import Robot
 from excite_cli.view.instants import Instants
 
 _BLUE, _VERMILION, _TRACK = "#0072B2", "#D55E00", "#8884"
-_NEAR = 0.05  # share of its scale, or of a range, below which a margin is told in colour
+_NEAR = 0.05  # share of its scale, or of a range, below which a margin is reported in colour
 _TABLE = '<table style="width:100%;font-size:12px;border-collapse:collapse;line-height:1.35">'
 
 

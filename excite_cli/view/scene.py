@@ -34,7 +34,7 @@ class Scene:
     """Everything of a problem that can be shown, at rest.
 
     capsules: those that constraints look at, with a surface for each, in the frames of their
-    joints. boxes: solid things in the world, by name; walls: half-spaces other than the floor.
+    joints. boxes: solid obstacles in the world, by name; walls: half-spaces other than the floor.
     region: what the centre of mass or the zero-moment point is kept in. contacts: (k, 3) points
     [m]. ground: height [m] at which the ground is drawn. low, high: (3,) corners of what the
     motions reach [m]; outline: (K, 3) outermost points of it [m]. note: what is

@@ -46,7 +46,7 @@ Watch = Callable[[News], None]
 
 
 def unwatched(news: News) -> None:
-    """Nobody is told."""
+    """Report to nobody."""
 
 
 class Workers(ABC):

@@ -39,7 +39,7 @@ def serve(descriptor: int, threads: int) -> None:
 
 
 class _Shared:
-    """What all tasks share, unpickled with the first of them: if it fails, that is told."""
+    """What all tasks share, unpickled with the first of them: if it fails, that is reported."""
 
     def __init__(self, body: bytes = b"") -> None:
         self._body, self._value, self._ready = body, None, False

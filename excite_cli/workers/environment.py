@@ -52,7 +52,7 @@ def surroundings() -> Surroundings:
 
 
 def _kernels() -> str:
-    """Which inner loops are in use; by name, since their room is above this one."""
+    """Which inner loops are in use; by name, since their package is above this one."""
     found = import_module("excite_cli.kernels.library").KERNELS
     return "numpy" if found is None else "compiled"
 

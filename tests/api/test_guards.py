@@ -76,12 +76,12 @@ def test_starts_of_another_shape_are_refused(problem: Problem, result: Result) -
     short = replace(start, coefficients=start.coefficients[:-1])
     with pytest.raises(FileError, match=r"shape \(8, 5\)"):
         plan(problem, starts=short)
-    with pytest.raises(FileError, match="ndarray is no motion"):
+    with pytest.raises(FileError, match="ndarray is not a motion"):
         plan(problem, starts=np.zeros((2, 3)))  # type: ignore[arg-type]
 
 
 def test_what_is_no_motion_is_named(problem: Problem, stored: Path, tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="Case is no motion"):
+    with pytest.raises(FileError, match="Case is not a motion"):
         check(problem, Case(problem.spec, problem.folder, problem.robot))  # type: ignore[arg-type]
     with pytest.raises(FileError, match=r"There is no file .*none\.csv"):
         check(problem, tmp_path / "none.csv")
@@ -98,7 +98,7 @@ def test_priors_that_do_not_fit_are_refused(
         plan(problem, priors=[Stack.empty(3)])
     with pytest.raises(FileError, match=r"no file .*none\.h5"):
         plan(problem, priors=[str(tmp_path / "none.h5")])
-    with pytest.raises(FileError, match="Case is nothing to plan on top of"):
+    with pytest.raises(FileError, match="Case cannot be planned on top of"):
         plan(problem, priors=[Case(problem.spec, problem.folder, problem.robot)])  # type: ignore[list-item]
 
 

@@ -29,7 +29,7 @@ def test_what_is_no_motion_is_one_sentence(loop: Loop, tmp_path: Path) -> None:
             take(str(loop.fit), loop.problem)
         with pytest.raises(FileError, match=r"There is no file none\.h5"):
             take("none.h5")
-        with pytest.raises(FileError, match=r"data\.h5 is no result file, so the robot is not k"):
+        with pytest.raises(FileError, match=r"data\.h5 is not a result file, so the robot is"):
             take(loop.data)
         with pytest.raises(FileError, match="do not say which robot moves"):
             take(motions_of(read_result(loop.result)))

@@ -103,7 +103,7 @@ def test_the_spring_with_inertias_free_and_kept() -> None:
 def test_what_tiago_leaves_open() -> None:
     arm = [f"arm_{j}_joint" for j in range(1, 5)]
     words = tiago([answer(arm, unexplained=[{"joint": "arm_3_joint"}])])
-    assert words.startswith("none; residuals of arm_3_joint told as unexplained.")
+    assert words.startswith("none; residuals of arm_3_joint reported as unexplained.")
     assert words.endswith("stay at 8.0 %, 8.0 % and 8.0 %")
 
 

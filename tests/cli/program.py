@@ -55,7 +55,7 @@ class Program:
         )
 
     def answer(self, *arguments: str | Path) -> Any:
-        """What `--json` prints, after a good end."""
+        """What `--json` prints, after a run that succeeded."""
         run = self(*arguments, "--json")
         assert run.returncode == 0, run.stderr
         return json.loads(run.stdout)

@@ -2,7 +2,7 @@
 
 Names are followed from where their type is stated (arguments, fields of classes, what a function
 returns) through assignments, loops and attributes; a read is an attribute of a section outside the
-room that checks the file. What is not followed counts as not read.
+package that checks the file. What is not followed counts as not read.
 """
 
 import ast
@@ -28,7 +28,7 @@ def sections_of(top: type[Section]) -> dict[str, type[Section]]:
 
 
 class Reads:
-    """Reads (section, key) in the modules of a package outside its room `config`."""
+    """Reads (section, key) in the modules of a package outside its own `config`."""
 
     def __init__(self, package: Path, known: dict[str, type[Section]]) -> None:
         self.known = known

@@ -133,19 +133,21 @@ def _imports(tree: ast.AST) -> list[str]:
     return [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
 
 
-@pytest.mark.parametrize("room", ["diagnosis", "simulation", "report", "identification", "export"])
-def test_rooms_above_know_no_kind_by_name(room: str) -> None:
+@pytest.mark.parametrize(
+    "package", ["diagnosis", "simulation", "report", "identification", "export"]
+)
+def test_packages_above_know_no_kind_by_name(package: str) -> None:
     """A kind of a package is judged, simulated and drawn as one of ours is."""
     own = {f"excite_cli.effects.{path.stem}" for path in (PACKAGE / "effects").glob("*.py")}
     shared = {"base", "catalogue", "simulated_robot", "parameter", "signals", "sign"}
     of_kinds = own - {f"excite_cli.effects.{name}" for name in shared}
-    names = NAMES if room == "diagnosis" else []
-    files = sorted((PACKAGE / room).rglob("*.py"))
+    names = NAMES if package == "diagnosis" else []
+    files = sorted((PACKAGE / package).rglob("*.py"))
     assert files
     for path in files:
         source = path.read_text(encoding="utf-8")
         tree = ast.parse(source)
         assert not set(_imports(tree)) & of_kinds, path.name
         assert not [name for name in names if name in source], path.name
-        if room in ("diagnosis", "simulation"):
+        if package in ("diagnosis", "simulation"):
             assert not set(_texts(tree)) & (set(NAMES) - {"armature"}), path.name

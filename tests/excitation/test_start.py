@@ -1,4 +1,4 @@
-"""Starts are admissible by construction, or the message says what stands in the way."""
+"""Starts are admissible by construction, or the message says what prevents one."""
 
 from pathlib import Path
 

@@ -73,5 +73,5 @@ def test_an_impossible_body_is_refused() -> None:
     robot = random_robot(1, joints=3)
     phi = true_inertias(robot, 0.3, seed=2)
     phi[4] = -1.0
-    with pytest.raises(RobotError, match=r"none that MuJoCo accepts.*consistent: true"):
+    with pytest.raises(RobotError, match=r"not one that MuJoCo accepts.*consistent: true"):
         mjcf(robot, IdentifiedModel(phi))

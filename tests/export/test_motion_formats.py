@@ -177,7 +177,7 @@ def test_bags_hold_one_message_and_are_replaced_whole(name: str, tmp_path: Path)
     assert np.array_equal(read_motion(single, JOINTS)[0].q, timed.q)
     other = tmp_path / "folder"
     other.mkdir()
-    with pytest.raises(FileError, match="is there and is no bag"):
+    with pytest.raises(FileError, match="exists and is not a bag"):
         MOTION_EXPORTERS[name].write(other, timed)
 
 

@@ -1,4 +1,4 @@
-"""Which pairs of a capsule and a thing are checked, how far they are kept, and what is told."""
+"""Which pairs of a capsule and an obstacle are checked, how far apart, and what is reported."""
 
 from pathlib import Path
 
@@ -139,7 +139,7 @@ def test_ignored_pairs_in_either_order() -> None:
     [
         (("toll", "floor"), "no link 'toll'. Did you mean 'tool'"),
         (("floor", "toll"), "no link 'toll'. Did you mean 'tool'"),
-        (("tool", "flor"), "no thing 'flor'. Did you mean 'floor'.*Things: floor, table"),
+        (("tool", "flor"), "no obstacle 'flor'. Did you mean 'floor'.*Obstacles: floor, table"),
         (("payload", "floor"), "no link 'payload'"),
     ],
 )

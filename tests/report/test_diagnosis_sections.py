@@ -99,7 +99,7 @@ def test_all_parts_are_there_and_the_page_is_sound(
     ]  # fmt: skip
     for words in (
         "viscous friction",
-        "friction that bends over speed",
+        "nonlinear viscous friction",
         "time stamps jitter by 3 %",
     ):
         assert words in structure.text
@@ -120,7 +120,7 @@ def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) ->
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert chart.title == "Viscous friction: elbow"
     assert "2 ± 0.2 N·m·s/rad" in chart.caption
-    assert "cannot tell it from: friction that bends over speed on elbow" in chart.caption
+    assert "cannot tell it from: nonlinear viscous friction on elbow" in chart.caption
     assert "99.8%" in chart.alternative or "99.9%" in chart.alternative
     assert "speed [rad/s]" in chart.svg
 

@@ -28,7 +28,7 @@ def test_a_named_pipe_is_refused(tmp_path: Path, suffix: str, command: str) -> N
         "report": ["report", pipe, "-o", tmp_path / "p.html"],
     }
     told = refused(*arguments.get(command, [command, SMOKE, pipe]))
-    assert f"{pipe} is a named pipe, no regular file" in told
+    assert f"{pipe} is a named pipe, not a regular file" in told
 
 
 def test_pipes_as_config_urdf_and_in_a_bag(tmp_path: Path) -> None:

@@ -102,7 +102,7 @@ def test_a_link_stays_and_its_file_is_written(tmp_path: Path) -> None:
 
 def test_devices_and_folders_are_never_replaced(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(FileError, match="no regular file"):
+    with pytest.raises(FileError, match="not a regular file"):
         write_atomically(tmp_path / "pipe", lambda file: file.write_text("1"))
     with pytest.raises(FileError, match="is a folder"):
         write_atomically(tmp_path, lambda file: file.write_text("1"))

@@ -49,7 +49,7 @@ def test_two_runs_on_one_output_and_a_stop(excite: Installed) -> None:
     ("output", "words"),
     [
         ("/sys/x.json", "cannot be written: no permission"),
-        ("/dev/full", "/dev/full is no regular file"),
+        ("/dev/full", "/dev/full is not a regular file"),
         (".", "is a folder"),
         ("file/x.json", "a part of this path is a file"),
         ("x" * 250, "this name is too long"),

@@ -62,7 +62,7 @@ def test_names_that_lead_here_may_not(port: int) -> None:
     with pytest.raises(urllib.error.HTTPError) as refused:
         urllib.request.urlopen(asked, timeout=10)
     assert refused.value.code == 403
-    assert b"is no name of this server" in refused.value.read()
+    assert b"is not a name of this server" in refused.value.read()
 
 
 def test_the_page_carries_a_policy(port: int) -> None:
