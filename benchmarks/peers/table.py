@@ -115,7 +115,7 @@ def goals(comparison: Comparison) -> str:
                 passed(max(low) < theirs.best),
             ]
         )
-    heads = ["goal", "FIGAROH", "excite, median (worst)", "ratio", "asked", ""]
+    heads = ["goal", "FIGAROH", "excite, median (worst)", "ratio", "required", ""]
     return _table(heads, rows) if rows else ""
 
 

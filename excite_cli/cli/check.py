@@ -16,7 +16,7 @@ def check(
         int, typer.Option("--random", min=0, max=10_000_000, help="Random instants beside them.")
     ] = 0,
     meshes: Annotated[
-        bool, typer.Option("--meshes/--no-meshes", help="Look at the collision meshes, too.")
+        bool, typer.Option("--meshes/--no-meshes", help="Check the collision meshes, too.")
     ] = True,
     slow: Annotated[
         float | None,
@@ -36,8 +36,8 @@ def check(
 
     Margins are taken at controller rate (and at random instants); distances of capsules are
     measured a second time by Pinocchio and coal. Between the instants every constraint is proved
-    with bounds that share nothing with the optimiser's kinematics; the collision meshes are looked
-    at by Pinocchio and coal, too. A verdict is `proved` (at every instant), `sampled` (no
+    with bounds that share nothing with the optimiser's kinematics; the collision meshes are checked
+    by Pinocchio and coal, too. A verdict is `proved` (at every instant), `sampled` (no
     violation seen, with the reason why it is not proved) or `BROKEN`. Exit status 1: something is
     broken.
 

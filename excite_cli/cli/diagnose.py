@@ -38,10 +38,10 @@ def diagnose(
 ) -> None:
     """Find what the declared model lacks: friction, springs, payloads, delays and more.
 
-    The declared model is fitted to all runs but the sealed one; its residual is traced to named
-    effects, with their size, certainty, and what these data cannot tell them from. The sealed run
-    is used once, for the error before and after. A single run is cut into blocks, every third
-    sealed.
+    The declared model is fitted to all runs but the held-out (sealed) one; its residual is traced
+    to named effects, with their size, certainty, and what these data cannot tell them from. The
+    sealed run is used once, for the error before and after. A single run is cut into blocks, every
+    third sealed.
 
     Examples:
       excite diagnose ur10.yaml measured.h5 -o diagnosis.h5 --apply better.yaml

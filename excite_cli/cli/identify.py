@@ -39,10 +39,11 @@ def identify(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Find the parameters of the declared model, with what they are worth.
+    """Find the parameters of the declared model, with their standard deviations.
 
-    Base parameters and those of the declared effects are fitted to all runs but the sealed one, on
-    which the errors are measured. A single run is cut into blocks, of which every third is sealed.
+    Base parameters and those of the declared effects are fitted to all runs but the held-out
+    (sealed) one, on which the errors are measured. A single run is cut into blocks, of which every
+    third is sealed.
 
     Examples:
       excite identify ur10.yaml measured.h5 -o fit.h5

@@ -34,7 +34,7 @@ def view(
     time: Annotated[
         float | None,
         typer.Option(
-            "--time", min=0.0, help="Instant of the PNG [s]. Default: where things are nearest."
+            "--time", min=0.0, help="Instant of the PNG [s]. Default: at the nearest distance."
         ),
     ] = None,
     ghosts: Annotated[

@@ -77,7 +77,7 @@ class MeasurementSpec(Section):
         "torque, {joint: {motor's joint: share}}",
     )
     sign: dict[str, Literal[-1, 1]] = Field(
-        default_factory=dict, description="-1 where the recorded torque counts the other way"
+        default_factory=dict, description="-1 where the recorded torque has the opposite sign"
     )
     offset: dict[str, Finite] = Field(
         default_factory=dict, description="added to recorded positions [rad or m]"
@@ -86,10 +86,10 @@ class MeasurementSpec(Section):
         "link", description="motor: divided by gear_ratio, undoing the coupling"
     )
     position_sign: dict[str, Literal[-1, 1]] = Field(
-        default_factory=dict, description="-1 where recorded positions count the other way"
+        default_factory=dict, description="-1 where recorded positions have the opposite sign"
     )
     velocity_sign: dict[str, Literal[-1, 1]] = Field(
-        default_factory=dict, description="-1 where recorded speeds count the other way"
+        default_factory=dict, description="-1 where recorded speeds have the opposite sign"
     )
     time: Literal["s", "ms", "us", "ns"] = Field("s", description="unit of the time stamps")
     angle: Literal["rad", "deg"] = Field(
@@ -100,7 +100,7 @@ class MeasurementSpec(Section):
     )
     channels: dict[Literal["t", "q", "dq", "tau"], str | None] = Field(
         default_factory=dict,
-        description="what the file calls a channel, as {tau: current}; {dq: null} leaves it out",
+        description="names of channels in the file, as {tau: current}; {dq: null} leaves it out",
     )
     names: dict[str, str] = Field(
         default_factory=dict, description="name in the file -> joint of the robot"
@@ -129,7 +129,8 @@ class DiagnosisSpec(Section):
 
     significance: Share = Field(0.01, description="family-wise error rate")
     gain: NonNegative = Field(
-        0.01, description="least share by which it lowers the error on runs left out"
+        0.01,
+        description="least share by which it lowers the error of cross-validation",
     )
     kinds: Literal["all"] | tuple[EffectKind, ...] = Field(
         "all", description="kinds of effects that are looked for"
@@ -138,8 +139,12 @@ class DiagnosisSpec(Section):
     moving_speed: Positive | None = Field(
         None, description="a joint moves above this speed [rad/s or m/s]; default 0.02"
     )
-    rounds: Integer = Field(60, ge=0, le=200, description="most effects that are added")
-    block: Positive | None = Field(None, description="[s] blocks a single run is cut into")
+    rounds: Integer = Field(
+        60, ge=0, le=200, description="largest number of effects that are added"
+    )
+    block: Positive | None = Field(
+        None, description="[s] length of the blocks a single run is cut into"
+    )
 
     @field_validator("kinds")
     @classmethod

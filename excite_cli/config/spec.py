@@ -99,4 +99,4 @@ class Spec(Section):
     identification: IdentificationSpec = IdentificationSpec()
     diagnosis: DiagnosisSpec = DiagnosisSpec()
     sequence: SequenceSpec = SequenceSpec()
-    seed: Integer = Field(1, ge=0, le=2**32 - 1, description="of all that is random")
+    seed: Integer = Field(1, ge=0, le=2**32 - 1, description="of all random numbers")

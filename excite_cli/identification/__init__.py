@@ -1,1 +1,1 @@
-"""From measured data to parameters, with what they are worth."""
+"""From measured data to parameters, with their standard deviations."""

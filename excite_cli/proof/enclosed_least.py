@@ -4,10 +4,10 @@ A functional y(s) of φ, enclosed over an interval, is at least
 
     c·y(s) − ‖D y(s)‖₁ − ‖E y(s)‖₂
 
-for every admitted φ (`dynamics.uncertain_inertias`). Entries of D y that keep their sign over the interval
-are ± themselves, so that they join c·y as one polynomial; the others count with the largest size
-they can have, which is small since they cross zero. With e the direction of E y in the middle,
-‖E y‖₂ ≤ e·E y + ‖the rest‖² / (2 e·E y).
+for every admitted φ (`dynamics.uncertain_inertias`). Entries of D y that keep their sign over the
+interval are ± themselves, so that they join c·y as one polynomial; the others count with the
+largest size they can have, which is small since they cross zero. With e the direction of E y in
+the middle, ‖E y‖₂ ≤ e·E y + ‖the rest‖² / (2 e·E y).
 """
 
 import numpy as np
