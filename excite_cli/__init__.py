@@ -1,7 +1,7 @@
 """excite: motions that make a robot's inertial parameters visible, and what its model lacks.
 
 What the commands do is one import away: `from excite_cli import load_problem, plan, diagnose`. The
-names below are imported when they are first asked for, so that `import excite_cli` stays light.
+names below are imported at their first use, so that `import excite_cli` stays light.
 """
 
 from importlib import import_module

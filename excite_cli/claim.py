@@ -26,7 +26,7 @@ _PATIENCE, _POLL = 5.0, 0.02  # s, for those who only put a finished file in pla
 
 @dataclass(frozen=True)
 class _Held:
-    """An open lock file, how often it was asked for, and the folders made for it, deepest first."""
+    """An open lock file, how often it was requested, and the folders made for it, deepest first."""
 
     handle: int
     count: int

@@ -51,7 +51,7 @@ def refuse_inputs_as_outputs(
     Raises
     ------
     FileError
-        One is: it is never replaced, whatever else was asked for.
+        One is: it is never replaced, whatever else was requested.
     """
     given = [Path(each) for each in inputs]
     for name, output in outputs.items():

@@ -12,6 +12,6 @@ way goes to a `Tell`, by default the logger "excite".
 Matrices here are small, and several BLAS threads make them slower: set OPENBLAS_NUM_THREADS=1
 before Python starts. (The program takes one thread by itself.)
 
-One module per command, imported when it is asked for: `import excite_cli` and `excite --help` stay
+One module per command, imported at its first use: `import excite_cli` and `excite --help` stay
 light.
 """

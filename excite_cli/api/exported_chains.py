@@ -45,12 +45,12 @@ class ExportedChain:
 
 
 def chains_of(file: Path, wanted: Wanted, tell: Tell) -> list[ExportedChain]:
-    """The motions asked for, ready to be sampled.
+    """The motions requested, ready to be sampled.
 
     Raises
     ------
     FileError, ConfigError, NoAdmissibleMotionError
-        The file cannot be read, does not hold or know what is asked for, or no admissible entry
+        The file cannot be read, does not hold or know what is requested, or no admissible entry
         was found.
     """
     if is_motion(file):

@@ -47,7 +47,7 @@ class ExportedMotion:
 class Exported:
     """The files that were written in `format`; of motions also what is in them.
 
-    `rate` [Hz], and `slow`: the share of the limits that was asked for.
+    `rate` [Hz], and `slow`: the share of the limits that was requested.
     """
 
     format: str

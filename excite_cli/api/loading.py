@@ -33,7 +33,7 @@ class Case(Shown):
     """What a config declares of a robot: enough for measured data, without anything to plan.
 
     Relative paths of `spec` start from `folder`. A `Problem` has all of this too, and can be given
-    wherever a case is asked for.
+    wherever a case is expected.
     """
 
     spec: Spec

@@ -94,7 +94,7 @@ def claim_result(path: Path, overwrite: bool, resume: bool = False, inputs: Inpu
     Raises
     ------
     ConfigError
-        Both are asked for.
+        Both are requested.
     FileError
         It is one of `inputs`, exists already and nothing says to replace or resume it, another run
         is writing it, or it cannot be written.

@@ -26,7 +26,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Report:
-    """The files that were written: the page, if one was asked for, and figures of motions."""
+    """The files that were written: the page, if one was requested, and figures of motions."""
 
     page: Path | None
     figures: tuple[Path, ...] = ()

@@ -8,7 +8,7 @@ from excite_cli.workers.catalogue import open_workers
 
 
 def working(workers: int, scheduler: str | None, threads: int, tell: Tell) -> Workers:
-    """Workers as asked for, to be closed.
+    """Workers as requested, to be closed.
 
     Raises
     ------

@@ -275,7 +275,7 @@ def run_guarded(action: Callable[[], None]) -> int:
     return status if isinstance(status, int) else 0
 
 
-# Nothing that a user could mend: the program looked for a file that it should have asked for.
+# Nothing that a user could fix: the program looked for a file that it should have asked for.
 _OUR_FAULT = (errno.ENOENT, errno.EEXIST)
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 

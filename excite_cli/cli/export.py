@@ -109,7 +109,7 @@ def export(
 
 
 def _numbers(motion: str) -> list[int]:
-    """The motion asked for; none stands for all."""
+    """The motion requested; none stands for all."""
     if motion != "all" and not (motion.isdecimal() and int(motion) > 0):
         raise ConfigError(f"--motion {motion}: give the number of a motion, from 1, or all.")
     return [] if motion == "all" else [int(motion)]

@@ -39,7 +39,7 @@ def ask(output: Path | None, joints: tuple[str, ...]) -> Answers:
 
 
 def _of_groups(groups: dict[str, tuple[str, ...]], count: int) -> tuple[str, ...]:
-    """Joints of the groups that are asked for; none for all."""
+    """Joints of the groups that are requested; none for all."""
     typer.echo("Joints to move:", err=True)
     typer.echo(f"  0  all {count}", err=True)
     names = list(groups)

@@ -18,7 +18,7 @@ USAGE_ERROR: type[Exception] = next(
 
 
 def in_our_words(error: Exception, words: list[str], commands: Iterable[str]) -> ConfigError | None:
-    """What is wrong, where, and what was meant; None for a page of help that was asked for."""
+    """What is wrong, where, and what was meant; None for a page of help that was requested."""
     if type(error).__name__ == "NoArgsIsHelpError":
         return None
     mistyped = _mistyped_command(error, words, list(commands))

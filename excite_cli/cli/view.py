@@ -149,7 +149,7 @@ def view(
 
 
 def _target(png: Path | None, gif: Path | None) -> Path | None:
-    """The picture that was asked for, with the suffix of its option."""
+    """The picture that was requested, with the suffix of its option."""
     if png is not None and gif is not None:
         raise ConfigError("--png and --gif: give one of them.")
     for option, path in (("png", png), ("gif", gif)):

@@ -131,7 +131,7 @@ class Balance(Constraint):
         return -change / weight[:, None], None, None
 
     def _worst(self, states: States) -> tuple[Array, Ratios]:
-        """Rows of mass and first moments, and the margins; those last asked for are kept."""
+        """Rows of mass and first moments, and the margins; those last requested are kept."""
         if self._last is None or self._last[0] is not states:
             rows, least = self._mass.rows(states), self._least_mass
             found = least_ratios(self._admitted, rows, self._functionals, _MASS, least)

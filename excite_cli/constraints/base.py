@@ -101,7 +101,7 @@ class Constraint(ABC):
     def why_not(self, states: States) -> str:
         """Why a real robot cannot stand as at the first of `states`, in words; empty if it can.
 
-        For members whose margin is broken by more than what a nudge should mend.
+        For members whose margin is broken by more than what a small change should repair.
         """
         return ""
 

@@ -78,7 +78,7 @@ def build_constraints(
     Raises
     ------
     ConfigError
-        A limit is asked for that the robot does not have and the file does not give, or one of
+        A limit is requested that the robot does not have and the file does not give, or one of
         `own` is not in the catalogue, or has settings that do not fit.
     """
     setting = Setting(spec, robot, uncertainty)

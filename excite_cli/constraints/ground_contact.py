@@ -133,7 +133,7 @@ class ZeroMomentPoint(Constraint):
         return by_q, by_v, by_a
 
     def _worst(self, states: States) -> Ratios:
-        """The margins; those last asked for are kept."""
+        """The margins; those last requested are kept."""
         if self._last is None or self._last[0] is not states:
             rows = self.ground.wrench.regressor(states)
             found = least_ratios(self.uncertainty, rows, self.functionals, _LOAD, self._floor)

@@ -16,7 +16,7 @@ KEPT = 0.002
 
 
 class MeshClearance(Constraint):
-    """One column per tabled pair of links: distance less `margin` and the error of the table."""
+    """One column per tabulated pair of links: distance less `margin` and the error of the table."""
 
     name = "mesh_clearance"
     title = "Nearest pair of meshes, less the margin"

@@ -1,4 +1,4 @@
-"""Distances between capsules (Eq. 53 with its sign mended): d_ij ≥ r_i + r_j + margin."""
+"""Distances between capsules (Eq. 53 with its sign corrected): d_ij ≥ r_i + r_j + margin."""
 
 import numpy as np
 

@@ -1,1 +1,1 @@
-"""What is made small: functions of the singular values of the regressor."""
+"""What is minimised: functions of the singular values of the regressor."""

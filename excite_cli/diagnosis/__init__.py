@@ -1,1 +1,1 @@
-"""From what the declared model leaves over to named effects, and to the next motion."""
+"""From the residual of the declared model to named effects, and to the next motion."""

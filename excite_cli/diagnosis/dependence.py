@@ -2,7 +2,7 @@
 
 A share is what smooth functions of one quantity take off the residual of the fit, but no more than
 they take off the error on runs left out: of noise every function explains something where it is
-fitted and nothing where it is not; and on runs left out a function may also mend what an
+fitted and nothing where it is not; and on runs left out a function may also repair what an
 ill-conditioned fit has spoiled there.
 """
 

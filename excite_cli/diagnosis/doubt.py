@@ -1,4 +1,4 @@
-"""Names that do not hold: effects that only come near something which is no effect we know.
+"""Names that do not hold: effects that only approximate something outside the catalogue.
 
 A line through a curve explains most of it, not its form. So for each effect that was found, E is
 the energy it explains on the joint where it matters most, and U what is left there with structure:

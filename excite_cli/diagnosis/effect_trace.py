@@ -1,4 +1,4 @@
-"""What convinces of an effect: the torque that everything else leaves, and the effect's own.
+"""The evidence for an effect: the torque that everything else leaves, and the effect's own.
 
 For effect e with columns C_e and fitted values θ_e, and r what the whole model leaves of the
 training torque, the partial residual is p = r + C_e θ_e. If the effect is there, p follows C_e θ_e

@@ -1,4 +1,4 @@
-"""What a quantity remembers: the way it came, as play operators see it.
+"""The history of a quantity (hysteresis), by play operators.
 
 A play operator of half-width r follows x only once x has moved r past it. x less what it shows is
 the part within the play: it runs into ±r and stays there until x turns round. Sums of such parts

@@ -1,4 +1,4 @@
-"""The way from the declared model to the diagnosis, told one effect at a time."""
+"""The way from the declared model to the diagnosis, one effect at a time."""
 
 from collections.abc import Sequence
 

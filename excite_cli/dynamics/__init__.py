@@ -1,1 +1,1 @@
-"""The robot: model, regressor, base parameters, distances, uncertain inertias."""
+"""Regressor, base parameters, inverse dynamics and their derivatives; uncertain inertias."""

@@ -2,7 +2,7 @@
 
 What effects are made of: the load of every joint, its derivatives, the columns of single bodies,
 the torque of gravity along each axis of the world, and the Jacobian of the last body. Everything is
-computed when first asked for, once.
+computed once, at first use.
 """
 
 from functools import cached_property

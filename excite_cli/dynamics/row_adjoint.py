@@ -33,7 +33,7 @@ Vectors = tuple[Array, Array]  # linear and angular part, each with its three co
 
 @dataclass(frozen=True)
 class _Motion:
-    """World motion at the instants asked for, components first.
+    """World motion at the instants requested, components first.
 
     Of the bodies (…, T, B): orientation (3, 3), place (3), velocity and acceleration (6), of the
     moved joints (6, T, n): columns with their first and second rates.

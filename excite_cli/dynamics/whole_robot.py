@@ -42,7 +42,7 @@ class GroundWrench:
         self._last: tuple[States, Array] | None = None
 
     def regressor(self, states: States) -> Array:
-        """The regressor at `states`; those last asked for are kept."""
+        """The regressor at `states`; those last requested are kept."""
         if self._last is None or self._last[0] is not states:
             self._last = states, self._evaluated(states)
         return self._last[1]

@@ -1,4 +1,4 @@
-"""A touch: an external force f at the tip during a window of time in one run.
+"""Contact: an external force f at the tip during a window of time in one run.
 
 The motors must add −Jᵀ f, with J the linear Jacobian of the last moved joint's frame in axes of the
 world. The parameters are the force on the robot.

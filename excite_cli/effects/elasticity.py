@@ -1,4 +1,4 @@
-"""A gear that gives way: two inertias with a spring in between, seen from the motor's encoder.
+"""An elastic gear: two inertias with a spring in between, seen from the motor's encoder.
 
 The spring turns by c τ_j, c = 1/K, so the link is at q_j − c τ_j. To first order in c the torque
 of all joints changes by

@@ -1,6 +1,6 @@
-"""The least change of a motion that mends its broken residuals to first order.
+"""The least change of a motion that repairs its broken residuals to first order.
 
-Rows that need mending are few: the dips in time of residuals near zero. The shortest change that
+Rows that need repair are few: the dips in time of residuals near zero. The shortest change that
 lifts them, in the metric of the task, is a least-distance problem (Lawson and Hanson 1974).
 """
 
@@ -16,15 +16,15 @@ from excite_cli.excitation.task import MotionTask
 Mask = NDArray[np.bool_]
 
 _ROUNDS = 10
-# Least residual aimed at, and the residual below which a dip is mended.
+# Least residual aimed at, and the residual below which a dip is repaired.
 _AIM, _NEAR = 1e-4, 0.05
 
 
 def corrected(task: MotionTask, x: Array, aim: float = _AIM, enough: float = 0.0) -> Array | None:
-    """x with the least corrections, in the metric of the task, that mend its linearised residuals.
+    """x with the least corrections, in the metric of the task, that repair linearised residuals.
 
-    `aim` is the residual wanted of the rows that are mended. None where some stay below `enough`;
-    rows that no change of x can mend (given ends) need only be positive.
+    `aim` is the residual wanted of the rows that are repaired. None where some stay below `enough`;
+    rows that no change of x can repair (given ends) need only be positive.
     """
     factor = np.linalg.cholesky(
         task.metric + 1e-9 * np.trace(task.metric) / task.size * np.eye(task.size)

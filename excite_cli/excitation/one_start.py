@@ -1,4 +1,4 @@
-"""One start of a motion: drawn, solved, and mended until it holds between the instants too.
+"""One start of a motion: drawn, solved, and corrected until it holds between the instants too.
 
 It depends on its arguments only, and these can be pickled: it may be done by any worker.
 """
@@ -82,7 +82,7 @@ def kept_between_instants(
     effort: Effort,
     report: ProgressCallback,
 ) -> Outcome:
-    """The outcome, mended until every constraint is proved between the instants.
+    """The outcome, corrected until every constraint is proved between the instants.
 
     Where a margin is negative (without certificates: at controller rate) the guard of that column
     is raised by it, and the solver goes on from the nearest point towards the base motion that has

@@ -1,4 +1,4 @@
-"""A way between two postures round everything that a standing robot must keep clear of.
+"""A path between two postures around everything that a standing robot must keep clear of.
 
 Two trees of postures grow from the ends towards random postures and towards each other
 (RRT-Connect, Kuffner and LaValle 2000); an edge goes on as far as it is free. All postures of an
@@ -34,7 +34,7 @@ _SHARE_OF_ENDS = 0.5
 class FreeSpace:
     """Postures at which standing still leaves `room` (a share of each scale) everywhere.
 
-    Columns for which an end of the way has less are asked for half of what it has.
+    Columns for which an end of the way has less must keep half of what it has.
     """
 
     def __init__(self, problem: Problem, ends: Array, room: float) -> None:

@@ -1,11 +1,11 @@
 """The same path, slower: speeds fall with the pace c, accelerations with its square.
 
-With |v_j(t)| ≤ share·v_max,j and |a_j(t)| ≤ share·a_max,j asked for at every instant,
+With |v_j(t)| ≤ share·v_max,j and |a_j(t)| ≤ share·a_max,j required at every instant,
 
     c = min(1, min_j share·v_max,j / max_t|v_j|, min_j √(share·a_max,j / max_t|a_j|))
 
 The largest speeds and accelerations are bounds over whole intervals of time (Taylor models), so
-that what is asked for holds between samples too. Torques of rigid bodies, τ = τ_g + c²·(τ₁ − τ_g),
+that the limits hold between samples too. Torques of rigid bodies, τ = τ_g + c²·(τ₁ − τ_g),
 lie between those of standing still at the same posture, τ_g, and those of the original, τ₁: a slow
 motion can break a bound on torque only where standing still breaks it.
 """

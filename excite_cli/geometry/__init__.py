@@ -1,1 +1,1 @@
-"""The robot: model, regressor, base parameters, distances, uncertain inertias."""
+"""Capsules, pairs of links, meshes and obstacles, and the distances between them."""

@@ -4,7 +4,7 @@ Nothing is shared with the capsules of the constraint: forward kinematics is Pin
 geometry is the URDF's, and coal decides. To be fast, each (pair, instant) is asked in turn: do
 balls around the links, do their convex hulls (by separating planes, a proof for each), do the
 meshes come nearer than the distance that matters? That last question is far cheaper than a
-distance, which is asked for only where it lowers the least one found so far.
+distance, which is requested only where it lowers the least one found so far.
 """
 
 from collections.abc import Collection, Iterable
@@ -80,7 +80,7 @@ class MeshProof:
     """Per interval k and judged pair p, each (K, P).
 
     distance: a lower bound [m] of that of the meshes at any instant of the interval, −∞ for pairs
-    that were not asked for; proved: where it exceeds the margin; broken: where the meshes are not
+    that were not requested; proved: where it exceeds the margin; broken: where the meshes are not
     farther apart than the margin at the instant given, so that no shorter interval can help.
     """
 

@@ -1,4 +1,4 @@
-"""Distance of the meshes of two links, tabled over the two joints between them."""
+"""Distance of the meshes of two links, tabulated over the two joints between them."""
 
 from dataclasses import dataclass
 from functools import cached_property

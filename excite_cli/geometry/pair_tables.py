@@ -1,4 +1,4 @@
-"""Distances of meshes that always lie near each other, tabled over the two joints between them.
+"""Distances of meshes that always lie near each other, tabulated over the two joints between them.
 
 The capsules of links a joint or two apart may overlap whatever the posture (a wrist's sensor and
 the forearm), so capsules cannot keep their meshes apart. But their distance depends on those

@@ -22,7 +22,7 @@ from excite_cli.identification.prior import InertialPrior
 from excite_cli.identification.pseudo_inertia import scaled_basis, smallest_eigenvalues
 from excite_cli.robot.model import Array
 
-# Least eigenvalue asked for, as a share of the mean mass of a body.
+# Least eigenvalue required, as a share of the mean mass of a body.
 _MARGIN = 1e-6
 _ROOT2 = float(np.sqrt(2.0))
 

@@ -30,7 +30,7 @@ def short_number(value: float, digits: int) -> str:
 
 
 def consistency_in_words(fit: Fit) -> str:
-    """Whether a physically consistent set fits as well; empty if none was asked for."""
+    """Whether a physically consistent set fits as well; empty if none was requested."""
     consistent = fit.consistent
     if consistent is None:
         return ""

@@ -54,7 +54,7 @@ def choose_processing(
     Raises
     ------
     ConfigError
-        A cut-off lies beyond half the recorded rate, or measured speeds are asked for and absent.
+        A cut-off lies beyond half the recorded rate, or measured speeds are requested and absent.
     """
     fs = float(np.median([1.0 / run.step for run in runs]))
     frequency, power = _spectra(runs, fs)

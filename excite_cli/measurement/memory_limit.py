@@ -1,4 +1,4 @@
-"""A limit of memory while a file that may be anyone's is read.
+"""A limit of memory while an untrusted file is read.
 
 A few damaged bytes make HDF5 ask for gigabytes: for a text whose length they state, or for a heap.
 While the limit holds such a request fails inside the library, which says so, and nothing is lost.

@@ -1,4 +1,4 @@
-"""Units that cannot be: milliseconds for seconds, degrees for radians, odd gains of the speed.
+"""Impossible units: milliseconds for seconds, degrees for radians, odd gains of the speed.
 
 Judged without a model of the dynamics: recorded speeds against differentiated positions, speeds
 and positions against the robot's limits, the sampling rate against any rate of a robot's bus.

@@ -1,1 +1,1 @@
-"""What quantities can be over whole intervals of time: Taylor models."""
+"""What holds over whole intervals of time: Taylor models, bounds, the certificate."""

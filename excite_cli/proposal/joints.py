@@ -47,7 +47,7 @@ def choose_joints(joints: Iterable[UrdfJoint], source: str, asked: tuple[str, ..
     RobotError
         No joint can be moved, or none but wheels and rotors.
     ConfigError
-        A joint that is asked for is unknown or cannot be moved.
+        A joint that is requested is unknown or cannot be moved.
     """
     joints = tuple(joints)
     if not joints:
@@ -150,7 +150,7 @@ def _as_asked(joints: tuple[UrdfJoint, ...], asked: tuple[str, ...]) -> Choice:
             )
     others = tuple(joint.name for joint in joints if joint.name not in asked)
     chosen = tuple(joint for joint in joints if joint.name in asked)
-    return Choice(chosen, {"not asked for": others} if others else {})
+    return Choice(chosen, {"not requested": others} if others else {})
 
 
 def _listed(names: tuple[str, ...]) -> str:

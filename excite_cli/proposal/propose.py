@@ -31,7 +31,7 @@ _FEW, _MANY = 10, 20
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked for.
+    """What is requested.
 
     urdf: as robot.urdf says it; folder: that of the config, from which paths start; joints: to
     move, empty for a choice of ours.
@@ -65,7 +65,7 @@ def propose(request: Request) -> Proposal:
     RobotError
         The robot lacks what a plan needs; the message names it.
     ConfigError
-        A joint that is asked for is unknown or cannot be moved.
+        A joint that is requested is unknown or cannot be moved.
     NoAdmissibleMotionError
         No posture of the robot is clear of its limits.
     """

@@ -1,7 +1,7 @@
 """Settling a proposed problem: a clear posture, and what must yield so that there is one.
 
-The optimiser's own search is asked for a posture. Where it finds none, what prevents one at
-the best posture yields: torque limits that do not hold the robot up, the distance kept between
+The optimiser's own search looks for a posture. Where it finds none, what prevents one at the best
+posture yields: torque limits that do not hold the robot up, the distance kept between
 capsules, and capsules of neighbours, whose meshes are kept apart instead. Links whose meshes touch
 where the robot stands are reported and left out, as the check of the meshes leaves them out.
 """

@@ -1,4 +1,4 @@
-"""What convinces of an effect: the torque that everything else leaves, and the law over it."""
+"""The evidence for an effect: the torque that everything else leaves, and the law over it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,1 +1,1 @@
-"""The robot: model, regressor, base parameters, distances, uncertain inertias."""
+"""The robot of a URDF: joints, links, limits, payload."""

@@ -1,6 +1,6 @@
 """What is checked of a URDF before any library reads it: size, depth, structure and numbers.
 
-A file may be anyone's. The libraries that build models of it recurse by its depth, print to the
+Files are not trusted. The libraries that build models of it recurse by its depth, print to the
 terminal, and some of them end the program by what they do not expect; so all that they get here is
 a tree of named links and joints, with finite numbers of a real robot, within limits of size.
 """

@@ -57,7 +57,7 @@ def run_study(
     Raises
     ------
     FileError
-        Files of a study are in the folder, and neither `resume` nor `overwrite` is asked for; or,
+        Files of a study are in the folder, and neither `resume` nor `overwrite` is requested; or,
         with `resume`, of other cases. Another run is writing it, or it cannot be written to.
     """
     claim(folder / TABLE)

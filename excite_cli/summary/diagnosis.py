@@ -31,7 +31,7 @@ def diagnosis_answer(
     written: Mapping[str, str | Path | None],
     verbose: bool = False,
 ) -> Answer:
-    """What `excite diagnose` answers; `written` are the files that were asked for, by kind.
+    """What `excite diagnose` answers; `written` are the files that were requested, by kind.
 
     With `verbose` also how the data were processed, every round's suspects, and small effects.
     """

@@ -23,7 +23,7 @@ from excite_cli.summary.noise_floor import floor_cells, floor_columns
 def identification_answer(
     found: Identification, written: Mapping[str, str | Path | None]
 ) -> Answer:
-    """What `excite identify` answers; `written` are the files that were asked for, by kind."""
+    """What `excite identify` answers; `written` are the files that were requested, by kind."""
     files = {kind: str(path) for kind, path in written.items() if path is not None}
     return Answer(tuple(identification_parts(found)), {**_data(found), "output": files})
 

@@ -81,7 +81,7 @@ def _uncertainty(problem: Problem) -> Iterator[Note]:
     if not held:
         yield _warning(
             "uncertainty bounds nothing: it concerns constraints.torque, balance and "
-            "contact, and none of them is asked for"
+            "contact, and none of them is configured"
         )
         return
     known = f", and within {spec.sigmas:g} standard deviations of {spec.fit}" if spec.fit else ""

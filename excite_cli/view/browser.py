@@ -61,7 +61,7 @@ def play_in_browser(
     """Serve the motions of `problem` until interrupted, or as long as `going`.
 
     `ready` hears the address and the port as soon as the page can be opened; the port is another
-    one than asked for if that is taken. `say` hears what cannot be shown as the URDF says it.
+    one than requested if that is taken. `say` hears what cannot be shown as the URDF says it.
 
     Raises
     ------

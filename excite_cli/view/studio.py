@@ -1,7 +1,7 @@
 """A scene at an instant as a picture: shaded bodies on a grid, with what is translucent over them.
 
 One ray for each pixel finds where edges are; there more rays smooth them. Everything is computed
-on the processor (see `tracing`).
+on the processor (see `rays`).
 """
 
 from collections.abc import Sequence

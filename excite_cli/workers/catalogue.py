@@ -1,4 +1,4 @@
-"""Where work can be done, by what is asked for."""
+"""Where work can be done: the workers that were requested."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ def open_workers(
     Raises
     ------
     ConfigError
-        Both are asked for, or less than one, or more than `MOST_WORKERS`.
+        Both are requested, or less than one, or more than `MOST_WORKERS`.
     ClusterError, MissingExtraError
         See `Cluster`.
     """

@@ -1,1 +1,1 @@
-"""Ways to the best motion: feasible interior point, SQP, SLSQP."""
+"""The search for the best motion: a feasible interior point."""

@@ -1,4 +1,4 @@
-"""Feasible interior point with a structured Hessian (the default).
+"""Feasible interior point with a structured Hessian.
 
 Minimises f(x) + μ/T Σ b(c_i(x)) for falling μ, f being the smooth criterion with p rising at the
 same time, and c_i > 0 the residuals. Every iterate is strictly admissible, so the run may be cut
@@ -133,7 +133,7 @@ class _Run:
                 return point.x, Status.CONVERGED
 
     def remember(self, point: _Point) -> None:
-        """Keep the best admissible point by the criterion asked for, not its stand-in."""
+        """Keep the best admissible point by the criterion requested, not its stand-in."""
         value = self.task.problem.criterion.value(point.spectrum.sigma)
         if value < self.best:
             self.best, self.best_x = value, point.x
