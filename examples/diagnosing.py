@@ -35,7 +35,7 @@ for named in found.effects:
     print(f"{named.effect.kind} on {joints}, p at most {p:.1g}")
     for name, found_value in named.parameters.items():
         print(f"  {name} = {found_value.value:.4f} ± {found_value.std:.4f} {found_value.unit}")
-    print(f"  not to be told from it: {[alias.kind for alias in named.aliases] or 'nothing'}")
+    print(f"  cannot be told apart from: {[alias.kind for alias in named.aliases] or 'nothing'}")
 before, after = found.before.mean_relative_moving, found.after.mean_relative_moving
 print(f"error on {found.sealed_run}: {before:.2%} before, {after:.2%} after")
 

@@ -120,7 +120,7 @@ def export_file(
         )
     if slow is not None:
         text = (
-            "a slowed motion needs other torques: judge what was written, `excite check CONFIG "
+            "a slowed motion needs other torques: check what was written, `excite check CONFIG "
             f"{paths[0]}`, before it is played"
         )
         tell(Note(Level.INFO, text))

@@ -31,8 +31,8 @@ def working(workers: int, scheduler: str | None, threads: int, tell: Tell) -> Wo
 def tell_idle(workers: int, starts: int, tell: Tell) -> None:
     """A hint where a motion has fewer starts than there are workers."""
     if workers > starts:
-        busy = "one start: one worker has" if starts == 1 else f"{starts} starts: {starts} have"
-        text = f"{busy} something to do, of {workers} workers; see --starts"
+        busy = "one start keeps one" if starts == 1 else f"{starts} starts keep {starts}"
+        text = f"{busy} of {workers} workers busy; see --starts"
         tell(Note(Level.HINT, text))
 
 

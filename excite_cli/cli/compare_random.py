@@ -13,7 +13,7 @@ from excite_cli.cli.help_page import OUTPUT
 def compare_random(
     config: options.Config,
     candidates: Annotated[
-        int, typer.Option("--candidates", min=1, help="Least number of random motions.")
+        int, typer.Option("--candidates", min=1, help="Minimum number of random motions.")
     ] = 300,
     budget: Annotated[
         float | None,

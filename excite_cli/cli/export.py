@@ -43,10 +43,10 @@ def export(
     rate: Annotated[float, typer.Option("--rate", help="Instants per second [Hz].")] = 1000.0,
     equidistant: Annotated[
         bool,
-        typer.Option("--equidistant", help="Stretch the step so that all are equal up to the end."),
+        typer.Option("--equidistant", help="Stretch the step so that all steps are equal."),
     ] = False,
     periods: Annotated[
-        int, typer.Option("--periods", min=1, help="Play a motion that closes this many times.")
+        int, typer.Option("--periods", min=1, help="Repeat a closed motion this many times.")
     ] = 1,
     slow: Annotated[
         float | None,

@@ -41,7 +41,7 @@ def optimize(
     ] = None,
     seed: options.Seed = None,
     overrides: options.Set = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with an existing file.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue an existing file.")] = False,
     overwrite: options.Overwrite = False,
     threads: options.Threads = 1,
     workers: options.Workers = 1,

@@ -46,7 +46,9 @@ def report(
     kind: Annotated[
         Format | None,
         typer.Option(
-            "--format", help="Of --figures in a folder. Default: png.", rich_help_panel=OUTPUT
+            "--format",
+            help="Format of --figures in a folder. Default: png.",
+            rich_help_panel=OUTPUT,
         ),
     ] = None,
     config: Annotated[

@@ -46,13 +46,16 @@ def simulate(
             "--repeat",
             rich_help_panel=_PLAYED,
             min=1,
-            help="Takes of each motion, with fresh noise.",
+            help="Recordings of each motion, with fresh noise.",
         ),
     ] = 1,
     periods: Annotated[
         int,
         typer.Option(
-            "--periods", rich_help_panel=_PLAYED, min=1, help="Periods of a motion in each take."
+            "--periods",
+            rich_help_panel=_PLAYED,
+            min=1,
+            help="Periods of a motion in each recording.",
         ),
     ] = 1,
     entry: Annotated[
@@ -80,7 +83,7 @@ def simulate(
         typer.Option(
             "--torque-noise",
             rich_help_panel=_MEASURED,
-            help="As a share of the joint's torque RMS.",
+            help="Torque noise as a share of the joint's RMS torque.",
         ),
     ] = 0.01,
     noise_correlation: Annotated[
@@ -88,7 +91,7 @@ def simulate(
         typer.Option(
             "--noise-correlation",
             rich_help_panel=_MEASURED,
-            help="Of the noise, from sample to sample.",
+            help="Correlation of the noise from sample to sample.",
         ),
     ] = 0.0,
     encoder: Annotated[
@@ -102,7 +105,7 @@ def simulate(
         typer.Option(
             "--inertia-error",
             rich_help_panel=_ROBOT,
-            help="Of the robot's inertias against the URDF; 0: none.",
+            help="Deviation of the robot's inertias from the URDF; 0: none.",
         ),
     ] = 0.2,
     no_declared: Annotated[
@@ -110,7 +113,7 @@ def simulate(
         typer.Option(
             "--no-declared",
             rich_help_panel=_ROBOT,
-            help="The robot lacks the config's own effects.",
+            help="Leave out the effects that the config declares.",
         ),
     ] = False,
     torque_limits: Annotated[
@@ -118,7 +121,7 @@ def simulate(
         typer.Option(
             "--torque-limits",
             rich_help_panel=_ROBOT,
-            help="Motors stop at the robot's effort limits.",
+            help="Motors saturate at the robot's effort limits.",
         ),
     ] = False,
     seed: options.Seed = None,

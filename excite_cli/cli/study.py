@@ -40,7 +40,7 @@ def study(
     ] = None,
     resume: Annotated[
         bool,
-        typer.Option("--resume", help="Skip cases that are there; failed ones are done again."),
+        typer.Option("--resume", help="Skip finished cases; repeat failed ones."),
     ] = False,
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,

@@ -38,7 +38,8 @@ def view(
         ),
     ] = None,
     ghosts: Annotated[
-        int, typer.Option("--ghosts", min=0, max=20, help="Faint other instants in the PNG.")
+        int,
+        typer.Option("--ghosts", min=0, max=20, help="Further instants, drawn faintly in the PNG."),
     ] = 0,
     size: Annotated[
         str | None,
@@ -47,7 +48,9 @@ def view(
     angles: Annotated[
         str,
         typer.Option(
-            "--view", metavar="AZIMUTH,ELEVATION", help="From where [°]: 0,0 is along the x axis."
+            "--view",
+            metavar="AZIMUTH,ELEVATION",
+            help="Direction of view [°]; 0,0: along the x axis.",
         ),
     ] = "35,18",
     fps: Annotated[

@@ -52,7 +52,7 @@ def check_plausibility(robot: Robot, runs: Sequence[PreparedRun]) -> None:
     Raises
     ------
     FileError
-        Columns are in another order, or torques or positions of joints count the other way.
+        Columns are in another order, or torques or positions of joints have the opposite sign.
     """
     samples, dynamics = samples_of(runs, _SAMPLES), InverseDynamics(robot)
     table = shares_left(
@@ -183,7 +183,8 @@ def _sentences(names: Sequence[str], change: Change) -> list[str]:
             whose = "every joint" if len(wrong) == n > 1 else ", ".join(names[j] for j in wrong)
             setting = ", ".join(f"{names[j]}: -1" for j in wrong)
             found.append(
-                f"the {word} of {whose} counts the other way (set measurement.{key}: {{{setting}}})"
+                f"the {word} of {whose} has the opposite sign "
+                f"(set measurement.{key}: {{{setting}}})"
             )
     return found
 

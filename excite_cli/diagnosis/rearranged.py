@@ -139,7 +139,7 @@ def positions_changed(dynamics: InverseDynamics, samples: Samples) -> list[Verdi
 
 
 def mirrored(dynamics: InverseDynamics, samples: Samples, change: Change) -> list[Verdict]:
-    """What torques of another sign may be as well: the joint's positions count the other way."""
+    """What torques of another sign may be as well: the joint's positions have the opposite sign."""
     turned = np.flatnonzero((change.tau_sign < 0) & (change.q_sign > 0))
     if not len(turned):
         return []

@@ -113,7 +113,7 @@ def _names_of_none(kind: type[Effect], kinds: Mapping[str, type[Effect]]) -> str
     for trait in ("refines", "excludes", "same_as", "deviates_from"):
         for name in getattr(kind, trait):
             if name not in kinds:
-                return f"`{trait}` names '{name}', which there is not.{nearest(name, kinds)}"
+                return f"`{trait}` names '{name}', which does not exist.{nearest(name, kinds)}"
     return ""
 
 

@@ -74,7 +74,7 @@ def mesh_verdict(path: Path, check: MeshCheck, times: Array) -> MeshVerdict:
         if len(pending) > _MOST_OPEN:
             break
         pending, asked = pending.halved(), np.tile(asked, (2, 1))
-    reason = "the meshes come too near to each other to be told apart between the instants"
+    reason = "the meshes come too near to each other for a proof between the instants"
     return MeshVerdict("sampled", reason, gaps, times)
 
 

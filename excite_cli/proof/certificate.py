@@ -154,7 +154,7 @@ def _settled(path: Path, constraint: Provable, open_: list[Intervals]) -> Verdic
     if len(pending) > _MOST_OPEN:
         return seen.verdict("sampled", lacking, "too many intervals would have to be looked at")
     if len(pending):
-        thin = "the margin is too thin to be told from zero"
+        thin = "the margin is too small to be distinguished from zero"
         return seen.verdict("sampled", lacking, thin)
     return Verdict(constraint.name, "proved", lacking)
 

@@ -52,7 +52,7 @@ def dependence_section(found: Diagnosis) -> Section:
     if not found.unexplained:
         sentences.append(
             Text(
-                "No dependence on any quantity is left that the tests call sure: what remains "
+                "No significant dependence on any quantity is left: what remains "
                 "behaves like noise.",
                 "good",
             )
@@ -105,7 +105,7 @@ def _map(dependence: Dependence) -> Block:
         caption=(
             "Columns: the joint whose torque is left. A share counts as far as runs left out "
             "confirm it; shares overlap, since quantities of one motion do. Not every one is "
-            "sure: the sentences above say which are."
+            "significant: the sentences above say which are."
         ),
     )
 

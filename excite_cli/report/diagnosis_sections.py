@@ -37,8 +37,7 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
         KeyFigure(
             "unexplained",
             counted(len(diagnosis.unexplained), "joint"),
-            ", ".join(each.joint for each in diagnosis.unexplained)
-            or "no dependence that the tests call sure",
+            ", ".join(each.joint for each in diagnosis.unexplained) or "no significant dependence",
         ),
     )
 

@@ -111,16 +111,16 @@ CASES: dict[str, tuple[Damage, tuple[str, ...]]] = {
     "reversed torques": (torques_in_order(4, 3, 2, 1, 0), ("torques are in another order",)),
     "all torque signs": (
         lambda run: replace(run, tau=-run.tau),
-        ("torque of every joint counts the other way", "measurement.sign"),
+        ("torque of every joint has the opposite sign", "measurement.sign"),
     ),
     "position sign": (
         flipped(2, "q", "dq"),
-        ("position of elbow counts the other way", "measurement.position_sign: {elbow: -1}"),
+        ("position of elbow has the opposite sign", "measurement.position_sign: {elbow: -1}"),
     ),
     **{
         f"torque sign of {name}": (
             flipped(j, "tau"),
-            (f"torque of {name} counts the other way", f"measurement.sign: {{{name}: -1}}"),
+            (f"torque of {name} has the opposite sign", f"measurement.sign: {{{name}: -1}}"),
         )
         for j, name in enumerate(NAMES)
     },

@@ -22,8 +22,8 @@ def test_a_system_that_does_not_tell_its_affinity_has_all_processors(
 @pytest.mark.parametrize(
     ("workers", "starts", "said"),
     [
-        (2, 1, "hint: one start: one worker has something to do"),
-        (4, 3, "hint: 3 starts: 3 have something to do"),
+        (2, 1, "hint: one start keeps one of 2 workers busy"),
+        (4, 3, "hint: 3 starts keep 3 of 4 workers busy"),
         (2, 2, ""),
         (1, 1, ""),
     ],

@@ -82,7 +82,7 @@ def test_clean_data_raise_no_alarm(robot: Robot, rubbing: Dataset, frictionless:
 def test_a_torque_or_a_position_of_other_sign(robot: Robot, rubbing: Dataset, j: int) -> None:
     name = robot.joint_names[j]
     message = told(robot, changed(rubbing, tau=negative(j)))
-    assert f"torque of {name} counts the other way" in message
+    assert f"torque of {name} has the opposite sign" in message
     message = told(robot, changed(rubbing, q=negative(j)))
     # Of light wrists, torque and position cannot be told apart, and both are named.
     assert f"measurement.position_sign: {{{name}: -1}}" in message
@@ -91,7 +91,7 @@ def test_a_torque_or_a_position_of_other_sign(robot: Robot, rubbing: Dataset, j:
 
 def test_all_torques_of_other_sign(robot: Robot, rubbing: Dataset) -> None:
     message = told(robot, changed(rubbing, tau=-np.ones(6)))
-    assert "torque of every joint counts the other way" in message
+    assert "torque of every joint has the opposite sign" in message
     assert "position" not in message.split("As they are")[0].replace("position_sign", "")
 
 
@@ -110,7 +110,7 @@ def test_torques_in_another_order(robot: Robot, rubbing: Dataset, name: str) -> 
     moved = [robot.joint_names[j] for j in range(6) if order[j] != j]
     assert "torques" in message.split("As they are")[0]
     assert all(joint in message for joint in moved)
-    assert "counts the other way" not in message.split("As they are")[0]
+    assert "has the opposite sign" not in message.split("As they are")[0]
 
 
 @pytest.mark.parametrize("name", ["swap", "shift", "reversal"])
@@ -130,7 +130,7 @@ def test_a_wrist_without_friction_cannot_be_judged_and_nothing_wrong_is_said(
     """The last link's torque comes from a centre of mass that the URDF puts on its axis: which
     side it is on, the sign of the torque, nobody can know. No other joint may be accused."""
     message = told(robot, changed(frictionless, tau=negative(5)))
-    assert message == "" or "torque of wrist_3_joint counts the other way" in message
+    assert message == "" or "torque of wrist_3_joint has the opposite sign" in message
 
 
 @pytest.mark.parametrize("name", URDFS)
@@ -140,7 +140,7 @@ def test_real_logs(name: str) -> None:
     for run in data.runs:
         assert told(robot, replace(data, runs=(run,))) == ""
     message = told(robot, changed(data, tau=negative(2)))
-    assert f"torque of {robot.joint_names[2]} counts the other way" in message
+    assert f"torque of {robot.joint_names[2]} has the opposite sign" in message
 
 
 def test_stacked_least_squares_against_scipy() -> None:

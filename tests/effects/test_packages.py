@@ -39,7 +39,7 @@ UNUSABLE = {
     "of no kind": (
         GOOD + "    refines = ('coulom_friction',)\n",
         "Mine",
-        "`refines` names 'coulom_friction', which there is not. Did you mean 'coulomb_friction'",
+        "`refines` names 'coulom_friction', which does not exist. Did you mean 'coulomb_friction'",
     ),
     "taken": ("from excite_cli.effects.spring import Spring as Mine", "Mine", "another effect"),
 }
