@@ -1,7 +1,7 @@
 """Errors the program raises on purpose, each with the exit status it leads to.
 
 Every message says what is wrong, where, what would have been allowed and what to do. Anything
-that is not an `ExciteError` is a bug of ours (exit status 70).
+that is not an `ExciteError` is a bug of this program (exit status 70).
 """
 
 import difflib
@@ -27,7 +27,7 @@ class RobotError(ExciteError):
 
 
 class FileError(ExciteError):
-    """A file that was given cannot be read, is not ours, or must not be overwritten."""
+    """A file that was given cannot be read, is of another program, or must not be overwritten."""
 
 
 class MissingExtraError(ExciteError):

@@ -23,7 +23,7 @@ def read_result(path: str | Path) -> Result:
     Raises
     ------
     FileError
-        The file is missing, unreadable, not ours, damaged, or of a newer schema.
+        The file is missing, unreadable, not one of this program, damaged, or of a newer schema.
     """
     return result_file.read_result(Path(path))
 

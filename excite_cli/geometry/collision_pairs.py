@@ -193,7 +193,7 @@ def _contacts(
     """Why each pair of capsules that overlap at all times is not checked.
 
     No motion can part the capsules, so nothing can be asked of them. Where the meshes do part at
-    times, the pair is said to be unguarded, so that somebody looks at it.
+    times, the pair is reported as unguarded, so that somebody checks it.
     """
     meshes: MeshDistances | None = None
     known: dict[tuple[str, str], float] = {}

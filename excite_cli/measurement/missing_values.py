@@ -1,4 +1,4 @@
-"""NaN and infinite values: taken out, filled and masked, and always said.
+"""NaN and infinite values: taken out, filled and masked, and always reported.
 
 What is larger than anything measured (`BEYOND`) counts as infinite: recorders write such numbers
 where they have none, and arithmetic with them overflows. Stamps may be larger, so that a clock in

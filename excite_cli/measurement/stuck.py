@@ -1,4 +1,4 @@
-"""Samples that repeat while the robot moves: masked, and said."""
+"""Samples that repeat while the robot moves: masked, and reported."""
 
 from dataclasses import replace
 

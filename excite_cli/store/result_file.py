@@ -130,7 +130,7 @@ def read_result(path: Path) -> Result:
     Raises
     ------
     FileError
-        The file is missing, unreadable, not ours, damaged, or of a newer schema.
+        The file is missing, unreadable, not one of this program, damaged, or of a newer schema.
     """
     with opened(path, OWN) as file:
         return _read(file, path)

@@ -33,7 +33,7 @@ REFUSED = {
 MISTYPED = {
     "thing to ignore": (
         [AWAY, "constraints.surroundings.ignore=[[forearm, tabel]]"],
-        "no thing 'tabel'. Did you mean 'table'",
+        "no obstacle 'tabel'. Did you mean 'table'",
     ),
     "link of the payload": (
         [LOAD.format(link="tol", end=0.1)],

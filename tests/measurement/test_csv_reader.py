@@ -94,7 +94,7 @@ def test_names_lead_to_joints(tmp_path: Path) -> None:
         read(write_csv(tmp_path / "b.csv", run), names={"A4": "wrist"})
     with pytest.raises(ConfigError, match=r"does not move.*Did you mean 'elbow'"):
         read(path, names={"A1": "elbo"})
-    with pytest.raises(ConfigError, match="twice to 'elbow'"):
+    with pytest.raises(ConfigError, match="two columns to 'elbow'"):
         read(path, names={"A1": "elbow", "A2": "elbow"})
 
 
