@@ -5,12 +5,14 @@ effects, labels of runs, names in words, sentences of findings.
 """
 
 import inspect
+import pkgutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass, replace
 from enum import Enum
 from functools import wraps
+from importlib import import_module
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -18,9 +20,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-import excite_cli.api as api
-import excite_cli.cli.diagnose_tables
-import excite_cli.cli.telling  # noqa: F401  (with all that it imports)
+import excite_cli as api
+import excite_cli.summary
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.catalogue import catalogue, kind_named
@@ -32,6 +33,9 @@ from tests.cli.program import SMOKE
 from tests.diagnosis.test_sealed import motion
 
 pytest.importorskip("mujoco")
+
+for summarised in pkgutil.iter_modules(excite_cli.summary.__path__, "excite_cli.summary."):
+    import_module(summarised.name)  # words are replaced in what is imported
 
 from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings
