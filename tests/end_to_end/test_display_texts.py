@@ -34,12 +34,12 @@ from tests.diagnosis.test_sealed import motion
 
 pytest.importorskip("mujoco")
 
-for summarised in pkgutil.iter_modules(excite_cli.summary.__path__, "excite_cli.summary."):
-    import_module(summarised.name)  # words are replaced in what is imported
-
 from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
+
+for summarised in pkgutil.iter_modules(excite_cli.summary.__path__, "excite_cli.summary."):
+    import_module(summarised.name)  # words are replaced in what is imported
 
 JUNK = "q[elbow] 6-12 s (first half): always in contact"  # looks like much, and means nothing
 ELBOW = 2
