@@ -22,13 +22,11 @@ import pytest
 
 import excite_cli as api
 import excite_cli.summary
-from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.excitation.result import Result
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Robot
-from excite_cli.store.diagnosis_file import read_diagnosis, write_diagnosis
 from tests.cli.program import SMOKE
 from tests.diagnosis.test_sealed import motion
 
@@ -169,9 +167,8 @@ def diagnosed(folder: Path) -> Diagnosis:
         ],
     )
     dataset = recorded(problem.robot)
-    found = diagnose(problem.robot, problem.base, dataset, problem.spec)
-    write_diagnosis(folder / "diagnosis.h5", found)
-    again = read_diagnosis(folder / "diagnosis.h5")
+    found = api.diagnose(problem, dataset, output=folder / "diagnosis.h5")
+    again = api.read_diagnosis(folder / "diagnosis.h5")
     assert not differences(found.effects, again.effects)
     return found
 
