@@ -12,9 +12,7 @@ def check(
     config: options.Config,
     file: options.MotionFile,
     rate: Annotated[float, typer.Option("--rate", min=1.0, help="Instants per second [Hz].")] = 1e3,
-    random: Annotated[
-        int, typer.Option("--random", min=0, max=10_000_000, help="Further random instants.")
-    ] = 0,
+    random: Annotated[int, typer.Option("--random", min=0, help="Further random instants.")] = 0,
     meshes: Annotated[
         bool, typer.Option("--meshes/--no-meshes", help="Check the collision meshes, too.")
     ] = True,

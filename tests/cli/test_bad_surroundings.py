@@ -31,7 +31,7 @@ REFUSED = {
     ),
 }  # fmt: skip
 MISTYPED = {
-    "thing to ignore": (
+    "obstacle to ignore": (
         [AWAY, "constraints.surroundings.ignore=[[forearm, tabel]]"],
         "no obstacle 'tabel'. Did you mean 'table'",
     ),
