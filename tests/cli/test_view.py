@@ -135,7 +135,7 @@ def test_a_missing_library_names_the_extra(
     assert "pip install 'excite-cli[view]'" in capsys.readouterr().err
 
 
-def test_ctrl_c_is_a_good_end(stored: Path, excite: Program) -> None:
+def test_ctrl_c_exits_with_status_0(stored: Path, excite: Program) -> None:
     pytest.importorskip("viser")
     process = excite.start("view", stored, "--no-open", "--json", "--port", "18080")
     try:
