@@ -15,12 +15,12 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+import excite_cli.cli.diagnose_tables
+import excite_cli.cli.telling  # noqa: F401  (with all that it imports)
 import numpy as np
 import pytest
 
 import excite_cli.api as api
-import excite_cli.cli.diagnose_tables
-import excite_cli.cli.telling  # noqa: F401  (with all that it imports)
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.catalogue import catalogue, kind_named
