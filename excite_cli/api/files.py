@@ -16,7 +16,6 @@ from excite_cli.store import diagnosis_file, fit_file, result_file
 from excite_cli.summary import diagnosis as diagnosis
 from excite_cli.summary import identification as identification
 from excite_cli.summary import motions as motions
-from excite_cli.summary import motions as motions
 
 
 def read_result(path: str | Path) -> Result:
