@@ -11,8 +11,10 @@ from excite_cli.cli.console import Terminal
 def check(
     config: options.Config,
     file: options.MotionFile,
-    rate: Annotated[float, typer.Option("--rate", help="Instants per second [Hz].")] = 1e3,
-    random: Annotated[int, typer.Option("--random", help="Random instants beside them.")] = 0,
+    rate: Annotated[float, typer.Option("--rate", min=1.0, help="Instants per second [Hz].")] = 1e3,
+    random: Annotated[
+        int, typer.Option("--random", min=0, help="Random instants beside them.")
+    ] = 0,
     meshes: Annotated[
         bool, typer.Option("--meshes/--no-meshes", help="Look at the collision meshes, too.")
     ] = True,
