@@ -1,6 +1,7 @@
 """What the linter of layers does not see: cycles, also through imports inside functions."""
 
 import ast
+import tomllib
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -65,6 +66,16 @@ def test_a_cycle_inside_functions_would_be_found(tmp_path: Path) -> None:
     assert cycle({name: imported(path, known) for name, path in known.items()})
     second.write_text("if TYPE_CHECKING:\n    import p.first\n")
     assert not cycle({name: imported(path, known) for name, path in known.items()})
+
+
+def test_commands_know_no_room_but_the_front_door() -> None:
+    """A new room is forbidden to them by the linter's contract, too."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = settings["tool"]["importlinter"]["contracts"]
+    (contract,) = [each for each in contracts if each.get("source_modules") == ["excite_cli.cli"]]
+    rooms = {f"excite_cli.{name.split('.')[1]}" for name in modules() if "." in name}
+    known = {f"excite_cli.{name}" for name in ("__main__", "api", "cli", "config", "errors")}
+    assert set(contract["forbidden_modules"]) == rooms - known
 
 
 def test_commands_parse_call_and_show() -> None:

@@ -4,10 +4,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from excite_cli.api.loading import inputs_of
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import paths_in
 from excite_cli.api.planning import plan
-from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.comparison import Comparison
@@ -67,8 +66,7 @@ def compare_random(
     NoAdmissibleMotionError
         No motion was found.
     """
-    inputs = (*paths_in(optimized), *files_of_config(problem.spec, problem.folder))
-    with held({"output": output}, overwrite, inputs):
+    with held({"output": output}, overwrite, inputs_of(problem, optimized)):
         if optimized is None:
             result = plan(problem, workers=workers, tell=lambda note: None)
         else:

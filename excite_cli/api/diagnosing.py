@@ -4,10 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from excite_cli.api.loading import Case, dataset_of, sources_of
+from excite_cli.api.loading import Case, dataset_of, inputs_of, sources_of
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
-from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.diagnosis.diagnose import diagnose as diagnose_dataset
 from excite_cli.diagnosis.records import Diagnosis
@@ -50,10 +49,7 @@ def diagnose(
         Config and data do not fit; order or signs of torques cannot be right; data too short; a
         file exists already.
     """
-    inputs: list[str | Path] = [
-        *sources_of(data),
-        *files_of_config(problem.spec, problem.folder),
-    ]
+    inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, "apply": apply}, overwrite, inputs):
         dataset = dataset_of(problem, data, tell)
         found = diagnose_dataset(
@@ -80,7 +76,6 @@ def save_config(path: str | Path, problem: Problem | Case, found: Diagnosis) -> 
     FileError
         It cannot be written.
     """
-    own = files_of_config(problem.spec, problem.folder)
-    refuse_inputs_as_outputs({"path": Path(path)}, own)
+    refuse_inputs_as_outputs({"path": Path(path)}, inputs_of(problem))
     text = found_config(problem.spec, problem.folder, found, Path(path))
     write_text_atomically(Path(path), text)

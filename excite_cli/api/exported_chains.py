@@ -19,6 +19,7 @@ from excite_cli.export.timed import repeated
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.note import Tell
+from excite_cli.store.fit_knowledge import fit_knowledge
 from excite_cli.store.result_file import read_result, read_samples
 from excite_cli.trajectory.chain import Chain, Segment
 from excite_cli.trajectory.sampled import through_samples
@@ -104,6 +105,7 @@ def _entered(
 ) -> tuple[list[Chain], tuple[Constraint, ...]]:
     """The motions from rest at a posture and back to it, and the constraints of their problem."""
     spec = parse_spec(result.config, f"the config stored in {file}")
-    problem = build_problem(spec, Path(result.config_folder))
+    folder = Path(result.config_folder)
+    problem = build_problem(spec, folder, fit_knowledge(spec, folder))
     posture = start_posture(problem.robot, wanted.start or {})
     return entered(problem, motions, posture, wanted.periods, tell), problem.constraints

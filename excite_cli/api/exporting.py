@@ -215,7 +215,7 @@ def _export_model(
                 f"{file} holds parameters of other joints or bodies than its config. Identify "
                 "again."
             )
-        own = files_of_config(spec, Path(stored.config_folder))
+        own = files_of_config(spec, Path(stored.config_folder), None)
         refuse_inputs_as_outputs({"--output": path}, own)
         write_models(robot, stored.fit, {"parameters" if format == "yaml" else format: path}, tell)
     return Exported(format, (path,))

@@ -3,10 +3,9 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from excite_cli.api.loading import Case, dataset_of, sources_of, tell_findings
+from excite_cli.api.loading import Case, dataset_of, inputs_of, sources_of, tell_findings
 from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
-from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.diagnosis.plausibility import check_dataset
 from excite_cli.excitation.problem import Problem
@@ -50,10 +49,7 @@ def identify(
         a file exists already.
     """
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
-    inputs: list[str | Path] = [
-        *sources_of(data),
-        *files_of_config(problem.spec, problem.folder),
-    ]
+    inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, **models}, overwrite, inputs):
         dataset = dataset_of(problem, data, tell)
         check_dataset(problem.robot, dataset, problem.spec)
@@ -89,7 +85,6 @@ def save_fit(
     FileError
         It cannot be written.
     """
-    own = files_of_config(problem.spec, problem.folder)
-    refuse_inputs_as_outputs({"path": Path(path)}, (*sources, *own))
+    refuse_inputs_as_outputs({"path": Path(path)}, inputs_of(problem, *sources))
     config, folder = spec_as_yaml(problem.spec), str(problem.folder)
     write_fit(Path(path), found, config, folder, problem.robot.fingerprint(), tuple(sources))

@@ -1,10 +1,12 @@
 """Configs, problems and measured data: what every command begins with."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+from excite_cli.api.paths import paths_in
+from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
@@ -32,13 +34,14 @@ _LEVELS = {"note": Level.NOTE, "warning": Level.WARNING}
 class Case(Shown):
     """What a config declares of a robot: enough for measured data, without anything to plan.
 
-    Relative paths of `spec` start from `folder`. A `Problem` has all of this too, and can be given
-    wherever a case is expected.
+    Relative paths of `spec` start from `folder`, where `file` lies if it was read from one. A
+    `Problem` has all of this too, and can be given wherever a case is expected.
     """
 
     spec: Spec
     folder: Path
     robot: Robot
+    file: Path | None = None
 
     @cached_property
     def base(self) -> BaseParameters:
@@ -66,8 +69,8 @@ def load_case(config: str | Path, overrides: Sequence[str] = ()) -> Case:
     >>> load_case("configs/smoke.yaml").robot.joint_names[:2]
     ('shoulder_yaw', 'shoulder_pitch')
     """
-    spec, folder = load_spec(Path(config), list(overrides)), Path(config).resolve().parent
-    return Case(spec, folder, build_robot(spec.robot, folder))
+    spec, file = load_spec(Path(config), list(overrides)), Path(config).resolve()
+    return Case(spec, file.parent, build_robot(spec.robot, file.parent), file)
 
 
 def load_problem(
@@ -89,17 +92,19 @@ def load_problem(
     >>> load_problem("configs/smoke.yaml", ["sequence.motions=1"]).variables
     45
     """
-    spec, folder = load_spec(Path(config), list(overrides)), Path(config).resolve().parent
-    return _built(spec, folder, tell)
+    spec, file = load_spec(Path(config), list(overrides)), Path(config).resolve()
+    return _built(spec, file.parent, file, tell)
 
 
 def problem_of(case: Problem | Case, tell: Tell = log_note) -> Problem:
     """The whole problem of a case, for what needs its constraints; see `load_problem`."""
-    return case if isinstance(case, Problem) else _built(case.spec, case.folder, tell)
+    if isinstance(case, Problem):
+        return case
+    return _built(case.spec, case.folder, case.file, tell)
 
 
-def _built(spec: Spec, folder: Path, tell: Tell) -> Problem:
-    problem = build_problem(spec, folder, fit_knowledge(spec, folder))
+def _built(spec: Spec, folder: Path, file: Path | None, tell: Tell) -> Problem:
+    problem = replace(build_problem(spec, folder, fit_knowledge(spec, folder)), file=file)
     for note in problem_notes(problem):
         tell(note)
     if spec.uncertainty is not None and spec.uncertainty.fit is not None:
@@ -151,6 +156,11 @@ def load_data(
     tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs_in_words(data)}"))
     tell_findings(data.findings, tell)
     return data
+
+
+def inputs_of(problem: Problem | Case, *given: object) -> list[Path]:
+    """What is read for the problem: files that are `given`, its config, and those that it names."""
+    return [*paths_in(*given), *files_of_config(problem.spec, problem.folder, problem.file)]
 
 
 def sources_of(data: Dataset | str | Path | Sequence[str | Path]) -> tuple[str, ...]:

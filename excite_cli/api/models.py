@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from excite_cli.atomic import write_text_atomically
-from excite_cli.export.exported import Exported, IdentifiedModel
+from excite_cli.export.exported import IdentifiedModel, ModelText
 from excite_cli.export.mjcf import mjcf
 from excite_cli.export.parameters import parameters_yaml
 from excite_cli.export.urdf import updated_urdf
@@ -12,7 +12,7 @@ from excite_cli.identification.fit import Fit
 from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note, Tell
 
-_WRITERS: dict[str, Callable[[Robot, IdentifiedModel], Exported]] = {
+_WRITERS: dict[str, Callable[[Robot, IdentifiedModel], ModelText]] = {
     "urdf": updated_urdf,
     "mjcf": mjcf,
 }

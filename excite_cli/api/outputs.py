@@ -1,7 +1,7 @@
-"""Where a command writes: refused before the work begins, not after it; and claimed.
+"""Where results go: refused before the work begins, not after it; and held while it lasts.
 
-A command claims its outputs until it ends (`check_outputs`, `claim_result`); a function of the
-library holds them while it works (`held`, `held_result`).
+Claims are counted: a command whose problem takes long to build holds its outputs before that, and
+the function that it calls once more.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,10 +17,11 @@ Outputs = Mapping[str, str | Path | None]
 Inputs = Iterable[str | Path]
 
 
-def check_outputs(outputs: Outputs, overwrite: bool, inputs: Inputs = ()) -> None:
+@contextmanager
+def held(outputs: Outputs, overwrite: bool, inputs: Inputs = ()) -> Iterator[None]:
     """See that every output (by the name of its option) can be written, and none twice.
 
-    They are then claimed by this process: another run on the same output is refused until it ends.
+    Within it they are claimed by this process: another run on the same output is refused.
 
     Raises
     ------
@@ -30,14 +31,6 @@ def check_outputs(outputs: Outputs, overwrite: bool, inputs: Inputs = ()) -> Non
     """
     with ExitStack() as claims:
         _claim_each(outputs, overwrite, inputs, claims)
-        claims.pop_all()  # good, so that none is left
-
-
-@contextmanager
-def held(outputs: Outputs, overwrite: bool, inputs: Inputs = ()) -> Iterator[None]:
-    """As `check_outputs`, for as long as the work takes."""
-    with ExitStack() as claims:
-        _claim_each(outputs, overwrite, inputs, claims)
         yield
 
 
@@ -45,7 +38,7 @@ def _claim_each(outputs: Outputs, overwrite: bool, inputs: Inputs, claims: ExitS
     given = {option: Path(path) for option, path in outputs.items() if path is not None}
     refuse_inputs_as_outputs({f"--{option}": path for option, path in given.items()}, inputs)
     for path in given.values():
-        claim_file(path)
+        _claim_file(path)
         claims.callback(leave, path)
         if path.exists() and not overwrite:
             raise FileError(
@@ -58,38 +51,19 @@ def _claim_each(outputs: Outputs, overwrite: bool, inputs: Inputs, claims: ExitS
             raise FileError(f"--{other} and --{option} both name {path}. Give two names.")
 
 
-def result_path(
-    output: Path | None,
-    config: Path,
-    overwrite: bool,
-    resume: bool = False,
-    inputs: Inputs = (),
-) -> Path:
-    """Where the result of `config` goes; see `claim_result`."""
+def result_path(output: Path | None, config: Path) -> Path:
+    """Where the result of `config` goes."""
     path = output or Path(f"{config.stem}.h5")
     if path.is_file() and config.is_file() and path.samefile(config):
         from excite_cli.config.load import load_spec  # `excite --help` needs none
 
         load_spec(config)  # tells that this is no config
-    claim_result(path, overwrite, resume, (config, *inputs))
     return path
 
 
 @contextmanager
 def held_result(path: Path | None, overwrite: bool, resume: bool, inputs: Inputs) -> Iterator[None]:
-    """As `claim_result`, for as long as the work takes; nothing where there is no path."""
-    if path is None:
-        yield
-        return
-    claim_result(path, overwrite, resume, inputs)
-    try:
-        yield
-    finally:
-        leave(path)
-
-
-def claim_result(path: Path, overwrite: bool, resume: bool = False, inputs: Inputs = ()) -> None:
-    """Claim the file of a result, which may be gone on with.
+    """Hold the file of a result, which may be gone on with; nothing where there is no path.
 
     Raises
     ------
@@ -101,17 +75,23 @@ def claim_result(path: Path, overwrite: bool, resume: bool = False, inputs: Inpu
     """
     if resume and overwrite:
         raise ConfigError("--resume goes on with the file, --overwrite replaces it: give one.")
+    if path is None:
+        yield
+        return
     refuse_inputs_as_outputs({"--output": path}, inputs)
-    claim_file(path)
-    if path.exists() and not overwrite and not resume:
+    _claim_file(path)
+    try:
+        if path.exists() and not overwrite and not resume:
+            raise FileError(
+                f"{path} exists already. Give another name with -o, go on with --resume, or "
+                "replace it with --overwrite."
+            )
+        yield
+    finally:
         leave(path)
-        raise FileError(
-            f"{path} exists already. Give another name with -o, go on with --resume, or replace "
-            "it with --overwrite."
-        )
 
 
-def claim_file(path: Path) -> None:
+def _claim_file(path: Path) -> None:
     """Claim `path` for this process.
 
     Raises

@@ -4,13 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from excite_cli.api.loading import Case
+from excite_cli.api.loading import Case, inputs_of
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.api.outputs import held_result
-from excite_cli.api.paths import paths_in
 from excite_cli.api.priors import Prior, load_prior, name_of
 from excite_cli.api.working import tell_idle
-from excite_cli.config.inputs import files_of_config
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
 from excite_cli.diagnosis.records import Diagnosis
@@ -84,8 +82,7 @@ def plan(
             write_result(path, current, model)
         tell(Note(Level.INFO, motion_sentence(step.motion)))
 
-    read = paths_in(priors, starts, following.name if following else None)
-    read += files_of_config(model.spec, model.folder)
+    read = inputs_of(model, priors, starts, following.name if following else None)
     with held_result(path, overwrite, resume, read):
         tell_idle(1 if workers is None else workers.count, model.spec.optimizer.restarts, tell)
         result = _begun(model, following, priors, path if resume else None, tell)
@@ -138,11 +135,10 @@ def plan_after(
         The file cannot be read; the diagnosis belongs to another robot.
     """
     spec, folder = problem.spec, problem.folder
-    if isinstance(found, Diagnosis):
-        following = after_diagnosis(found, spec, folder, fit_knowledge(spec, folder))
-    else:
-        read = read_diagnosis(Path(found))
-        following = after_diagnosis(read, spec, folder, fit_knowledge(spec, folder))
+    read = found if isinstance(found, Diagnosis) else read_diagnosis(Path(found))
+    following = after_diagnosis(read, spec, folder, fit_knowledge(spec, folder))
+    following = replace(following, model=replace(following.model, file=problem.file))
+    if not isinstance(found, Diagnosis):
         following = replace(following, name=str(found))
     for note in problem_notes(following.model):
         tell(note)

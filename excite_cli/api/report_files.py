@@ -25,12 +25,13 @@ class Told:
     @property
     def earlier(self) -> frozenset[str]:
         """Names of the files that it was made on top of."""
-        return frozenset(Path(prior).name for prior in getattr(self.content, "priors", ()))
+        priors = self.content.priors if isinstance(self.content, Result) else ()
+        return frozenset(Path(prior).name for prior in priors)
 
     @property
     def stage(self) -> int:
         """Motions come first, then what was identified, then what was diagnosed."""
-        return ("Result", "StoredFit", "Diagnosis").index(type(self.content).__name__)
+        return (Result, StoredFit, Diagnosis).index(type(self.content))
 
 
 def read_files(paths: Sequence[Path]) -> tuple[Told, ...]:
@@ -59,11 +60,7 @@ def _read(path: Path) -> Result | StoredFit | Diagnosis:
         raise FileError(f"{path} is a folder. Give files: result, fit or diagnosis (.h5).")
     if is_fit(path):
         return read_fit(path)
-    try:
-        diagnosed = is_diagnosis(path)
-    except OSError:  # damaged: whoever reads it says so
-        diagnosed = False
-    if diagnosed:
+    if is_diagnosis(path):
         return read_diagnosis(path)
     try:
         return read_result(path)

@@ -6,12 +6,10 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from excite_cli.api.entering import Start, entered, start_posture
-from excite_cli.api.loading import Case, problem_of
+from excite_cli.api.loading import Case, inputs_of, problem_of
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import paths_in
 from excite_cli.config.data_spec import MeasurementSpec
-from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import FileError
@@ -70,8 +68,7 @@ def simulate(
     NoAdmissibleMotionError
         No admissible way from `start` into a motion was found.
     """
-    inputs = (*paths_in(motions), *files_of_config(problem.spec, problem.folder))
-    with held({"output": output}, overwrite, inputs):
+    with held({"output": output}, overwrite, inputs_of(problem, motions)):
         load_mujoco()
         segments = load_motions(problem, motions, chosen, tell)
         if not segments:

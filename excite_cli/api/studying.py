@@ -72,11 +72,11 @@ def _refuse_inputs(task: StudyTask, cases: Sequence[StudyCase], folder: Path) ->
     """No file of the study may be the config, a log, or what the config names."""
     settings = [f"{key}={value}" for key, value in cases[0].values.items()]
     spec = load_spec(task.config, [*task.overrides, *settings])
-    own = files_of_config(spec, task.config.parent)
+    own = files_of_config(spec, task.config.parent, task.config)
     logs = {case.log for case in cases if case.log is not None}
     written = (folder / TABLE, *(path for case in cases for path in files_of(folder, case)))
     present = {f"{path.name}:": path for path in written if path.exists()}
-    refuse_inputs_as_outputs(present, (task.config, *own, *sorted(logs)))
+    refuse_inputs_as_outputs(present, (*own, *sorted(logs)))
 
 
 def study_folder(config: str | Path, output: str | Path | None) -> Path:

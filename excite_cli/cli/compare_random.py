@@ -62,7 +62,7 @@ def compare_random(
     from excite_cli.api.comparing import compare_random as compare
     from excite_cli.api.comparing import comparison_answer, optimized_for
     from excite_cli.api.loading import load_problem
-    from excite_cli.api.outputs import check_outputs
+    from excite_cli.api.outputs import held
     from excite_cli.api.planning import plan
     from excite_cli.api.threads import single_threaded
     from excite_cli.api.working import working
@@ -70,9 +70,12 @@ def compare_random(
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     inputs = (config,) if optimized is None else (config, optimized)
-    check_outputs({"output": output}, overwrite, inputs)
     changes = options.changes(overrides, seed=seed, motions=motions)
-    with single_threaded(threads), working(workers, scheduler, threads, terminal.tell) as place:
+    with (
+        held({"output": output}, overwrite, inputs),
+        single_threaded(threads),
+        working(workers, scheduler, threads, terminal.tell) as place,
+    ):
         problem = load_problem(config, changes, terminal.tell)
         if optimized is not None:
             result = optimized_for(problem, optimized)

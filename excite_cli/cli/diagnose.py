@@ -49,11 +49,9 @@ def diagnose(
     from excite_cli.api.diagnosing import diagnose as diagnose_data
     from excite_cli.api.diagnosing import diagnosis_answer
     from excite_cli.api.loading import load_case
-    from excite_cli.api.outputs import check_outputs
     from excite_cli.api.threads import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    check_outputs({"output": output, "apply": apply}, overwrite, (config, *data))
     with single_threaded(), terminal.live("diagnose", 10) as line:
         found = diagnose_data(
             load_case(config, overrides or ()),

@@ -52,12 +52,10 @@ def identify(
     from excite_cli.api.identifying import identification_answer
     from excite_cli.api.identifying import identify as identify_data
     from excite_cli.api.loading import load_case
-    from excite_cli.api.outputs import check_outputs
     from excite_cli.api.threads import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
-    check_outputs({"output": output, **models}, overwrite, (config, *data))
     with single_threaded(), terminal.live("identify") as line:
         found = identify_data(
             load_case(config, overrides or ()),

@@ -70,7 +70,7 @@ def optimize(
       excite optimize ur10.yaml -o next.h5 --after diagnosis.h5
     """
     from excite_cli.api.loading import load_case, load_problem
-    from excite_cli.api.outputs import result_path
+    from excite_cli.api.outputs import held_result, result_path
     from excite_cli.api.planning import Planned, plan, plan_after, plan_answer
     from excite_cli.api.threads import single_threaded
     from excite_cli.api.working import working
@@ -80,10 +80,14 @@ def optimize(
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     if after is not None and prior:
         raise ConfigError("--after brings the measured data with it: leave --prior out.")
-    inputs = [each for each in (*(prior or ()), start, after) if each is not None]
-    path = result_path(output, config, overwrite, resume, inputs)
+    inputs = [each for each in (config, *(prior or ()), start, after) if each is not None]
+    path = result_path(output, config)
     changes = options.changes(overrides, seed=seed, motions=motions, restarts=restarts)
-    with single_threaded(threads), working(workers, scheduler, threads, terminal.tell) as place:
+    with (
+        held_result(path, overwrite, resume, inputs),
+        single_threaded(threads),
+        working(workers, scheduler, threads, terminal.tell) as place,
+    ):
         planned: Planned
         if after is None:
             planned = load_problem(config, changes, terminal.tell)

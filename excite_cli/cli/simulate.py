@@ -147,14 +147,12 @@ def simulate(
           --effect 'payload@all=1.5;runs:motion_2'
     """
     from excite_cli.api.loading import load_case
-    from excite_cli.api.outputs import check_outputs
     from excite_cli.api.simulating import SimulationSettings, simulation_answer
     from excite_cli.api.simulating import simulate as simulate_motions
     from excite_cli.api.threads import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     start = start_from(posture, entry)
-    check_outputs({"output": output}, overwrite, (config, file))
     with single_threaded():
         case = load_case(config, overrides or ())
         settings = SimulationSettings(

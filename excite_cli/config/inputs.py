@@ -5,7 +5,7 @@ from pathlib import Path
 from excite_cli.config.spec import Spec
 
 
-def files_of_config(spec: Spec, folder: Path, config: Path | None = None) -> tuple[Path, ...]:
+def files_of_config(spec: Spec, folder: Path, config: Path | None) -> tuple[Path, ...]:
     """The config (if it is a file), its URDF and the fit of `uncertainty.fit`, there or not.
 
     Relative paths start from `folder`.

@@ -1,7 +1,7 @@
 """From measured data to a diagnosis: split, filter, trace, name, and measure once at the end."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,16 +21,18 @@ from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.plausibility import check_plausibility
 from excite_cli.diagnosis.records import (
+    Absorbed,
     Approximation,
     Assumption,
     Diagnosis,
     EffectRecord,
     Information,
     NamedEffect,
+    Unexplained,
 )
 from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.rounds import rounds_of
-from excite_cli.diagnosis.traces import Traces
+from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.diagnosis.words import assumption_in_words
@@ -38,7 +40,7 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.declared_runs import check_declared_runs
-from excite_cli.identification.noise_floor import noise_floor
+from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
@@ -90,11 +92,7 @@ def diagnose(
     covariance = covariance_of(
         traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
     )
-    rules = traced.judge.rules
-    unexplained, dependence = unexplained_structure(
-        traced.data, traced.candidates, traced.chosen, traced.signals, traced.noise,
-        (rules.significance, rules.gain, rules.inflation), robot.joint_names,
-    )  # fmt: skip
+    unexplained, dependence = _unexplained(traced, robot)
     doubts = approximations(traced, unexplained, robot.joint_names)
     named, rivals = _named(model, traced, parameters, covariance, doubts)
     models = both_models(model, traced, parameters)
@@ -109,22 +107,13 @@ def diagnose(
         base_names=base.in_words(),
         declared=tuple(record_of(e, robot.joint_names) for e in model.declared),
         effects=named,
-        absorbed=tuple(
-            absorbed_effects(
-                traced.judge.white, traced.candidates, _column_names(model),
-                robot.joint_names, traced.chosen,
-            )
-        ),
+        absorbed=_absorbed(model, traced),
         unexplained=tuple(unexplained),
         sealed_run=parts.sealed_name,
         before=sealed_part.before,
         after=sealed_part.after,
         rounds=rounds_of(traced, robot.joint_names),
-        findings=(
-            *dataset.findings,
-            *(Finding("assumed", "warning", assumption_in_words(each)) for each in assumed),
-            *(floor.noticed(robot.joint_names) if floor else ()),
-        ),
+        findings=(*dataset.findings, *_noticed(assumed, floor, robot)),
         processing=_choices(processing, traced, parts, training),
         phi=model.full_inertias(parameters),
         base_values=base_values,
@@ -141,7 +130,35 @@ def diagnose(
         ),
         sealed_traces=sealed_part.traces,
         assumed=assumed,
-    )  # fmt: skip
+    )
+
+
+def _noticed(
+    assumed: Sequence[Assumption], floor: NoiseFloor | None, robot: Robot
+) -> Iterator[Finding]:
+    for each in assumed:
+        yield Finding("assumed", "warning", assumption_in_words(each))
+    if floor is not None:
+        yield from floor.noticed(robot.joint_names)
+
+
+def _unexplained(traced: Traced, robot: Robot) -> tuple[list[Unexplained], Dependence]:
+    rules = traced.judge.rules
+    return unexplained_structure(
+        traced.data,
+        traced.candidates,
+        traced.chosen,
+        traced.signals,
+        traced.noise,
+        (rules.significance, rules.gain, rules.inflation),
+        robot.joint_names,
+    )
+
+
+def _absorbed(model: Model, traced: Traced) -> tuple[Absorbed, ...]:
+    names = _column_names(model), model.robot.joint_names
+    found = absorbed_effects(traced.judge.white, traced.candidates, *names, traced.chosen)
+    return tuple(found)
 
 
 def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:

@@ -28,10 +28,11 @@ from excite_cli.excitation.extension import in_words, why_not_planned
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.shown.record import Shown
 
 
-@dataclass(frozen=True)
-class NextMotion:
+@dataclass(frozen=True, repr=False)
+class NextMotion(Shown):
     """The problem of the next motion, and the `model` that its result is kept for.
 
     `prior` are the measured data on the columns of `model`, which is `problem` unless that

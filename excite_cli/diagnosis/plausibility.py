@@ -169,11 +169,11 @@ def _sentences(names: Sequence[str], change: Change) -> list[str]:
     here = np.arange(n)
     found = []
     if (change.q_order != here).any():
-        together = (change.q_order == change.tau_order).all()
+        together = bool((change.q_order == change.tau_order).all())
         what = "columns" if together else "positions"
-        found.append(_order(names, change.q_order, what))
+        found.append(_order(names, change.q_order, what, together))
     elif (change.tau_order != here).any():
-        found.append(_order(names, change.tau_order, "torques"))
+        found.append(_order(names, change.tau_order, "torques", False))
     for sign, word, key in (
         (change.tau_sign, "torque", "sign"),
         (change.q_sign, "position", "position_sign"),
@@ -189,8 +189,8 @@ def _sentences(names: Sequence[str], change: Change) -> list[str]:
     return found
 
 
-def _order(names: Sequence[str], columns: Order, what: str) -> str:
-    """What stands where, and how to name it: column `order[j]` belongs to joint j."""
+def _order(names: Sequence[str], columns: Order, what: str, nameable: bool) -> str:
+    """What stands where, and how to name it if the config can: column `order[j]` is joint j's."""
     order: list[int] = columns.tolist()
     moved = [j for j in range(len(names)) if order[j] != j]
     if len(moved) == 2:
@@ -198,7 +198,7 @@ def _order(names: Sequence[str], columns: Order, what: str) -> str:
     else:
         listed = ", ".join(f"{names[order[j]]} holds {names[j]}" for j in moved)
         words = f"the {what} are in another order than their names ({listed})"
-    if what == "columns":
+    if nameable:
         mapping = ", ".join(f"{names[order[j]]}: {names[j]}" for j in moved)
         return f"{words} (set measurement.names: {{{mapping}}})"
     return f"{words} (correct the names of these columns in the file)"

@@ -33,8 +33,8 @@ class Approximation:
     kind: str = ""
 
 
-@dataclass(frozen=True)
-class NamedEffect:
+@dataclass(frozen=True, repr=False)
+class NamedEffect(Shown):
     """An effect that the declared model lacks, with its evidence.
 
     `parameters` as people know them; `p_value` corrected for the family of tests;

@@ -31,6 +31,12 @@ def title_of(kind: str) -> str:
     return known.title if known is not None else kind
 
 
+def other_name_of(kind: str) -> tuple[str, ...]:
+    """Kinds that together are the same torque as this one."""
+    known = catalogue().get(kind)
+    return known.same_as if known is not None else ()
+
+
 def place_in_words(record: EffectRecord, joints: int) -> str:
     """Where an effect is, on a robot with so many joints; with its runs, if not in all."""
     whole = len(record.joints) == joints > 2

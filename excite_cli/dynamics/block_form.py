@@ -1,4 +1,4 @@
-"""The regressor and its vector–Jacobian product in the paper's block form, as a reference.
+"""The vector–Jacobian product of the regressor in the paper's block form: an independent reference.
 
 Row block i (joint), column block j (body) of Y, for bodies j in the subtree of joint i
 (Eqs. 18–23, 𝒴 and 𝒜 in Eqs. 57–59):
@@ -57,31 +57,6 @@ class _RowBlock:
     rows: slice
     projection: Array
     subtree: tuple[int, ...]
-
-
-def block_regressor(robot: Robot, q: Array, v: Array, a: Array) -> Array:
-    """Y(q, v, a) for the measured rows, by Eqs. 18–23.
-
-    Parameters
-    ----------
-    q, v, a: (T, n) of the moved joints [rad, rad/s, rad/s²; m for prismatic joints]
-
-    Returns
-    -------
-    (T, R, 10·n_bodies), Pinocchio's order of parameters, base wrench as [force; moment] in the
-    base frame
-    """
-    joints = joints_of(robot)
-    motions = body_motions(robot, joints, q, v, a)
-    transforms = [force_transform(body.position, body.rotation) for body in motions]
-    inverses = [_inverse_transform(body.position, body.rotation) for body in motions]
-    bodies = [rigid_body_regressor(*_local(body)) for body in motions]
-    result = np.zeros((len(q), len(robot.rows), 10 * robot.n_bodies))
-    for block in _row_blocks(robot, joints):
-        left = block.projection @ inverses[block.joint]
-        for j in block.subtree:
-            result[:, block.rows, _columns(j)] = left @ transforms[j] @ bodies[j]
-    return result
 
 
 def block_pull_back(

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from excite_cli.constraints.base import Array
 from excite_cli.excitation.progress import Status
 from excite_cli.proof.worst_margin import Worst
+from excite_cli.shown.record import Shown
 
 
 @dataclass(frozen=True)
@@ -17,8 +18,8 @@ class Outcome:
     evaluations: int
 
 
-@dataclass(frozen=True)
-class Motion:
+@dataclass(frozen=True, repr=False)
+class Motion(Shown):
     """One generated motion that keeps all constraints.
 
     `condition_number` is that of the motion alone, `stacked_condition_number` that of the motion

@@ -132,7 +132,6 @@ class Search:
     """The way (m, n) from start to end, or None and how far the search came, in words."""
 
     way: Array | None
-    extensions: int
     seconds: float
     reached: str = ""
 
@@ -146,24 +145,23 @@ def find_way(problem: Problem, start: Array, end: Array, seed: int) -> Search:
     began = time.perf_counter()
     seconds = min(_SECONDS, problem.spec.optimizer.max_seconds)
     ends = np.array([start, end])
-    count, reached = 0, ""
+    reached = ""
     for share, room in enumerate(_ROOM, start=1):
         space = FreeSpace(problem, ends, room)
         deadline = began + seconds * share / len(_ROOM)
         rng = np.random.default_rng((seed, 23, share))
-        way, tried, reached = _connected(space, start, end, rng, deadline)
-        count += tried
+        way, reached = _connected(space, start, end, rng, deadline)
         if way is not None:
             way = _shortened(space, way, rng, deadline)
-            return Search(way, count, time.perf_counter() - began)
-    return Search(None, count, time.perf_counter() - began, reached)
+            return Search(way, time.perf_counter() - began)
+    return Search(None, time.perf_counter() - began, reached)
 
 
 def _connected(
     space: FreeSpace, start: Array, end: Array, rng: np.random.Generator, deadline: float
-) -> tuple[Array | None, int, str]:
+) -> tuple[Array | None, str]:
     if space.is_clear(start, end):
-        return np.array([start, end]), 0, ""
+        return np.array([start, end]), ""
     unit = space.upper - space.lower
     trees = [_Tree(start, unit), _Tree(end, unit)]
     for tried in range(1, _EXTENSIONS + 1):
@@ -177,10 +175,10 @@ def _connected(
         elif (met := _reach(space, other, growing.nodes[grown])) is not None:
             one, two = growing.back_from(grown), other.back_from(met)
             way = [*one[::-1], *two[1:]]
-            return np.array(way if tried % 2 == 0 else way[::-1]), tried, ""
+            return np.array(way if tried % 2 == 0 else way[::-1]), ""
         if time.perf_counter() > deadline:
             break
-    return None, tried, _reached(space, trees[0], trees[1])
+    return None, _reached(space, trees[0], trees[1])
 
 
 def _reached(space: FreeSpace, first: _Tree, second: _Tree) -> str:

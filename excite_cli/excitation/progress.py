@@ -65,16 +65,14 @@ class Starts:
 
 @dataclass(frozen=True)
 class Progress:
-    """What a solver tells while it runs; `worst` is the smallest margin, in its own unit.
+    """What a solver tells while it runs; `worst_margin` is the smallest, in its own unit.
 
     `starts`: where there is more than one.
     """
 
     iteration: int
     figure: Figure
-    worst_name: str
     worst_margin: float
-    worst_unit: str
     seconds: float
     stage: Stage
     starts: Starts | None = None

@@ -17,7 +17,7 @@ def followed(report: ProgressCallback, problem: Problem, starts: int) -> Watch:
         told: Progress | None = news.word
         if isinstance(news.result, FoundMotion):  # its last point keeps all limits
             count = news.result.outcome.iterations
-            told = Progress(count, news.result.figure, "", 0.0, "", news.result.seconds, Stage())
+            told = Progress(count, news.result.figure, 0.0, news.result.seconds, Stage())
             iterations[news.index] = most
         elif told is not None:
             iterations[news.index] = min(told.iteration, most)

@@ -86,8 +86,7 @@ class MotionTask:
         self, iteration: int, spectrum: Spectrum, values: list[Array], seconds: float, stage: Stage
     ) -> Progress:
         """The record that is shown while a solver runs."""
-        name, margin, unit = "", float("inf"), ""
-        smallest = float("inf")
+        smallest = margin = float("inf")
         for constraint, value, guard in zip(
             self.problem.constraints, values, self.guards, strict=True
         ):
@@ -95,8 +94,7 @@ class MotionTask:
             if value[:, at].min() < smallest:
                 smallest = float(value[:, at].min())
                 margin = smallest * float(constraint.scale[at]) + float(guard[at])
-                name, unit = constraint.name, constraint.unit_of(at)
-        return Progress(iteration, spectrum.figure, name, margin, unit, seconds, stage)
+        return Progress(iteration, spectrum.figure, margin, seconds, stage)
 
     @cached_property
     def metric(self) -> Array:

@@ -10,7 +10,7 @@ from excite_cli.robot.model import Array
 
 
 @dataclass(frozen=True)
-class Exported:
+class ModelText:
     """`text` of the file; `notes`, sentences for the person who uses it."""
 
     text: str

@@ -11,8 +11,8 @@ import numpy as np
 from excite_cli.effects.base import Effect
 from excite_cli.errors import RobotError
 from excite_cli.export.exported import (
-    Exported,
     IdentifiedModel,
+    ModelText,
     in_words,
     number,
     ten_as_body,
@@ -24,7 +24,7 @@ from excite_cli.robot.tree import Tree, TreeJoint, tree_of
 _ADDED = ("damping", "frictionloss", "armature")
 
 
-def mjcf(robot: Robot, model: IdentifiedModel) -> Exported:
+def mjcf(robot: Robot, model: IdentifiedModel) -> ModelText:
     """The model's text, and what MJCF cannot hold.
 
     Raises
@@ -56,7 +56,7 @@ def mjcf(robot: Robot, model: IdentifiedModel) -> Exported:
     if left:
         words = in_words(left, robot.joint_names)
         notes.append(f"MJCF cannot hold: {words}. The file of parameters does")
-    return Exported(ElementTree.tostring(root, encoding="unicode") + "\n", tuple(notes))
+    return ModelText(ElementTree.tostring(root, encoding="unicode") + "\n", tuple(notes))
 
 
 def _ten(tree: Tree, j: int) -> slice:

@@ -17,8 +17,8 @@ from excite_cli.dynamics.regressor import payload_parameters, standard_parameter
 from excite_cli.effects.base import Effect
 from excite_cli.errors import RobotError
 from excite_cli.export.exported import (
-    Exported,
     IdentifiedModel,
+    ModelText,
     in_words,
     number,
     ten_as_body,
@@ -38,7 +38,7 @@ _INERTIA = (
 _UNCHANGED = 1e-14
 
 
-def updated_urdf(robot: Robot, model: IdentifiedModel) -> Exported:
+def updated_urdf(robot: Robot, model: IdentifiedModel) -> ModelText:
     """The URDF's text with `model` in it, and what a URDF cannot hold.
 
     Raises
@@ -71,7 +71,7 @@ def updated_urdf(robot: Robot, model: IdentifiedModel) -> Exported:
         notes.append(f"the payload ({robot.payload.in_words}) is not in it: keep robot.payload")
     ElementTree.indent(root)
     body_text = ElementTree.tostring(root, encoding="unicode")
-    return Exported(f'<?xml version="1.0"?>\n{body_text}\n', tuple(notes))
+    return ModelText(f'<?xml version="1.0"?>\n{body_text}\n', tuple(notes))
 
 
 def _carriers(robot: Robot, root: ElementTree.Element) -> list[str]:

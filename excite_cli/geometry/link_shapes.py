@@ -104,20 +104,28 @@ def collision_model(robot: Robot) -> pin.GeometryModel:
     RobotError
         A mesh is missing, lies outside the robot's folders, or cannot be read.
     """
-    check_mesh_paths(robot.description)
+    advice = " Repair the mesh, or drop constraints.self_collision."
+    return _geometry(robot, "collision", pin.GeometryType.COLLISION, advice)
+
+
+def visual_model(robot: Robot) -> pin.GeometryModel:
+    """Visual geometry of the URDF; otherwise as `collision_model`."""
+    return _geometry(robot, "visual", pin.GeometryType.VISUAL)
+
+
+def _geometry(
+    robot: Robot, kind: str, of_pin: pin.GeometryType, advice: str = ""
+) -> pin.GeometryModel:
+    described = robot.description
+    check_mesh_paths(described, kind)
     try:
         return pin.buildGeomFromUrdfString(
-            robot.model,
-            robot.description.xml,
-            pin.GeometryType.COLLISION,
-            None,
-            list(robot.description.package_dirs),
+            robot.model, described.xml, of_pin, None, list(described.package_dirs)
         )
     except (RuntimeError, ValueError) as error:
         first = (str(error).strip().splitlines() or ["no reason given"])[0]
         raise RobotError(
-            f"{robot.description.path.name}: the collision geometry cannot be loaded: {first}. "
-            "Repair the mesh, or drop constraints.self_collision."
+            f"{described.path.name}: the {kind} geometry cannot be loaded: {first}.{advice}"
         ) from error
 
 

@@ -24,13 +24,12 @@ class Solution:
     """x (p,) of least norm (columns scaled), and what the data say about it.
 
     `inverse` (p, p) of CᵀC on the directions that are seen; `seen` (p,): parameters that have no
-    part in a direction which the data do not show; `remainder` ‖τ − C x‖².
+    part in a direction which the data do not show.
     """
 
     x: Array
     inverse: Array
     seen: Mask
-    remainder: float
 
 
 def triangle_of(rows: Array) -> Array:
@@ -73,8 +72,7 @@ def solve(factor: Array) -> Solution:
     x = directions.T @ (inverse * (left.T @ right)) / scale
     half = directions.T * inverse / scale[:, None]
     blind = np.linalg.norm(directions[~kept], axis=0) if (~kept).any() else np.zeros(len(x))
-    missed = right - triangle @ x
-    return Solution(x, half @ half.T, blind < 1e-6, float(factor[-1, -1] ** 2 + missed @ missed))
+    return Solution(x, half @ half.T, blind < 1e-6)
 
 
 def residual_squares(factors: Sequence[Array], x: Array) -> Array:

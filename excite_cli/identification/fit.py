@@ -96,10 +96,6 @@ class Fit(Shown):
         """φ (P,): the consistent set if there is one, else `phi`."""
         return self.phi if self.consistent is None else self.consistent.phi
 
-    def predict(self, run: RunColumns, base: BaseParameters) -> Array:
-        """τ̂ (M, n) of a run."""
-        return columns_of(run, base) @ self.values
-
     def predict_raw(self, run: RunColumns, robot: Robot) -> tuple[Array, Array]:
         """Rigid-body torque and τ̂ (T, n) at the working rate, not averaged."""
         signals = signals_of(run.prepared, robot, self.phi)

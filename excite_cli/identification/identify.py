@@ -97,8 +97,8 @@ def identify(
     tell("closed-loop bias")
     hausman = _hausman(training, dataset, parts, processing, found, (sealed, spec.diagnosis.block))
     floor = noise_floor(parts.training, processing)
-    error, sealed_traces = _judged(found, held_out, sealed=True)
-    training_error, training_traces = _judged(found, training, sealed=False)
+    error, sealed_traces = judged(found, held_out, sealed=True)
+    training_error, training_traces = judged(found, training, sealed=False)
     return Identification(
         fit=found,
         sealed_run=parts.sealed_name,
@@ -127,12 +127,7 @@ def _regression(
     return build_regression(robot, base, effects, [prepare(run, processing) for run in runs])
 
 
-def errors_of(found: Fit, regression: Regression) -> Errors:
-    """Errors of the fit's torque on the runs of `regression`."""
-    return _judged(found, regression, sealed=False)[0]
-
-
-def _judged(
+def judged(
     found: Fit, regression: Regression, sealed: bool
 ) -> tuple[Errors, tuple[TorqueTrace, ...]]:
     """Errors of the fit's torque on the runs of `regression`, and this torque over time."""

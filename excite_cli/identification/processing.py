@@ -108,15 +108,8 @@ def _bandwidth(frequency: Array, power: Array) -> float:
 def _position_cutoff(
     spec: FilterSpec, frequency: Array, power: Array, fs: float, bandwidth: float, reasons: list
 ) -> float | None:
-    if spec.position == "none":
-        return None
     if spec.position != "auto":
-        if float(spec.position) >= fs / 2:
-            raise ConfigError(
-                f"measurement.filter.position: {float(spec.position):g} Hz is beyond half the "
-                f"recorded rate ({fs:g} Hz). Give a lower cut-off, or 'none'."
-            )
-        return float(spec.position)
+        return _given_cutoff("position", spec.position, fs)
     floor = np.median(power[frequency > 0.3 * fs], axis=0)
     above = power > _ABOVE_FLOOR * floor
     last = [frequency[np.flatnonzero(~column)[0]] if not column.all() else fs for column in above.T]
@@ -130,16 +123,20 @@ def _position_cutoff(
     return chosen
 
 
-def _parallel_cutoff(spec: FilterSpec, bandwidth: float, fs: float, reasons: list) -> float | None:
-    if spec.parallel == "none":
+def _given_cutoff(key: str, given: float | str, fs: float) -> float | None:
+    if given == "none":
         return None
+    if float(given) >= fs / 2:
+        raise ConfigError(
+            f"measurement.filter.{key}: {float(given):g} Hz is beyond half the recorded rate "
+            f"({fs:g} Hz). Give a lower cut-off, or 'none'."
+        )
+    return float(given)
+
+
+def _parallel_cutoff(spec: FilterSpec, bandwidth: float, fs: float, reasons: list) -> float | None:
     if spec.parallel != "auto":
-        if float(spec.parallel) >= fs / 2:
-            raise ConfigError(
-                f"measurement.filter.parallel: {float(spec.parallel):g} Hz is beyond half the "
-                f"recorded rate ({fs:g} Hz). Give a lower cut-off, or 'none'."
-            )
-        return float(spec.parallel)
+        return _given_cutoff("parallel", spec.parallel, fs)
     chosen = min(
         max(_PARALLEL_BY_BANDWIDTH * bandwidth, _LOWEST_PARALLEL), _HIGHEST_PARALLEL, fs / 5.0
     )

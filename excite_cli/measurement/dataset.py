@@ -33,8 +33,8 @@ class Finding:
     joints: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, repr=False)
+class Run(Shown):
     """One recording, or a part of it: t (T,), q and tau (T, n), dq (T, n) if it was recorded.
 
     `name` is the recording's, `part` says which part of it. `valid` (T, n): samples that may be

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+from excite_cli.measurement.dataset import Array, Finding, Mask, Run, Severity
 
 
 def dead_channels(runs: Sequence[Run], joints: tuple[str, ...]) -> tuple[list[Run], list[Finding]]:
@@ -82,7 +82,11 @@ def _of_run(
 def _copies(run: Run, joints: tuple[str, ...]) -> list[Finding]:
     """Two joints with the very same numbers: a column written twice."""
     findings = []
-    for word, values in (("torque", run.tau), ("position", run.q)):
+    channels: list[tuple[str, Array, Severity]] = [
+        ("torque", run.tau, "error"),
+        ("position", run.q, "warning"),
+    ]
+    for word, values, severity in channels:
         moving = ~_constant(values)
         for j in range(len(joints)):
             same = (values[:, j + 1 :] == values[:, j : j + 1]).all(axis=0) & moving[j]
@@ -91,7 +95,6 @@ def _copies(run: Run, joints: tuple[str, ...]) -> list[Finding]:
                     f"{word}s of {joints[j]} and {joints[k]} are the same numbers: one column was "
                     "written twice"
                 )
-                severity = "error" if word == "torque" else "warning"
                 pair = (joints[j], joints[k])
-                findings.append(Finding("duplicate", severity, text, run.name, pair))  # type: ignore[arg-type]
+                findings.append(Finding("duplicate", severity, text, run.name, pair))
     return findings

@@ -9,6 +9,7 @@ from excite_cli.diagnosis.words import (
     counted,
     covariate_in_words,
     is_small,
+    other_name_of,
     p_in_words,
     place_in_words,
     title_of,
@@ -95,9 +96,12 @@ def _lead(found: Diagnosis) -> str:
 
 def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:
     everything = len(found.joint_names)
-    others = ", ".join(
+    names = [
         f"{title_of(alias.kind)} on {place_in_words(alias, everything)}" for alias in named.aliases
-    )
+    ]
+    if same := other_name_of(named.effect.kind):
+        names.append(" together with ".join(map(title_of, same)))
+    others = ", ".join(names)
     if named.approximates:
         others = approximation_in_words(named.approximates, covariate_in_words)
     return (

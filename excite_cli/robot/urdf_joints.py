@@ -55,49 +55,57 @@ class UrdfSurvey:
     has_shapes: bool
 
 
-def survey(description: RobotDescription) -> UrdfSurvey:
-    """The movable joints of a URDF with all that it says about them."""
-    root = ElementTree.fromstring(description.xml)
-    masses = {link.get("name", ""): _mass(link) for link in root.findall("link")}
-    elements = root.findall("joint")
-    children: dict[str, list[ElementTree.Element]] = {}
-    parent_joint: dict[str, ElementTree.Element] = {}
-    for element in elements:
-        children.setdefault(_link(element, "parent"), []).append(element)
-        parent_joint[_link(element, "child")] = element
-    total = sum(masses.values())
+class _Tree:
+    """Links and joints of a URDF as they hang on each other; circles end where they began."""
 
-    def below(link: str) -> tuple[float, list[str]]:
+    def __init__(self, root: ElementTree.Element) -> None:
+        self.joints = root.findall("joint")
+        self.masses = {link.get("name", ""): _mass(link) for link in root.findall("link")}
+        self._children: dict[str, list[ElementTree.Element]] = {}
+        self._parent_joint: dict[str, ElementTree.Element] = {}
+        for element in self.joints:
+            self._children.setdefault(_link(element, "parent"), []).append(element)
+            self._parent_joint[_link(element, "child")] = element
+
+    def below(self, link: str) -> tuple[float, list[str]]:
+        """The mass of `link` and all that it carries, and movable joints between these."""
         mass, names, todo, seen = 0.0, [], [link], set()
         while todo:
             at = todo.pop()
             if at in seen:
                 continue
             seen.add(at)
-            mass += masses.get(at, 0.0)
-            for element in children.get(at, []):
+            mass += self.masses.get(at, 0.0)
+            for element in self._children.get(at, []):
                 todo.append(_link(element, "child"))
                 if element.get("type") != "fixed":
                     names.append(element.get("name", ""))
         return mass, names
 
-    def over(element: ElementTree.Element) -> list[str]:
+    def above(self, element: ElementTree.Element) -> list[str]:
+        """Movable joints between the root and a joint."""
         names: list[str] = []
         link, seen = _link(element, "parent"), set()
-        while link in parent_joint and link not in seen:
+        while link in self._parent_joint and link not in seen:
             seen.add(link)
-            upper = parent_joint[link]
+            upper = self._parent_joint[link]
             if upper.get("type") != "fixed":
                 names.append(upper.get("name", ""))
             link = _link(upper, "parent")
         return names[::-1]
 
+
+def survey(description: RobotDescription) -> UrdfSurvey:
+    """The movable joints of a URDF with all that it says about them."""
+    root = ElementTree.fromstring(description.xml)
+    tree = _Tree(root)
+    total = sum(tree.masses.values())
     joints = []
-    for element in elements:
+    for element in tree.joints:
         if element.get("type") == "fixed":
             continue
         child = _link(element, "child")
-        mass, beyond = below(child)
+        mass, beyond = tree.below(child)
         mimic = element.find("mimic")
         lower, upper = _limit(element, "lower", 0.0), _limit(element, "upper", 0.0)
         joints.append(
@@ -112,7 +120,7 @@ def survey(description: RobotDescription) -> UrdfSurvey:
                 effort=_limit(element, "effort"),
                 mimics=None if mimic is None else mimic.get("joint", ""),
                 carried=mass / total if total > 0 else 0.0,
-                above=tuple(over(element)),
+                above=tuple(tree.above(element)),
                 beyond=tuple(beyond),
             )
         )

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -36,7 +36,7 @@ Progress = Callable[[str, int], None]
 class Truth:
     """What the simulated robot is: inertias φ (10·n_bodies,) and all its effects."""
 
-    phi: Array
+    phi: Array = field(repr=False)
     effects: tuple[Planted, ...]
 
     def record(self, joint_names: Sequence[str]) -> dict[str, object]:

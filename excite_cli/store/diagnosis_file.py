@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from excite_cli.atomic import write_atomically
@@ -27,11 +26,10 @@ from excite_cli.diagnosis.records import (
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_file import new_hdf5
-from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.store import checked
 from excite_cli.store.approximation_text import approximation_as_data, approximation_of
 from excite_cli.store.joint_errors import require_joints
-from excite_cli.store.own_file import PROGRAM, OwnFile, opened
+from excite_cli.store.own_file import PROGRAM, OwnFile, is_marked, opened
 from excite_cli.store.trace_groups import (
     read_torque_traces,
     read_traces,
@@ -90,13 +88,7 @@ def read_diagnosis(path: Path) -> Diagnosis:
 
 def is_diagnosis(path: Path) -> bool:
     """Whether `path` is a file that `write_diagnosis` wrote."""
-    if not (path.is_file() and h5py.is_hdf5(path)):
-        return False
-    try:
-        with limited_memory(path), h5py.File(path, "r") as file:
-            return str(file.attrs.get("content", "")) == CONTENT
-    except Exception:  # damaged, in whatever way: whoever reads it says so
-        return False
+    return is_marked(path, OWN)
 
 
 def _write(path: Path, diagnosis: Diagnosis) -> None:

@@ -22,10 +22,9 @@ from excite_cli.identification.identify import Identification
 from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_file import new_hdf5
-from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.store import checked
 from excite_cli.store.joint_errors import require_joints
-from excite_cli.store.own_file import PROGRAM, OwnFile, opened
+from excite_cli.store.own_file import PROGRAM, OwnFile, is_marked, opened
 from excite_cli.store.trace_groups import read_torque_traces, write_torque_traces
 from excite_cli.store.versions import versions
 
@@ -139,13 +138,7 @@ def read_fit(path: Path) -> StoredFit:
 
 def is_fit(path: Path) -> bool:
     """Whether `path` is a file that `write_fit` wrote."""
-    if not (path.is_file() and h5py.is_hdf5(path)):
-        return False
-    try:
-        with limited_memory(path), h5py.File(path, "r") as file:
-            return str(file.attrs.get("kind", "")) == KIND
-    except Exception:  # damaged, in whatever way: whoever reads it says so
-        return False
+    return is_marked(path, OWN)
 
 
 def _read(file: Any, path: Path) -> StoredFit:

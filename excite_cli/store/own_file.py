@@ -29,6 +29,18 @@ class OwnFile:
     marker: tuple[str, str] | None = None
 
 
+def is_marked(path: Path, own: OwnFile) -> bool:
+    """Whether `path` is an HDF5 file with the marker of its kind."""
+    if own.marker is None or not (path.is_file() and h5py.is_hdf5(path)):
+        return False
+    name, value = own.marker
+    try:
+        with limited_memory(path), h5py.File(path, "r") as file:
+            return str(file.attrs.get(name, "")) == value
+    except Exception:  # damaged, in whatever way: whoever reads it says so
+        return False
+
+
 @contextmanager
 def opened(path: Path, own: OwnFile) -> Iterator[Any]:
     """The open file, checked to be of this kind; whatever goes wrong while it is read is reported.

@@ -1,6 +1,8 @@
 """Measured data in words, and their runs as a table."""
 
-from excite_cli.measurement.dataset import Dataset
+from collections.abc import Sequence
+
+from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
 
@@ -13,20 +15,32 @@ def runs_in_words(data: Dataset) -> str:
 
 def dataset_parts(data: Dataset) -> Parts:
     """The runs, and what was noticed."""
+    noticed = dict.fromkeys(f"{each.severity}: {each.text}" for each in data.findings)
+    return [_run_table(f"Runs of {', '.join(data.joint_names)}", data.runs), *noticed]
+
+
+def _run_table(title: str, runs: Sequence[Run]) -> Table:
+    """Also where each came from, if they were read from files."""
+    read = any(run.origin.file for run in runs)
     rows = tuple(
         (
-            run.name,
+            run.label,
             str(len(run.t)),
             f"{run.duration:.2f}",
             f"{1.0 / run.step:.4g}",
             f"{run.usable().mean():.1%}",
+            *([f"{run.origin.file} {run.origin.place}".strip()] if read else []),
         )
-        for run in data.runs
+        for run in runs
     )
-    names = ("run", "samples", "seconds", "rate [Hz]", "usable")
-    table = Table(f"Runs of {', '.join(data.joint_names)}", names, rows, left=("run",))
-    noticed = dict.fromkeys(f"{each.severity}: {each.text}" for each in data.findings)
-    return [table, *noticed]
+    names = ("run", "samples", "seconds", "rate [Hz]", "usable", *(["from"] if read else []))
+    return Table(title, names, rows, left=("run",), words=("from",) if read else ())
+
+
+def _run_in_words(run: Run) -> str:
+    words = f"{run.label}: {run.q.shape[1]} joints, {len(run.t)} samples, {run.duration:.3g} s"
+    return f"{words}, from {run.origin.file}" if run.origin.file else words
 
 
 show(Dataset, lambda data: f"{len(data.joint_names)} joints; {runs_in_words(data)}", dataset_parts)
+show(Run, _run_in_words, lambda run: [_run_table("Run", [run])])

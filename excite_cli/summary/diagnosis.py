@@ -1,6 +1,6 @@
 """A diagnosis for people (tables and sentences) and for scripts (JSON)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from excite_cli.diagnosis.words import (
     counted,
     covariate_in_symbols,
     is_small,
+    other_name_of,
     p_in_words,
     place_in_words,
     value_in_words,
@@ -107,6 +108,17 @@ def _effects(found: Diagnosis, verbose: bool) -> Parts:
     if verbose or len(small) < 2:  # a line about one is no shorter than the one
         small = []
     shown = [each for each in ranked if not any(each is other for other in small)]
+    parts: Parts = [_effect_table(shown, everything, verbose)]
+    if small:
+        listed = ", ".join(_what(each.effect, everything) for each in small)
+        parts.append(
+            f"and {len(small)} small ones (each below {SMALL_SHARE:.1%}): {listed} "
+            "(--verbose: sizes)"
+        )
+    return [*parts, *(text for named in found.named for text in _other_names(named, everything))]
+
+
+def _effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -> Table:
     rows = tuple(
         (
             named.effect.kind,
@@ -117,25 +129,24 @@ def _effects(found: Diagnosis, verbose: bool) -> Parts:
         )
         for named in shown
     )
-    table = Table(
+    return Table(
         "What the declared model lacks (share: of the residual)",
         ("effect", "where", "size", *(["p"] if verbose else []), "share"),
         rows,
         left=("effect",),
         words=("where", "size"),
     )
-    parts: Parts = [table]
-    if small:
-        listed = ", ".join(_what(each.effect, everything) for each in small)
-        parts.append(
-            f"and {len(small)} small ones (each below {SMALL_SHARE:.1%}): {listed} "
-            "(--verbose: sizes)"
-        )
-    for named in found.named:
-        if named.aliases:
-            others = ", ".join(_what(alias, everything) for alias in named.aliases)
-            parts.append(f"{_what(named.effect, everything)} cannot be told from: {others}")
-    return parts
+
+
+def _other_names(named: NamedEffect, everything: int) -> list[str]:
+    """What it cannot be told from: by these data, and by any."""
+    what, found = _what(named.effect, everything), []
+    if named.aliases:
+        others = ", ".join(_what(alias, everything) for alias in named.aliases)
+        found.append(f"{what} cannot be told from: {others}")
+    if same := other_name_of(named.effect.kind):
+        found.append(f"{what} is the same torque as {' and '.join(same)}")
+    return found
 
 
 def _what(record: EffectRecord, everything: int) -> str:
@@ -313,4 +324,15 @@ def _in_words(found: Diagnosis) -> str:
     return f"{effects or 'nothing is missing'}; mean error {before:.2%} → {after:.2%}"
 
 
+def _named_in_words(named: NamedEffect) -> str:
+    """`coulomb_friction on elbow: coulomb 2.998 ± 0.0012 N·m`; joints are named, however many."""
+    sizes = (value_in_words(name, value) for name, value in named.parameters.items())
+    return f"{_what(named.effect, 0)}: {', '.join(sizes)}"
+
+
 show(Diagnosis, _in_words, diagnosis_parts)
+show(
+    NamedEffect,
+    _named_in_words,
+    lambda named: [_effect_table([named], 0, verbose=True), *_other_names(named, 0)],
+)

@@ -12,6 +12,8 @@ from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.margins import worst_data
+from excite_cli.summary.problem import problem_parts
+from excite_cli.trajectory.chain import Segment
 
 
 def plan_answer(planned: Problem | NextMotion, result: Result, output: str) -> Answer:
@@ -34,10 +36,7 @@ def plan_answer(planned: Problem | NextMotion, result: Result, output: str) -> A
 
 def result_parts(result: Result) -> Parts:
     """Condition numbers, and margins where something was asked to be kept."""
-    tables: Parts = [motion_table(result.motions)]
-    if result.motions and result.motions[0].margins:
-        tables.append(margin_table(result.motions))
-    return tables
+    return _tables(result.motions)
 
 
 def motion_table(motions: Sequence[Motion]) -> Table:
@@ -133,4 +132,23 @@ def _in_words(result: Result) -> str:
     return f"{words}, stacked condition number {result.motions[-1].stacked_condition_number:.2f}"
 
 
+def _tables(motions: Sequence[Motion]) -> Parts:
+    tables: Parts = [motion_table(motions)]
+    if motions and motions[0].margins:
+        tables.append(margin_table(motions))
+    return tables
+
+
+def _segment_in_words(segment: Segment) -> str:
+    joints = segment.coefficients.shape[1]
+    return f"{segment.name}: {joints} joints, {segment.trajectory.duration:.4g} s"
+
+
 show(Result, _in_words, result_parts)
+show(Motion, motion_sentence, lambda motion: _tables([motion]))
+show(Segment, _segment_in_words, lambda segment: [_segment_in_words(segment)])
+show(
+    NextMotion,
+    lambda following: following.messages[0],
+    lambda following: [*following.messages, *problem_parts(following.problem)],
+)

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.shown.record import Shown
 from excite_cli.trajectory.base import Array, Trajectory
 
 
-@dataclass(frozen=True)
-class Segment:
+@dataclass(frozen=True, repr=False)
+class Segment(Shown):
     """One trajectory with its coefficients (K, n); `name` says what it is for."""
 
     name: str

@@ -10,8 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from excite_cli.errors import RobotError
-from excite_cli.geometry.link_shapes import collision_model
-from excite_cli.robot.description import check_mesh_paths
+from excite_cli.geometry.link_shapes import collision_model, visual_model
 from excite_cli.robot.model import Array, Robot
 from excite_cli.view.surface import (
     Surface,
@@ -54,7 +53,7 @@ def robot_bodies(robot: Robot, cell: float = 0.0) -> tuple[tuple[Body, ...], str
     """
     note = ""
     try:
-        model = _visual_model(robot)
+        model = visual_model(robot)
     except RobotError as error:
         model, note = None, f"{error} The collision shapes are shown instead."
     if model is None or not model.geometryObjects:
@@ -79,23 +78,6 @@ def robot_bodies(robot: Robot, cell: float = 0.0) -> tuple[tuple[Body, ...], str
         colour = _colour(item, list(links).index(link))
         found.append(Body(str(item.name), int(item.parentJoint), surface, colour))
     return tuple(found), note
-
-
-def _visual_model(robot: Robot) -> pin.GeometryModel:
-    check_mesh_paths(robot.description, "visual")
-    try:
-        return pin.buildGeomFromUrdfString(
-            robot.model,
-            robot.description.xml,
-            pin.GeometryType.VISUAL,
-            None,
-            list(robot.description.package_dirs),
-        )
-    except (RuntimeError, ValueError) as error:
-        first = (str(error).strip().splitlines() or ["no reason given"])[0]
-        raise RobotError(
-            f"{robot.description.path.name}: the visual geometry cannot be loaded: {first}."
-        ) from error
 
 
 def _colour(item: pin.GeometryObject, number: int) -> Colour:

@@ -25,7 +25,7 @@ from excite_cli.workers.base import (
     Workers,
     unwatched,
 )
-from excite_cli.workers.environment import Surroundings, surroundings
+from excite_cli.workers.environment import Environment, environment
 from excite_cli.workers.travel import able_to_travel
 
 _ANSWER, _FIRST_WORKER = 5.0, 10.0  # [s] to wait for the scheduler, and for a worker
@@ -105,7 +105,7 @@ class Cluster(Workers):
         held = self._client.submit(_as_it_is, blob, pure=False)
         futures = [
             self._client.submit(
-                _do, digest, held, function, task, self._threads, surroundings(), pure=False
+                _do, digest, held, function, task, self._threads, environment(), pure=False
             )
             for task in tasks
         ]
@@ -147,13 +147,13 @@ class Cluster(Workers):
                 f"{self.address} --nthreads 1"
             ) from error
         try:
-            there: dict[str, Surroundings] = self._client.run(_there)
+            there: dict[str, Environment] = self._client.run(_there)
         except ImportError as error:
             raise ClusterError(
                 f"--scheduler {self.address}: its workers do not have excite ({error}). Install "
                 "it where they run."
             ) from error
-        here = surroundings()
+        here = environment()
         for worker, found in there.items():
             differs = here.against(found)
             if differs:
@@ -205,8 +205,8 @@ async def _greet(address: str) -> None:
         await scheduler.identity()
 
 
-def _there() -> Surroundings:
-    return surroundings()
+def _there() -> Environment:
+    return environment()
 
 
 def _as_it_is(blob: bytes) -> bytes:
@@ -214,14 +214,14 @@ def _as_it_is(blob: bytes) -> bytes:
 
 
 def _do(
-    digest: str, blob: bytes, function: Function, task: Any, threads: int, asked: Surroundings
+    digest: str, blob: bytes, function: Function, task: Any, threads: int, asked: Environment
 ) -> tuple[str, Any]:
     """One task, in a worker of the cluster."""
     from threadpoolctl import threadpool_limits
 
     _keep_memory()
     try:
-        differs = asked.against(surroundings())  # workers may have come later
+        differs = asked.against(environment())  # workers may have come later
         if differs:
             raise ClusterError(_other_versions(f"worker {_own_address()}", differs))
         if getattr(_held, "digest", "") != digest:

@@ -19,7 +19,7 @@ _LIBRARIES = ("numpy", "scipy", "pin", "coal", "clarabel")
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class Environment:
     """Versions of the libraries, the digest of our own source, and how numbers are rounded.
 
     Among the versions is whether the inner loops are the compiled ones.
@@ -28,7 +28,7 @@ class Surroundings:
     versions: tuple[tuple[str, str], ...]
     rounding: str
 
-    def against(self, other: "Surroundings") -> str:
+    def against(self, other: "Environment") -> str:
         """In words, what differs from `other` and must not; empty if nothing does."""
         mine, theirs = dict(self.versions), dict(other.versions)
         return ", ".join(
@@ -39,7 +39,7 @@ class Surroundings:
 
 
 @cache
-def surroundings() -> Surroundings:
+def environment() -> Environment:
     """Those of this process."""
     versions = [("Python", platform.python_version()), ("excite", _own_source())]
     for name in _LIBRARIES:
@@ -48,7 +48,7 @@ def surroundings() -> Surroundings:
         except metadata.PackageNotFoundError:
             versions.append((name, "none"))
     versions.append(("kernels", _kernels()))
-    return Surroundings(tuple(versions), _rounding())
+    return Environment(tuple(versions), _rounding())
 
 
 def _kernels() -> str:

@@ -5,8 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli import ConfigError, FileError, export_file, motions_of, read_result
-from tests.api.conftest import Loop
+from excite_cli import (
+    ConfigError,
+    FileError,
+    export_file,
+    load_problem,
+    motions_of,
+    plan,
+    read_result,
+)
+from tests.api.conftest import SMALL, SMOKE, Loop
 
 
 def test_what_the_format_cannot_hold_is_one_sentence(loop: Loop, tmp_path: Path) -> None:
@@ -48,6 +56,15 @@ def test_a_motion_file_knows_neither_limits_nor_robot(loop: Loop, tmp_path: Path
             export_file(path, "npz", tmp_path / "one.npz", **more)  # type: ignore[arg-type]
     with pytest.raises(FileError, match=r"--motion 2: .*one\.csv holds one motion"):
         export_file(path, "npz", tmp_path / "one.npz", chosen=[2])
+
+
+def test_a_motion_planned_with_a_fit_is_entered_from_rest(loop: Loop, tmp_path: Path) -> None:
+    """Its problem is that of the result, what the fit knows included."""
+    uncertain = [f"uncertainty.fit={loop.fit}", "constraints.torque.scale=1"]
+    problem = load_problem(SMOKE, [*SMALL, "sequence.motions=1", *uncertain])
+    plan(problem, output=tmp_path / "arm.h5")
+    found = export_file(tmp_path / "arm.h5", "csv", tmp_path / "arm.csv", rate=50.0, start={})
+    assert found.motions[0].durations.keys() == {"entry", "motion", "return"}
 
 
 def test_a_fit_is_written_as_a_model(loop: Loop, tmp_path: Path) -> None:

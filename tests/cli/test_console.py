@@ -119,7 +119,7 @@ def test_the_best_so_far_keeps_all_limits() -> None:
 
     def words(value: float, margin: float, measure: Measure = Measure.CONDITION_NUMBER) -> str:
         figure = Figure(measure, value)
-        return best.words(Progress(1, figure, "torque", margin, "N·m", 0.1, Stage(1, 3)))
+        return best.words(Progress(1, figure, margin, 0.1, Stage(1, 3)))
 
     assert words(9.0, -0.1) == "condition number 9.00"
     assert words(12.0, 0.1) == "condition number 12.00 (best 12.00)"

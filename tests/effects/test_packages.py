@@ -91,8 +91,8 @@ def test_the_program_works_on_and_says_so(tmp_path: Path, monkeypatch: pytest.Mo
     config.write_text(f"{text}effects: [{{kind: viscous_friction}}]\n")
     options = ("--set", "optimizer.max_iterations=1", "--motions", "1", "-o", tmp_path / "arm.h5")
     ended = excite("optimize", config, *options)
-    assert ended.status == 0, ended
-    assert "warning: effect 'mine' (foreign_effects:Mine) of a package is set aside" in ended.err
+    assert ended.returncode == 0, ended
+    assert "warning: effect 'mine' (foreign_effects:Mine) of a package is set aside" in ended.stderr
     assert (tmp_path / "arm.h5").is_file()
 
 

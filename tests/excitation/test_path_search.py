@@ -78,7 +78,6 @@ def test_a_free_way_is_straight(table: Problem) -> None:
     search = find_way(table, start, near, 1)
     assert search.way is not None
     assert len(search.way) == 2
-    assert search.extensions == 0
 
 
 def test_a_motion_round_the_wall_keeps_all_constraints(table: Problem) -> None:

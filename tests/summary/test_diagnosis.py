@@ -50,6 +50,15 @@ def printed(found: Diagnosis) -> str:
     return "\n".join(lines)
 
 
+def test_other_names_of_the_same_torque_are_told() -> None:
+    found = make_diagnosis(rivals=())
+    (named, *others) = found.effects
+    effect = replace(named.effect, kind="asymmetric_friction")
+    text = printed(replace(found, effects=(replace(named, effect=effect), *others)))
+    assert "is the same torque as coulomb_friction and torque_offset" in text
+    assert "the same torque" not in printed(found)
+
+
 def test_the_noise_floor_stands_beside_the_errors(doubted: Diagnosis) -> None:
     """All joints are left with 1 N·m; repeated periods show 0.8 N·m, at the elbow 0.25 N·m."""
     floor = {name: 0.25 if name == "elbow" else 0.8 for name in doubted.joint_names[:-1]}

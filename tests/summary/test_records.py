@@ -1,11 +1,17 @@
 """Records read well in a console, and show the terminal's tables in a notebook."""
 
 import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from excite_cli import (
+    Case,
     Problem,
     Result,
     check,
@@ -13,20 +19,33 @@ from excite_cli import (
     describe_robot,
     load_case,
     load_problem,
+    motions_of,
     plan,
+    plan_after,
     propose,
     verify_gradient,
+    write_result,
 )
 from excite_cli.api.checking import check_answer
 from excite_cli.api.comparing import comparison_answer
 from excite_cli.api.planning import plan_answer
 from excite_cli.cli.console import Terminal
+from excite_cli.measurement.dataset import Run
+from excite_cli.measurement.run_identity import Origin
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import Shown
 from excite_cli.shown.table import Table
+from tests.diagnosis.synthetic_diagnosis import make_diagnosis, smoke_spec
 
 ROOT = Path(__file__).resolve().parents[2]
 SMOKE = ROOT / "configs" / "smoke.yaml"
+RUN = Run(
+    "elbow",
+    np.arange(5) / 10,
+    np.zeros((5, 3)),
+    np.zeros((5, 3)),
+    origin=Origin("log.h5", "/runs/elbow"),
+)
 BRIEF = ["optimizer.max_iterations=6", "sequence.motions=1"]
 
 
@@ -43,10 +62,17 @@ def result(problem: Problem) -> Result:
 @pytest.fixture(scope="module")
 def records(problem: Problem, result: Result) -> dict[str, Shown]:
     inspections = check(problem, result, rate=50.0, meshes=False)
+    found = make_diagnosis(rivals=())
+    following = plan_after(Case(smoke_spec(), SMOKE.parent, problem.robot), found)
     return {
         "smoke_arm: 5 joints, 26 base parameters": problem,
         "smoke_arm: 5 joints)": load_case(SMOKE),
         "1 motion of 5 joints, stacked condition number": result,
+        "motion 1: condition number": result.motions[0],
+        "motion_1: 5 joints, 6 s": motions_of(result)[0],
+        "elbow: 3 joints, 5 samples, 0.4 s, from log.h5": RUN,
+        "viscous_friction on elbow: ": found.effects[0],
+        "the next motion": following,
         "motion_1: no violation": inspections,
         "no violation; joint_position proved": inspections["motion_1"],
         "2 candidates": compare_random(problem, result, candidates=2, seconds=0),
@@ -54,6 +80,26 @@ def records(problem: Problem, result: Result) -> dict[str, Shown]:
         "smoke_arm: 5 joints (": describe_robot(ROOT / "data" / "smoke_arm.urdf"),
         "The gradient is right.": verify_gradient(problem),
     }
+
+
+def test_records_of_a_file_are_shown_whatever_else_was_imported(
+    problem: Problem, result: Result, tmp_path: Path
+) -> None:
+    write_result(tmp_path / "r.h5", result, problem)
+    read = "from excite_cli import read_result; r = read_result('r.h5'); print(r, r.motions)"
+    run = subprocess.run(
+        [sys.executable, "-c", read], cwd=tmp_path, capture_output=True, text=True, check=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert run.stdout == f"{result!r} {result.motions!r}\n"
+    assert "…" not in run.stdout
+
+
+def test_a_run_says_where_it_was_read() -> None:
+    html = RUN._repr_html_()
+    assert html is not None
+    assert "log.h5 /runs/elbow" in html
+    assert "from" not in (replace(RUN, origin=Origin())._repr_html_() or "")
 
 
 def test_a_record_is_a_few_words(records: dict[str, Shown]) -> None:

@@ -85,8 +85,8 @@ def test_spoiled_parts_give_a_sentence(kind: str, loop: Loop, tmp_path: Path) ->
 
 def _sound(name: str, arguments: list[str | Path]) -> int:
     run = excite(*arguments)
-    assert run.status in (0, 1, 2), (name, arguments, run.err)
-    return run.status
+    assert run.returncode in (0, 1, 2), (name, arguments, run.stderr)
+    return run.returncode
 
 
 def edited(source: Path, target: Path, change: Callable[[h5py.File], None]) -> Path:

@@ -149,9 +149,14 @@ def test_folders_that_hold_inputs(tmp_path: Path) -> None:
 
 def test_the_library_refuses_too(files: Files) -> None:
     problem = api.load_problem(files.config, ["optimizer.max_iterations=1", FIT])
-    data = api.load_data(problem, files.data)
+    data, case = api.load_data(problem, files.data), api.load_case(files.config)
+    following = api.plan_after(case, files.diagnosis)
     calls: list[Callable[[], object]] = [
         lambda: api.plan(problem, output=files.urdf, overwrite=True),
+        lambda: api.plan(problem, output=files.config, overwrite=True),
+        lambda: api.plan(following, output=files.config, overwrite=True),
+        lambda: api.diagnose(case, data, apply=files.config, overwrite=True),
+        lambda: api.simulate(case, files.result, output=files.config, overwrite=True),
         lambda: api.plan(problem, output=str(files.fit), overwrite=True),
         lambda: api.plan(problem, priors=[files.result], output=files.result, overwrite=True),
         lambda: api.diagnose(problem, data, output=files.data),

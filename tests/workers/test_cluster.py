@@ -9,7 +9,7 @@ import pytest
 from excite_cli.errors import ConfigError, MissingExtraError, NoAdmissibleMotionError
 from excite_cli.workers.base import News
 from excite_cli.workers.cluster import Cluster, ClusterError
-from excite_cli.workers.environment import Surroundings, surroundings
+from excite_cli.workers.environment import Environment, environment
 from tests.workers import work
 
 distributed = pytest.importorskip("distributed")
@@ -55,9 +55,9 @@ def test_a_lost_worker_costs_its_task_a_second_try(cluster: Cluster, tmp_path: P
 def test_a_worker_with_other_versions_is_refused(
     scheduler: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here = surroundings()
-    other = Surroundings((("Python", "2.7"), *here.versions[1:]), here.rounding)
-    monkeypatch.setattr("excite_cli.workers.cluster.surroundings", lambda: other)
+    here = environment()
+    other = Environment((("Python", "2.7"), *here.versions[1:]), here.rounding)
+    monkeypatch.setattr("excite_cli.workers.cluster.environment", lambda: other)
     with pytest.raises(ClusterError, match=r"other versions.*Python 2\.7 here, 3"):
         Cluster(scheduler.scheduler_address)  # type: ignore[attr-defined]
 
@@ -65,8 +65,8 @@ def test_a_worker_with_other_versions_is_refused(
 def test_one_that_rounds_otherwise_is_told(
     scheduler: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    other = Surroundings(surroundings().versions, "something else")
-    monkeypatch.setattr("excite_cli.workers.cluster.surroundings", lambda: other)
+    other = Environment(environment().versions, "something else")
+    monkeypatch.setattr("excite_cli.workers.cluster.environment", lambda: other)
     warnings: list[str] = []
     Cluster(scheduler.scheduler_address, warn=warnings.append).close()  # type: ignore[attr-defined]
     assert "rounds in another way" in warnings[0]

@@ -3,13 +3,13 @@
 import pytest
 
 from excite_cli.kernels import library as kernels
-from excite_cli.workers.environment import surroundings
+from excite_cli.workers.environment import environment
 
 
 def test_workers_without_the_compiled_loops_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels, "KERNELS", object())
-    here = surroundings.__wrapped__()
+    here = environment.__wrapped__()
     monkeypatch.setattr(kernels, "KERNELS", None)
-    there = surroundings.__wrapped__()
+    there = environment.__wrapped__()
     assert here.against(here) == ""
     assert here.against(there) == "kernels compiled here, numpy there"
