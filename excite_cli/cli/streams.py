@@ -17,29 +17,45 @@ _NOBODY_READS = (errno.EPIPE,)
 _STANDARD = (0, 1, 2)
 
 
-class _Steady(io.RawIOBase):
-    """The descriptor of a stream, written to as long as that works."""
+class _Steady(io.TextIOWrapper):
+    """Text to a descriptor, as long as that works; then to nowhere, if the error is `given_up`.
 
-    def __init__(self, descriptor: int, given_up: Callable[[OSError], bool]) -> None:
-        self._descriptor, self._given_up = descriptor, given_up
+    Only the buffers of Python itself know what was written: an interrupt at any instant neither
+    loses a line nor writes it twice.
+    """
 
-    def fileno(self) -> int:
-        return self._descriptor
+    def __init__(self, stream: Any, given_up: Callable[[OSError], bool]) -> None:
+        file = io.FileIO(stream.fileno(), "w", closefd=False)
+        super().__init__(
+            io.BufferedWriter(file),
+            encoding=stream.encoding,
+            errors="replace",
+            line_buffering=stream.line_buffering,
+        )
+        self._given_up = given_up
 
-    def isatty(self) -> bool:
-        return os.isatty(self._descriptor)
-
-    def writable(self) -> bool:
-        return True
-
-    def write(self, data: Any) -> int:
-        """All of `data`, as far as the caller knows."""
+    def write(self, text: str) -> int:
+        """Take all of the text."""
         try:
-            return os.write(self._descriptor, data)
+            return super().write(text)
         except OSError as error:
-            if not self._given_up(error):
-                raise
-            return len(memoryview(data).cast("B"))
+            self._give_up(error)
+            return len(text)
+
+    def flush(self) -> None:
+        """Write what is buffered."""
+        try:
+            super().flush()
+        except OSError as error:
+            self._give_up(error)
+
+    def _give_up(self, error: OSError) -> None:
+        if not self._given_up(error):
+            raise error
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self.fileno())
+        os.close(nowhere)
+        super().flush()
 
 
 @contextlib.contextmanager
@@ -74,13 +90,6 @@ def _steady(stream: Any, given_up: Callable[[OSError], bool]) -> Any:
     if stream is None:
         return io.StringIO()
     try:
-        descriptor = stream.fileno()
+        return _Steady(stream, given_up)
     except (OSError, ValueError):  # it is kept in memory
         return stream
-    raw = _Steady(descriptor, given_up)
-    return io.TextIOWrapper(
-        io.BufferedWriter(raw),
-        encoding=stream.encoding,
-        errors="replace",
-        line_buffering=stream.line_buffering,
-    )
