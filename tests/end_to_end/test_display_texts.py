@@ -17,7 +17,6 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-import excite_cli.cli.telling
 import numpy as np
 import pytest
 
