@@ -49,7 +49,7 @@ class Ground:
 
     @property
     def runs(self) -> tuple[str, ...]:
-        return tuple(s.run for s in self.signals)
+        return tuple(s.run.name for s in self.signals)
 
 
 def ground_of(

@@ -70,7 +70,7 @@ def plan(
     --------
     >>> from excite_cli import load_problem, plan
     >>> problem = load_problem("configs/smoke.yaml", ["optimizer.max_iterations=20"])
-    >>> [str(motion.status) for motion in plan(problem).motions]
+    >>> [motion.status for motion in plan(problem).motions]
     ['iteration limit', 'iteration limit']
     """
     path = None if output is None else Path(output)

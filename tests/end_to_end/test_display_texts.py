@@ -5,29 +5,28 @@ effects, labels of runs, names in words, sentences of findings.
 """
 
 import inspect
+import pkgutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass, replace
 from enum import Enum
 from functools import wraps
+from importlib import import_module
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-import excite_cli.cli.diagnose_tables
-import excite_cli.cli.telling  # noqa: F401  (with all that it imports)
 import numpy as np
 import pytest
 
-import excite_cli.api as api
-from excite_cli.diagnosis.diagnose import diagnose
+import excite_cli as api
+import excite_cli.summary
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.excitation.result import Result
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Robot
-from excite_cli.store.diagnosis_file import read_diagnosis, write_diagnosis
 from tests.cli.program import SMOKE
 from tests.diagnosis.test_sealed import motion
 
@@ -36,6 +35,9 @@ pytest.importorskip("mujoco")
 from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
+
+for summarised in pkgutil.iter_modules(excite_cli.summary.__path__, "excite_cli.summary."):
+    import_module(summarised.name)  # words are replaced in what is imported
 
 JUNK = "q[elbow] 6-12 s (first half): always in contact"  # looks like much, and means nothing
 ELBOW = 2
@@ -165,9 +167,8 @@ def diagnosed(folder: Path) -> Diagnosis:
         ],
     )
     dataset = recorded(problem.robot)
-    found = diagnose(problem.robot, problem.base, dataset, problem.spec)
-    write_diagnosis(folder / "diagnosis.h5", found)
-    again = read_diagnosis(folder / "diagnosis.h5")
+    found = api.diagnose(problem, dataset, output=folder / "diagnosis.h5")
+    again = api.read_diagnosis(folder / "diagnosis.h5")
     assert not differences(found.effects, again.effects)
     return found
 

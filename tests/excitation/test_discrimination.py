@@ -19,6 +19,7 @@ from excite_cli.excitation.discrimination import (
     residual_directions,
 )
 from excite_cli.excitation.extension import extend
+from excite_cli.excitation.progress import Measure
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import build_weighting
 from excite_cli.trajectory.fourier import FourierTrajectory
@@ -120,7 +121,7 @@ def test_the_envelope_gradient_is_exact(kinds: list[str], floating: bool) -> Non
             for h in (3e-5, 1e-5, 3e-6)
         ]
         assert min(errors) < 1e-7
-    assert "divergence" in spectrum.words
+    assert spectrum.figure.measure is Measure.DIVERGENCE
 
 
 def test_the_earlier_data_alone() -> None:

@@ -176,5 +176,5 @@ def test_what_is_asked_for_decides_where() -> None:
         assert three.pids == (), "processes were started before there is a task"
     with pytest.raises(ConfigError, match="give one of them"):
         open_workers(2, "tcp://localhost:8786")
-    with pytest.raises(ConfigError, match="1 or more"):
+    with pytest.raises(ConfigError, match="Allowed are 1 to"):
         open_workers(0)
