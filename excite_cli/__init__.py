@@ -46,18 +46,23 @@ if TYPE_CHECKING:
     from excite_cli.config.spec import Spec as Spec
     from excite_cli.diagnosis.next_motion import NextMotion as NextMotion
     from excite_cli.diagnosis.records import Diagnosis as Diagnosis
+    from excite_cli.diagnosis.records import NamedEffect as NamedEffect
     from excite_cli.errors import ConfigError as ConfigError
     from excite_cli.errors import ExciteError as ExciteError
     from excite_cli.errors import FileError as FileError
+    from excite_cli.errors import MissingExtraError as MissingExtraError
     from excite_cli.errors import NoAdmissibleMotionError as NoAdmissibleMotionError
     from excite_cli.errors import RobotError as RobotError
     from excite_cli.excitation.comparison import Comparison as Comparison
     from excite_cli.excitation.inspection import Inspection as Inspection
     from excite_cli.excitation.inspections import Inspections as Inspections
+    from excite_cli.excitation.motion import Motion as Motion
     from excite_cli.excitation.problem import Problem as Problem
     from excite_cli.excitation.result import Result as Result
+    from excite_cli.identification.fit import Fit as Fit
     from excite_cli.identification.identify import Identification as Identification
     from excite_cli.measurement.dataset import Dataset as Dataset
+    from excite_cli.measurement.dataset import Run as Run
     from excite_cli.proposal.propose import Proposal as Proposal
     from excite_cli.shown.note import Level as Level
     from excite_cli.shown.note import Note as Note
@@ -95,15 +100,24 @@ _HOMES = {
     "api.viewing": ("Drawing", "Serving", "View", "draw_motion", "view_motions"),
     "config.spec": ("Spec",),
     "diagnosis.next_motion": ("NextMotion",),
-    "diagnosis.records": ("Diagnosis",),
-    "errors": ("ConfigError", "ExciteError", "FileError", "NoAdmissibleMotionError", "RobotError"),
+    "diagnosis.records": ("Diagnosis", "NamedEffect"),
+    "errors": (
+        "ConfigError",
+        "ExciteError",
+        "FileError",
+        "MissingExtraError",
+        "NoAdmissibleMotionError",
+        "RobotError",
+    ),
     "excitation.comparison": ("Comparison",),
     "excitation.inspection": ("Inspection",),
     "excitation.inspections": ("Inspections",),
+    "excitation.motion": ("Motion",),
     "excitation.problem": ("Problem",),
     "excitation.result": ("Result",),
+    "identification.fit": ("Fit",),
     "identification.identify": ("Identification",),
-    "measurement.dataset": ("Dataset",),
+    "measurement.dataset": ("Dataset", "Run"),
     "proposal.propose": ("Proposal",),
     "shown.note": ("Level", "Note"),
     "simulation.settings": ("SimulationSettings",),

@@ -1,6 +1,7 @@
 """What the linter of layers does not see: cycles, also through imports inside functions."""
 
 import ast
+import re
 import tomllib
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
@@ -85,3 +86,13 @@ def test_commands_parse_call_and_show() -> None:
                 body = node.body[1:] if ast.get_docstring(node) is not None else node.body
                 lines = body[-1].end_lineno - body[0].lineno + 1 if body else 0
                 assert lines < LONGEST_COMMAND, f"{path.name}: {node.name} has {lines} lines"
+
+
+def test_the_map_in_the_readme_has_every_package_and_no_other() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    drawn = text.partition("excite_cli/\n")[2].partition("```")[0]
+    named = set(re.findall(r"(?:^  |\s{2}|, )([a-z_]+(?:/|\.py))(?=\s)", drawn, re.MULTILINE))
+    package = ROOT / "excite_cli"
+    folders = {f"{path.parent.name}/" for path in package.glob("*/__init__.py")}
+    files = {path.name for path in package.glob("*.py") if not path.name.startswith("__")}
+    assert named == folders | files
