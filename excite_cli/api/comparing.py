@@ -4,10 +4,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
+from excite_cli.api.loading import files_of
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import paths_in
 from excite_cli.api.planning import plan
-from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.comparison import Comparison
@@ -42,6 +43,7 @@ def optimized_for(problem: Problem, optimized: Result | str | Path) -> Result:
     return result
 
 
+@checked()
 def compare_random(
     problem: Problem,
     optimized: Result | str | Path | None = None,
@@ -67,7 +69,7 @@ def compare_random(
     NoAdmissibleMotionError
         No motion was found.
     """
-    inputs = (*paths_in(optimized), *files_of_config(problem.spec, problem.folder))
+    inputs = (*paths_in(optimized), *files_of(problem))
     with held({"output": output}, overwrite, inputs):
         if optimized is None:
             result = plan(problem, workers=workers, tell=lambda note: None)

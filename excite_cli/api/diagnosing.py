@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from excite_cli.api.loading import Case, dataset_of, sources_of
+from excite_cli.api.arguments import checked
+from excite_cli.api.loading import Case, dataset_of, files_of, sources_of
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
-from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.diagnosis.diagnose import diagnose as diagnose_dataset
 from excite_cli.diagnosis.records import Diagnosis
@@ -21,6 +21,7 @@ from excite_cli.store.versions import versions
 from excite_cli.summary.diagnosis import diagnosis_answer as diagnosis_answer
 
 
+@checked()
 def diagnose(
     problem: Problem | Case,
     data: Dataset | str | Path | Sequence[str | Path],
@@ -52,7 +53,7 @@ def diagnose(
     """
     inputs: list[str | Path] = [
         *sources_of(data),
-        *files_of_config(problem.spec, problem.folder),
+        *files_of(problem),
     ]
     with held({"output": output, "apply": apply}, overwrite, inputs):
         dataset = dataset_of(problem, data, tell)
@@ -72,6 +73,7 @@ def diagnose(
         return found
 
 
+@checked()
 def save_config(path: str | Path, problem: Problem | Case, found: Diagnosis) -> None:
     """Write the config with the effects that a diagnosis found: `excite diagnose --apply`.
 
@@ -80,7 +82,7 @@ def save_config(path: str | Path, problem: Problem | Case, found: Diagnosis) -> 
     FileError
         It cannot be written.
     """
-    own = files_of_config(problem.spec, problem.folder)
+    own = files_of(problem)
     refuse_inputs_as_outputs({"path": Path(path)}, own)
     text = found_config(problem.spec, problem.folder, found, Path(path))
     write_text_atomically(Path(path), text)

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from excite_cli.api.loading import Case, dataset_of, sources_of, tell_findings
+from excite_cli.api.arguments import checked
+from excite_cli.api.loading import Case, dataset_of, files_of, sources_of, tell_findings
 from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
-from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.diagnosis.plausibility import check_dataset
 from excite_cli.excitation.problem import Problem
@@ -19,6 +19,7 @@ from excite_cli.store.fit_file import write_fit
 from excite_cli.summary.identification import identification_answer as identification_answer
 
 
+@checked()
 def identify(
     problem: Problem | Case,
     data: Dataset | str | Path | Sequence[str | Path],
@@ -52,7 +53,7 @@ def identify(
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
     inputs: list[str | Path] = [
         *sources_of(data),
-        *files_of_config(problem.spec, problem.folder),
+        *files_of(problem),
     ]
     with held({"output": output, **models}, overwrite, inputs):
         dataset = dataset_of(problem, data, tell)
@@ -74,6 +75,7 @@ def identify(
         return found
 
 
+@checked()
 def save_fit(
     path: str | Path,
     problem: Problem | Case,
@@ -89,7 +91,7 @@ def save_fit(
     FileError
         It cannot be written.
     """
-    own = files_of_config(problem.spec, problem.folder)
+    own = files_of(problem)
     refuse_inputs_as_outputs({"path": Path(path)}, (*sources, *own))
     config, folder = spec_as_yaml(problem.spec), str(problem.folder)
     write_fit(Path(path), found, config, folder, problem.robot.fingerprint(), tuple(sources))

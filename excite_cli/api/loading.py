@@ -1,10 +1,12 @@
 """Configs, problems and measured data: what every command begins with."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
+from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
@@ -32,13 +34,14 @@ _LEVELS = {"note": Level.NOTE, "warning": Level.WARNING}
 class Case(Shown):
     """What a config declares of a robot: enough for measured data, without anything to plan.
 
-    Relative paths of `spec` start from `folder`. A `Problem` has all of this too, and can be given
-    wherever a case is asked for.
+    Relative paths of `spec` start from `folder`; `source` is the file of the config, if it has one.
+    A `Problem` has all of this too, and can be given wherever a case is asked for.
     """
 
     spec: Spec
     folder: Path
     robot: Robot
+    source: Path | None = None
 
     @cached_property
     def base(self) -> BaseParameters:
@@ -53,6 +56,7 @@ show(
 )
 
 
+@checked()
 def load_case(config: str | Path, overrides: Sequence[str] = ()) -> Case:
     """The robot and declared model of a config, without capsules; `overrides` as with `--set`.
 
@@ -67,9 +71,10 @@ def load_case(config: str | Path, overrides: Sequence[str] = ()) -> Case:
     ('shoulder_yaw', 'shoulder_pitch')
     """
     spec, folder = load_spec(Path(config), list(overrides)), Path(config).resolve().parent
-    return Case(spec, folder, build_robot(spec.robot, folder))
+    return Case(spec, folder, build_robot(spec.robot, folder), Path(config).absolute())
 
 
+@checked()
 def load_problem(
     config: str | Path, overrides: Sequence[str] = (), tell: Tell = log_note
 ) -> Problem:
@@ -90,16 +95,21 @@ def load_problem(
     45
     """
     spec, folder = load_spec(Path(config), list(overrides)), Path(config).resolve().parent
-    return _built(spec, folder, tell)
+    return _built(spec, folder, Path(config).absolute(), tell)
 
 
 def problem_of(case: Problem | Case, tell: Tell = log_note) -> Problem:
     """The whole problem of a case, for what needs its constraints; see `load_problem`."""
-    return case if isinstance(case, Problem) else _built(case.spec, case.folder, tell)
+    return case if isinstance(case, Problem) else _built(case.spec, case.folder, case.source, tell)
 
 
-def _built(spec: Spec, folder: Path, tell: Tell) -> Problem:
-    problem = build_problem(spec, folder, fit_knowledge(spec, folder))
+def files_of(problem: Problem | Case) -> tuple[Path, ...]:
+    """The files that a problem was made from: config, URDF and fit."""
+    return files_of_config(problem.spec, problem.folder, problem.source)
+
+
+def _built(spec: Spec, folder: Path, source: Path | None, tell: Tell) -> Problem:
+    problem = replace(build_problem(spec, folder, fit_knowledge(spec, folder)), source=source)
     for note in problem_notes(problem):
         tell(note)
     if spec.uncertainty is not None and spec.uncertainty.fit is not None:
@@ -121,6 +131,7 @@ def _doubt_fit(path: Path, tell: Tell) -> None:
         tell(Note(Level.WARNING, text))
 
 
+@checked()
 def load_data(
     problem: Problem | Case,
     files: str | Path | Sequence[str | Path],

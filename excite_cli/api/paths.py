@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from excite_cli.errors import FileError
+from excite_cli.measurement.dataset import Dataset
 
 
 def existing(path: str | Path) -> Path:
@@ -19,6 +20,7 @@ def existing(path: str | Path) -> Path:
 
 
 def paths_in(*given: object) -> list[Path]:
-    """Those of `given` that are files, also in lists: what a function reads by its path."""
+    """Those of `given` that are files, also in lists, and the files that data were read from."""
     listed = [x for each in given for x in (each if isinstance(each, list | tuple) else [each])]
-    return [Path(each) for each in listed if isinstance(each, str | Path)]
+    read = [x for each in listed for x in (each.sources if isinstance(each, Dataset) else [each])]
+    return [Path(each) for each in read if isinstance(each, str | Path)]

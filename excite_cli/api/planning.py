@@ -4,13 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from excite_cli.api.loading import Case
+from excite_cli.api.arguments import checked
+from excite_cli.api.loading import Case, files_of
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.api.outputs import held_result
 from excite_cli.api.paths import paths_in
 from excite_cli.api.priors import Prior, load_prior, name_of
 from excite_cli.api.working import tell_idle
-from excite_cli.config.inputs import files_of_config
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
 from excite_cli.diagnosis.records import Diagnosis
@@ -34,6 +34,7 @@ Planned = Problem | NextMotion
 PlanProgress = Callable[[int, Progress], None]
 
 
+@checked("starts")
 def plan(
     problem: Planned,
     *,
@@ -85,7 +86,7 @@ def plan(
         tell(Note(Level.INFO, motion_sentence(step.motion)))
 
     read = paths_in(priors, starts, following.name if following else None)
-    read += files_of_config(model.spec, model.folder)
+    read += files_of(model)
     with held_result(path, overwrite, resume, read):
         tell_idle(1 if workers is None else workers.count, model.spec.optimizer.restarts, tell)
         result = _begun(model, following, priors, path if resume else None, tell)
@@ -123,6 +124,7 @@ def _begun(
     return new_result(model, stacks, versions(), model.folder)
 
 
+@checked()
 def plan_after(
     problem: Problem | Case, found: Diagnosis | str | Path, tell: Tell = log_note
 ) -> NextMotion:
@@ -144,6 +146,7 @@ def plan_after(
         read = read_diagnosis(Path(found))
         following = after_diagnosis(read, spec, folder, fit_knowledge(spec, folder))
         following = replace(following, name=str(found))
+    following = replace(following, model=replace(following.model, source=problem.source))
     for note in problem_notes(following.model):
         tell(note)
     for message in following.messages:

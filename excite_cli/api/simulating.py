@@ -5,13 +5,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.entering import Start, entered, start_posture
-from excite_cli.api.loading import Case, problem_of
+from excite_cli.api.loading import Case, files_of, problem_of
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import paths_in
 from excite_cli.config.data_spec import MeasurementSpec
-from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import FileError
@@ -33,6 +33,7 @@ from excite_cli.trajectory.chain import Segment
 _KEPT = {"filter", "topic", "rate"}
 
 
+@checked("motions")
 def simulate(
     problem: Problem | Case,
     motions: Motions,
@@ -70,7 +71,7 @@ def simulate(
     NoAdmissibleMotionError
         No admissible way from `start` into a motion was found.
     """
-    inputs = (*paths_in(motions), *files_of_config(problem.spec, problem.folder))
+    inputs = (*paths_in(motions), *files_of(problem))
     with held({"output": output}, overwrite, inputs):
         load_mujoco()
         segments = load_motions(problem, motions, chosen, tell)

@@ -39,7 +39,7 @@ class Problem(Shown):
 
     `extension` holds the effects whose columns stand beside the base regressor. With a
     `separation` a motion is sought that tells effects apart, and `extension` has the rivals too.
-    Relative paths of `spec` start from `folder`.
+    Relative paths of `spec` start from `folder`; `source` is the file of the config, if it has one.
     """
 
     spec: Spec
@@ -56,6 +56,7 @@ class Problem(Shown):
     extension: Extension
     separation: Separation | None = None
     folder: Path = Path()
+    source: Path | None = None
 
     @property
     def variables(self) -> int:

@@ -45,7 +45,7 @@ def test_a_motion_file_knows_neither_limits_nor_robot(loop: Loop, tmp_path: Path
     (path,) = export_file(loop.result, "csv", tmp_path / "one.csv", chosen=[1]).paths
     for option, more in (("--slow", {"slow": 0.3}), ("--entry", {"start": {}})):
         with pytest.raises(FileError, match=f"{option}: .*does not say which robot"):
-            export_file(path, "npz", tmp_path / "one.npz", **more)  # type: ignore[arg-type]
+            export_file(path, "npz", tmp_path / "one.npz", **more)
     with pytest.raises(FileError, match=r"--motion 2: .*one\.csv holds one motion"):
         export_file(path, "npz", tmp_path / "one.npz", chosen=[2])
 
