@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.paths import refuse_twice
 from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
@@ -145,14 +146,16 @@ def load_data(
     Raises
     ------
     FileError
-        A file cannot be read, or holds what no fit should be made of.
+        A file cannot be read, is given twice, or holds what no fit should be made of.
     ConfigError, MissingExtraError
         The config names what the file lacks; the library for bags is not installed.
     """
     paths = [files] if isinstance(files, str | Path) else files
+    given = [Path(each) for each in paths]
+    refuse_twice(given)  # a run that is fitted must not be the sealed one, too
     robot, limits = problem.robot, problem.robot.limits
     data = read_dataset(
-        [Path(each) for each in paths],
+        given,
         problem.spec.measurement,
         robot.joint_names,
         (limits.lower, limits.upper, limits.velocity, limits.effort),

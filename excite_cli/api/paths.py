@@ -1,5 +1,6 @@
 """Paths that are given, seen to before any work begins."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from excite_cli.errors import FileError
@@ -24,3 +25,18 @@ def paths_in(*given: object) -> list[Path]:
     listed = [x for each in given for x in (each if isinstance(each, list | tuple) else [each])]
     read = [x for each in listed for x in (each.sources if isinstance(each, Dataset) else [each])]
     return [Path(each) for each in read if isinstance(each, str | Path)]
+
+
+def refuse_twice(paths: Iterable[Path]) -> None:
+    """See that no file is given twice, whatever it is called.
+
+    Raises
+    ------
+    FileError
+        One is.
+    """
+    seen: set[Path] = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise FileError(f"{path} is given twice.")
+        seen.add(path.resolve())

@@ -234,3 +234,10 @@ def test_data_at_hand_keep_their_file(loop: Loop) -> None:
         with pytest.raises(FileError, match=r"would replace .*data\.h5, which is read here"):
             call()
     assert loop.data.read_bytes() == before
+
+
+def test_a_log_counts_once(loop: Loop, tmp_path: Path) -> None:
+    again = tmp_path / "again.h5"
+    again.symlink_to(loop.data)
+    with pytest.raises(FileError, match=r"again\.h5 is given twice"):
+        load_data(loop.problem, [loop.data, again])
