@@ -19,6 +19,7 @@ from excite_cli.store import diagnosis_file, fit_file, result_file
 # How records that are read are shown.
 from excite_cli.summary import diagnosis as diagnosis
 from excite_cli.summary import identification as identification
+from excite_cli.summary import motions as motions
 
 
 @checked()
