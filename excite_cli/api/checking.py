@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import FileError
@@ -26,6 +27,7 @@ from excite_cli.summary.inspections import check_answer as check_answer
 from excite_cli.trajectory.chain import Segment
 
 
+@checked("motions")
 def check(
     problem: Problem,
     motions: Motions,
@@ -58,6 +60,8 @@ def check(
     """
     segments = load_motions(problem, motions, tell=tell)
     names = [each.name for each in segments]
+    if not names:
+        raise FileError("There is no motion to check.")
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise FileError(f"Two motions are called {twice}. Give each a name of its own.")

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.loading import inputs_of
 from excite_cli.api.outputs import held
 from excite_cli.api.planning import plan
@@ -41,6 +42,7 @@ def optimized_for(problem: Problem, optimized: Result | str | Path) -> Result:
     return result
 
 
+@checked()
 def compare_random(
     problem: Problem,
     optimized: Result | str | Path | None = None,

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.loading import Case, dataset_of, inputs_of, sources_of
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
@@ -20,6 +21,7 @@ from excite_cli.store.versions import versions
 from excite_cli.summary.diagnosis import diagnosis_answer as diagnosis_answer
 
 
+@checked()
 def diagnose(
     problem: Problem | Case,
     data: Dataset | str | Path | Sequence[str | Path],
@@ -68,6 +70,7 @@ def diagnose(
         return found
 
 
+@checked()
 def save_config(path: str | Path, problem: Problem | Case, found: Diagnosis) -> None:
     """Write the config with the effects that a diagnosis found: `excite diagnose --apply`.
 

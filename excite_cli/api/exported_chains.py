@@ -10,7 +10,7 @@ from excite_cli.config.constraints_spec import ConstraintsSpec, JointLimitsSpec
 from excite_cli.config.load import parse_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
-from excite_cli.errors import FileError
+from excite_cli.errors import ExciteError, FileError
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.time_scaling import PaceLimits, slowed_chain
@@ -60,6 +60,7 @@ def chains_of(file: Path, wanted: Wanted, tell: Tell) -> list[ExportedChain]:
     result = read_result(file)
     motions, joints = motions_of(result, wanted.chosen, str(file)), result.joint_names
     require_own_samples(file, result, motions, read_samples(file))
+    _require_own_joints(file, result)
     if wanted.start is not None:
         chains, constraints = _entered(file, result, motions, wanted, tell)
     else:
@@ -90,6 +91,23 @@ def _own_motion(file: Path, wanted: Wanted) -> tuple[tuple[str, ...], Segment]:
             "does; give one."
         )
     return found.joint_names, segment
+
+
+def _require_own_joints(file: Path, result: Result) -> None:
+    """Names in another order would send every joint the motion of another one.
+
+    A robot that is not found here, or is another one by now, tells nothing.
+    """
+    spec = parse_spec(result.config, f"the config stored in {file}")
+    try:
+        robot = build_robot(spec.robot, Path(result.config_folder))
+    except ExciteError:
+        return
+    if robot.fingerprint() == result.fingerprint and robot.joint_names != result.joint_names:
+        raise FileError(
+            f"{file} names other joints than the robot it was made for, or in another order: it "
+            "was edited. Plan its motions again."
+        )
 
 
 def _joint_bounds(file: Path, result: Result) -> tuple[Constraint, ...]:

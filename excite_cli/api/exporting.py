@@ -5,6 +5,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.entering import Start, durations_of
 from excite_cli.api.exported_chains import ExportedChain, Wanted, chains_of
 from excite_cli.api.models import write_models
@@ -57,6 +58,7 @@ class Exported:
     slow: float | None = None
 
 
+@checked()
 def export_file(
     file: str | Path,
     format: str,
@@ -216,6 +218,6 @@ def _export_model(
                 "again."
             )
         own = files_of_config(spec, Path(stored.config_folder), None)
-        refuse_inputs_as_outputs({"--output": path}, own)
+        refuse_inputs_as_outputs({"--output": path}, (*own, *stored.sources))
         write_models(robot, stored.fit, {"parameters" if format == "yaml" else format: path}, tell)
     return Exported(format, (path,))

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.loading import Case, dataset_of, inputs_of, sources_of, tell_findings
 from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
@@ -18,6 +19,7 @@ from excite_cli.store.fit_file import write_fit
 from excite_cli.summary.identification import identification_answer as identification_answer
 
 
+@checked()
 def identify(
     problem: Problem | Case,
     data: Dataset | str | Path | Sequence[str | Path],
@@ -70,6 +72,7 @@ def identify(
         return found
 
 
+@checked()
 def save_fit(
     path: str | Path,
     problem: Problem | Case,

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from excite_cli.api.paths import paths_in
+from excite_cli.api.arguments import checked
+from excite_cli.api.paths import paths_in, refuse_twice
 from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
@@ -56,6 +57,7 @@ show(
 )
 
 
+@checked()
 def load_case(config: str | Path, overrides: Sequence[str] = ()) -> Case:
     """The robot and declared model of a config, without capsules; `overrides` as with `--set`.
 
@@ -73,6 +75,7 @@ def load_case(config: str | Path, overrides: Sequence[str] = ()) -> Case:
     return Case(spec, file.parent, build_robot(spec.robot, file.parent), file)
 
 
+@checked()
 def load_problem(
     config: str | Path, overrides: Sequence[str] = (), tell: Tell = log_note
 ) -> Problem:
@@ -126,6 +129,7 @@ def _doubt_fit(path: Path, tell: Tell) -> None:
         tell(Note(Level.WARNING, text))
 
 
+@checked()
 def load_data(
     problem: Problem | Case,
     files: str | Path | Sequence[str | Path],
@@ -139,14 +143,16 @@ def load_data(
     Raises
     ------
     FileError
-        A file cannot be read, or holds what no fit should be made of.
+        A file cannot be read, is given twice, or holds what no fit should be made of.
     ConfigError, MissingExtraError
         The config names what the file lacks; the library for bags is not installed.
     """
     paths = [files] if isinstance(files, str | Path) else files
+    given = [Path(each) for each in paths]
+    refuse_twice(given)  # a run that is fitted must not be the sealed one, too
     robot, limits = problem.robot, problem.robot.limits
     data = read_dataset(
-        [Path(each) for each in paths],
+        given,
         problem.spec.measurement,
         robot.joint_names,
         (limits.lower, limits.upper, limits.velocity, limits.effort),

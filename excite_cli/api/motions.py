@@ -1,10 +1,12 @@
 """Motions of any origin: results, formats of controllers, measured data, trajectories at hand."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.loading import Case, dataset_of, load_data
 from excite_cli.config.load import parse_spec
 from excite_cli.config.spec import Spec
@@ -31,6 +33,7 @@ Motions = Result | Segment | Sequence[Segment] | Dataset | str | Path
 _FAR_BEYOND = 4.0
 
 
+@checked("motions")
 def load_motions(
     problem: Problem | Case,
     motions: Motions,
@@ -73,6 +76,7 @@ def load_motions(
     return _measured(problem, data)
 
 
+@checked()
 def motions_of(
     result: Result, chosen: Sequence[int] = (), name: str = "the result"
 ) -> list[Segment]:
@@ -148,7 +152,10 @@ def _fitting(robot: Robot, motion: object) -> Segment:
             f"{robot.n} joints of {robot.name} ask for {shape}. Take the config that the motions "
             "were made with."
         )
-    return motion
+    coefficients = np.asarray(motion.coefficients)
+    if coefficients.dtype.kind not in "fiu" or not np.isfinite(coefficients).all():
+        raise FileError(f"{motion.name} has coefficients that are no finite numbers.")
+    return replace(motion, coefficients=coefficients.astype(float))
 
 
 def _motion(path: Path, robot: Robot, tell: Tell) -> Segment:

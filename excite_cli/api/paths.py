@@ -1,8 +1,10 @@
 """Paths that are given, seen to before any work begins."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from excite_cli.errors import FileError
+from excite_cli.measurement.dataset import Dataset
 
 
 def existing(path: str | Path) -> Path:
@@ -19,6 +21,22 @@ def existing(path: str | Path) -> Path:
 
 
 def paths_in(*given: object) -> list[Path]:
-    """Those of `given` that are files, also in lists: what a function reads by its path."""
+    """Those of `given` that are files, also in lists, and the files that data were read from."""
     listed = [x for each in given for x in (each if isinstance(each, list | tuple) else [each])]
-    return [Path(each) for each in listed if isinstance(each, str | Path)]
+    read = [x for each in listed for x in (each.sources if isinstance(each, Dataset) else [each])]
+    return [Path(each) for each in read if isinstance(each, str | Path)]
+
+
+def refuse_twice(paths: Iterable[Path]) -> None:
+    """See that no file is given twice, whatever it is called.
+
+    Raises
+    ------
+    FileError
+        One is.
+    """
+    seen: set[Path] = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise FileError(f"{path} is given twice.")
+        seen.add(path.resolve())

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.loading import Case, inputs_of
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.api.outputs import held_result
@@ -32,6 +33,7 @@ Planned = Problem | NextMotion
 PlanProgress = Callable[[int, Progress], None]
 
 
+@checked("starts")
 def plan(
     problem: Planned,
     *,
@@ -120,6 +122,7 @@ def _begun(
     return new_result(model, stacks, versions(), model.folder)
 
 
+@checked()
 def plan_after(
     problem: Problem | Case, found: Diagnosis | str | Path, tell: Tell = log_note
 ) -> NextMotion:

@@ -30,7 +30,7 @@ def load_prior(problem: Problem, prior: Prior, name: str, tell: Tell) -> Result 
     Raises
     ------
     FileError
-        A file cannot be read, the prior is none, or does not fit the problem.
+        A file cannot be read, or the prior does not fit the problem.
     """
     if isinstance(prior, str | Path):
         path = Path(prior)
@@ -48,10 +48,8 @@ def load_prior(problem: Problem, prior: Prior, name: str, tell: Tell) -> Result 
         return _fitting(problem, prior, name)
     if isinstance(prior, Segment):
         stack, words = planned_stack(problem, load_motions(problem, prior)[0])
-    elif isinstance(prior, Dataset):
-        stack, words = measured_stack(problem, prior)
     else:
-        raise FileError(f"--prior {name}: {type(prior).__name__} cannot be planned on top of.")
+        stack, words = measured_stack(problem, prior)
     tell(Note(Level.INFO, f"--prior {name}: {words}"))
     return stack
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, cast
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError
@@ -24,6 +25,7 @@ Base = Literal["fixed", "floating"]
 _FARTHEST = 3  # folders upwards, for which a path is still told as a relative one
 
 
+@checked()
 def propose(
     urdf: str | Path,
     folder: str | Path = ".",
@@ -53,6 +55,7 @@ def propose(
     return propose_config(Request(str(urdf), Path(folder), tuple(joints), base))
 
 
+@checked()
 def save_proposal(
     robot: str | Path,
     output: str | Path | None = None,

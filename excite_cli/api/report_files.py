@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from excite_cli.api.paths import refuse_twice
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import FileError
 from excite_cli.excitation.result import Result
@@ -42,11 +43,7 @@ def read_files(paths: Sequence[Path]) -> tuple[Told, ...]:
     FileError
         A file is missing, given twice, damaged, or of another kind.
     """
-    seen: set[Path] = set()
-    for path in paths:
-        if path.resolve() in seen:
-            raise FileError(f"{path} is given twice.")
-        seen.add(path.resolve())
+    refuse_twice(paths)
     stems = [path.stem for path in paths]
     names = [
         path.stem if stems.count(path.stem) == 1 else str(path.with_suffix("")) for path in paths

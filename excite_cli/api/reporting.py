@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.motions import motions_of
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import paths_in
@@ -32,6 +33,7 @@ class Report:
     figures: tuple[Path, ...] = ()
 
 
+@checked()
 def write_report(
     files: str | Path | Sequence[str | Path],
     output: str | Path | None = None,

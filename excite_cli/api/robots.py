@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import RobotError, nearest
 from excite_cli.robot.described import DescribedRobot, describe
@@ -24,6 +25,7 @@ def list_robots() -> Answer:
     return robots_answer(known_robots(), list(example_robots()))
 
 
+@checked()
 def describe_robot(robot: str | Path) -> DescribedRobot:
     """Joints of a robot with their limits and links; `robot` is a name of the list, or a URDF file.
 

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
 from excite_cli.config.spec import Spec
@@ -14,6 +15,7 @@ def config_schema() -> str:
     return json.dumps(Spec.model_json_schema(), indent=2, ensure_ascii=False)
 
 
+@checked()
 def save_schema(path: str | Path, overwrite: bool = False) -> Answer:
     """Write the schema; what is returned says how an editor finds it.
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.entering import Start, entered, start_posture
 from excite_cli.api.loading import Case, inputs_of, problem_of
 from excite_cli.api.motions import Motions, load_motions
@@ -31,6 +32,7 @@ from excite_cli.trajectory.chain import Segment
 _KEPT = {"filter", "topic", "rate"}
 
 
+@checked("motions")
 def simulate(
     problem: Problem | Case,
     motions: Motions,

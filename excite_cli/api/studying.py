@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.identifying import identify, save_fit
 from excite_cli.api.loading import load_case, load_data, load_problem
@@ -32,6 +33,7 @@ from excite_cli.summary.study import study_answer as study_answer
 from excite_cli.workers.base import Tell, Workers
 
 
+@checked()
 def run_study(
     config: str | Path,
     logs: Sequence[str | Path] = (),

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from excite_cli.api.arguments import checked
 from excite_cli.api.loading import load_problem
 from excite_cli.api.motions import Motions, load_motions, motions_of
 from excite_cli.api.outputs import held
@@ -41,6 +42,7 @@ class Drawing:
     seconds: float | None = None
 
 
+@checked("motions")
 def view_motions(
     motions: Motions,
     config: Problem | str | Path | None = None,
@@ -83,6 +85,7 @@ def view_motions(
         tell(Note(Level.INFO, "Ended."))
 
 
+@checked("motions")
 def draw_motion(
     motions: Motions,
     output: str | Path,

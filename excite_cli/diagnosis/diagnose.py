@@ -39,7 +39,7 @@ from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
-from excite_cli.identification.declared_runs import check_declared_runs
+from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import prior_rows
@@ -76,6 +76,7 @@ def diagnose(
     check_declared_runs(spec.effects, dataset)
     model = _model(robot, base, spec)
     parts = split(dataset, sealed, spec.diagnosis.block)
+    check_left_to_fit(spec.effects, parts)
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )

@@ -56,6 +56,8 @@ def matches(problem: Problem, result: Result) -> str | None:
     """None when stacks of `result` fit `problem`; otherwise what differs, in words."""
     if result.fingerprint != problem.robot.fingerprint():
         return "it was made for another robot, other moved joints, posture or rows"
+    if result.joint_names != problem.robot.joint_names:
+        return "it names other joints, or in another order"
     if not np.array_equal(result.base_selection, problem.base.selection):
         return "its base parameters differ"
     here = problem.extension.names

@@ -22,6 +22,8 @@ from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, int
 from excite_cli.trajectory.base import Trajectory
 from excite_cli.trajectory.chain import Chain
 
+# A share of the limits below which a motion takes hours, and no memory holds its instants.
+_LEAST = 1e-3
 _INTERVALS = 2000  # in a motion, or one for each of its smooth pieces
 _CHUNK = 4000
 
@@ -50,10 +52,10 @@ def slowing(limits: PaceLimits, trajectory: Trajectory, coefficients: Array, sha
     Raises
     ------
     ConfigError
-        `share` is not between 0 and 1, or no joint has a limit.
+        `share` is not between `_LEAST` and 1, or no joint has a limit.
     """
-    if not 0.0 < share <= 1.0:
-        raise ConfigError(f"--slow {share:g}: give a share of the limits above 0, at most 1.")
+    if not _LEAST <= share <= 1.0:
+        raise ConfigError(f"--slow {share:g}: give a share of the limits from {_LEAST:g} to 1.")
     both = np.concatenate([limits.velocity, limits.acceleration])
     if not np.isfinite(both).any():
         raise ConfigError(

@@ -1,7 +1,8 @@
-"""Runs that the configuration names must be in the data."""
+"""Runs that the configuration names must be in the data, and not all of them sealed."""
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.errors import ConfigError, nearest
+from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Dataset
 
 
@@ -21,3 +22,22 @@ def check_declared_runs(specs: tuple[EffectSpec, ...] | None, dataset: Dataset) 
                     f"effects[{index}].runs: there is no run '{name}' in the data."
                     f"{nearest(name, names)} Runs: {', '.join(names)}."
                 )
+
+
+def check_left_to_fit(specs: tuple[EffectSpec, ...] | None, parts: Split) -> None:
+    """Refuse effects that are declared for sealed runs only: nothing would be fitted of them.
+
+    Raises
+    ------
+    ConfigError
+        There is such an effect.
+    """
+    for index, spec in enumerate(specs or ()):
+        names = () if spec.runs == "all" else spec.runs
+        if names and not any(run.id.is_among(names) for run in parts.training):
+            others = [unit for unit in parts.units if unit not in (*names, parts.sealed_name)]
+            instead = f" Seal another run: --sealed '{others[-1]}'." if others else ""
+            raise ConfigError(
+                f"effects[{index}].runs: '{', '.join(names)}' is sealed, so that nothing is left "
+                f"to fit {spec.kind} on.{instead}"
+            )

@@ -10,7 +10,7 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ExciteError
-from excite_cli.identification.declared_runs import check_declared_runs
+from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.fit import (
     Fit,
@@ -83,6 +83,7 @@ def identify(
     effects = declared_effects(spec.effects, robot)
     check_declared_runs(spec.effects, dataset)
     parts = split(dataset, sealed, spec.diagnosis.block)
+    check_left_to_fit(spec.effects, parts)
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )

@@ -52,6 +52,14 @@ def number(attributes: Any, name: str) -> float:
     return float(value)
 
 
+def condition(attributes: Any, name: str) -> float:
+    """An attribute that is a condition number; infinity and NaN are left to who reads it."""
+    value = number(attributes, name)
+    if value < 1.0 - 1e-9:
+        raise ValueError(f"attribute '{name}' is below 1, as no condition number is")
+    return value
+
+
 def count(attributes: Any, name: str) -> int:
     """An attribute that is a whole number, not below 0."""
     value = number(attributes, name)

@@ -145,12 +145,13 @@ def read_samples(path: Path) -> dict[int, tuple[Matrix, Matrix, Matrix, Matrix]]
         As `read_result`.
     """
     with opened(path, OWN) as file:
-        return {int(index): _samples(group) for index, group in file["motions"].items()}
+        joints = len(checked.names(file.attrs["joint_names"], "attribute 'joint_names'"))
+        return {int(index): _samples(group, joints) for index, group in file["motions"].items()}
 
 
-def _samples(group: Any) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+def _samples(group: Any, joints: int) -> tuple[Matrix, Matrix, Matrix, Matrix]:
     t = checked.array(group["t"], (None,))
-    q, v, a = (checked.array(group[name], (len(t), None)) for name in "qva")
+    q, v, a = (checked.array(group[name], (len(t), joints)) for name in "qva")
     return t, q, v, a
 
 
@@ -204,8 +205,8 @@ def _read(file: Any, path: Path) -> Result:
             RandomMotion(
                 index,
                 checked.array(file[f"random/{index}/coefficients"], shape),
-                checked.number(file[f"random/{index}"].attrs, "condition_number"),
-                checked.number(file[f"random/{index}"].attrs, "stacked_condition_number"),
+                checked.condition(file[f"random/{index}"].attrs, "condition_number"),
+                checked.condition(file[f"random/{index}"].attrs, "stacked_condition_number"),
             )
             for index in sorted(int(name) for name in file.get("random", {}))
         ),
@@ -228,8 +229,8 @@ def _read_motion(group: Any, index: int, shape: tuple[int, int]) -> Motion:
     return Motion(
         index=index,
         coefficients=checked.array(group["coefficients"], shape),
-        condition_number=checked.number(attributes, "condition_number"),
-        stacked_condition_number=checked.number(attributes, "stacked_condition_number"),
+        condition_number=checked.condition(attributes, "condition_number"),
+        stacked_condition_number=checked.condition(attributes, "stacked_condition_number"),
         improved=checked.flag(attributes, "improved"),
         note=checked.text(attributes, "note"),
         status=Status(checked.text(attributes, "status")),

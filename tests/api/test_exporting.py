@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 from excite_cli import (
     ConfigError,
     FileError,
+    check,
     export_file,
     load_problem,
     motions_of,
@@ -53,7 +55,7 @@ def test_a_motion_file_knows_neither_limits_nor_robot(loop: Loop, tmp_path: Path
     (path,) = export_file(loop.result, "csv", tmp_path / "one.csv", chosen=[1]).paths
     for option, more in (("--slow", {"slow": 0.3}), ("--entry", {"start": {}})):
         with pytest.raises(FileError, match=f"{option}: .*does not say which robot"):
-            export_file(path, "npz", tmp_path / "one.npz", **more)  # type: ignore[arg-type]
+            export_file(path, "npz", tmp_path / "one.npz", **more)
     with pytest.raises(FileError, match=r"--motion 2: .*one\.csv holds one motion"):
         export_file(path, "npz", tmp_path / "one.npz", chosen=[2])
 
@@ -72,3 +74,30 @@ def test_a_fit_is_written_as_a_model(loop: Loop, tmp_path: Path) -> None:
     assert found.paths == (tmp_path / "arm.urdf",)
     assert not found.motions
     assert "<robot" in found.paths[0].read_text(encoding="utf-8")
+
+
+def test_joints_in_another_order_are_not_exported(loop: Loop, tmp_path: Path) -> None:
+    path, output = tmp_path / "edited.h5", tmp_path / "motion.csv"
+    path.write_bytes(loop.result.read_bytes())
+    with h5py.File(path, "r+") as file:
+        file.attrs["joint_names"] = list(file.attrs["joint_names"])[::-1]
+    with pytest.raises(FileError, match=r"edited\.h5 names other joints .* or in another order"):
+        export_file(path, "csv", output)
+    with pytest.raises(FileError, match="cannot be stacked: it names other joints, or in another"):
+        plan(loop.problem, priors=[path])
+    assert not list(tmp_path.glob("*.csv"))
+
+
+def test_edited_samples_and_figures_are_told(loop: Loop, tmp_path: Path) -> None:
+    path = tmp_path / "edited.h5"
+    path.write_bytes(loop.result.read_bytes())
+    with h5py.File(path, "r+") as file:
+        positions = file["motions/1/q"][:, :1]
+        del file["motions/1/q"]
+        file["motions/1/q"] = positions
+    with pytest.raises(FileError, match=r"edited\.h5"):
+        check(loop.problem, path, rate=10.0)
+    with h5py.File(path, "r+") as file:
+        file["motions/1"].attrs["condition_number"] = -1.0
+    with pytest.raises(FileError, match="'condition_number' is below 1"):
+        read_result(path)

@@ -17,6 +17,7 @@ from excite_cli import (
     Result,
     check,
     compare_random,
+    export_file,
     load_data,
     load_problem,
     motions_of,
@@ -26,12 +27,14 @@ from excite_cli import (
     read_fit,
     read_result,
     simulate,
+    write_dataset,
+    write_result,
 )
 from excite_cli.cli.check import check as check_command
 from excite_cli.cli.compare_random import compare_random as compare_command
 from excite_cli.cli.optimize import optimize as optimize_command
 from excite_cli.excitation.stack import Stack
-from tests.api.conftest import BRIEF, SMOKE, UR10
+from tests.api.conftest import BRIEF, SMOKE, UR10, Loop
 
 Call = Callable[[Path, Any], object]
 OTHER_JOINTS = "moves other joints than the config: shoulder_yaw, shoulder_pitch, elbow"
@@ -98,7 +101,7 @@ def test_priors_that_do_not_fit_are_refused(
         plan(problem, priors=[Stack.empty(3)])
     with pytest.raises(FileError, match=r"no file .*none\.h5"):
         plan(problem, priors=[str(tmp_path / "none.h5")])
-    with pytest.raises(FileError, match="Case cannot be planned on top of"):
+    with pytest.raises(ConfigError, match=r"one of priors is Case.*Give text, Path, Result"):
         plan(problem, priors=[Case(problem.spec, problem.folder, problem.robot)])  # type: ignore[list-item]
 
 
@@ -186,3 +189,55 @@ def test_the_terminal_says_the_same(command: str, stored: Path, tmp_path: Path) 
     with pytest.raises(type(first.value)) as second:
         called(stored, other)
     assert str(second.value) == str(first.value)
+
+
+KEPT: dict[str, Callable[[Problem, Path, Path], object]] = {
+    "plan": lambda problem, stored, to: plan(problem, output=to, overwrite=True),
+    "compare_random": lambda problem, stored, to: compare_random(
+        problem, stored, candidates=1, seconds=0, output=to, overwrite=True
+    ),
+    "simulate": lambda problem, stored, to: simulate(problem, stored, output=to, overwrite=True),
+    "write_result": lambda problem, stored, to: write_result(to, read_result(stored), problem),
+}
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_a_script_never_replaces_the_config(name: str, stored: Path, tmp_path: Path) -> None:
+    config = tmp_path / "arm.yaml"
+    urdf = SMOKE.parents[1] / "data" / "smoke_arm.urdf"
+    config.write_text(SMOKE.read_text().replace("../data/smoke_arm.urdf", str(urdf)))
+    link = tmp_path / "link.yaml"
+    link.symlink_to(config)
+    before, problem = config.read_bytes(), load_problem(config, BRIEF)
+    for output in (config, link):
+        with pytest.raises(FileError, match=r"would replace .*arm\.yaml, which is read here"):
+            KEPT[name](problem, stored, output)
+    assert config.read_bytes() == before
+
+
+def test_a_result_is_written_with_its_own_problem(
+    other: Problem, result: Result, tmp_path: Path
+) -> None:
+    with pytest.raises(FileError, match="does not belong to the problem: it was made for another"):
+        write_result(tmp_path / "x.h5", result, other)
+
+
+def test_data_at_hand_keep_their_file(loop: Loop) -> None:
+    before = loop.data.read_bytes()
+    data = load_data(loop.problem, loop.data)
+    for call in (
+        lambda: plan(loop.problem, priors=[data], output=loop.data, overwrite=True),
+        lambda: simulate(loop.problem, data, output=loop.data, overwrite=True),
+        lambda: write_dataset(loop.data, data),
+        lambda: export_file(loop.fit, "yaml", loop.data, overwrite=True),
+    ):
+        with pytest.raises(FileError, match=r"would replace .*data\.h5, which is read here"):
+            call()
+    assert loop.data.read_bytes() == before
+
+
+def test_a_log_counts_once(loop: Loop, tmp_path: Path) -> None:
+    again = tmp_path / "again.h5"
+    again.symlink_to(loop.data)
+    with pytest.raises(FileError, match=r"again\.h5 is given twice"):
+        load_data(loop.problem, [loop.data, again])

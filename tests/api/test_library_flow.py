@@ -2,6 +2,8 @@
 
 import json
 import logging
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -26,7 +28,7 @@ from excite_cli import (
 )
 from excite_cli.api.schema import config_schema
 from excite_cli.claim import claim, leave
-from tests.api.conftest import BRIEF, ROOT, SMOKE
+from tests.api.conftest import BRIEF, ROOT, SMOKE, Loop
 
 
 def test_nothing_is_printed_and_notes_go_to_the_log(
@@ -119,3 +121,11 @@ def test_a_study_from_python(tmp_path: Path) -> None:
 def test_the_gradient_and_the_schema() -> None:
     assert verify_gradient(load_problem(SMOKE, BRIEF)).passed
     assert "trajectory" in json.loads(config_schema())["properties"]
+
+
+def test_a_file_that_is_read_first_is_shown_as_a_table(loop: Loop) -> None:
+    """Whatever else a notebook has imported before: in a process of its own, nothing."""
+    for read, path in (("read_result", loop.result), ("read_fit", loop.fit)):
+        code = f"import excite_cli; print(excite_cli.{read}({str(path)!r})._repr_html_())"
+        shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        assert "<table" in shown.stdout, shown.stderr

@@ -184,3 +184,19 @@ def test_a_run_that_is_not_in_the_data_is_named_with_the_nearest(
         "effects[2].runs: there is no run 'paylod' in the data. Did you mean 'payload'? "
         "Runs: slow, payload, last."
     )
+
+
+@pytest.mark.parametrize("call", [identify, diagnose])
+def test_an_effect_of_the_sealed_run_alone_is_refused(
+    call: object, robot: Robot, base: BaseParameters, recorded: Dataset
+) -> None:
+    """Nothing would be fitted of it, and the error of the sealed run be all its own."""
+    assert callable(call)
+    dataset = renamed(recorded, "slow", "empty", "take 6-12 s")
+    with pytest.raises(ConfigError) as error:
+        call(robot, base, dataset, spec_of(robot, "take 6-12 s"))
+    assert str(error.value) == (
+        "effects[2].runs: 'take 6-12 s' is sealed, so that nothing is left to fit torque_offset on."
+        " Seal another run: --sealed 'empty'."
+    )
+    call(robot, base, dataset, spec_of(robot, "take 6-12 s"), "empty")
