@@ -73,7 +73,7 @@ battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effec
 # program alone takes what pyproject.toml allows, as it does in an environment of a user's own.
 $(STAMP): pyproject.toml requirements/ci.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --require-hashes -r requirements/ci.txt
+	$(BIN)/python -m pip install --quiet --no-compile --require-hashes -r requirements/ci.txt
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	touch $(STAMP) $(USER_STAMP)
 

@@ -138,14 +138,20 @@ def _cut(file: h5py.File) -> None:
     file["motions/1/q"] = samples
 
 
-@pytest.mark.parametrize("change", [_faster, _shifted, _cut])
+OTHERS = "are not those of its coefficients and config"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [(_faster, OTHERS), (_shifted, OTHERS), (_cut, "has the shape 121 x 4 instead of 121 x 5")],
+)
 def test_export_of_what_its_samples_do_not_say(
-    loop: Loop, tmp_path: Path, change: Callable[[h5py.File], None]
+    loop: Loop, tmp_path: Path, change: Callable[[h5py.File], None], words: str
 ) -> None:
     """Whoever edits a config would send another motion to the robot than was checked."""
     file = edited(loop.result, tmp_path / "r.h5", change)
     told = refused("export", file, "-f", "csv", "-o", tmp_path / "m.csv")
-    assert "are not those of its coefficients and config" in told
+    assert words in told
     assert not (tmp_path / "m.csv").exists()
 
 

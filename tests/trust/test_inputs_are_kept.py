@@ -151,6 +151,7 @@ def test_the_library_refuses_too(files: Files) -> None:
     problem = api.load_problem(files.config, ["optimizer.max_iterations=1", FIT])
     data, case = api.load_data(problem, files.data), api.load_case(files.config)
     following = api.plan_after(case, files.diagnosis)
+    found, fit = api.read_diagnosis(files.diagnosis), api.identify(case, data)
     calls: list[Callable[[], object]] = [
         lambda: api.plan(problem, output=files.urdf, overwrite=True),
         lambda: api.plan(problem, output=files.config, overwrite=True),
@@ -160,8 +161,8 @@ def test_the_library_refuses_too(files: Files) -> None:
         lambda: api.plan(problem, output=str(files.fit), overwrite=True),
         lambda: api.plan(problem, priors=[files.result], output=files.result, overwrite=True),
         lambda: api.diagnose(problem, data, output=files.data),
-        lambda: api.save_config(files.urdf, problem, None),  # type: ignore[arg-type]
-        lambda: api.save_fit(files.urdf, problem, None),  # type: ignore[arg-type]
+        lambda: api.save_config(files.urdf, problem, found),
+        lambda: api.save_fit(files.urdf, problem, fit),
     ]
     before = files.contents()
     for call in calls:
