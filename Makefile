@@ -85,7 +85,7 @@ lock:                    ## pin all dependencies anew, for Python 3.11 and newer
 	  --custom-compile-command "make lock" --output-file requirements/ci.txt
 	rm -rf $(VENV)-lock
 
-FLOOR_TESTS := tests/kernels/test_library.py tests/config tests/criteria tests/dynamics \
+FLOOR_TESTS := tests/kernels/test_compiled.py tests/config tests/criteria tests/dynamics \
   tests/measurement/test_bag_reader.py tests/measurement/test_hdf5_reader.py \
   tests/report/test_page.py tests/simulation/test_mujoco_model.py tests/store tests/workers
 floors:                  ## the lowest versions that pyproject.toml allows: quick tests, a whole loop

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from excite_cli.kernels.library import KERNELS
+from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.kernels.library import KERNELS
+from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.model import Array, Robot
 
 Indices = NDArray[np.intp]

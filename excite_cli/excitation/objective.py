@@ -22,7 +22,7 @@ from excite_cli.excitation.extension import Extension
 from excite_cli.excitation.progress import Figure, Measure
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting
-from excite_cli.kernels.library import KERNELS
+from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.model import Array, Robot
 from excite_cli.trajectory.base import Basis
 

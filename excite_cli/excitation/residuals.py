@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.dynamics.states import States
-from excite_cli.kernels.library import KERNELS
+from excite_cli.kernels.compiled import KERNELS
 from excite_cli.trajectory.base import Basis
 
 Mask = NDArray[np.bool_]

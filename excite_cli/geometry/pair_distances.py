@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from excite_cli.dynamics.states import States
 from excite_cli.geometry.segments import Nearest, nearest_points, normals
 from excite_cli.geometry.world_segments import CapsuleAxes, WorldSegments
-from excite_cli.kernels.library import KERNELS
+from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 

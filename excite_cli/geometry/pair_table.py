@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.kernels.library import KERNELS
+from excite_cli.kernels.compiled import KERNELS
 
 Array = NDArray[np.float64]
 

@@ -53,7 +53,7 @@ def environment() -> Environment:
 
 def _kernels() -> str:
     """Which inner loops are in use; by name, since their package is above this one."""
-    found = import_module("excite_cli.kernels.library").KERNELS
+    found = import_module("excite_cli.kernels.compiled").KERNELS
     return "numpy" if found is None else "compiled"
 
 

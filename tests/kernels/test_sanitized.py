@@ -11,12 +11,12 @@ pytestmark = pytest.mark.skipif(not runtime(), reason="no gcc with AddressSaniti
 
 _TESTS = """
 import pytest
-sys.exit(pytest.main(["-q", "-x", "-p", "no:cacheprovider", "tests/kernels/test_library.py"]))
+sys.exit(pytest.main(["-q", "-x", "-p", "no:cacheprovider", "tests/kernels/test_compiled.py"]))
 """
 # One gradient at an instant that there is not: shapes fit, so that the call is let in.
 _PLANTED = """
 import numpy as np
-from excite_cli.kernels.library import KERNELS
+from excite_cli.kernels.compiled import KERNELS
 left, times = np.ones((1, 2)), np.array([{instant}])
 KERNELS.call("squared", times, np.ones(1), left, left, np.zeros((3, 2, 2)))
 print("ended")

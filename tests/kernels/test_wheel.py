@@ -53,5 +53,5 @@ def test_without_a_compiler(tmp_path: Path) -> None:
     assert built.stem.endswith("-py3-none-any")
     with zipfile.ZipFile(built) as archive:
         names = archive.namelist()
-    assert "excite_cli/kernels/library.py" in names
+    assert "excite_cli/kernels/compiled.py" in names
     assert not any(name.endswith(".so") for name in names)

@@ -21,7 +21,7 @@ from excite_cli.geometry import pair_distances
 from excite_cli.geometry.pair_distances import PairDistances
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.kernels import library as kernels
-from excite_cli.kernels.library import KERNELS
+from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.capsule import Capsule
 from tests.robot.random_robots import random_robot
 
@@ -134,7 +134,7 @@ def test_squares_per_instant(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_numpy_forms_can_be_asked_for() -> None:
-    code = "from excite_cli.kernels.library import KERNELS; print(KERNELS)"
+    code = "from excite_cli.kernels.compiled import KERNELS; print(KERNELS)"
     environment = {**os.environ, "EXCITE_KERNELS": "numpy"}
     said = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
