@@ -20,8 +20,8 @@ _FLAGS = [
 # Put in place of the installed library before any caller has taken it.
 _WITH_LIBRARY = """
 import ctypes, sys
-from excite_cli.kernels import library
-library.KERNELS = library.Kernels(ctypes.CDLL({library!r}))
+from excite_cli.kernels import compiled
+compiled.KERNELS = compiled.Kernels(ctypes.CDLL({library!r}))
 """
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from excite_cli.kernels import library
+from excite_cli.kernels import compiled
 from excite_cli.kernels.arguments import Array, CheckedFunction, Number, Size
 from excite_cli.kernels.signatures import SIGNATURES
 
@@ -118,7 +118,7 @@ def test_the_shape_that_was_wanted_is_told() -> None:
 
 def test_signatures_are_those_of_the_c_files() -> None:
     """Same functions, and argument for argument the same names and kinds."""
-    folder = Path(library.__file__).parent
+    folder = Path(compiled.__file__).parent
     text = "".join(path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.c")))
     found = dict(re.findall(r"^EXPORT void (\w+)\(([^)]*)\)", text, re.MULTILINE))
     assert found.keys() == SIGNATURES.keys()
@@ -140,8 +140,8 @@ def _is_as_declared(argument: Size | Number | Array, text: str) -> bool:
 
 
 def test_compiled_functions_have_declared_types() -> None:
-    if library.KERNELS is None:
+    if compiled.KERNELS is None:
         pytest.skip("not compiled here")
-    for name, function in library.KERNELS._functions.items():
+    for name, function in compiled.KERNELS._functions.items():
         types = [argument.c_type for argument in SIGNATURES[name]]
         assert function._function.argtypes == types

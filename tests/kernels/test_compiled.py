@@ -20,7 +20,7 @@ from excite_cli.excitation.residuals import Rows, squared_per_instant
 from excite_cli.geometry import pair_distances
 from excite_cli.geometry.pair_distances import PairDistances
 from excite_cli.geometry.pair_table import PairTable
-from excite_cli.kernels import library as kernels
+from excite_cli.kernels import compiled as kernels
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.capsule import Capsule
 from tests.robot.random_robots import random_robot

@@ -2,7 +2,7 @@
 
 import pytest
 
-from excite_cli.kernels import library as kernels
+from excite_cli.kernels import compiled as kernels
 from excite_cli.workers.environment import environment
 
 
