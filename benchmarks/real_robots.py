@@ -18,10 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.marked_part import MarkedPart
 from excite_cli.atomic import write_text_atomically
 
 DATA = Path(__file__).parents[1] / "data"
-BEGIN, END = "<!-- real robots: written by benchmarks.real_robots -->", "<!-- real robots: end -->"
+PART = MarkedPart("real robots", "benchmarks.real_robots")
 HEADS = ("log", "before", "after", "what was found")
 _PROGRAM = "from excite_cli.cli.app import main; main()"
 _CAD = ("--set", "identification.inertias=cad")
@@ -78,7 +79,7 @@ def main() -> None:
             print(line(rows[-1]), flush=True)
     if arguments.markdown is not None:
         page = arguments.markdown.read_text(encoding="utf-8")
-        write_text_atomically(arguments.markdown, placed(page, table(rows)))
+        write_text_atomically(arguments.markdown, PART.replaced(page, table(rows)))
 
 
 def diagnosed(log: Log, options: Sequence[str]) -> Answer:
@@ -220,21 +221,6 @@ def line(cells: Sequence[str]) -> str:
 def table(rows: Sequence[Sequence[str]]) -> str:
     """The rows under their heads, in Markdown."""
     return "\n".join(line(each) for each in [HEADS, ["---"] * len(HEADS), *rows])
-
-
-def placed(page: str, content: str) -> str:
-    """`page` with `content` between the two marks.
-
-    Raises
-    ------
-    ValueError
-        The page lacks the marks.
-    """
-    before, _, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not end:
-        raise ValueError(f"the page lacks {BEGIN} … {END}")
-    return f"{before}{BEGIN}\n{content}\n{END}{after}"
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.marked_part import MarkedPart
 from benchmarks.peers.figaroh_races import BLIND, CLAIMED, CLEAR
 from benchmarks.peers.judge import Verdict
 from benchmarks.peers.our_races import NAMES
@@ -65,22 +66,12 @@ def markdown(comparison: Comparison) -> str:
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-BEGIN, END = "<!-- peers: written by benchmarks.peers -->", "<!-- peers: end -->"
+PART = MarkedPart("peers", "benchmarks.peers")
 
 
 def placed(page: str, comparison: Comparison) -> str:
-    """`page` with the dated goals between the two marks.
-
-    Raises
-    ------
-    ValueError
-        The page lacks the marks.
-    """
-    before, _, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not end:
-        raise ValueError(f"the page lacks {BEGIN} … {END}")
-    return f"{before}{BEGIN}\nMeasured on {comparison.date}.\n\n{goals(comparison)}\n{END}{after}"
+    """`page` with the dated goals between its two marks."""
+    return PART.replaced(page, f"Measured on {comparison.date}.\n\n{goals(comparison)}")
 
 
 def goals(comparison: Comparison) -> str:

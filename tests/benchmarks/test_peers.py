@@ -8,7 +8,7 @@ import pytest
 from benchmarks.peers.figaroh_races import BLIND, CLEAR, LIMITS, find
 from benchmarks.peers.our_driver import Clock, timed, with_columns
 from benchmarks.peers.race import Race
-from benchmarks.peers.table import BEGIN, END, OURS, Comparison, Entry, goals, markdown, placed
+from benchmarks.peers.table import OURS, PART, Comparison, Entry, goals, markdown, placed
 from benchmarks.problems import motion, problem
 from excite_cli.excitation.problem import Problem
 
@@ -104,9 +104,9 @@ def test_figaroh_that_is_not_there_is_none(small: Problem) -> None:
 
 def test_the_goals_are_put_between_the_marks_of_a_page_and_nowhere_else() -> None:
     found = compared(race(BLIND, 1, (40.0, 20.0)), race(OURS, 1, (2.0, 20.0)))
-    page = placed(f"above\n{BEGIN}\nold\n{END}\nbelow", found)
-    assert page.startswith(f"above\n{BEGIN}\nMeasured on 2026-01-01.")
-    assert page.endswith(f"{END}\nbelow")
+    page = placed(f"above\n{PART.begin}\nold\n{PART.end}\nbelow", found)
+    assert page.startswith(f"above\n{PART.begin}\nMeasured on 2026-01-01.")
+    assert page.endswith(f"{PART.end}\nbelow")
     assert "old" not in page
     assert placed(page, found) == page
     with pytest.raises(ValueError, match="lacks"):

@@ -5,15 +5,13 @@ from typing import Any
 import pytest
 
 from benchmarks.real_robots import (
-    BEGIN,
     DATA,
-    END,
     LOGS,
+    PART,
     Answer,
     kr300,
     kr300_cad,
     percent,
-    placed,
     row,
     table,
     tiago,
@@ -108,15 +106,15 @@ def test_what_tiago_leaves_open() -> None:
 
 
 def test_the_table_takes_the_place_between_the_marks() -> None:
-    page = f"before\n{BEGIN}\nold\n{END}\nafter\n"
-    assert placed(page, table([("a", "1 %", "2 %", "b")])) == (
-        f"before\n{BEGIN}\n| log | before | after | what was found |\n| --- | --- | --- | --- |\n"
-        f"| a | 1 % | 2 % | b |\n{END}\nafter\n"
+    page = f"before\n{PART.begin}\nold\n{PART.end}\nafter\n"
+    assert PART.replaced(page, table([("a", "1 %", "2 %", "b")])) == (
+        f"before\n{PART.begin}\n| log | before | after | what was found |\n| --- | --- | --- | --- |\n"
+        f"| a | 1 % | 2 % | b |\n{PART.end}\nafter\n"
     )
     with pytest.raises(ValueError, match="lacks"):
-        placed("nothing", "")
+        PART.replaced("nothing", "")
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert placed(readme, "x").count("x\n" + END) == 1
+    assert PART.replaced(readme, "x").count("x\n" + PART.end) == 1
 
 
 def test_words() -> None:
