@@ -108,8 +108,8 @@ def test_what_tiago_leaves_open() -> None:
 def test_the_table_takes_the_place_between_the_marks() -> None:
     page = f"before\n{PART.begin}\nold\n{PART.end}\nafter\n"
     assert PART.replaced(page, table([("a", "1 %", "2 %", "b")])) == (
-        f"before\n{PART.begin}\n| log | before | after | what was found |\n| --- | --- | --- | --- |\n"
-        f"| a | 1 % | 2 % | b |\n{PART.end}\nafter\n"
+        f"before\n{PART.begin}\n| log | before | after | what was found |\n"
+        f"| --- | --- | --- | --- |\n| a | 1 % | 2 % | b |\n{PART.end}\nafter\n"
     )
     with pytest.raises(ValueError, match="lacks"):
         PART.replaced("nothing", "")
