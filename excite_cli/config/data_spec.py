@@ -14,6 +14,7 @@ from excite_cli.config.section import (
 )
 
 EffectKind = str
+RunStates = dict[EffectKind, str]  # `none`: without it
 
 
 class EffectSpec(Section):

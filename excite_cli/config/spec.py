@@ -14,6 +14,7 @@ from excite_cli.config.data_spec import (
     EffectSpec,
     IdentificationSpec,
     MeasurementSpec,
+    RunStates,
 )
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.section import Integer, Positive, Power, Section
@@ -94,6 +95,11 @@ class Spec(Section):
     optimizer: OptimizerSpec = OptimizerSpec()
     effects: tuple[EffectSpec, ...] | None = Field(
         None, description="the declared model; default: the friction of the URDF's <dynamics>"
+    )
+    runs: dict[str, RunStates] = Field(
+        default_factory=dict,
+        description="what differs between runs, {run: {kind of effect: state}}, as {monday_3: "
+        "{payload: tool_2kg}}; runs of one state share its effect, `none` is without",
     )
     measurement: MeasurementSpec = MeasurementSpec()
     identification: IdentificationSpec = IdentificationSpec()

@@ -90,4 +90,4 @@ def _predicted(robot: Robot, fitted: FittedModel, run: PreparedRun, regressor: A
     body = RigidBody(robot, fitted.phi, run.q, run.v, run.a)
     body.__dict__["regressor"] = regressor  # it does not depend on φ, and takes a while
     values = fitted.values if len(fitted.effects) else np.zeros(0)
-    return predicted(body, fitted.effects, values, run.t, run.run)
+    return predicted(body, fitted.effects, values, run)

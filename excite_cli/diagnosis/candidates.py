@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.config.data_spec import DiagnosisSpec
+from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named
+from excite_cli.effects.declared_states import States, declared_sets
 from excite_cli.errors import ConfigError, ExciteWarning
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
@@ -18,8 +20,9 @@ from excite_cli.robot.model import Array, Robot
 _TOGETHER = 16  # effects that are filtered at once
 
 
+Runs = tuple[str, ...]
 # Kind, joints and runs: candidates that differ in shape only share it.
-Place = tuple[str, tuple[int, ...], tuple[str, ...]]
+Place = tuple[str, tuple[int, ...], Runs]
 
 
 @dataclass(frozen=True)
@@ -49,14 +52,13 @@ class Candidate:
 
 def possible_effects(
     spec: DiagnosisSpec,
-    robot: Robot,
-    declared: Sequence[Effect],
+    model: Model,
     signals: Sequence[Signals],
     residuals: Sequence[Array],
     runs: Sequence[str],
     around: Mapping[Place, list[dict]],
 ) -> list[tuple[Effect, int]]:
-    """All effects to be tested but those declared, and how many tests each stands for.
+    """All effects to be tested but those that `model` declares, and how many tests each stands for.
 
     `signals` and `residuals` (T, n) are of the training parts; `runs` the names of all runs, for
     effects that are present in some of them only; `around` shapes for (kind, joints, runs) that
@@ -70,16 +72,19 @@ def possible_effects(
     for name in (*([] if spec.kinds == "all" else spec.kinds), *spec.exclude):
         kind_named(name, "diagnosis")
     names = list(catalogue()) if spec.kinds == "all" else list(spec.kinds)
-    known = {(e.kind, e.joints) for e in declared}
+    known = {(e.kind, e.joints) for e in model.declared}
+    robot = model.robot
     found: list[tuple[Effect, int]] = []
     for name in names:
         if name in spec.exclude:
             continue
         kind = catalogue()[name]
         try:
-            effects, tests = _of_kind(kind, robot, known, signals, residuals, runs)
+            sets = _sets_of(kind, runs, signals, model.states)
+            effects, tests = _of_kind(kind, robot, known, signals, residuals, sets)
+            changes = _changes(kind, model, sets, signals)
             if is_of_a_package(kind):
-                require_columns(effects, signals)
+                require_columns([*effects, *(change for change, _ in changes)], signals)
         except (Exception, SystemExit) as error:
             if not is_of_a_package(kind):
                 raise
@@ -98,6 +103,7 @@ def possible_effects(
             # Below the speed at which a joint counts as moving, samples are left out.
             if effect.shows_above(slowest)
         ]
+        found += [(change, count * len(names)) for change, count in changes]
     if not found:
         raise ConfigError("diagnosis: every effect to be looked for is declared or excluded.")
     return found
@@ -109,7 +115,7 @@ def _of_kind(
     known: Container[tuple[str, tuple[int, ...]]],
     signals: Sequence[Signals],
     residuals: Sequence[Array],
-    runs: Sequence[str],
+    sets: Sequence[Runs],
 ) -> tuple[list[Effect], int]:
     """All effects of a kind at places that are not `known`, and how many tests they stand for."""
     effects: list[Effect] = []
@@ -118,8 +124,8 @@ def _of_kind(
         if (kind.kind, place) in known:
             continue
         if kind.per_run:
-            effects += _in_runs(kind, robot, place, signals, residuals, runs)
-            tests += len(runs) * kind.tests_of_grid(robot, place, signals[:1])
+            effects += _in_runs(kind, robot, place, signals, residuals, sets)
+            tests += len(sets) * kind.tests_of_grid(robot, place, signals[:1])
         else:
             shapes = kind.tuned(robot, place, signals, residuals)
             effects += [kind(place, shape) for shape in shapes]
@@ -139,37 +145,68 @@ def require_columns(effects: Sequence[Effect], signals: Sequence[Signals]) -> No
                 raise ValueError("its columns are not finite numbers")
 
 
+def _sets_of(
+    kind: type[Effect], runs: Sequence[str], signals: Sequence[Signals], states: States
+) -> list[Runs]:
+    """The sets of runs in which a kind that may differ between them is looked for.
+
+    As declared; else each training run on its own and neighbours together, but not all of them:
+    there it would be part of the robot. What was not trained on is in no set.
+    """
+    declared = declared_sets(kind.kind, states)
+    if declared is not None:
+        return declared if not kind.shapes else [(run,) for each in declared for run in each]
+    trained = [run for run in runs if any(s.run.is_among((run,)) for s in signals)]
+    if kind.shapes:
+        return [(run,) for run in trained]
+    if len(runs) < 2:
+        return []
+    longest = max(len(trained) - 1, 1)
+    return [
+        tuple(trained[i : i + length])
+        for length in range(1, longest + 1)
+        for i in range(len(trained) - length + 1)
+    ]
+
+
 def _in_runs(
     kind: type[Effect],
     robot: Robot,
     place: tuple[int, ...],
     signals: Sequence[Signals],
     residuals: Sequence[Array],
-    runs: Sequence[str],
+    sets: Sequence[Runs],
 ) -> list[Effect]:
-    """A kind that is present in some runs only, looked for in each on its own.
-
-    One without a shape of its own also in all runs from some run on; in all of them it
-    would be part of the robot.
-    """
+    """A kind that is present in some runs only, looked for in each set of them."""
     found: list[Effect] = []
-    trained = [run for run in runs if any(s.run.is_among((run,)) for s in signals)]
-    for run in trained:
-        own = [i for i, s in enumerate(signals) if s.run.is_among((run,))]
+    for runs in sets:
+        own = [i for i, s in enumerate(signals) if s.run.is_among(runs)]
         shapes = kind.tuned(robot, place, [signals[i] for i in own], [residuals[i] for i in own])
-        if kind.shapes or len(runs) > 1:
-            found += [kind(place, shape, (run,)) for shape in shapes]
-    if not kind.shapes:
-        later = [tuple(runs[i:]) for i in range(1, len(runs) - 1)]
-        some = [
-            tuple(trained[i:k])
-            for i in range(len(trained))
-            for k in range(i + 2, len(trained) + 1)
-            if k - i < len(trained)
-        ]
-        together = [*later, *(each for each in some if each not in later)]
-        found += [kind(place, {}, chosen) for chosen in together if set(chosen) & set(trained)]
+        found += [kind(place, shape, runs) for shape in shapes]
     return found
+
+
+def _changes(
+    kind: type[Effect], model: Model, sets: Sequence[Runs], signals: Sequence[Signals]
+) -> list[tuple[Effect, int]]:
+    """A kind that all runs have, more or less of it in some, and how many tests each stands for.
+
+    In one run, from some run on, or up to some run. Where all have it, a change in most runs is the
+    opposite change in the others: then these few are named, since more runs count for more tests.
+    """
+    if not kind.changes_between_runs:
+        return []
+    trained = tuple(dict.fromkeys(s.run.name for s in signals))
+    known = {(e.kind, e.joints, e.runs) for e in model.declared}
+    found = [
+        (kind(place, {}, runs), 2 * len(runs) > len(trained))
+        for place in kind.places(model.robot)
+        for runs in sets
+        if (kind.kind, place, runs) not in known
+        and not set(trained) <= set(runs)
+        and (len(runs) == 1 or runs[0] == trained[0] or runs[-1] == trained[-1])
+    ]
+    return [(effect, len(found) * (1 + most)) for effect, most in found]
 
 
 def with_columns(

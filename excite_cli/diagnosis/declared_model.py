@@ -1,13 +1,14 @@
 """What a diagnosis knows before: the robot, the effects that are declared, a prior or none."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
+from excite_cli.effects.declared_states import States
 from excite_cli.identification.prior import inertial_prior
 from excite_cli.robot.model import Array, Robot
 
@@ -22,12 +23,13 @@ class KeptInertias:
 
 @dataclass(frozen=True)
 class Model:
-    """What is known before: robot, declared effects, a prior on the inertias or none."""
+    """What is known before: robot, declared effects, a prior on the inertias, states of runs."""
 
     robot: Robot
     base: BaseParameters
     declared: tuple[Effect, ...]
     prior: KeptInertias | None
+    states: States = field(default_factory=dict)
 
     @property
     def declared_width(self) -> int:

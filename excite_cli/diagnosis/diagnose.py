@@ -73,7 +73,7 @@ def diagnose(
         The data cannot be what the configuration says (joint order, signs), or are too short.
     """
     started = time.monotonic()
-    check_declared_runs(spec.effects, dataset)
+    check_declared_runs(spec, dataset)
     model = _model(robot, base, spec)
     parts = split(dataset, sealed, spec.diagnosis.block)
     check_left_to_fit(spec.effects, parts)
@@ -167,7 +167,7 @@ def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:
     if spec.identification.inertias == "cad":
         cad = standard_parameters(robot)
         prior = KeptInertias(cad, prior_rows(robot, cad, spec.identification.uncertainty))
-    return Model(robot, base, declared_effects(spec.effects, robot), prior)
+    return Model(robot, base, declared_effects(spec.effects, robot), prior, spec.runs)
 
 
 def _column_names(model: Model) -> list[str]:

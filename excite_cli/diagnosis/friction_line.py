@@ -37,7 +37,7 @@ def friction_lines(traced: Traced, start: int) -> Array:
 def _find(traced: Traced, kind: str, joints: Sequence[int]) -> int | None:
     for i in traced.chosen:
         effect = traced.candidates[i].effect
-        if effect.kind == kind and tuple(effect.joints) == tuple(joints):
+        if (effect.kind, effect.joints, effect.runs) == (kind, tuple(joints), ()):
             return i
     return None
 

@@ -49,7 +49,11 @@ class Judgement:
 
     def __post_init__(self) -> None:
         """Look up who refines whom, and which kinds exclude each other."""
-        at = {(c.effect.kind, c.effect.joints): i for i, c in enumerate(self.candidates)}
+        at = {
+            (c.effect.kind, c.effect.joints): i
+            for i, c in enumerate(self.candidates)
+            if not c.effect.runs
+        }
         self.parents = [
             tuple(
                 at[kind, (joint,)]

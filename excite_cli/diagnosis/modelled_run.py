@@ -34,7 +34,7 @@ class ModelledRun:
         """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
         run, body = self.run, self._at(phi)
         load = body.load
-        signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run.run)
+        signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run.run, run.start)
         if not len(values):
             return signals
         # Defects of the measurement do not change the torque that they act upon.

@@ -10,7 +10,6 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import effect_columns
-from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 
 _SETTLED = 3
@@ -25,9 +24,9 @@ class Prediction:
 
 
 def predicted(
-    body: RigidBody, effects: Sequence[Effect], values: Array, t: Array, run: RunId
+    body: RigidBody, effects: Sequence[Effect], values: Array, run: PreparedRun
 ) -> Prediction:
-    """What a model says of a motion at instants `t` (T,) of a run; its inertias are the body's.
+    """What a model says of the motion of a run; its inertias are the body's.
 
     Effects that look at the torque see the model's own.
     """
@@ -39,7 +38,7 @@ def predicted(
     )
     total = load
     for _ in range(_SETTLED):
-        signals = Signals(t, body.q, body.v, body.a, load, torque, body, run)
+        signals = Signals(run.t, run.q, run.v, run.a, load, torque, body, run.run, run.start)
         columns = effect_columns(effects, signals)
         total = load + columns @ values
         if not len(effects):

@@ -79,7 +79,7 @@ class Search:
         return [
             i
             for i, c in enumerate(self.candidates)
-            if c.place not in taken and c.place not in shut and c.effect.tier <= latest
+            if c.place not in taken and c.place not in shut and c.effect.asked_for <= latest
         ]
 
     def _best_one(self, chosen: list[int], latest: Tier) -> tuple[int, ...]:

@@ -171,9 +171,7 @@ def _one_pass(
         shapes = {
             place: shapes_around(effect, signals) for place, effect in found.items() if effect.shape
         }
-        possible = possible_effects(
-            spec, model.robot, model.declared, signals, raw, run_names, shapes
-        )
+        possible = possible_effects(spec, model, signals, raw, run_names, shapes)
         candidates = with_columns(possible, signals, data.runs)
     plain = data.evidence(candidates, NoiseModel.white(fit.levels))
     usual = _usual(candidates, _carried_over(fit.effects, candidates))
@@ -220,7 +218,12 @@ def _usual(candidates: Sequence[Candidate], found: Sequence[int]) -> list[int]:
     taken = {candidates[i].place for i in found}
     usual = list(found)
     for i, c in enumerate(candidates):
-        if c.effect.usual and c.place not in taken and len(c.effect.runs) < 2:
+        if (
+            c.effect.usual
+            and c.place not in taken
+            and len(c.effect.runs) < 2
+            and not c.effect.is_change
+        ):
             usual.append(i)
             taken.add(c.place)
     return usual

@@ -87,6 +87,9 @@ class Effect(ABC):
     function_of: ClassVar[tuple[Quantity, ...]] = ()
     defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
+    # In all runs, but its size may change from run to run: in runs of its own it is that change.
+    changes_between_runs: ClassVar[bool] = False
+    of_campaign: ClassVar[bool] = False  # its columns look at the campaign's clock
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
     why_not_excitable: ClassVar[str] = ""
@@ -151,6 +154,16 @@ class Effect(ABC):
         """Whether the effect is present in `run`."""
         return not self.runs or run.is_among(self.runs)
 
+    @property
+    def is_change(self) -> bool:
+        """Whether it is by how much something that all runs have is more, or less, in some."""
+        return self.changes_between_runs and bool(self.runs)
+
+    @property
+    def asked_for(self) -> Tier:
+        """Its tier; a change in some runs waits for what sets runs apart on many robots."""
+        return max(self.tier, Tier.MANY_ROBOTS) if self.is_change else self.tier
+
     def rows(self, n: int) -> tuple[int, ...]:
         """Moved joints in whose torque it shows."""
         return self.joints
@@ -194,8 +207,11 @@ class Effect(ABC):
     def possible(self, values: Array, early: bool) -> bool:
         """Whether fitted `values` have signs and sizes that physics allows.
 
-        `early`: in the first passes of a diagnosis, which do not know the torque well.
+        `early`: in the first passes of a diagnosis, which do not know the torque well. A change may
+        be of either sign.
         """
+        if self.is_change:
+            return True
         given = zip(self.parameters, values, strict=True)
         return all(parameter.allows(float(value), early) for parameter, value in given)
 

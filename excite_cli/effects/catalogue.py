@@ -21,6 +21,7 @@ from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.coupled_friction import CoupledFriction
 from excite_cli.effects.elasticity import Elasticity
 from excite_cli.effects.encoder_offset import EncoderOffset
+from excite_cli.effects.friction_change import FrictionChange
 from excite_cli.effects.friction_drift import FrictionDrift
 from excite_cli.effects.load_dependent_friction import LoadDependentFriction
 from excite_cli.effects.nonlinear_viscous_friction import NonlinearViscousFriction
@@ -45,6 +46,7 @@ _OURS: tuple[type[Effect], ...] = (
     StribeckFriction,
     LoadDependentFriction,
     FrictionDrift,
+    FrictionChange,
     CoupledFriction,
     Armature,
     Spring,

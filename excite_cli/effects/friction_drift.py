@@ -1,6 +1,7 @@
 """Friction that changes during a run, as oil and grease warm up: τ_j = t (ċ sgn v_j + ḃ v_j).
 
-t counts from the start of the run, so every run drifts anew. Warming up makes both rates negative.
+t counts from the start of the run, so every run drifts anew: `friction_change` goes on from one
+recording to the next. Warming up makes both rates negative.
 """
 
 from typing import ClassVar

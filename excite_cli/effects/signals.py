@@ -15,7 +15,7 @@ class Signals:
 
     `t` (T,) from the start of the run [s]; `q, v, a` (T, n); `load` (T, n) rigid-body torque of
     the model so far, `torque` (T, n) all of it with the effects found; `body` gives the derivatives
-    of the rigid-body torque.
+    of the rigid-body torque. `start` is the campaign's time at t = 0 [s].
     """
 
     t: Array
@@ -26,6 +26,12 @@ class Signals:
     torque: Array
     body: RigidBody
     run: RunId = field(default_factory=RunId)
+    start: float = 0.0
+
+    @property
+    def clock(self) -> Array:
+        """Time on the campaign's clock (T,) [s]."""
+        return self.start + self.t
 
     def rate(self, x: Array) -> Array:
         """dx/dt by central differences along the first axis."""

@@ -23,6 +23,7 @@ class TorqueGain(Effect):
     parameters: ClassVar = (Parameter("gain", "1", 0.005, 0.5, believed=(-0.5, 0.5)),)
     data_defect: ClassVar = True
     usual: ClassVar = True
+    changes_between_runs: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
         """load_j, (T, 1, 1)."""

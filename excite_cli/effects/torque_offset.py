@@ -20,6 +20,7 @@ class TorqueOffset(Effect):
     data_defect: ClassVar = True
     surprise: ClassVar = 1.0
     usual: ClassVar = True
+    changes_between_runs: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
         """Ones, (T, 1, 1)."""

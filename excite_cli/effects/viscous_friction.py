@@ -17,6 +17,7 @@ class ViscousFriction(Effect):
     surprise: ClassVar = 0.0  # every joint has it
     tier: ClassVar = Tier.EVERY_ROBOT
     usual: ClassVar = True
+    changes_between_runs: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
         """v_j, (T, 1, 1)."""

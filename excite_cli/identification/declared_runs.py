@@ -1,27 +1,30 @@
 """Runs that the configuration names must be in the data, and not all of them sealed."""
 
 from excite_cli.config.data_spec import EffectSpec
+from excite_cli.config.spec import Spec
+from excite_cli.effects.declared_states import check_states
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Dataset
 
 
-def check_declared_runs(specs: tuple[EffectSpec, ...] | None, dataset: Dataset) -> None:
-    """Refuse effects that are declared for a run which `dataset` does not hold.
+def check_declared_runs(spec: Spec, dataset: Dataset) -> None:
+    """Refuse effects and states that are declared for a run which `dataset` does not hold.
 
     Raises
     ------
     ConfigError
-        There is no run of such a name.
+        There is no run of such a name, or its state is of a kind that all runs share.
     """
     names = dataset.names
-    for index, spec in enumerate(specs or ()):
-        for name in () if spec.runs == "all" else spec.runs:
+    for index, effect in enumerate(spec.effects or ()):
+        for name in () if effect.runs == "all" else effect.runs:
             if name not in names:
                 raise ConfigError(
                     f"effects[{index}].runs: there is no run '{name}' in the data."
                     f"{nearest(name, names)} Runs: {', '.join(names)}."
                 )
+    check_states(spec.runs, names)
 
 
 def check_left_to_fit(specs: tuple[EffectSpec, ...] | None, parts: Split) -> None:

@@ -81,7 +81,7 @@ def identify(
         A run is too short.
     """
     effects = declared_effects(spec.effects, robot)
-    check_declared_runs(spec.effects, dataset)
+    check_declared_runs(spec, dataset)
     parts = split(dataset, sealed, spec.diagnosis.block)
     check_left_to_fit(spec.effects, parts)
     processing = choose_processing(

@@ -31,8 +31,8 @@ _FEWEST = 8  # decimated samples a run needs to say anything
 class PreparedRun:
     """One run (or block of it) ready for regression.
 
-    `t` (T,) from the start of the recording `run`, `q, v, a, tau_raw` (T, n) at the working rate
-    with borders cut; `averages` (M, T) gives filtered and decimated values, at `step`, of any
+    `t` (T,) from the start of the recording `run` (at `start` [s] on the campaign's clock), `q, v,
+    a, tau_raw` (T, n) at the working rate with borders cut; `averages` (M, T) gives filtered and decimated values, at `step`, of any
     column: A x; `tau` (M, n) = A tau_raw; `valid` (M, n) samples untouched by invalid ones;
     `moving` (M, n) where the joint itself moves.
 
@@ -55,6 +55,7 @@ class PreparedRun:
     tau_fit: Array
     usable: NDArray[np.bool_]
     step: float
+    start: float = 0.0
 
     def averaged(self, columns: Array) -> Array:
         """A applied along the first axis of (T, …)."""
@@ -131,6 +132,7 @@ def prepare(
         tau_fit=np.stack([np.asarray(for_fit[j] @ tau[:, j]) for j in joints], axis=1),
         usable=np.stack([filled(for_fit[j]) & filled(fit_averages[j]) for j in joints], axis=1),
         step=float((centers[1] - centers[0]) * h),
+        start=run.start,
     )
 
 

@@ -8,6 +8,7 @@ block leaks into its neighbours.
 from dataclasses import dataclass, replace
 
 from excite_cli.errors import ConfigError, nearest
+from excite_cli.measurement.campaign_clock import on_campaign_clock
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.run_identity import Part, RunId
 
@@ -53,7 +54,7 @@ def split(dataset: Dataset, sealed: str | None = None, block: float | None = Non
     ConfigError
         There is no run of that name, or a single run is too short to be cut.
     """
-    runs = [_from_start(run) for run in dataset.runs]
+    runs = on_campaign_clock([_from_start(run) for run in dataset.runs])
     if sealed is not None and sealed not in dataset.names:
         raise ConfigError(
             f"--sealed: there is no run '{sealed}'.{nearest(sealed, dataset.names)} "

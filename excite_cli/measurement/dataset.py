@@ -39,7 +39,8 @@ class Run(Shown):
 
     `name` is the recording's, `part` says which part of it. `valid` (T, n): samples that may be
     used, per joint (false where saturated, stuck or bridged). `extra` holds further channels of the
-    file, (T,) or (T, m), untouched. `epoch`: seconds from 1970 (UTC) to t = 0, where the data know.
+    file, (T,) or (T, m), untouched. `epoch`: seconds from 1970 (UTC) to t = 0, where the data know;
+    `start`: the campaign's time at t = 0 [s], once it is known (`campaign_clock`).
     """
 
     name: str
@@ -52,6 +53,7 @@ class Run(Shown):
     origin: Origin = field(default_factory=Origin)
     part: Part = field(default_factory=Part)
     epoch: float | None = None
+    start: float = 0.0
 
     @property
     def id(self) -> RunId:

@@ -1,7 +1,7 @@
 """What the robot of one run is made of, and its making: inertias, joints, drives, instruments."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ class Build:
     `springs` are k and c of k q + c. `looped` effects act through their own formula at every step;
     `compensated` ones are known to the controller;
     `recorded` ones change what is written down. `reading` (n, 2): sharpness and level of the
-    saturation of the recorded torque.
+    saturation of the recorded torque. `start`: when the run begins, on the campaign's clock [s].
     """
 
     robot: Robot
@@ -50,6 +50,7 @@ class Build:
     looped: list[Planted] = field(default_factory=list)
     compensated: list[Planted] = field(default_factory=list)
     recorded: list[Planted] = field(default_factory=list)
+    start: float = 0.0
 
     @classmethod
     def bare(cls, robot: Robot, phi: Array, run: RunId) -> "Build":
@@ -98,9 +99,11 @@ class Build:
         self.recorded.append(Planted(effect, values))
 
 
-def assemble(robot: Robot, phi: Array, run: RunId, planted: Iterable[Planted]) -> Build:
+def assemble(
+    robot: Robot, phi: Array, run: RunId, planted: Iterable[Planted], start: float = 0.0
+) -> Build:
     """The robot of one run with the effects that are active in it."""
-    build = Build.bare(robot, phi, run)
+    build = replace(Build.bare(robot, phi, run), start=start)
     for each in planted:
         if each.effect.active(run):
             each.effect.build_into(build, each.values, each.named())

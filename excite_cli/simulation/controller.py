@@ -67,7 +67,7 @@ def compensated(build: Build, reference: Reference, share: float) -> Reference:
     body = RigidBody(build.robot, build.phi, reference.q, reference.v, reference.a)
     signals = Signals(
         np.maximum(reference.t, 0.0), reference.q, reference.v, reference.a, load, load, body,
-        build.run,
+        build.run, build.start,
     )  # fmt: skip
     extra = np.sum([p.effect.torque(signals, p.values) for p in build.compensated], axis=0)
     return replace(reference, feed_forward=load + share * extra)

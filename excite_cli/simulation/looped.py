@@ -15,19 +15,19 @@ import numpy as np
 
 from excite_cli.dynamics.rigid_body import RigidBody, robot_with
 from excite_cli.effects.base import Effect, Signals
-from excite_cli.measurement.run_identity import RunId
-from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.model import Array
+from excite_cli.simulation.build import Build
 from excite_cli.simulation.planted import Planted
 
 EDGE = 5e-3  # rad/s; the smoothed sign is ±1 to 1e-4 there
 
 
 class LoopedEffects:
-    """The torque of some effects on the robot with inertias φ, instant by instant."""
+    """The torque of the looped effects of a run's robot, instant by instant."""
 
-    def __init__(self, robot: Robot, phi: Array, run: RunId, planted: Sequence[Planted]) -> None:
-        self._robot, self._phi, self._run = robot, phi, run
-        self._model = robot_with(robot, phi)
+    def __init__(self, build: Build) -> None:
+        self._build, robot, planted = build, build.robot, build.looped
+        self._model = robot_with(robot, build.phi)
         self._local = [p for p in planted if p.effect.scope == "joint"]
         self._wide = [p for p in planted if p.effect.scope != "joint"]
         self._zero = np.zeros(robot.n)
@@ -52,10 +52,10 @@ class LoopedEffects:
         states, times = self._states[rows], self._times[rows]
         states[0], states[1], states[2], states[3] = q, v, a, load
         times[:] = max(t, 0.0)
-        body = RigidBody(self._robot, self._phi, states[0], states[1], states[2], model=self._model)
-        return Signals(
-            times, states[0], states[1], states[2], states[3], states[3], body, self._run
-        )
+        q, v, a, load = states
+        build = self._build
+        body = RigidBody(build.robot, build.phi, q, v, a, model=self._model)
+        return Signals(times, q, v, a, load, load, body, build.run, build.start)
 
 
 def _total(planted: Sequence[Planted], signals: Signals) -> Array:

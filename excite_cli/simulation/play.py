@@ -92,7 +92,7 @@ class _Effects:
     """Applies looped effects: their dry part as the joints' friction loss, the rest as torque."""
 
     def __init__(self, build: Build, plant: Plant, data: Any) -> None:
-        self._looped = LoopedEffects(build.robot, build.phi, build.run, build.looped)
+        self._looped = LoopedEffects(build)
         self._motor = plant.motor if build.soft else slice(None)
         self._load = _Load(plant, data, self._motor)
         self._acceleration = data.qacc

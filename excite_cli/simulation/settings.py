@@ -18,9 +18,9 @@ class SimulationSettings:
     `torque_noise`: standard deviation as a share of the joint's torque RMS in that run, with the
     correlation `noise_correlation` from sample to sample. `encoder`: rad (m) a count.
     `inertia_error`: how far the true inertias are from the URDF. `repeat`: takes of each motion,
-    `periods` of it in each. `bandwidth` of the controller [rad/s], `compensation`: the share of
-    friction and springs that it knows. `torque_limits`: the motors stop
-    at the robot's effort limits.
+    `periods` of it in each; `pause` [s] between recordings, which then have absolute stamps.
+    `bandwidth` of the controller [rad/s], `compensation`: the share of friction and springs that it
+    knows. `torque_limits`: the motors stop at the robot's effort limits.
     """
 
     seed: int = 1
@@ -31,6 +31,7 @@ class SimulationSettings:
     inertia_error: float = 0.2
     repeat: int = 1
     periods: int = 1
+    pause: float = 0.0
     control_rate: float = 1000.0
     step: float = 5e-4
     bandwidth: float = 100.0
@@ -77,7 +78,7 @@ class SimulationSettings:
                 f"inertia error: {self.inertia_error:g} is not between 0 and 0.6; 0.2 makes "
                 "inertias 10 to 30 % larger or smaller."
             )
-        for name in ("torque_noise", "encoder"):
+        for name in ("torque_noise", "encoder", "pause"):
             if not getattr(self, name) >= 0.0:
                 raise ConfigError(f"{name.replace('_', ' ')}: it must not be negative.")
         for name in ("repeat", "periods"):

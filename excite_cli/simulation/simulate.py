@@ -30,6 +30,7 @@ from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.true_robot import true_inertias
 
 Progress = Callable[[str, int], None]
+_FIRST_DAY = 1.7e9  # s from 1970: when a simulated campaign with pauses begins
 
 
 @dataclass(frozen=True)
@@ -91,12 +92,14 @@ def simulate(
     tracking: dict[str, Array] = {}
     with silent_engine():
         takes = takes_of(motions, settings.repeat)
+        start = 0.0
         for motion in motions:
-            taken = _takes(robot, phi, motion, takes[motion.name], settings, planted)
+            taken = _takes(robot, phi, motion, takes[motion.name], settings, planted, start)
             for run, error in taken:
                 progress(run.name, len(runs))
                 runs.append(run)
                 tracking[run.name] = error
+                start = _next_start(run, settings)
     dataset = Dataset(robot.joint_names, tuple(runs), ("simulated",))
     return Simulation(dataset, Truth(phi, planted), tracking)
 
@@ -108,22 +111,26 @@ def _takes(
     names: Sequence[str],
     settings: SimulationSettings,
     planted: Sequence[Planted],
+    start: float,
 ) -> Iterator[tuple[Run, Array]]:
     """Every take of one motion with its tracking error; the channel `q_ref` is the motion itself.
 
-    Takes with the same effects differ in what is recorded, not in what happens.
+    Takes with the same effects differ in what is recorded, not in what happens. The first begins at
+    `start` [s] on the campaign's clock.
     """
     duration = settings.periods * motion.duration
     end = duration + 2.0 / settings.rate
     t = control_instants(-settings.lead_in, end, settings.control_rate)
     reference = reference_of(robot, motion, t)
-    played: dict[tuple[bool, ...], Played] = {}
+    played: dict[tuple[float, ...], Played] = {}
     for name in names:
         run_id = RunId(name)
-        build = assemble(robot, phi, run_id, planted)
+        build = assemble(robot, phi, run_id, planted, start)
         if settings.torque_limits:
             build.clip = np.minimum(build.clip, robot.limits.effort)
-        active = tuple(p.effect.active(run_id) for p in planted)
+        present = [p.effect.active(run_id) for p in planted]
+        dated = any(p.effect.of_campaign for p, here in zip(planted, present, strict=True) if here)
+        active = (*present, start if dated else 0.0)
         if active not in played:
             plant = make(build, settings.physics_step)
             gains = gains_of(build, plant, reference, settings.bandwidth)
@@ -133,8 +140,15 @@ def _takes(
         numbers = [settings.seed, 2, _number(name.encode()), _number(motion.number)]
         rng = np.random.default_rng(numbers)
         run = record(build, played[active], duration, settings, rng)
-        run = replace(run, extra={"q_ref": motion.states(run.t)[0]})
+        epoch = _FIRST_DAY + start if settings.pause else None
+        run = replace(run, extra={"q_ref": motion.states(run.t)[0]}, start=start, epoch=epoch)
+        start = _next_start(run, settings)
         yield run, _tracking_error(reference, played[active], duration)
+
+
+def _next_start(run: Run, settings: SimulationSettings) -> float:
+    """When the next recording begins, on the campaign's clock [s]."""
+    return run.start + run.duration + settings.pause
 
 
 def _number(data: bytes) -> int:

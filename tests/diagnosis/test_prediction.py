@@ -1,6 +1,7 @@
 """What a model predicts for a run is what its regression says, and errors are counted from it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -59,7 +60,7 @@ def torque(
     run: PreparedRun,
     name: RunId,
 ) -> Array:
-    return predicted(body_of(robot, phi, run), kinds, values, run.t, name).torque
+    return predicted(body_of(robot, phi, run), kinds, values, replace(run, run=name)).torque
 
 
 def test_prediction_is_columns_times_parameters(robot: Robot, runs: list[PreparedRun]) -> None:
@@ -94,7 +95,7 @@ def test_a_delay_acts_on_all_torque_that_the_robot_makes(
     """τ(t − δ) with τ = load + friction, to first order, and no delay of the delayed."""
     phi, run = standard_parameters(robot), runs[0]
     kinds = (ViscousFriction((1,)), TorqueDelay((1,)))
-    tau = torque(robot, phi, kinds, np.array([30.0, 0.01]), run, "r1")
+    tau = torque(robot, phi, kinds, np.array([30.0, 0.01]), run, RunId("r1"))
     whole = RigidBody(robot, phi, run.q, run.v, run.a).load.copy()
     whole[:, 1] += 30.0 * run.v[:, 1]
     late = CubicSpline(run.t, whole[:, 1])(run.t - 0.01)
@@ -106,7 +107,7 @@ def test_a_delay_acts_on_all_torque_that_the_robot_makes(
 
 def test_without_effects_it_is_the_rigid_body(robot: Robot, runs: list[PreparedRun]) -> None:
     phi = standard_parameters(robot)
-    tau = torque(robot, phi, (), np.zeros(0), runs[0], "r1")
+    tau = torque(robot, phi, (), np.zeros(0), runs[0], RunId("r1"))
     assert tau == pytest.approx(RigidBody(robot, phi, runs[0].q, runs[0].v, runs[0].a).load)
 
 
@@ -115,7 +116,7 @@ def test_errors_are_those_of_the_residual(robot: Robot, runs: list[PreparedRun])
     found = errors_on(
         robot,
         runs,
-        [predicted(body_of(robot, phi, run), (), np.zeros(0), run.t, "r") for run in runs],
+        [predicted(body_of(robot, phi, run), (), np.zeros(0), run) for run in runs],
     )
     tau = np.concatenate([run.tau for run in runs])
     model = np.concatenate(

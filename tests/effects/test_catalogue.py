@@ -20,6 +20,7 @@ KINDS = [
     "stribeck_friction",
     "load_dependent_friction",
     "friction_drift",
+    "friction_change",
     "coupled_friction",
     "armature",
     "spring",

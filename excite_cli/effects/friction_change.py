@@ -1,0 +1,73 @@
+"""Friction that changes over a campaign, as a robot warms up: τ_j = φ(t) (Δc sgn v_j + Δb v_j).
+
+t is the campaign's time, from the start of its first recording, and φ grows from 0 to 1 within the
+campaign's span S, towards an end with time constant T:
+
+    φ(t) = (1 − e^(−t/T)) / (1 − e^(−S/T)),   for T ≫ S   φ(t) = t/S.
+
+So Δc and Δb are by how much friction is larger at the end than at the start, and Coulomb and
+viscous friction beside it are those of the start. A recording that took no part in the fit has its
+own place on the clock.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from excite_cli.effects.base import Abscissa, Effect, Parameter, Signals, Tier
+from excite_cli.effects.sign import smooth_sign
+from excite_cli.robot.model import Array, Robot
+
+_TIME_CONSTANTS = (0.1, 0.3, 1.0, 20.0)  # of the span; the last is a straight line
+_FEWEST = 3  # recordings: two differ by a step as well as by a trend
+
+
+class FrictionChange(Effect):
+    """τ_j = φ(t) (coulomb_change · sgn v_j + viscous_change · v_j), of either sign."""
+
+    kind: ClassVar = "friction_change"
+    title: ClassVar = "friction that changes over the campaign"
+    signature: ClassVar = "friction is not the same in later recordings as in earlier ones"
+    function_of: ClassVar = ("speed", "time")
+    parameters: ClassVar = (
+        Parameter("coulomb_change", "N·m", 0.02, 100.0),
+        Parameter("viscous_change", "N·m·s/rad", 0.02, 100.0),
+    )
+    shapes: ClassVar = (
+        Parameter("time_constant", "s", 1.0, 1e7),
+        Parameter("span", "s", 1.0, 1e7),
+    )
+    defaults: ClassVar[Mapping[str, float]] = {"time_constant": 20.0, "span": 60.0}
+    of_campaign: ClassVar = True
+    excitable: ClassVar = False
+    why_not_excitable: ClassVar = "it shows between recordings; a motion lasts too short"
+    refines: ClassVar = ("viscous_friction", "coulomb_friction")
+
+    @classmethod
+    def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
+        """From a quick start to a straight line; nothing where recordings are too few."""
+        if len({seen.run.name for seen in signals}) < _FEWEST:
+            return []
+        span = max(float(seen.clock[-1]) for seen in signals)
+        return [{"time_constant": share * span, "span": span} for share in _TIME_CONSTANTS]
+
+    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
+        """The span is no choice."""
+        return () if name == "span" else super().finer_steps(name, signals)
+
+    def progress(self, clock: Array) -> Array:
+        """φ at times on the campaign's clock [s]."""
+        constant, span = self.shape["time_constant"], self.shape["span"]
+        return np.asarray(np.expm1(-clock / constant) / np.expm1(-span / constant))
+
+    def columns(self, signals: Signals) -> Array:
+        """φ sgn v_j and φ v_j, (T, 1, 2)."""
+        v = signals.v[:, self.joints[0]]
+        progress = self.progress(signals.clock)
+        return (progress[:, None] * np.stack([smooth_sign(v), v], axis=-1))[:, None]
+
+    def abscissa(self, signals: Signals) -> Abscissa:
+        """The campaign's time with the sign of the speed."""
+        sign = smooth_sign(signals.v[:, self.joints[0]])
+        return Abscissa("campaign time, signed by the direction", "s", signals.clock * sign)
