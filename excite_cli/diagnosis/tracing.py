@@ -239,7 +239,11 @@ def _with_the_obvious(
     for _ in range(_OBVIOUS):
         schur = plain.schur(usual)
         taken = {candidates[i].place for i in usual}
-        free = [i for i, c in enumerate(candidates) if c.place not in taken and not c.effect.runs]
+        free = [
+            i
+            for i, c in enumerate(candidates)
+            if c.place not in taken and (c.effect.is_change or not c.effect.runs)
+        ]
         ranked = sorted(free, key=lambda i: -schur.singles[i].chi2)
         for i in ranked[:4]:
             joints = list(candidates[i].rows)

@@ -3,6 +3,7 @@
 A wrong torque constant or gear ratio of one joint. The same gain on all joints is absorbed by the
 inertial parameters, which then are all wrong by it. The gain of the joint's friction is absorbed by
 its friction parameters in the same way; what shows is the gain of the rigid-body torque alone.
+Of some runs it is that of all their torque.
 """
 
 from collections.abc import Mapping
@@ -14,7 +15,7 @@ from excite_cli.robot.model import Array
 
 
 class TorqueGain(Effect):
-    """τ_j grows by g · (rigid-body torque)."""
+    """τ_j grows by g · (rigid-body torque); in runs of its own by g · (torque)."""
 
     kind: ClassVar = "torque_gain"
     title: ClassVar = "wrong gain of the measured torque"
@@ -26,8 +27,9 @@ class TorqueGain(Effect):
     changes_between_runs: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
-        """load_j, (T, 1, 1)."""
-        return signals.load[:, list(self.joints), None]
+        """load_j, in runs of its own torque_j, (T, 1, 1)."""
+        seen = signals.torque if self.is_change else signals.load
+        return seen[:, list(self.joints), None]
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
@@ -36,5 +38,6 @@ class TorqueGain(Effect):
         robot.gain[list(self.joints)] += values[0]
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
-        """∂/∂load_j = weight."""
-        return Cotangents(load=signals.only(self.joints[0], weights[:, 0, 0]))
+        """∂/∂load_j or ∂/∂torque_j = weight."""
+        back = signals.only(self.joints[0], weights[:, 0, 0])
+        return Cotangents(torque=back) if self.is_change else Cotangents(load=back)
