@@ -32,6 +32,7 @@ from excite_cli.diagnosis.records import (
 )
 from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.rounds import rounds_of
+from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.unexplained import unexplained_structure
@@ -44,7 +45,7 @@ from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
-from excite_cli.identification.split import Split, split
+from excite_cli.identification.split import Split, split, with_ends_sealed
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.robot.model import Array, Robot
@@ -77,17 +78,11 @@ def diagnose(
     model = _model(robot, base, spec)
     parts = split(dataset, sealed, spec.diagnosis.block)
     check_left_to_fit(spec.effects, parts)
-    processing = choose_processing(
-        parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
-    )
-    progress("filtering", 0)
-
-    def prepared(coupled: Sequence[tuple[int, int, float]]) -> list[PreparedRun]:
-        return [prepare(run, processing, coupled) for run in parts.training]
-
-    training = prepared(())
-    check_plausibility(robot, training)
-    traced = trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
+    training, processing, traced = _searched(model, spec, parts, progress)
+    with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
+    if with_ends.ends:
+        parts = with_ends
+        training, processing, traced = _searched(model, spec, parts, progress)
     progress("naming", 8)
     parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
     covariance = covariance_of(
@@ -99,7 +94,8 @@ def diagnose(
     models = both_models(model, traced, parameters)
     sealed_part = on_sealed(robot, models, [prepare(run, processing) for run in parts.sealed])
     base_values, base_std = _base_parameters(model, parameters, covariance)
-    floor, assumed = noise_floor(parts.training, processing), _assumed(traced, parts)
+    floor = noise_floor(parts.training, processing)
+    assumed = assumptions(traced.effects, parts, model)
     return Diagnosis(
         config="",
         config_folder="",
@@ -131,7 +127,26 @@ def diagnose(
         ),
         sealed_traces=sealed_part.traces,
         assumed=assumed,
+        parts=on_sealed_ends(model, models, parts.ends, processing),
     )
+
+
+def _searched(
+    model: Model, spec: Spec, parts: Split, progress: Progress
+) -> tuple[list[PreparedRun], Processing, Traced]:
+    """Training parts as they are filtered, how, and what was found in them."""
+    processing = choose_processing(
+        parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
+    )
+    progress("filtering", 0)
+
+    def prepared(coupled: Sequence[tuple[int, int, float]]) -> list[PreparedRun]:
+        return [prepare(run, processing, coupled) for run in parts.training]
+
+    training = prepared(())
+    check_plausibility(model.robot, training)
+    traced = trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
+    return training, processing, traced
 
 
 def _noticed(
@@ -289,21 +304,6 @@ def _information(model: Model, traced: Traced, rivals: list[tuple[Alias, Array]]
             for alias, values in unique.values()
         ),
         noise=traced.levels,
-    )
-
-
-def _assumed(traced: Traced, parts: Split) -> tuple[Assumption, ...]:
-    """Effects of single runs leave open whether the sealed one has them."""
-    sealed = tuple(sorted({run.id.key for run in parts.sealed}))
-    return tuple(
-        Assumption(
-            effect.kind,
-            effect.runs,
-            sealed,
-            any(effect.active(run.id) for run in parts.sealed),
-        )
-        for effect in traced.effects
-        if effect.runs
     )
 
 

@@ -57,7 +57,7 @@ class Judgement:
         self.parents = [
             tuple(
                 at[kind, (joint,)]
-                for kind in c.effect.refines
+                for kind in c.effect.builds_on
                 for joint in c.effect.joints
                 if (kind, (joint,)) in at
             )

@@ -79,6 +79,17 @@ class Assumption:
     runs: tuple[str, ...]
     sealed: tuple[str, ...]
     present: bool
+    joints: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class SealedEnds:
+    """Errors on the ends of training `runs`, sealed since these runs carry `effects` of their own."""
+
+    runs: tuple[str, ...]
+    effects: tuple[EffectRecord, ...]
+    before: Errors
+    after: Errors
 
 
 @dataclass(frozen=True)
@@ -124,7 +135,7 @@ class Diagnosis(Shown):
 
     `effects`: all that were added to the declared model. `noise_floor` [N·m] (N): RMS per joint of
     what changes from period to period in training runs, filtered as for the errors; None if no
-    motion was repeated. `traces` of the training data, `sealed_traces` of the sealed ones; files of
+    motion was repeated. `parts`: errors on what is sealed beside the sealed run. `traces` of the training data, `sealed_traces` of the sealed ones; files of
     earlier versions have none.
     """
 
@@ -153,6 +164,7 @@ class Diagnosis(Shown):
     traces: Traces | None = None
     sealed_traces: tuple[TorqueTrace, ...] = ()
     assumed: tuple[Assumption, ...] = ()
+    parts: tuple[SealedEnds, ...] = ()
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:

@@ -85,11 +85,13 @@ def approximation_in_words(
 
 def assumption_in_words(assumed: Assumption) -> str:
     """What was assumed of an effect of single runs, and what to do if it is wrong."""
-    there = "is" if assumed.present else "is not"
+    there = "present" if assumed.present else "absent"
+    at = f" of {assumed.joints[0]}" if len(assumed.joints) == 1 else ""
+    sealed = ", ".join(assumed.sealed)
+    told = ", ".join(f"{run}: {{{assumed.kind}: a}}" for run in (*assumed.runs, *assumed.sealed))
     return (
-        f"{assumed.kind} was found in {', '.join(assumed.runs)}; for the error it is assumed that "
-        f"it {there} in the sealed {', '.join(assumed.sealed)}. If you know better, declare it "
-        "under effects with its runs."
+        f"{assumed.kind}{at} in {', '.join(assumed.runs)}: taken to be {there} in the sealed "
+        f"{sealed}. If it is there, declare one state for all of them: runs: {{{told}}}."
     )
 
 

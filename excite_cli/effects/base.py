@@ -91,6 +91,7 @@ class Effect(ABC):
     changes_between_runs: ClassVar[bool] = False
     of_campaign: ClassVar[bool] = False  # its columns look at the campaign's clock
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
+    rigid_body: ClassVar[bool] = False  # carried by the links: its torque is part of the load
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
     why_not_excitable: ClassVar[str] = ""
 
@@ -160,6 +161,12 @@ class Effect(ABC):
         return self.changes_between_runs and bool(self.runs)
 
     @property
+    def builds_on(self) -> tuple[str, ...]:
+        """Kinds of one joint that must be in before it: `refines`; of a change that all may have."""
+        every = self.is_change and self.tier == Tier.EVERY_ROBOT
+        return (*self.refines, self.kind) if every else self.refines
+
+    @property
     def asked_for(self) -> Tier:
         """Its tier; a change in some runs waits for what sets runs apart on many robots."""
         return max(self.tier, Tier.MANY_ROBOTS) if self.is_change else self.tier
@@ -192,9 +199,9 @@ class Effect(ABC):
     def imitates(self) -> bool:
         """Whether it comes near all that it refines, which then stays in whatever it explains.
 
-        Nor may it replace any of that.
+        Nor may it replace any of that. Changes in enough runs are as good as what all runs have.
         """
-        return False
+        return self.is_change
 
     @property
     def completes(self) -> bool:

@@ -24,6 +24,7 @@ _PARALLEL_BY_BANDWIDTH, _HIGHEST_PARALLEL, _LOWEST_PARALLEL = 6.0, 12.0, 4.0
 GAUSSIAN = float(np.sqrt(np.log(2.0)) / (2.0 * np.pi))
 GAUSSIAN_REACH = 3.5  # half width of the average in standard deviations
 DEFAULT_MOVING = 0.02  # rad/s
+_ENOUGH = 12  # averages that a part of a run should give
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,12 @@ class Processing:
     moving_speed: float
     bandwidth: float
     reasons: tuple[str, ...] = ()
+
+    @property
+    def shortest(self) -> float:
+        """How long a part of a run must be to say anything [s]."""
+        reach = GAUSSIAN_REACH * GAUSSIAN / self.parallel_cutoff if self.parallel_cutoff else 0.0
+        return 2.0 * (self.border + reach) + _ENOUGH / self.rate
 
     def as_data(self) -> dict[str, object]:
         """Plain values for files and JSON."""

@@ -1,7 +1,7 @@
 """The regression: torque and the columns that explain it, filtered and decimated alike."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,31 @@ def effect_columns(effects: Sequence[Effect], signals: Signals) -> Array:
             block[:, list(effect.rows(n))] = effect.columns(signals)
         blocks.append(block)
     return np.concatenate(blocks, axis=2)
+
+
+def carrying(signals: Signals, effects: Sequence[Effect], values: Array) -> Signals:
+    """The signals with the bodies that `effects` of `values` add: their torque is load, too."""
+    if not any(effect.rigid_body for effect in effects):
+        return signals
+    load = signals.load + _torque_of(signals, effects, values, [e.rigid_body for e in effects])
+    return replace(signals, load=load, torque=load)
+
+
+def with_torque(signals: Signals, effects: Sequence[Effect], values: Array) -> Signals:
+    """The signals with the torque of `effects` of `values` beside the load.
+
+    Defects of the measurement do not change the torque that they act upon.
+    """
+    seen = [not (effect.rigid_body or effect.data_defect) for effect in effects]
+    return replace(signals, torque=signals.load + _torque_of(signals, effects, values, seen))
+
+
+def _torque_of(
+    signals: Signals, effects: Sequence[Effect], values: Array, which: Sequence[bool]
+) -> Array:
+    """Torque (T, n) of those effects `which` are meant."""
+    meant = np.repeat(which, [len(effect.parameters) for effect in effects])
+    return effect_columns(effects, signals) @ np.where(meant, values, 0.0)
 
 
 def build_regression(

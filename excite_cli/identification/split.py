@@ -3,11 +3,16 @@
 A recording with gaps is sealed, or left out, with all its stretches; if there is no other, its
 stretches count as recordings. Blocks are cut before any filter runs, so that nothing of a sealed
 block leaks into its neighbours.
+
+Of runs with effects of their own the end may be sealed, too: only there it shows what such an
+effect is worth on data that took no part.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from excite_cli.errors import ConfigError, nearest
+from excite_cli.identification.processing import Processing
 from excite_cli.measurement.campaign_clock import on_campaign_clock
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.run_identity import Part, RunId
@@ -22,7 +27,8 @@ class Split:
     """Training and sealed parts, and the fold (left out together) of each training part.
 
     `units`: what can be sealed, in order: recordings, or the stretches of the only one.
-    `sealed_name` tells people what is sealed.
+    `sealed_name` tells people what is sealed; `ends` are those of training runs that are sealed
+    beside it.
     """
 
     training: tuple[Run, ...]
@@ -30,6 +36,7 @@ class Split:
     sealed_name: str
     folds: tuple[int, ...]
     units: tuple[str, ...]
+    ends: tuple[Run, ...] = ()
 
     def unit(self, run: RunId) -> str:
         """The unit that a run belongs to."""
@@ -72,6 +79,27 @@ def split(dataset: Dataset, sealed: str | None = None, block: float | None = Non
         middle = len(run.t) // 2
         training = [_block(run, 1, 0, middle), _block(run, 2, middle, len(run.t))]
     return Split(tuple(training), kept, sealed, _folds(training), units)
+
+
+def with_ends_sealed(parts: Split, runs: Collection[str], processing: Processing) -> Split:
+    """The last third of each of these training `runs` sealed as well, where it is long enough.
+
+    Between both parts lies the border that filters cut off.
+    """
+    training: list[Run] = []
+    ends: list[Run] = []
+    least = max(_SHORTEST, processing.shortest)
+    for run in parts.training:
+        count = len(run.t)
+        end = count - round(max(run.duration / _EVERY, least) / run.step)
+        start = end - round(processing.border / run.step)
+        if run.id.is_among(runs) and start * run.step > least:
+            number = run.part.block or 1
+            training.append(_block(run, number, 0, start))
+            ends.append(_block(run, number + 1, end, count))
+        else:
+            training.append(run)
+    return replace(parts, training=tuple(training), ends=tuple(ends))
 
 
 def _from_start(run: Run) -> Run:

@@ -21,6 +21,7 @@ from excite_cli.diagnosis.records import (
     Information,
     NamedEffect,
     Round,
+    SealedEnds,
     Unexplained,
 )
 from excite_cli.identification.errors_of_torque import Errors
@@ -62,6 +63,7 @@ _RECORDS: dict[str, Any] = {
 _LATER: dict[str, Any] = {
     "noise_floor": dict[str, float] | None,
     "assumed": tuple[Assumption, ...],
+    "parts": tuple[SealedEnds, ...],
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
@@ -129,8 +131,8 @@ def _read(file: Any, path: Path) -> Diagnosis:
     fields["phi"] = checked.array(file["phi"], (None,))
     fields.update({name: checked.array(file[name], base, finite=False) for name in _OF_BASE})
     for name, kind in _LATER.items():
-        stored = f"records/{name}" in file
-        fields[name] = _record(file, f"records/{name}", kind) if stored else None
+        if f"records/{name}" in file:
+            fields[name] = _record(file, f"records/{name}", kind)
     # Files of earlier versions have no traces.
     fields["traces"] = read_traces(file["traces"], joints) if "traces" in file else None
     if "sealed_traces" in file:
@@ -141,7 +143,8 @@ def _read(file: Any, path: Path) -> Diagnosis:
         information=_information(file["information"], len(joints)),
         **fields,
     )
-    require_joints(joints, (found.before, found.after), found.noise_floor)
+    ends = [error for part in found.parts for error in (part.before, part.after)]
+    require_joints(joints, (found.before, found.after, *ends), found.noise_floor)
     if not _named_joints(found) <= set(joints):
         raise ValueError("it names joints that are not its own")
     return found
@@ -167,6 +170,7 @@ def _named_joints(found: Diagnosis) -> set[str]:
         *found.information.model,
         *found.information.rivals,
         *(each.effect for each in found.effects),
+        *(effect for part in found.parts for effect in part.effects),
         *(alias for each in found.effects for alias in each.aliases),
         *(suspect.effect for each in found.rounds for suspect in each.suspects),
         *found.absorbed,
