@@ -180,7 +180,7 @@ def _shaped_in_runs(
     found: list[tuple[float, Effect]] = []
     for number, run in enumerate(units[0]):
         own = [i for i, unit in enumerate(units[1]) if unit == number]
-        signals, residuals = ([series[i] for i in own] for series in motion)
+        signals, residuals = [motion[0][i] for i in own], [motion[1][i] for i in own]
         for shape in kind.tuned(robot, place, signals, residuals):
             effect = kind(place, shape, (run,))
             rows = list(effect.rows(robot.n))

@@ -15,7 +15,6 @@ from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
-
 # Blocks of a run whose samples are fitted and judged in turn; short runs have four at least.
 _BLOCK = 1.0  # s
 _FEWEST_BLOCKS = 4
