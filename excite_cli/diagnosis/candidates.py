@@ -7,29 +7,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.config.data_spec import DiagnosisSpec
-from excite_cli.diagnosis.declared_model import Model
+from excite_cli.diagnosis.in_runs import Place, SeenRuns, changes, effects_of_runs
 from excite_cli.diagnosis.records import EffectRecord
+from excite_cli.diagnosis.run_sets import sets_looked_at
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named
-from excite_cli.effects.declared_states import States, declared_sets
 from excite_cli.errors import ConfigError, ExciteWarning
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
-from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.model import Array
 
 _TOGETHER = 16  # effects that are filtered at once
-
-
-Runs = tuple[str, ...]
-# Kind, joints and runs: candidates that differ in shape only share it.
-Place = tuple[str, tuple[int, ...], Runs]
 
 
 @dataclass(frozen=True)
 class Candidate:
     """An effect that may be missing, with its columns in every training part.
 
-    `columns[i]` (M_i, len(rows), p) filtered and decimated; zeros where it is not present.
+    `columns[i]` (M_i, len(rows), p) filtered and decimated; zeros, which take no room, where it is
+    not present.
     `tests`: how many tests its kind stands for, times the number of kinds (Bonferroni with equal
     shares of α for all kinds).
     """
@@ -41,7 +37,7 @@ class Candidate:
 
     @property
     def place(self) -> Place:
-        """Kind, joints and runs."""
+        """Kind, joints and runs: candidates that differ in shape only share it."""
         return self.effect.kind, self.effect.joints, self.effect.runs
 
     @property
@@ -52,17 +48,13 @@ class Candidate:
 
 def possible_effects(
     spec: DiagnosisSpec,
-    model: Model,
-    signals: Sequence[Signals],
-    residuals: Sequence[Array],
-    runs: Sequence[str],
+    declared: Sequence[Effect],
+    seen: SeenRuns,
     around: Mapping[Place, list[dict]],
 ) -> list[tuple[Effect, int]]:
-    """All effects to be tested but those that `model` declares, and how many tests each stands for.
+    """All effects to be tested but those declared, and how many tests each stands for.
 
-    `signals` and `residuals` (T, n) are of the training parts; `runs` the names of all runs, for
-    effects that are present in some of them only; `around` shapes for (kind, joints, runs) that
-    were found already.
+    `around` are shapes for (kind, joints, runs) that were found already.
 
     Raises
     ------
@@ -72,19 +64,18 @@ def possible_effects(
     for name in (*([] if spec.kinds == "all" else spec.kinds), *spec.exclude):
         kind_named(name, "diagnosis")
     names = list(catalogue()) if spec.kinds == "all" else list(spec.kinds)
-    known = {(e.kind, e.joints) for e in model.declared}
-    robot = model.robot
+    known = {(e.kind, e.joints) for e in declared}
+    known_in_runs = {(e.kind, e.joints, e.runs) for e in declared}
     found: list[tuple[Effect, int]] = []
     for name in names:
         if name in spec.exclude:
             continue
         kind = catalogue()[name]
         try:
-            sets = _sets_of(kind, runs, signals, model.states)
-            effects, tests = _of_kind(kind, robot, known, signals, residuals, sets)
-            changes = _changes(kind, model, sets, signals)
+            effects, tests = _of_kind(kind, known, seen)
+            changed = changes(kind, known_in_runs, seen)
             if is_of_a_package(kind):
-                require_columns([*effects, *(change for change, _ in changes)], signals)
+                require_columns([*effects, *(each for each, _ in changed)], seen.signals)
         except (Exception, SystemExit) as error:
             if not is_of_a_package(kind):
                 raise
@@ -94,8 +85,12 @@ def possible_effects(
         count = max(tests, len(effects)) * len(names)
         for known_place, near in around.items():
             if known_place[0] == name:
+                again = [kind(known_place[1], shape, known_place[2]) for shape in near]
+                if again[0].is_change:
+                    changed = _with(changed, again[0])
+                    continue
                 kept = [e for e in effects if (e.kind, e.joints, e.runs) != known_place]
-                effects = kept + [kind(known_place[1], shape, known_place[2]) for shape in near]
+                effects = kept + again
         slowest = spec.moving_speed or DEFAULT_MOVING
         found += [
             (effect, count)
@@ -103,33 +98,35 @@ def possible_effects(
             # Below the speed at which a joint counts as moving, samples are left out.
             if effect.shows_above(slowest)
         ]
-        found += [(change, count * len(names)) for change, count in changes]
+        found += [(effect, tests * len(names)) for effect, tests in changed]
     if not found:
         raise ConfigError("diagnosis: every effect to be looked for is declared or excluded.")
     return found
 
 
+def _with(changed: list[tuple[Effect, int]], found: Effect) -> list[tuple[Effect, int]]:
+    """The changes, one that was found before among them."""
+    there = any((e.joints, e.runs) == (found.joints, found.runs) for e, _ in changed)
+    return changed if there else [*changed, (found, max((n for _, n in changed), default=1))]
+
+
 def _of_kind(
-    kind: type[Effect],
-    robot: Robot,
-    known: Container[tuple[str, tuple[int, ...]]],
-    signals: Sequence[Signals],
-    residuals: Sequence[Array],
-    sets: Sequence[Runs],
+    kind: type[Effect], known: Container[tuple[str, tuple[int, ...]]], seen: SeenRuns
 ) -> tuple[list[Effect], int]:
     """All effects of a kind at places that are not `known`, and how many tests they stand for."""
     effects: list[Effect] = []
     tests = 0
-    for place in kind.places(robot):
+    for place in kind.places(seen.robot):
         if (kind.kind, place) in known:
             continue
         if kind.per_run:
-            effects += _in_runs(kind, robot, place, signals, residuals, sets)
-            tests += len(sets) * kind.tests_of_grid(robot, place, signals[:1])
+            effects += effects_of_runs(kind, place, seen)
+            tried = kind.tests_of_grid(seen.robot, place, seen.signals[:1])
+            tests += sets_looked_at(len(seen.runs)) * tried
         else:
-            shapes = kind.tuned(robot, place, signals, residuals)
+            shapes = kind.tuned(seen.robot, place, seen.signals, seen.residuals)
             effects += [kind(place, shape) for shape in shapes]
-            tests += kind.tests_of_grid(robot, place, signals)
+            tests += kind.tests_of_grid(seen.robot, place, seen.signals)
     return effects, tests
 
 
@@ -143,70 +140,6 @@ def require_columns(effects: Sequence[Effect], signals: Sequence[Signals]) -> No
                 raise ValueError(f"its columns have the shape {columns.shape} instead of {shape}")
             if columns.dtype.kind != "f" or not np.isfinite(columns).all():
                 raise ValueError("its columns are not finite numbers")
-
-
-def _sets_of(
-    kind: type[Effect], runs: Sequence[str], signals: Sequence[Signals], states: States
-) -> list[Runs]:
-    """The sets of runs in which a kind that may differ between them is looked for.
-
-    As declared; else each training run on its own and neighbours together, but not all of them:
-    there it would be part of the robot. What was not trained on is in no set.
-    """
-    declared = declared_sets(kind.kind, states)
-    if declared is not None:
-        return declared if not kind.shapes else [(run,) for each in declared for run in each]
-    trained = [run for run in runs if any(s.run.is_among((run,)) for s in signals)]
-    if kind.shapes:
-        return [(run,) for run in trained]
-    if len(runs) < 2:
-        return []
-    longest = max(len(trained) - 1, 1)
-    return [
-        tuple(trained[i : i + length])
-        for length in range(1, longest + 1)
-        for i in range(len(trained) - length + 1)
-    ]
-
-
-def _in_runs(
-    kind: type[Effect],
-    robot: Robot,
-    place: tuple[int, ...],
-    signals: Sequence[Signals],
-    residuals: Sequence[Array],
-    sets: Sequence[Runs],
-) -> list[Effect]:
-    """A kind that is present in some runs only, looked for in each set of them."""
-    found: list[Effect] = []
-    for runs in sets:
-        own = [i for i, s in enumerate(signals) if s.run.is_among(runs)]
-        shapes = kind.tuned(robot, place, [signals[i] for i in own], [residuals[i] for i in own])
-        found += [kind(place, shape, runs) for shape in shapes]
-    return found
-
-
-def _changes(
-    kind: type[Effect], model: Model, sets: Sequence[Runs], signals: Sequence[Signals]
-) -> list[tuple[Effect, int]]:
-    """A kind that all runs have, more or less of it in some, and how many tests each stands for.
-
-    In one run, from some run on, or up to some run. Where all have it, a change in most runs is the
-    opposite change in the others: then these few are named, since more runs count for more tests.
-    """
-    if not kind.changes_between_runs:
-        return []
-    trained = tuple(dict.fromkeys(s.run.name for s in signals))
-    known = {(e.kind, e.joints, e.runs) for e in model.declared}
-    found = [
-        (kind(place, {}, runs), 2 * len(runs) > len(trained))
-        for place in kind.places(model.robot)
-        for runs in sets
-        if (kind.kind, place, runs) not in known
-        and not set(trained) <= set(runs)
-        and (len(runs) == 1 or runs[0] == trained[0] or runs[-1] == trained[-1])
-    ]
-    return [(effect, len(found) * (1 + most)) for effect, most in found]
 
 
 def with_columns(
@@ -238,7 +171,7 @@ def _filtered(
     """Columns (M, len(rows), p) in one run of effects on the same rows, filtered together."""
     present = [i for i, effect in enumerate(effects) if effect.active(signals.run)]
     size = run.averages.shape[0], len(rows)
-    found = [np.zeros((*size, len(effect.parameters))) for effect in effects]
+    found = [np.broadcast_to(0.0, (*size, len(effect.parameters))) for effect in effects]
     for some in _portions(present):
         columns = [effects[i].columns(signals) for i in some]
         ends = np.cumsum([block.shape[2] for block in columns])

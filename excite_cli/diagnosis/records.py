@@ -84,7 +84,7 @@ class Assumption:
 
 @dataclass(frozen=True)
 class SealedEnds:
-    """Errors on the ends of training `runs`, sealed since these runs carry `effects` of their own."""
+    """Errors on the ends of training `runs`, sealed since these carry `effects` of their own."""
 
     runs: tuple[str, ...]
     effects: tuple[EffectRecord, ...]
@@ -135,7 +135,8 @@ class Diagnosis(Shown):
 
     `effects`: all that were added to the declared model. `noise_floor` [N·m] (N): RMS per joint of
     what changes from period to period in training runs, filtered as for the errors; None if no
-    motion was repeated. `parts`: errors on what is sealed beside the sealed run. `traces` of the training data, `sealed_traces` of the sealed ones; files of
+    motion was repeated. `parts`: errors on what is sealed beside the sealed run. `traces` of the
+    training data, `sealed_traces` of the sealed ones; files of
     earlier versions have none.
     """
 

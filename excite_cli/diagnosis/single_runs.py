@@ -28,9 +28,7 @@ def assumptions(effects: Sequence[Effect], parts: Split, model: Model) -> tuple[
     names = model.robot.joint_names
     sealed = tuple(dict.fromkeys(run.id.key for run in parts.sealed))
     return tuple(
-        Assumption(
-            effect.kind, effect.runs, sealed, False, tuple(names[j] for j in effect.joints)
-        )
+        Assumption(effect.kind, effect.runs, sealed, False, tuple(names[j] for j in effect.joints))
         for effect in effects
         if effect.runs and not _declared(effect, parts.sealed, model)
     )

@@ -15,6 +15,7 @@ from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis.candidates import Candidate, possible_effects, with_columns
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.evidence import Evidence
+from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.modelled_run import ModelledRun, training_data
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
@@ -161,17 +162,21 @@ def _one_pass(
     candidates: list[Candidate] = []
     if spec.rounds:
         # Kinds that are searched on the residual must see what the last search gave to one of them.
+        # Likewise the runs of what is in some of them only.
         plain_kinds = np.repeat(
-            [effect.tier != Tier.LAST for effect in effects],
+            [effect.tier != Tier.LAST and not effect.runs for effect in effects],
             [len(effect.parameters) for effect in effects],
         )
         steady = [body.signals(fit.phi, effects, fit.values * plain_kinds) for body in bodies]
         raw = [body.run.tau_raw - s.torque for body, s in zip(bodies, steady, strict=True)]
         found = {(e.kind, e.joints, e.runs): e for e in fit.effects}
         shapes = {
-            place: shapes_around(effect, signals) for place, effect in found.items() if effect.shape
+            place: shapes_around(effect, signals) if effect.shape else [{}]
+            for place, effect in found.items()
+            if effect.shape or effect.runs
         }
-        possible = possible_effects(spec, model, signals, raw, run_names, shapes)
+        seen = SeenRuns(model.robot, signals, raw, run_names, model.states)
+        possible = possible_effects(spec, model.declared, seen, shapes)
         candidates = with_columns(possible, signals, data.runs)
     plain = data.evidence(candidates, NoiseModel.white(fit.levels))
     usual = _usual(candidates, _carried_over(fit.effects, candidates))

@@ -91,7 +91,7 @@ class Effect(ABC):
     changes_between_runs: ClassVar[bool] = False
     of_campaign: ClassVar[bool] = False  # its columns look at the campaign's clock
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
-    rigid_body: ClassVar[bool] = False  # carried by the links: its torque is part of the load
+    carried: ClassVar[bool] = False  # a body: its torque is part of the load of the joints
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
     why_not_excitable: ClassVar[str] = ""
 
@@ -162,7 +162,7 @@ class Effect(ABC):
 
     @property
     def builds_on(self) -> tuple[str, ...]:
-        """Kinds of one joint that must be in before it: `refines`; of a change that all may have."""
+        """Kinds of one joint that must be in before it: `refines`; of a change, its own kind."""
         every = self.is_change and self.tier == Tier.EVERY_ROBOT
         return (*self.refines, self.kind) if every else self.refines
 

@@ -1,6 +1,6 @@
 """States of runs that the configuration declares: who carries what, by labels.
 
-    runs: {monday_3: {payload: tool_2kg}, tuesday_1: {payload: tool_2kg}, tuesday_2: {payload: none}}
+    runs: {monday_3: {payload: tool_2kg}, tuesday_1: {payload: tool_2kg}, friday_2: {payload: none}}
 
 Runs with one label share one state: an effect of that kind is in all of them or in none. Where
 labels of a kind are declared, runs without one are without the effect.

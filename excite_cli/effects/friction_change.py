@@ -15,7 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Abscissa, Effect, Parameter, Signals, Tier
+from excite_cli.effects.base import Abscissa, Effect, Parameter, Signals
 from excite_cli.effects.sign import smooth_sign
 from excite_cli.robot.model import Array, Robot
 

@@ -32,9 +32,9 @@ class PreparedRun:
     """One run (or block of it) ready for regression.
 
     `t` (T,) from the start of the recording `run` (at `start` [s] on the campaign's clock), `q, v,
-    a, tau_raw` (T, n) at the working rate with borders cut; `averages` (M, T) gives filtered and decimated values, at `step`, of any
-    column: A x; `tau` (M, n) = A tau_raw; `valid` (M, n) samples untouched by invalid ones;
-    `moving` (M, n) where the joint itself moves.
+    a, tau_raw` (T, n) at the working rate with borders cut; `averages` (M, T) gives filtered and
+    decimated values, at `step`, of any column: A x; `tau` (M, n) = A tau_raw; `valid` (M, n)
+    samples untouched by invalid ones; `moving` (M, n) where the joint itself moves.
 
     For fits every joint has averages of its own, which leave out invalid samples and those in
     which it stands or reverses; `tau_fit` (M, n) are those of the torque, `usable` (M, n) where

@@ -52,6 +52,19 @@ def signals_of(prepared: PreparedRun, robot: Robot, phi: Array | None = None) ->
     )  # fmt: skip
 
 
+def with_carried(signals: Signals, effects: Sequence[Effect], values: Array) -> Signals:
+    """The same, with the bodies among `effects` in load and torque: gears carry them, too."""
+    if not any(effect.carried for effect in effects):
+        return signals
+    carried, at = np.zeros_like(signals.load), 0
+    for effect in effects:
+        width = len(effect.parameters)
+        if effect.carried:
+            carried += effect.torque(signals, values[at : at + width])
+        at += width
+    return replace(signals, load=signals.load + carried, torque=signals.torque + carried)
+
+
 def effect_columns(effects: Sequence[Effect], signals: Signals) -> Array:
     """Columns (T, n, k) of all linear parameters of all effects, at the working rate."""
     n = signals.q.shape[1]
@@ -62,31 +75,6 @@ def effect_columns(effects: Sequence[Effect], signals: Signals) -> Array:
             block[:, list(effect.rows(n))] = effect.columns(signals)
         blocks.append(block)
     return np.concatenate(blocks, axis=2)
-
-
-def carrying(signals: Signals, effects: Sequence[Effect], values: Array) -> Signals:
-    """The signals with the bodies that `effects` of `values` add: their torque is load, too."""
-    if not any(effect.rigid_body for effect in effects):
-        return signals
-    load = signals.load + _torque_of(signals, effects, values, [e.rigid_body for e in effects])
-    return replace(signals, load=load, torque=load)
-
-
-def with_torque(signals: Signals, effects: Sequence[Effect], values: Array) -> Signals:
-    """The signals with the torque of `effects` of `values` beside the load.
-
-    Defects of the measurement do not change the torque that they act upon.
-    """
-    seen = [not (effect.rigid_body or effect.data_defect) for effect in effects]
-    return replace(signals, torque=signals.load + _torque_of(signals, effects, values, seen))
-
-
-def _torque_of(
-    signals: Signals, effects: Sequence[Effect], values: Array, which: Sequence[bool]
-) -> Array:
-    """Torque (T, n) of those effects `which` are meant."""
-    meant = np.repeat(which, [len(effect.parameters) for effect in effects])
-    return effect_columns(effects, signals) @ np.where(meant, values, 0.0)
 
 
 def build_regression(

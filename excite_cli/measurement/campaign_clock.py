@@ -38,7 +38,7 @@ def _by_stamps(epochs: dict[str, float | None], spans: Spans) -> dict[str, float
     known = {name: epoch for name, epoch in epochs.items() if epoch is not None}
     if len(known) < len(epochs):
         return None
-    ordered = sorted((known[name] + first, known[name] + last) for name, (first, last) in spans.items())
+    ordered = sorted((known[name] + span[0], known[name] + span[1]) for name, span in spans.items())
     if any(after[0] < before[1] - _OVERLAP for before, after in pairwise(ordered)):
         return None
     return {name: epoch - ordered[0][0] for name, epoch in known.items()}

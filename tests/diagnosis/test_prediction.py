@@ -16,8 +16,10 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.load_dependent_friction import LoadDependentFriction
 from excite_cli.effects.payload import Payload
+from excite_cli.effects.sign import smooth_sign
 from excite_cli.effects.torque_delay import TorqueDelay
 from excite_cli.effects.viscous_friction import ViscousFriction
+from excite_cli.identification.fit import rebuilt
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.regression import build_regression
@@ -64,17 +66,33 @@ def torque(
 
 
 def test_prediction_is_columns_times_parameters(robot: Robot, runs: list[PreparedRun]) -> None:
-    """On inertias other than the URDF's; one effect looks at the load."""
+    """On inertias other than the URDF's; one effect looks at the load, one is in one run only."""
     rng = np.random.default_rng(0)
     phi = standard_parameters(robot) * rng.uniform(0.8, 1.2, 10 * robot.n_bodies)
-    kinds = effects()[:3]
+    kinds = effects()
     values = rng.uniform(0.1, 0.5, sum(len(e.parameters) for e in kinds))
     regression = build_regression(robot, find_base_parameters(robot), kinds, runs, phi)
+    regression = rebuilt(regression, phi, values)  # the payload is part of the load
     for run, columns in zip(runs, regression.runs, strict=True):
         tau = torque(robot, phi, kinds, values, run, run.run)
         assert tau.shape == run.q.shape
         modelled = columns.inertial @ phi + columns.effects @ values
         assert run.averaged_for_fit(tau) == pytest.approx(modelled, rel=1e-9, abs=1e-9)
+
+
+def test_gears_carry_the_payload_too(robot: Robot, runs: list[PreparedRun]) -> None:
+    phi = standard_parameters(robot)
+    run, (payload, friction) = runs[0], (Payload((0, 1, 2)), LoadDependentFriction((1,)))
+    mass, ratio = np.array([2.0, 0.0, 0.0, 0.1, 0.01, 0.0, 0.01, 0.0, 0.0, 0.01]), np.array([0.2])
+    alone, carrying = (
+        torque(robot, phi, kinds, values, run, run.run)
+        for kinds, values in (
+            ((payload,), mass),
+            ((payload, friction), np.append(mass, ratio)),
+        )
+    )
+    sign = smooth_sign(run.v[:, 1])
+    assert carrying[:, 1] - alone[:, 1] == pytest.approx(0.2 * np.abs(alone[:, 1]) * sign)
 
 
 def test_an_effect_acts_in_its_runs_by_the_name_that_is_given(
@@ -87,22 +105,6 @@ def test_an_effect_acts_in_its_runs_by_the_name_that_is_given(
     load = RigidBody(robot, phi, runs[0].q, runs[0].v, runs[0].a).load
     assert np.array_equal(one, load)
     assert np.abs(two - load).max() > 0.1
-
-
-def test_friction_that_grows_with_load_feels_the_payload(
-    robot: Robot, runs: list[PreparedRun]
-) -> None:
-    phi, run = standard_parameters(robot), replace(runs[0], run=RunId("r2"))
-    payload = Payload((0, 1, 2), {}, ("r2",))
-    mass = payload.planted(2.0, {})[1]
-    kinds = (LoadDependentFriction((1,)), payload)
-    tau = torque(robot, phi, kinds, np.array([0.1, *mass]), run, RunId("r2"))
-    with_body = phi.copy()
-    with_body[-10:] += mass
-    load = RigidBody(robot, with_body, run.q, run.v, run.a).load
-    friction = 0.1 * np.abs(load[:, 1]) * np.tanh(run.v[:, 1] / 1e-3)
-    assert tau[:, 1] == pytest.approx(load[:, 1] + friction, rel=1e-9)
-    assert np.abs(load - RigidBody(robot, phi, run.q, run.v, run.a).load).max() > 1.0
 
 
 def test_a_delay_acts_on_all_torque_that_the_robot_makes(

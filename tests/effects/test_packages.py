@@ -101,19 +101,18 @@ def test_columns_that_fail_are_set_aside_by_the_diagnosis(
     case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from excite_cli.diagnosis.candidates import possible_effects
-    from excite_cli.diagnosis.declared_model import Model
-    from excite_cli.dynamics.base_parameters import find_base_parameters
+    from excite_cli.diagnosis.in_runs import SeenRuns
     from excite_cli.effects.base import Signals
     from tests.effects.motions import signals_of
     from tests.robot.random_robots import random_robot
 
     install(tmp_path, GOOD + COLUMNS.format(FAILING[case]), "Mine", monkeypatch)
     robot = random_robot(9, joints=3, branches=False)
-    model = Model(robot, find_base_parameters(robot), (), None)
     signals: list[Signals] = [signals_of(robot, 30)]
+    seen = SeenRuns(robot, signals, [signals[0].load], ["run"])
     spec = api.load_case(SMOKE).spec.diagnosis.model_copy(update={"kinds": ("mine", "spring")})
     with pytest.warns(ExciteWarning, match="'mine' of a package is set aside"):
-        found = possible_effects(spec, model, signals, [signals[0].load], ["run"], {})
+        found = possible_effects(spec, (), seen, {})
     assert {effect.kind for effect, _ in found} == {"spring"}
 
 

@@ -1,0 +1,126 @@
+"""Effects of single runs that are tested: in the sets of runs that are declared, else told by data.
+
+What is not in the robot itself (a payload, a contact) is in some runs and not in the others. Of
+what all runs have (friction, the offset and the gain of a torque sensor) there may be more or less
+in some: such a change is an effect of the same kind in runs of its own. In all training runs either
+would be part of the model that they share; what was not trained on is in no set that data tell.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+
+from excite_cli.diagnosis.run_sets import (
+    MOST,
+    RunEvidence,
+    evidence_by_run,
+    run_sets,
+    sets_looked_at,
+)
+from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.declared_states import States, declared_sets
+from excite_cli.robot.model import Array, Robot
+
+_LOOKED_AT = 1000  # samples of a part, at most, from which the runs of an effect are told
+
+Runs = tuple[str, ...]
+Place = tuple[str, tuple[int, ...], Runs]
+
+
+@dataclass(frozen=True)
+class SeenRuns:
+    """Training parts, and what they leave: `signals` and `residuals` (T, n) of each.
+
+    `runs`: names of all runs, trained on or not; `states` those that the configuration declares.
+    """
+
+    robot: Robot
+    signals: Sequence[Signals]
+    residuals: Sequence[Array]
+    runs: Sequence[str]
+    states: States = field(default_factory=dict)
+
+    @property
+    def trained(self) -> list[str]:
+        """Names of the runs that parts belong to."""
+        return [run for run in self.runs if any(s.run.is_among((run,)) for s in self.signals)]
+
+    def parts_of(self, runs: Collection[str]) -> list[int]:
+        """Indices of the parts of some runs."""
+        return [i for i, s in enumerate(self.signals) if s.run.is_among(runs)]
+
+    def evidence(self, effect: Effect, units: Sequence[Runs], positive: bool) -> RunEvidence:
+        """What columns of the effect say in each of the `units`."""
+        rows = list(effect.rows(self.robot.n))
+        parts = [(i, k) for k, runs in enumerate(units) for i in self.parts_of(runs)]
+        thin = [slice(None, None, max(1, len(s.t) // _LOOKED_AT)) for s in self.signals]
+        return evidence_by_run(
+            [effect.columns(self.signals[i])[thin[i]] for i, _ in parts],
+            [self.residuals[i][thin[i]][:, rows] for i, _ in parts],
+            [k for _, k in parts],
+            positive,
+        )
+
+
+def effects_of_runs(kind: type[Effect], place: tuple[int, ...], seen: SeenRuns) -> list[Effect]:
+    """A kind that is present in some runs only."""
+    sets = declared_sets(kind.kind, seen.states)
+    if kind.shapes:
+        named = None if sets is None else {run for runs in sets for run in runs}
+        return _shaped(kind, place, seen, [r for r in seen.trained if named is None or r in named])
+    if sets is None:
+        sets = _told(kind(place, {}), seen, kind.parameters[0].nonnegative)
+    return [kind(place, {}, runs) for runs in sets]
+
+
+def changes(
+    kind: type[Effect], known: Collection[Place], seen: SeenRuns
+) -> list[tuple[Effect, int]]:
+    """By how much there is more, or less, of a kind in some runs; how many tests each stands for.
+
+    A change in some runs is the opposite change in all others, if all have the kind: so the fewer
+    are named. What not every robot has may as well begin with the larger set, at a higher price.
+    """
+    if not kind.changes_between_runs or len(seen.trained) < 2:
+        return []
+    places = kind.places(seen.robot)
+    sets = declared_sets(kind.kind, seen.states)
+    tests = len(places) * sets_looked_at(len(seen.trained))
+    found: list[tuple[Effect, int]] = []
+    for place in places:
+        told = _told(kind(place, {}), seen, False) if sets is None else sets
+        for runs in told:
+            rest = tuple(run for run in seen.trained if run not in runs)
+            change = kind(place, {}, runs)
+            found.append((change, tests))
+            if sets is None and change.builds_on == kind.refines:
+                found.append((kind(place, {}, rest), 2 * tests))
+    whole = set(seen.trained)
+    return [
+        (effect, count)
+        for effect, count in found
+        if (effect.kind, effect.joints, effect.runs) not in known and not whole <= set(effect.runs)
+    ]
+
+
+def _told(effect: Effect, seen: SeenRuns, positive: bool) -> list[Runs]:
+    """The sets of runs that explain most."""
+    trained = seen.trained
+    if len(trained) < 2:
+        return []
+    found = seen.evidence(effect, [(run,) for run in trained], positive)
+    return [tuple(trained[k] for k in chosen) for chosen in run_sets(found)]
+
+
+def _shaped(
+    kind: type[Effect], place: tuple[int, ...], seen: SeenRuns, runs: Sequence[str]
+) -> list[Effect]:
+    """The runs and shapes that explain most of the residual, a few of all."""
+    found: list[tuple[float, Effect]] = []
+    for run in runs:
+        own = seen.parts_of((run,))
+        signals, residuals = [seen.signals[i] for i in own], [seen.residuals[i] for i in own]
+        for shape in kind.tuned(seen.robot, place, signals, residuals):
+            effect = kind(place, shape, (run,))
+            found.append((seen.evidence(effect, [(run,)], False).energy([0]), effect))
+    found.sort(key=lambda each: -each[0])
+    return [effect for _, effect in found[:MOST]]
