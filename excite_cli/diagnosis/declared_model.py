@@ -8,7 +8,7 @@ import numpy as np
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
-from excite_cli.effects.declared_states import States
+from excite_cli.identification.declared_states import States
 from excite_cli.identification.prior import inertial_prior
 from excite_cli.robot.model import Array, Robot
 

@@ -1,9 +1,10 @@
-"""Effects of single runs that are tested: in the sets of runs that are declared, else told by data.
+"""Effects of single runs that are tested: in declared sets of runs, else in sets that data tell.
 
-What is not in the robot itself (a payload, a contact) is in some runs and not in the others. Of
-what all runs have (friction, the offset and the gain of a torque sensor) there may be more or less
-in some: such a change is an effect of the same kind in runs of its own. In all training runs either
-would be part of the model that they share; what was not trained on is in no set that data tell.
+What does not belong to the robot (something that it holds or touches) is in some runs and not in
+the others. Of what all runs have (friction, the offset and the gain of a torque sensor) there may
+be more or less in some: such a change is an effect of the same kind in runs of its own. In all
+training runs either would be part of the model that they share; what was not trained on is in no
+set that data tell.
 """
 
 from collections.abc import Collection, Sequence
@@ -17,7 +18,7 @@ from excite_cli.diagnosis.run_sets import (
     sets_looked_at,
 )
 from excite_cli.effects.base import Effect, Signals
-from excite_cli.effects.declared_states import States, declared_sets
+from excite_cli.identification.declared_states import States, declared_sets
 from excite_cli.robot.model import Array, Robot
 
 _LOOKED_AT = 1000  # samples of a part, at most, from which the runs of an effect are told

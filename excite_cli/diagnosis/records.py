@@ -136,8 +136,7 @@ class Diagnosis(Shown):
     `effects`: all that were added to the declared model. `noise_floor` [N·m] (N): RMS per joint of
     what changes from period to period in training runs, filtered as for the errors; None if no
     motion was repeated. `parts`: errors on what is sealed beside the sealed run. `traces` of the
-    training data, `sealed_traces` of the sealed ones; files of
-    earlier versions have none.
+    training data, `sealed_traces` of the sealed ones; files of earlier versions have none.
     """
 
     config: str

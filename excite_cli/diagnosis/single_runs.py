@@ -19,7 +19,7 @@ from excite_cli.measurement.dataset import Run
 
 
 def runs_of_their_own(effects: Sequence[Effect]) -> set[str]:
-    """Runs that carry an effect for all of their time: a contact has its own window."""
+    """Runs that have an effect for all of their time: one with a shape may have its own window."""
     return {run for effect in effects if not effect.shapes for run in effect.runs}
 
 

@@ -3,7 +3,13 @@
 from collections.abc import Callable
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate
-from excite_cli.diagnosis.records import Approximation, Assumption, EffectRecord, NamedEffect
+from excite_cli.diagnosis.records import (
+    Approximation,
+    Assumption,
+    EffectRecord,
+    NamedEffect,
+    SealedEnds,
+)
 from excite_cli.effects.base import Quantity, Value
 from excite_cli.effects.catalogue import catalogue
 
@@ -88,10 +94,23 @@ def assumption_in_words(assumed: Assumption) -> str:
     there = "present" if assumed.present else "absent"
     at = f" of {assumed.joints[0]}" if len(assumed.joints) == 1 else ""
     sealed = ", ".join(assumed.sealed)
-    told = ", ".join(f"{run}: {{{assumed.kind}: a}}" for run in (*assumed.runs, *assumed.sealed))
+    some = assumed.runs if len(assumed.runs) < 4 else (assumed.runs[0], "…")
+    told = ", ".join(
+        run if run == "…" else f"{run}: {{{assumed.kind}: a}}" for run in (*some, *assumed.sealed)
+    )
     return (
         f"{assumed.kind}{at} in {', '.join(assumed.runs)}: taken to be {there} in the sealed "
         f"{sealed}. If it is there, declare one state for all of them: runs: {{{told}}}."
+    )
+
+
+def ends_in_words(part: SealedEnds) -> str:
+    """The errors on the sealed ends of runs that carry effects of their own."""
+    kinds = ", ".join(dict.fromkeys(effect.kind for effect in part.effects))
+    return (
+        f"The ends of {', '.join(part.runs)}{f' (with {kinds})' if kinds else ''} took no part, "
+        f"either: mean error there {part.before.mean_relative_moving:.2%} → "
+        f"{part.after.mean_relative_moving:.2%} where joints move."
     )
 
 

@@ -89,7 +89,8 @@ class Effect(ABC):
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
     # In all runs, but its size may change from run to run: in runs of its own it is that change.
     changes_between_runs: ClassVar[bool] = False
-    of_campaign: ClassVar[bool] = False  # its columns look at the campaign's clock
+    # Its columns look at the campaign's clock; its parameters are changes of those of `refines`.
+    of_campaign: ClassVar[bool] = False
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
     carried: ClassVar[bool] = False  # a body: its torque is part of the load of the joints
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`

@@ -42,7 +42,7 @@ class FrictionChange(Effect):
     of_campaign: ClassVar = True
     excitable: ClassVar = False
     why_not_excitable: ClassVar = "it shows between recordings; a motion lasts too short"
-    refines: ClassVar = ("viscous_friction", "coulomb_friction")
+    refines: ClassVar = ("coulomb_friction", "viscous_friction")
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:

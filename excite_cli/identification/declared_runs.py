@@ -2,8 +2,8 @@
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
-from excite_cli.effects.declared_states import check_states
 from excite_cli.errors import ConfigError, nearest
+from excite_cli.identification.declared_states import check_states
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Dataset
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from excite_cli.diagnosis.change_words import changes_in_words
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
@@ -15,7 +16,7 @@ from excite_cli.diagnosis.words import (
     title_of,
     value_in_words,
 )
-from excite_cli.report.page import Block, Section, Table
+from excite_cli.report.page import Block, Section, Table, Text
 
 _COLUMNS = ("effect", "where", "size ± 2 standard deviations", "p", "share", "gain")
 
@@ -60,6 +61,7 @@ def found_section(found: Diagnosis) -> Section:
                 right=frozenset({3, 4, 5}),
             )
         )
+    blocks += [Text(text) for text in changes_in_words(found)]
     if found.absorbed:
         blocks.append(_absorbed(found))
     return Section("diagnosis-found", "What was found", tuple(blocks), _lead(found))

@@ -4,7 +4,7 @@ from typing import Any
 
 from excite_cli.diagnosis.next_motion import next_experiment
 from excite_cli.diagnosis.records import Diagnosis
-from excite_cli.diagnosis.words import counted, title_of
+from excite_cli.diagnosis.words import counted, ends_in_words, title_of
 from excite_cli.report.dependence_section import dependence_section
 from excite_cli.report.diagnosis_found_section import found_section
 from excite_cli.report.effect_section import effect_section
@@ -73,6 +73,7 @@ def _errors(diagnosis: Diagnosis) -> Section:
         diagnosis.noise_floor,
         "On sealed data; raw: after, on the torque as recorded, without any filter.",
     )
+    blocks = (*blocks, *(Text(ends_in_words(part)) for part in diagnosis.parts))
     lead = (
         f"On {diagnosis.sealed_run}, which took no part in choosing or fitting. Before: the "
         "declared model, fitted to the same training data; after: with the effects that were "

@@ -5,14 +5,23 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from excite_cli.diagnosis.change_words import changes_in_words
 from excite_cli.diagnosis.next_motion import next_experiment
-from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Round
+from excite_cli.diagnosis.records import (
+    Diagnosis,
+    EffectRecord,
+    NamedEffect,
+    Round,
+    SealedEnds,
+)
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
     approximation_in_words,
+    assumption_in_words,
     counted,
     covariate_in_symbols,
+    ends_in_words,
     is_small,
     other_name_of,
     p_in_words,
@@ -56,12 +65,15 @@ def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
         parts += _effects(found, verbose)
     if found.approximations:
         parts.append(_approximation_table(found))
+    parts += changes_in_words(found)
     if not found.effects:
         parts.append("Nothing is missing: no effect of the catalogue passes.")
     parts += _absorbed(found) + _unexplained(found)
     parts.append(_error_table(found, verbose))
     above = above_the_floor(found.after, found.noise_floor)
     parts += [above] if above else []
+    parts += [ends_in_words(part) for part in found.parts]
+    parts += [f"Assumed: {assumption_in_words(each)}" for each in found.assumed]
     parts.append(_verdict(found))
     return parts
 
@@ -282,6 +294,15 @@ def _named(named: NamedEffect, runs: list[str]) -> dict[str, Any]:
     }
 
 
+def _ends(part: SealedEnds) -> dict[str, Any]:
+    return {
+        "runs": list(part.runs),
+        "effects": [_record(effect) for effect in part.effects],
+        "before": part.before.as_data(),
+        "after": part.after.as_data(),
+    }
+
+
 def _data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
     """The answer for `--json`."""
     runs = [str(name) for name in found.processing.get("runs", [])]
@@ -305,6 +326,7 @@ def _data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
             "sealed_run": found.sealed_run,
             "before": found.before.as_data(),
             "after": found.after.as_data(),
+            "parts": [_ends(part) for part in found.parts],
         },
         "assumed": [asdict(each) for each in found.assumed],
         "noise_floor": found.noise_floor,

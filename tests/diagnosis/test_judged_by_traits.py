@@ -11,6 +11,7 @@ from scipy.stats import chi2
 
 from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis.candidates import Candidate, possible_effects
+from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.refinement import shapes_around
@@ -36,6 +37,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
     "stribeck_friction": (2.0, 2, False),
     "load_dependent_friction": (1.0, 2, True),
     "friction_drift": (15.0, 3, False),
+    "friction_change": (4.0, 2, False),
     "coupled_friction": (3.0, 2, True),
     "armature": (1.0, 2, True),
     "spring": (12.0, 2, True),
@@ -56,6 +58,7 @@ REFINED: Mapping[str, tuple[str, ...]] = {
     "nonlinear_viscous_friction": STRAIGHT,
     "stribeck_friction": STRAIGHT,
     "friction_drift": STRAIGHT,
+    "friction_change": ("coulomb_friction", "viscous_friction"),
     "coupled_friction": STRAIGHT,
     "asymmetric_friction": ("coulomb_friction", "torque_offset"),
     "load_dependent_friction": ("coulomb_friction",),
@@ -216,7 +219,7 @@ def test_peaks_of_friction_below_the_speeds_that_count_are_not_looked_for(
     robot = random_robot(4, joints=1, branches=False, prismatic=False)
     run = signals_of(robot, 300)
     spec = DiagnosisSpec(kinds=("stribeck_friction", "armature"), moving_speed=slowest)
-    found = possible_effects(spec, robot, (), [run], [run.load], ["run"], {})
+    found = possible_effects(spec, (), SeenRuns(robot, [run], [run.load], ["run"]), {})
     speeds = [e.shape["stribeck_speed"] for e, _ in found if e.kind == "stribeck_friction"]
     assert len(speeds) == left
     assert all(speed >= slowest for speed in speeds)

@@ -15,6 +15,7 @@ from excite_cli.diagnosis.possible_sizes import possible_sizes
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect
+from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import (
     FIXED,
@@ -105,6 +106,7 @@ def random_judge() -> tuple[Judgement, Rows, Rows]:
     """On random columns with correlated noise; the rows of both its evidences."""
     data = random_data(21)
     candidates = [replace(c, tests=k + 1) for k, c in enumerate(random_candidates(21))]
+    candidates[4] = replace(candidates[4], effect=CoulombFriction((0,)))  # not a change of it
     white, plain = autoregression(), NoiseModel.white(np.array([0.9, 2.0]))
     judge = Judgement(
         data.evidence(candidates, white), data.evidence(candidates, plain), candidates,

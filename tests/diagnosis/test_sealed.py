@@ -136,13 +136,15 @@ def test_what_is_assumed_of_the_sealed_run_is_told(baseline: Diagnosis) -> None:
     """The payload is found in the second run; nobody said that the sealed one has it."""
     (payload,) = [each for each in baseline.effects if each.effect.kind == "payload"]
     assert payload.effect.runs == ("motion_2",)
-    assumed = Assumption("payload", payload.effect.runs, ("motion_3",), present=False)
+    joints = payload.effect.joints
+    assumed = Assumption("payload", payload.effect.runs, ("motion_3",), False, joints)
     assert baseline.assumed == (assumed,)
     told = [each.text for each in baseline.findings if each.kind == "assumed"]
     assert told == [assumption_in_words(assumed)]
-    assert "is assumed that it is not in the sealed motion_3" in told[0]
-    there = replace(assumed, present=True)
-    assert "is assumed that it is in the sealed motion_3" in assumption_in_words(there)
+    assert "payload in motion_2: taken to be absent in the sealed motion_3." in told[0]
+    assert "runs: {motion_2: {payload: a}, motion_3: {payload: a}}" in told[0]
+    (friction,) = (replace(assumed, kind="coulomb_friction", joints=("elbow",)),)
+    assert "coulomb_friction of elbow in motion_2:" in assumption_in_words(friction)
 
 
 def test_a_run_sealed_by_name_is_used_for_the_errors_only(

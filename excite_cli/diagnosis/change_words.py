@@ -1,0 +1,54 @@
+"""What changed from run to run, in words: the value before and after, not only their difference."""
+
+from collections.abc import Iterator
+
+from excite_cli.diagnosis.records import Diagnosis, NamedEffect
+from excite_cli.effects.base import Value
+from excite_cli.effects.catalogue import catalogue
+
+_SURE = 2.0  # standard deviations from which a change is told
+_LONG = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
+
+
+def changes_in_words(found: Diagnosis) -> list[str]:
+    """A sentence for everything that changed over the campaign, or in some runs."""
+    return [text for named in found.named for text in _told(found, named)]
+
+
+def _told(found: Diagnosis, named: NamedEffect) -> Iterator[str]:
+    record = named.effect
+    kind = catalogue().get(record.kind)
+    if kind is None or not (kind.of_campaign or (kind.changes_between_runs and record.runs)):
+        return
+    changed = kind.refines if kind.of_campaign else (record.kind,)
+    for parameter, of in zip(kind.parameters, changed, strict=False):
+        change, start = named.parameters[parameter.name], _shared(found, of, record.joints)
+        if start is None or abs(change.value) <= _SURE * change.std:
+            continue
+        what = f"{catalogue()[of].title} of {', '.join(record.joints)}"
+        end = Value(start + change.value, change.std, catalogue()[of].parameters[0].unit)
+        if kind.of_campaign:
+            how = "fell" if abs(end.value) < abs(start) else "rose"
+            over = _duration(record.shape["span"])
+            yield f"{what} {how} from {start:.3g} to {end.value:.3g} {end.unit} over {over}."
+        else:
+            runs = ", ".join(record.runs)
+            yield f"{what}: {end.value:.3g} instead of {start:.3g} {end.unit} in {runs}."
+
+
+def _shared(found: Diagnosis, kind: str, joints: tuple[str, ...]) -> float | None:
+    """What all runs have of a kind, found or declared."""
+    known = [*(each.effect for each in found.effects), *found.information.model]
+    return next(
+        (
+            record.values[0]
+            for record in known
+            if (record.kind, record.joints, record.runs) == (kind, joints, ()) and record.values
+        ),
+        None,
+    )
+
+
+def _duration(seconds: float) -> str:
+    size, unit = next((each for each in _LONG if seconds >= 2.0 * each[0]), _LONG[-1])
+    return f"{seconds / size:.3g} {unit}"
