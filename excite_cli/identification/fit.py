@@ -256,16 +256,25 @@ def _essential(linear: LinearFit, std: Array) -> Mask:
 
 
 def effect_parameters(effects: Sequence[Effect]) -> tuple[Parameter, ...]:
-    """Linear parameters of all effects, in the order of their columns."""
-    return tuple(parameter for effect in effects for parameter in effect.parameters)
+    """Linear parameters of all effects, in the order of their columns; a change has either sign."""
+    return tuple(
+        replace(parameter, nonnegative=parameter.nonnegative and not effect.is_change)
+        for effect in effects
+        for parameter in effect.parameters
+    )
 
 
 def effect_parameter_names(
     effects: Sequence[Effect], joint_names: Sequence[str]
 ) -> tuple[str, ...]:
-    """Names such as `viscous_friction.viscous[joint_1]`."""
-    return tuple(
-        f"{effect.kind}.{parameter.name}[{','.join(joint_names[j] for j in effect.joints)}]"
+    """Names such as `viscous_friction.viscous[joint_1]`, with the runs of what is a change."""
+    places = [
+        ",".join(joint_names[j] for j in effect.joints)
+        + (f"; {', '.join(effect.runs)}" if effect.is_change else "")
         for effect in effects
+    ]
+    return tuple(
+        f"{effect.kind}.{parameter.name}[{place}]"
+        for effect, place in zip(effects, places, strict=True)
         for parameter in effect.parameters
     )

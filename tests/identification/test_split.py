@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from excite_cli.config.data_spec import FilterSpec
 from excite_cli.errors import ConfigError
-from excite_cli.identification.split import Split, split
+from excite_cli.identification.processing import choose_processing
+from excite_cli.identification.split import Split, split, with_ends_sealed
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.run_identity import Part
 
@@ -160,3 +162,34 @@ def test_time_counts_from_the_start_of_the_run() -> None:
     assert found.training[0].t[0] == 0.0
     assert found.sealed[0].t[0] == 0.0
     assert found.training[1].t[0] == pytest.approx(1.5)
+
+
+def test_ends_of_some_runs_are_sealed_a_border_away_from_the_rest() -> None:
+    runs = [run(name, 12.0) for name in ("one", "two", "three")]
+    whole = split(data(*runs))
+    how = choose_processing(whole.training, FilterSpec(border=0.25))
+    found = with_ends_sealed(whole, {"two", "three"}, how)
+    assert [each.name for each in found.training] == ["one", "two"]
+    assert numbers(found.training[:1]) == list(range(1200))
+    assert numbers(found.training[1:]) == list(range(775))
+    assert [each.name for each in found.ends] == ["two"]
+    assert numbers(found.ends) == list(range(800, 1200))
+    assert found.ends[0].label == "two 8-11.99 s"
+    assert (found.sealed, found.folds, found.units) == (whole.sealed, whole.folds, whole.units)
+
+
+@pytest.mark.parametrize(("seconds", "sealed"), [(1.6, 0), (2.5, 100), (6.0, 200)])
+def test_an_end_lasts_a_second_at_least_and_leaves_as_much(seconds: float, sealed: int) -> None:
+    runs = [run("one", 9.0), run("two", seconds), run("three", 9.0)]
+    whole = split(data(*runs))
+    how = replace(choose_processing(whole.training, FilterSpec()), border=0.1, rate=50.0)
+    found = with_ends_sealed(whole, {"two"}, how)
+    assert len(numbers(found.ends)) == pytest.approx(sealed, abs=1)
+    assert len(found.ends) == (sealed > 0)
+
+
+def test_the_campaign_goes_on_from_run_to_run() -> None:
+    found = split(data(run("one", 3.0, start=7.0), run("two", 3.0), run("three", 3.0)))
+    assert [each.start for each in (*found.training, *found.sealed)] == pytest.approx(
+        [0.0, 2.99, 5.98]
+    )
