@@ -53,10 +53,10 @@ class SeenRuns:
         """What columns of the effect say in each of the `units`."""
         rows = list(effect.rows(self.robot.n))
         parts = [(i, k) for k, runs in enumerate(units) for i in self.parts_of(runs)]
-        thin = [slice(None, None, max(1, len(s.t) // _LOOKED_AT)) for s in self.signals]
+        thin = [max(1, len(s.t) // _LOOKED_AT) for s in self.signals]
         return evidence_by_run(
-            [effect.columns(self.signals[i])[thin[i]] for i, _ in parts],
-            [self.residuals[i][thin[i]][:, rows] for i, _ in parts],
+            [effect.columns(self.signals[i].every(thin[i])) for i, _ in parts],
+            [self.residuals[i][:: thin[i], rows] for i, _ in parts],
             [k for _, k in parts],
             positive,
         )
