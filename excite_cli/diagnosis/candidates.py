@@ -10,6 +10,7 @@ from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named
+from excite_cli.effects.placing import places_named
 from excite_cli.errors import ConfigError, ExciteWarning
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
@@ -77,7 +78,8 @@ def possible_effects(
             continue
         kind = catalogue()[name]
         try:
-            effects, tests = _of_kind(kind, robot, known, signals, residuals, runs)
+            places = _places(kind, robot, spec)
+            effects, tests = _of_kind(kind, places, robot, known, signals, residuals, runs)
             if is_of_a_package(kind):
                 require_columns(effects, signals)
         except (Exception, SystemExit) as error:
@@ -103,8 +105,15 @@ def possible_effects(
     return found
 
 
+def _places(kind: type[Effect], robot: Robot, spec: DiagnosisSpec) -> list[tuple[int, ...]]:
+    if kind.carried and spec.payload_links:
+        return places_named(kind, spec.payload_links, robot, "diagnosis.payload_links")
+    return kind.places(robot)
+
+
 def _of_kind(
     kind: type[Effect],
+    places: Sequence[tuple[int, ...]],
     robot: Robot,
     known: Container[tuple[str, tuple[int, ...]]],
     signals: Sequence[Signals],
@@ -114,7 +123,7 @@ def _of_kind(
     """All effects of a kind at places that are not `known`, and how many tests they stand for."""
     effects: list[Effect] = []
     tests = 0
-    for place in kind.places(robot):
+    for place in places:
         if (kind.kind, place) in known:
             continue
         if kind.per_run:

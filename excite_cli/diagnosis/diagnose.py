@@ -39,6 +39,7 @@ from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
+from excite_cli.effects.placing import told_on
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
@@ -95,7 +96,9 @@ def diagnose(
     )
     unexplained, dependence = _unexplained(traced, robot)
     doubts = approximations(traced, unexplained, robot.joint_names)
-    named, rivals = _named(model, traced, parameters, covariance, doubts)
+    named, rivals = _named(
+        model, traced, parameters, covariance, doubts, spec.diagnosis.payload_links
+    )
     models = both_models(model, traced, parameters)
     sealed_part = on_sealed(robot, models, [prepare(run, processing) for run in parts.sealed])
     base_values, base_std = _base_parameters(model, parameters, covariance)
@@ -186,6 +189,7 @@ def _named(
     parameters: Array,
     covariance: Array,
     doubts: Mapping[int, Approximation],
+    links: Sequence[str],
 ) -> tuple[tuple[NamedEffect, ...], list[tuple[Alias, Array]]]:
     """Named effects with values, evidence and aliases; and the aliases with their own values."""
     judge, names = traced.judge, model.robot.joint_names
@@ -227,10 +231,14 @@ def _named(
                 record_of(traced.candidates[alias.candidate].effect, names, values[-width:])
             )
         strength.append(gain.chi2)
+        link = told_on(c.effect, model.robot, links)
+        seen = c.effect.seen_from(link) if link else np.eye(c.width)
         found.append(
             NamedEffect(
-                effect=record_of(c.effect, names, parameters[own]),
-                parameters=c.effect.report(shown[own], spread[own, own]),
+                effect=replace(
+                    record_of(c.effect, names, parameters[own]), link=link.name if link else ""
+                ),
+                parameters=c.effect.report(seen @ shown[own], seen @ spread[own, own] @ seen.T),
                 p_value=judge.p_value(i, gain),
                 share_of_residual=float(np.clip(share, 0.0, 1.0)),
                 gain=float(judge.left_out_gain(rest, [i])),

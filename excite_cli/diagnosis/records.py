@@ -16,13 +16,17 @@ from excite_cli.shown.record import Shown
 
 @dataclass(frozen=True)
 class EffectRecord:
-    """An effect by name: kind, names of its joints, shape, linear parameters, runs (all: empty)."""
+    """An effect by name: kind, names of its joints, shape, linear parameters, runs (all: empty).
+
+    `link`: of something carried, the link in whose frame its numbers are told.
+    """
 
     kind: str
     joints: tuple[str, ...]
     shape: dict[str, float] = field(default_factory=dict)
     values: tuple[float, ...] = ()
     runs: tuple[str, ...] = ()
+    link: str = ""
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,8 @@ def place_in_words(record: EffectRecord, joints: int) -> str:
     """Where an effect is, on a robot with so many joints; with its runs, if not in all."""
     whole = len(record.joints) == joints > 2
     where = "all joints" if whole else ", ".join(record.joints)
+    if record.link:
+        where = f"{where}, frame of {record.link}"
     return f"{where} ({', '.join(record.runs)})" if record.runs else where
 
 

@@ -25,6 +25,7 @@ from excite_cli.effects.parameter import Parameter, Value, deviation
 from excite_cli.effects.signals import Cotangents, Signals
 from excite_cli.effects.simulated_robot import JOINT_PARTS, SimulatedRobot
 from excite_cli.measurement.run_identity import RunId
+from excite_cli.robot.link_frame import LinkFrame
 from excite_cli.robot.model import Array, Robot
 
 Scope = Literal["joint", "pair", "robot"]
@@ -86,6 +87,7 @@ class Effect(ABC):
     # of the effect would be left.
     function_of: ClassVar[tuple[Quantity, ...]] = ()
     defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
+    carried: ClassVar[bool] = False  # hangs on one joint's body, and may be named by its link
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
@@ -232,6 +234,10 @@ class Effect(ABC):
             return None
         name, unit, series = _DRAWN_OVER[self.function_of[0]]
         return Abscissa(name, unit, getattr(signals, series)[:, self.joints[0]])
+
+    def seen_from(self, link: LinkFrame) -> Array:
+        """Linear parameters in the frame of `link`: that matrix (p, p) times `values`."""
+        return np.eye(len(self.parameters))
 
     def report(self, values: Array, covariance: Array) -> dict[str, Value]:
         """Named parameters as people know them, with standard deviations."""

@@ -1,7 +1,7 @@
-"""A body on the flange that the model does not have: the last body's ten columns of Y.
+"""A body that the model does not have, on a hand: ten columns of Y, those of the carrying body.
 
-The last body is that of the last moved joint. In runs that all carry it, it is absorbed by the last
-body's own parameters; it shows where some runs carry it and others do not.
+It is looked for on every leaf of the tree of moved joints. In runs that all carry it, it is absorbed
+by that body's own parameters; it shows where some runs carry it and others do not.
 """
 
 from collections.abc import Mapping
@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from excite_cli.dynamics.pseudo_inertia import moved
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.effects.base import (
     Cotangents,
@@ -20,13 +21,17 @@ from excite_cli.effects.base import (
     deviation,
 )
 from excite_cli.effects.simulated_robot import SimulatedRobot
-from excite_cli.robot.model import Array
+from excite_cli.robot.link_frame import LinkFrame, leaves
+from excite_cli.robot.model import Array, Robot
 
 _RADIUS = 0.05  # m, of the sphere that is planted
 
 
 class Payload(Effect):
-    """Mass, first moments and inertia of an added body, about the last joint's frame."""
+    """Mass, first moments and inertia of an added body, about the frame of the joint it hangs on.
+
+    Files of earlier versions name all joints, and mean the last one.
+    """
 
     kind: ClassVar = "payload"
     title: ClassVar = "payload that the model does not have"
@@ -40,32 +45,48 @@ class Payload(Effect):
             for name in ("Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
         ),
     )
+    carried: ClassVar = True
     defaults: ClassVar[Mapping[str, float]] = {"cx": 0.0, "cy": 0.0, "cz": 0.05, "radius": _RADIUS}
     per_run: ClassVar = True
     usual: ClassVar = True
 
+    @classmethod
+    def places(cls, robot: Robot) -> list[tuple[int, ...]]:
+        """Every leaf."""
+        return [(j,) for j in leaves(robot)]
+
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
     ) -> None:
-        """The body that the last joint carries has more inertia."""
-        robot.phi[-PARAMETERS_PER_BODY:] += values
+        """The body that carries it has more inertia."""
+        robot.phi[self._ten(robot.robot.n, len(robot.phi))] += values
 
     def rows(self, n: int) -> tuple[int, ...]:
         """All joints."""
         return tuple(range(n))
 
     def columns(self, signals: Signals) -> Array:
-        """The last ten columns of Y, (T, n, 10)."""
-        return signals.body.regressor[:, :, -PARAMETERS_PER_BODY:]
+        """Ten columns of Y, (T, n, 10)."""
+        regressor = signals.body.regressor
+        return regressor[:, :, self._ten(regressor.shape[1], regressor.shape[2])]
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
-        """The weights, in the last ten columns of Y."""
+        """The weights, in the ten columns of Y."""
         back = np.zeros_like(signals.body.regressor)
-        back[:, :, -PARAMETERS_PER_BODY:] = weights
+        back[:, :, self._ten(back.shape[1], back.shape[2])] = weights
         return Cotangents(regressor=back)
 
+    def _ten(self, n: int, count: int) -> slice:
+        """Where φ, of `count` entries, has the body that carries it; moved bodies are the last."""
+        first = count + PARAMETERS_PER_BODY * (self.joints[-1] - n)
+        return slice(first, first + PARAMETERS_PER_BODY)
+
+    def seen_from(self, link: LinkFrame) -> Array:
+        """Mass, first moments and inertia about the link's frame."""
+        return moved(link.rotation, link.translation)
+
     def report(self, values: Array, covariance: Array) -> dict[str, Value]:
-        """Also the centre of mass `cx, cy, cz` in the last joint's frame."""
+        """Also the centre of mass `cx, cy, cz` in the joint's frame."""
         found = super().report(values, covariance)
         mass = float(values[0])
         if mass != 0.0:

@@ -273,6 +273,7 @@ def _named(named: NamedEffect, runs: list[str]) -> dict[str, Any]:
     return {
         "kind": named.effect.kind,
         "joints": list(named.effect.joints),
+        **({"link": named.effect.link} if named.effect.link else {}),
         "parameters": {name: asdict(value) for name, value in named.parameters.items()},
         "p_value": named.p_value,
         "share_of_residual": named.share_of_residual,
