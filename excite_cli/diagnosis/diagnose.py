@@ -13,11 +13,11 @@ from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import Alias, aliases_of
 from excite_cli.diagnosis.before_after import both_models, on_sealed, training_traces
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.correlated_covariance import covariance_of
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
 from excite_cli.diagnosis.evidence import SHARED
+from excite_cli.diagnosis.final_fit import final_fit
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.plausibility import check_plausibility
 from excite_cli.diagnosis.records import (
@@ -30,7 +30,6 @@ from excite_cli.diagnosis.records import (
     NamedEffect,
     Unexplained,
 )
-from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.rounds import rounds_of
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
@@ -90,10 +89,8 @@ def diagnose(
     check_plausibility(robot, training)
     traced = trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
     progress("naming", 8)
-    parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
-    covariance = covariance_of(
-        traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
-    )
+    final = final_fit(traced)
+    traced, parameters, covariance = final.traced, final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
     doubts = approximations(traced, unexplained, robot.joint_names)
     named, rivals = _named(

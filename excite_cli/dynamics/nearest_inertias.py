@@ -62,6 +62,14 @@ def nearest_inertias(
     return Nearest(x, float(w @ w), status, solved)
 
 
+def half_of(covariance: Array) -> Array:
+    """B (size, size) with B Bᵀ a `covariance`, however ill-conditioned."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    scale[scale < 1e-150] = 1.0
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 1e-12)))
+
+
 def _least_norm(rows: Array, bounds: Array, signs: int, bodies: int) -> tuple[Array, str]:
     import clarabel
 

@@ -1,9 +1,13 @@
 """An elastic gear: two inertias with a spring in between, seen from the motor's encoder.
 
-The spring turns by c τ_j, c = 1/K, so the link is at q_j − c τ_j. To first order in c the torque
-of all joints changes by
+The spring turns by c τ_j, c = 1/K, so the link is at q_j − c τ_j and the torque of all joints
+changes by
 
-    −c (∂τ/∂q_j τ_j + ∂τ/∂v_j dτ_j/dt + ∂τ/∂a_j d²τ_j/dt²),     τ the rigid-body torque.
+    −c (∂τ/∂q_j τ_j + ∂τ/∂v_j dτ_j/dt + ∂τ/∂a_j d²τ_j/dt²).
+
+τ_j is what the spring carries, this change included: to first order in c the rigid-body torque,
+later that of the model found so far (`Signals.at_link`), so that higher orders in the ratio of the
+motion's frequency to the resonance come in pass by pass.
 
 With an encoder at the link nothing of this shows.
 """
@@ -15,8 +19,11 @@ import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier, Value
 from excite_cli.effects.directional import slope_of_gradient
+from excite_cli.effects.seen import Seen
 from excite_cli.effects.simulated_robot import SimulatedRobot, Transmission, rotor_inertia
 from excite_cli.robot.model import Array
+
+_MOST_BENT = 0.1  # rad, under the RMS of the load; harmonic drives bend by a few mrad
 
 
 class Elasticity(Effect):
@@ -27,8 +34,19 @@ class Elasticity(Effect):
     signature: ClassVar = "the residual follows the fourth derivative of the motion, on many joints"
     parameters: ClassVar = (Parameter("compliance", "rad/(N·m)", 1e-6, 1e-3, nonnegative=True),)
     tier: ClassVar = Tier.LAST
+    bends: ClassVar = True
     excludes: ClassVar = ("backlash",)
     settings: ClassVar[Mapping[str, float]] = {"rotor_inertia": 0.0, "damping_ratio": 0.02}
+
+    def absurd(self, values: Array, seen: Seen) -> str:
+        """No arm hangs in its gears by more than a tenth of a radian."""
+        bent = float(values[0] * seen.load[self.joints[0]])
+        if bent <= _MOST_BENT:
+            return ""
+        stiffness = 1.0 / values[0]
+        return (
+            f"a gear of {stiffness:.3g} N·m/rad would bend by {bent:.2g} rad under its usual load"
+        )
 
     def leftover(self, values: Array) -> float:
         """Of a compliance the columns are the first order only."""
@@ -71,7 +89,7 @@ class Elasticity(Effect):
 
     def _twist(self, signals: Signals) -> Array:
         """τ_j and its first and second rates, (3, T)."""
-        load = signals.load[:, self.joints[0]]
+        load = (signals.load if signals.at_link is None else signals.at_link)[:, self.joints[0]]
         rate = signals.rate(load)
         return np.stack([load, rate, signals.rate(rate)])
 

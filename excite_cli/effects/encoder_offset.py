@@ -20,7 +20,12 @@ class EncoderOffset(Effect):
     kind: ClassVar = "encoder_offset"
     title: ClassVar = "offset of an encoder"
     signature: ClassVar = "residuals on many joints as if one of them stood elsewhere"
-    parameters: ClassVar = (Parameter("offset", "rad", 1e-3, 0.2, believed=(-0.2, 0.2)),)
+    parameters: ClassVar = (
+        Parameter(
+            "offset", "rad", 1e-3, 0.2, believed=(-0.2, 0.2),
+            because="nobody overlooks a joint that stands off by more than 0.2 rad",
+        ),
+    )  # fmt: skip
     usual: ClassVar = True
 
     def leftover(self, values: Array) -> float:

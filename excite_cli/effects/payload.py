@@ -1,7 +1,11 @@
 """A body that the model does not have, on a hand: ten columns of Y, those of the carrying body.
 
-It is looked for on every leaf of the tree of moved joints. In runs that all carry it, it is absorbed
-by that body's own parameters; it shows where some runs carry it and others do not.
+It is looked for on every leaf of the tree of moved joints. In runs that all carry it, it is
+absorbed by that body's own parameters; it shows where some runs carry it and others do not.
+
+Ten fitted numbers are those of no body as soon as an inertia is known worse than it is large. So
+they are judged by their χ² distance to the numbers that bodies have (`nearest_inertias`), and what
+is told are the nearest of these.
 """
 
 from collections.abc import Mapping
@@ -9,7 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.dynamics.pseudo_inertia import moved
+from excite_cli.dynamics.nearest_inertias import half_of, nearest_inertias
+from excite_cli.dynamics.pseudo_inertia import moved, smallest_eigenvalues
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.effects.base import (
     Cotangents,
@@ -20,11 +25,14 @@ from excite_cli.effects.base import (
     Value,
     deviation,
 )
+from excite_cli.effects.seen import Seen
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.link_frame import LinkFrame, leaves
 from excite_cli.robot.model import Array, Robot
 
 _RADIUS = 0.05  # m, of the sphere that is planted
+_LENGTH = np.array([0.1])  # m, in which eigenvalues of inertias are told in kg
+_ROUNDING, _LIGHTEST = 1e-6, 1e-3  # of the mass; kg
 
 
 class Payload(Effect):
@@ -49,6 +57,8 @@ class Payload(Effect):
     defaults: ClassVar[Mapping[str, float]] = {"cx": 0.0, "cy": 0.0, "cz": 0.05, "radius": _RADIUS}
     per_run: ClassVar = True
     usual: ClassVar = True
+    size: ClassVar = ("mass",)
+    forgiven: ClassVar = 0.05  # it is seen by its weight; of its inertia, models know little
 
     @classmethod
     def places(cls, robot: Robot) -> list[tuple[int, ...]]:
@@ -84,6 +94,28 @@ class Payload(Effect):
     def seen_from(self, link: LinkFrame) -> Array:
         """Mass, first moments and inertia about the link's frame."""
         return moved(link.rotation, link.translation)
+
+    def possible(self, values: Array, early: bool) -> bool:
+        """Whether some body has these numbers."""
+        least = smallest_eigenvalues(values, _LENGTH)[0]
+        return bool(values[0] >= 0.0 and least >= -_ROUNDING * max(abs(values[0]), _LIGHTEST))
+
+    def why_not(self, values: Array) -> str:
+        """No body is so, and none near it."""
+        return f"no body has this mass ({values[0]:.3g} kg), centre and inertia, or nearly so"
+
+    def absurd(self, values: Array, seen: Seen) -> str:
+        """Nobody lets a robot carry more than it weighs."""
+        if values[0] <= seen.mass:
+            return ""
+        return f"mass of {values[0]:.3g} kg is more than the robot's own {seen.mass:.3g} kg"
+
+    def nearest(self, values: Array, covariance: Array) -> Array:
+        """Those of the body nearest to `values`."""
+        margin = _ROUNDING * max(abs(float(values[0])), _LIGHTEST)
+        back, no_signs = half_of(covariance), np.zeros(0, dtype=np.intp)
+        found = nearest_inertias(back, values, _LENGTH, no_signs, margin)
+        return found.x if found.solved else values
 
     def report(self, values: Array, covariance: Array) -> dict[str, Value]:
         """Also the centre of mass `cx, cy, cz` in the joint's frame."""

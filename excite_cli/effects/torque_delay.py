@@ -24,7 +24,12 @@ class TorqueDelay(Effect):
     signature: ClassVar = "the residual is the torque's rate of change, on all joints alike"
     function_of: ClassVar = ("load",)
     scope: ClassVar[Scope] = "robot"
-    parameters: ClassVar = (Parameter("delay", "s", 5e-4, 0.1, believed=(-0.1, 0.1)),)
+    parameters: ClassVar = (
+        Parameter(
+            "delay", "s", 5e-4, 0.1, believed=(-0.1, 0.1),
+            because="no controller closes its loop with more than 0.1 s",
+        ),
+    )  # fmt: skip
     data_defect: ClassVar = True
 
     @classmethod

@@ -23,8 +23,7 @@ _, SPHERE = Payload.planted(2.0, {"cx": 0.03, "cy": -0.02, "cz": 0.1})
 
 @pytest.fixture(scope="module")
 def branched() -> Robot:
-    robot = next(r for r in map(random_robot, range(40)) if len(leaves(r)) > 1)
-    return robot
+    return next(r for r in map(random_robot, range(40)) if len(leaves(r)) > 1)
 
 
 def carried(robot: Robot, joint: int) -> str:
