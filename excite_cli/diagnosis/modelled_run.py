@@ -11,7 +11,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns, with_load_at_links
+from excite_cli.identification.regression import effect_columns
 from excite_cli.robot.model import Array
 
 
@@ -42,7 +42,6 @@ class ModelledRun:
             [not effect.data_defect for effect in effects],
             [len(effect.parameters) for effect in effects],
         )
-        signals = with_load_at_links(signals, effects, values)
         extra = effect_columns(effects, signals) @ np.where(in_robot, values, 0.0)
         return replace(signals, torque=load + extra)
 

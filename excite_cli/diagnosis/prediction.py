@@ -9,7 +9,7 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns, with_load_at_links
+from excite_cli.identification.regression import effect_columns
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 
@@ -40,7 +40,6 @@ def predicted(
     total = load
     for _ in range(_SETTLED):
         signals = Signals(t, body.q, body.v, body.a, load, torque, body, run)
-        signals = with_load_at_links(signals, effects, values)
         columns = effect_columns(effects, signals)
         total = load + columns @ values
         if not len(effects):

@@ -95,7 +95,6 @@ class Effect(ABC):
     carried: ClassVar[bool] = False  # hangs on one joint's body, and may be named by its link
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
-    bends: ClassVar[bool] = False  # links move otherwise than joints say, and so does the load
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
     why_not_excitable: ClassVar[str] = ""
 
@@ -255,7 +254,7 @@ class Effect(ABC):
         return next((reason for reason in reasons if reason), "no effect of its kind is so")
 
     def over_error(self, values: Array, covariance: Array) -> float:
-        """Its size over its error: above 1 beyond two standard deviations, or as rare for several."""
+        """Size over error: above 1 beyond two standard deviations, or as rare for several."""
         names = [parameter.name for parameter in self.parameters]
         at = [names.index(name) for name in self.size or names]
         whiten = np.linalg.inv(half_of(covariance[np.ix_(at, at)]))

@@ -15,8 +15,7 @@ class Signals:
 
     `t` (T,) from the start of the run [s]; `q, v, a` (T, n); `load` (T, n) rigid-body torque of
     the model so far, `torque` (T, n) all of it with the effects found; `body` gives the derivatives
-    of the rigid-body torque. `at_link` (T, n) is the load where links move otherwise than joints
-    (`Effect.bends`); None if they do not.
+    of the rigid-body torque.
     """
 
     t: Array
@@ -27,7 +26,6 @@ class Signals:
     torque: Array
     body: RigidBody
     run: RunId = field(default_factory=RunId)
-    at_link: Array | None = None
 
     def rate(self, x: Array) -> Array:
         """dx/dt by central differences along the first axis."""

@@ -1,7 +1,7 @@
 """The regression: torque and the columns that explain it, filtered and decimated alike."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,6 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array, Robot
-
-_SETTLED = 3  # times that a load bends its own gear anew
 
 
 @dataclass(frozen=True)
@@ -64,20 +62,6 @@ def effect_columns(effects: Sequence[Effect], signals: Signals) -> Array:
             block[:, list(effect.rows(n))] = effect.columns(signals)
         blocks.append(block)
     return np.concatenate(blocks, axis=2)
-
-
-def with_load_at_links(signals: Signals, effects: Sequence[Effect], values: Array) -> Signals:
-    """The same with what effects of these linear parameters, that bend links, make of the load."""
-    ends = np.cumsum([len(effect.parameters) for effect in effects])
-    bending = [
-        (effect, values[end - len(effect.parameters) : end])
-        for effect, end in zip(effects, ends, strict=True)
-        if effect.bends
-    ]
-    for _ in range(_SETTLED if bending else 0):
-        bent = sum((effect.torque(signals, own) for effect, own in bending), signals.load)
-        signals = replace(signals, at_link=bent)
-    return signals
 
 
 def build_regression(
