@@ -221,7 +221,7 @@ class Effect(ABC):
 
         whiten = np.linalg.inv(half_of(covariance))
         low = np.where(signs, 0.0, -np.inf)
-        return np.asarray(lsq_linear(whiten, whiten @ values, (low, np.inf)).x)
+        return np.asarray(lsq_linear(whiten, whiten @ values, (low, np.inf), method="bvls").x)
 
     def may_be(self, values: Array, covariance: Array, early: bool) -> bool:
         """Whether values that physics allows are as near as the error of the fit makes likely.
