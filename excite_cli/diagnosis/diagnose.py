@@ -236,11 +236,12 @@ def _named(
                     record_of(c.effect, names, parameters[own]), link=link.name if link else ""
                 ),
                 parameters=c.effect.report(seen @ shown[own], seen @ spread[own, own] @ seen.T),
-                p_value=judge.p_value(i, gain),
+                p_value=judge.told_p_value(i, gain),
                 share_of_residual=float(np.clip(share, 0.0, 1.0)),
                 gain=float(judge.left_out_gain(rest, [i])),
                 aliases=tuple(records),
                 approximates=doubts.get(i),
+                least_p=judge.rules.least_p,
             )
         )
     order = np.argsort([-each for each in strength], kind="stable")

@@ -18,7 +18,7 @@ from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.modelled_run import ModelledRun, training_data
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
-from excite_cli.diagnosis.placebo import inflation_of
+from excite_cli.diagnosis.placebo import placebos_of
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
 from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
@@ -48,6 +48,7 @@ class Traced:
     signals: tuple[Signals, ...]
     levels: Array
     inflation: float
+    sizes: PossibleSizes
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -182,16 +183,17 @@ def _one_pass(
     left = data.residuals(candidates, usual, plain.solve(usual))
     noise = fit_noise(left, [run.usable for run in data.runs])
     white = data.evidence(candidates, noise)
-    inflation = inflation_of(data, candidates, usual, noise, white)
-    rules = Rules(spec.significance, spec.gain, inflation)
-    allowed = PossibleSizes(
+    placebos = placebos_of(data, candidates, usual, noise, white)
+    inflation = placebos.inflation
+    rules = Rules(spec.significance, spec.gain, inflation, placebos.least_p)
+    sizes = PossibleSizes(
         candidates, attempt < 2, spread_of(white.covariance, inflation), _seen(data, signals)
     )
-    judge = Judgement(white, plain, candidates, rules, allowed)
+    judge = Judgement(white, plain, candidates, rules, sizes)
     chosen = Search(judge, spec.rounds).run()
     return Traced(
         data, tuple(candidates), noise, judge, tuple(chosen), fit.phi, tuple(signals),
-        fit.levels, inflation,
+        fit.levels, inflation, sizes,
     )  # fmt: skip
 
 

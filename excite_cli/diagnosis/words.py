@@ -46,9 +46,11 @@ def place_in_words(record: EffectRecord, joints: int) -> str:
     return f"{where} ({', '.join(record.runs)})" if record.runs else where
 
 
-def p_in_words(p: float) -> str:
-    """A p-value; below 1e-16 it is no more than that."""
-    return "< 1e-16" if p < 1e-16 else f"{p:.1e}" if p < 1e-3 else f"{p:.2g}"
+def p_in_words(p: float, least: float) -> str:
+    """A p-value; the `least` that placebos back is no more than a bound."""
+    if p <= max(least, 1e-16):
+        return f"< {max(least, 1e-16):.1g}"
+    return f"{p:.1e}" if p < 1e-3 else f"{p:.2g}"
 
 
 def value_in_words(name: str, value: Value) -> str:

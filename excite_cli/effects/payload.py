@@ -32,6 +32,7 @@ from excite_cli.robot.model import Array, Robot
 
 _RADIUS = 0.05  # m, of the sphere that is planted
 _LENGTH = np.array([0.1])  # m, in which eigenvalues of inertias are told in kg
+_NOTHING = 2e-3  # of the robot's mass: its own screws are more
 _ROUNDING, _LIGHTEST = 1e-6, 1e-3  # of the mass; kg
 
 
@@ -105,10 +106,13 @@ class Payload(Effect):
         return f"no body has this mass ({values[0]:.3g} kg), centre and inertia, or nearly so"
 
     def absurd(self, values: Array, seen: Seen) -> str:
-        """Nobody lets a robot carry more than it weighs."""
-        if values[0] <= seen.mass:
-            return ""
-        return f"mass of {values[0]:.3g} kg is more than the robot's own {seen.mass:.3g} kg"
+        """Nobody lets a robot carry more than it weighs, or notices what weighs next to nothing."""
+        mass = float(values[0])
+        if mass > seen.mass:
+            return f"mass of {mass:.3g} kg is more than the robot's own {seen.mass:.3g} kg"
+        if mass < _NOTHING * seen.mass:
+            return f"mass of {mass:.2g} kg is next to nothing beside {seen.mass:.3g} kg of robot"
+        return ""
 
     def nearest(self, values: Array, covariance: Array) -> Array:
         """Those of the body nearest to `values`."""

@@ -13,7 +13,7 @@ from excite_cli.effects.payload import Payload
 from excite_cli.effects.seen import Seen
 
 # A robot on which no size is absurd.
-LARGE = Seen(np.full(2, 1e12), np.zeros(2), 1e12)
+LARGE = Seen(np.full(2, 1e12), np.zeros(2), 40.0)
 NONNEGATIVE = (
     "viscous_friction", "coulomb_friction", "nonlinear_viscous_friction", "stribeck_friction",
     "load_dependent_friction", "armature", "elasticity",
@@ -74,7 +74,7 @@ def test_a_payload_is_refused_where_no_body_is_near() -> None:
     assert possible("payload", *flat, error=0.02)
     assert possible("payload", *flat, error=1e-5)  # what it explains is its weight
     assert not possible("payload", -2.7, *sphere[1:], error=0.1)
-    plate = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 5.0]  # no sign is wrong
+    plate = [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 5.0]  # no sign is wrong
     assert not possible("payload", *plate, error=0.01)
     assert possible("payload", *plate, error=2.0)
 
@@ -97,6 +97,7 @@ def test_absurd_sizes_are_told_with_their_reason() -> None:
     robot = Seen(np.full(2, 80.0), np.array([20.0, 1.0]), 30.0)
     _, heavy = Payload.planted(31.0, {})
     for kind, values, words in (
+        ("payload", heavy / 1e3, "next to nothing"),
         ("payload", heavy, "more than the robot's own 30 kg"),
         ("contact", np.array([3e-3, 0.0, 0.0]), "no touch"),
         ("elasticity", np.array([1.0 / 54.0]), "54 N·m/rad would bend by 0.37 rad"),
