@@ -57,6 +57,7 @@ class Payload(Effect):
     carried: ClassVar = True
     defaults: ClassVar[Mapping[str, float]] = {"cx": 0.0, "cy": 0.0, "cz": 0.05, "radius": _RADIUS}
     per_run: ClassVar = True
+    carried: ClassVar = True
     usual: ClassVar = True
     size: ClassVar = ("mass",)
     forgiven: ClassVar = 0.05  # it is seen by its weight; of its inertia, models know little
