@@ -92,10 +92,10 @@ class Effect(ABC):
     # of the effect would be left.
     function_of: ClassVar[tuple[Quantity, ...]] = ()
     defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
-    carried: ClassVar[bool] = False  # hangs on one joint's body, and may be named by its link
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
-    carried: ClassVar[bool] = False  # a body: its torque is part of the load of the joints
+    # A body that one joint carries: part of the load of joints, and named by its link if one likes.
+    carried: ClassVar[bool] = False
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
     why_not_excitable: ClassVar[str] = ""
 

@@ -54,7 +54,6 @@ class Payload(Effect):
             for name in ("Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
         ),
     )
-    carried: ClassVar = True
     defaults: ClassVar[Mapping[str, float]] = {"cx": 0.0, "cy": 0.0, "cz": 0.05, "radius": _RADIUS}
     per_run: ClassVar = True
     carried: ClassVar = True
