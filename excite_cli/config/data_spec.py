@@ -137,6 +137,9 @@ class DiagnosisSpec(Section):
         "all", description="kinds of effects that are looked for"
     )
     exclude: tuple[EffectKind, ...] = Field((), description="kinds that are not looked for")
+    payload_links: tuple[str, ...] = Field(
+        (), description="links that may carry a payload; default: the last of every moved branch"
+    )
     moving_speed: Positive | None = Field(
         None, description="a joint moves above this speed [rad/s or m/s]; default 0.02"
     )

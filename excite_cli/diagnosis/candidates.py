@@ -12,10 +12,11 @@ from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.diagnosis.run_sets import sets_looked_at
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named
+from excite_cli.effects.placing import places_named
 from excite_cli.errors import ConfigError, ExciteWarning
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
-from excite_cli.robot.model import Array
+from excite_cli.robot.model import Array, Robot
 
 _TOGETHER = 16  # effects that are filtered at once
 
@@ -72,7 +73,8 @@ def possible_effects(
             continue
         kind = catalogue()[name]
         try:
-            effects, tests = _of_kind(kind, known, seen)
+            places = _places(kind, seen.robot, spec)
+            effects, tests = _of_kind(kind, places, known, seen)
             changed = changes(kind, known_in_runs, seen)
             if is_of_a_package(kind):
                 require_columns([*effects, *(each for each, _ in changed)], seen.signals)
@@ -110,13 +112,22 @@ def _with(changed: list[tuple[Effect, int]], found: Effect) -> list[tuple[Effect
     return changed if there else [*changed, (found, max((n for _, n in changed), default=1))]
 
 
+def _places(kind: type[Effect], robot: Robot, spec: DiagnosisSpec) -> list[tuple[int, ...]]:
+    if kind.carried and spec.payload_links:
+        return places_named(kind, spec.payload_links, robot, "diagnosis.payload_links")
+    return kind.places(robot)
+
+
 def _of_kind(
-    kind: type[Effect], known: Container[tuple[str, tuple[int, ...]]], seen: SeenRuns
+    kind: type[Effect],
+    places: Sequence[tuple[int, ...]],
+    known: Container[tuple[str, tuple[int, ...]]],
+    seen: SeenRuns,
 ) -> tuple[list[Effect], int]:
     """All effects of a kind at places that are not `known`, and how many tests they stand for."""
     effects: list[Effect] = []
     tests = 0
-    for place in kind.places(seen.robot):
+    for place in places:
         if (kind.kind, place) in known:
             continue
         if kind.per_run:

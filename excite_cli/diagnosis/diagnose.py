@@ -13,11 +13,11 @@ from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import Alias, aliases_of
 from excite_cli.diagnosis.before_after import both_models, on_sealed, training_traces
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.correlated_covariance import covariance_of
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
 from excite_cli.diagnosis.evidence import SHARED
+from excite_cli.diagnosis.final_fit import final_fit
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.plausibility import check_plausibility
 from excite_cli.diagnosis.records import (
@@ -30,7 +30,6 @@ from excite_cli.diagnosis.records import (
     NamedEffect,
     Unexplained,
 )
-from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.rounds import rounds_of
 from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
 from excite_cli.diagnosis.traces import Dependence, Traces
@@ -40,6 +39,7 @@ from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
+from excite_cli.effects.placing import told_on
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
@@ -84,13 +84,13 @@ def diagnose(
         parts = with_ends
         training, processing, traced = _searched(model, spec, parts, progress)
     progress("naming", 8)
-    parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
-    covariance = covariance_of(
-        traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
-    )
+    final = final_fit(traced)
+    traced, parameters, covariance = final.traced, final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
     doubts = approximations(traced, unexplained, robot.joint_names)
-    named, rivals = _named(model, traced, parameters, covariance, doubts)
+    named, rivals = _named(
+        model, traced, parameters, covariance, doubts, spec.diagnosis.payload_links
+    )
     models = both_models(model, traced, parameters)
     sealed_part = on_sealed(robot, models, [prepare(run, processing) for run in parts.sealed])
     base_values, base_std = _base_parameters(model, parameters, covariance)
@@ -201,6 +201,7 @@ def _named(
     parameters: Array,
     covariance: Array,
     doubts: Mapping[int, Approximation],
+    links: Sequence[str],
 ) -> tuple[tuple[NamedEffect, ...], list[tuple[Alias, Array]]]:
     """Named effects with values, evidence and aliases; and the aliases with their own values."""
     judge, names = traced.judge, model.robot.joint_names
@@ -242,15 +243,20 @@ def _named(
                 record_of(traced.candidates[alias.candidate].effect, names, values[-width:])
             )
         strength.append(gain.chi2)
+        link = told_on(c.effect, model.robot, links)
+        seen = c.effect.seen_from(link) if link else np.eye(c.width)
         found.append(
             NamedEffect(
-                effect=record_of(c.effect, names, parameters[own]),
-                parameters=c.effect.report(shown[own], spread[own, own]),
-                p_value=judge.p_value(i, gain),
+                effect=replace(
+                    record_of(c.effect, names, parameters[own]), link=link.name if link else ""
+                ),
+                parameters=c.effect.report(seen @ shown[own], seen @ spread[own, own] @ seen.T),
+                p_value=judge.told_p_value(i, gain),
                 share_of_residual=float(np.clip(share, 0.0, 1.0)),
                 gain=float(judge.left_out_gain(rest, [i])),
                 aliases=tuple(records),
                 approximates=doubts.get(i),
+                least_p=judge.rules.least_p,
             )
         )
     order = np.argsort([-each for each in strength], kind="stable")

@@ -27,11 +27,12 @@ _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
 
 @dataclass(frozen=True)
 class Rules:
-    """α of the family, least gain (RMS) on runs left out, inflation of χ²."""
+    """α of the family, least gain (RMS) on runs left out, inflation of χ², least p that is told."""
 
     significance: float
     gain: float
     inflation: float = 1.0
+    least_p: float = 0.0
 
 
 @dataclass
@@ -131,6 +132,10 @@ class Judgement:
             return 1.0
         single = chi2.sf(gain.chi2 / self.rules.inflation, gain.dof)
         return float(min(1.0, self.candidates[candidate].tests * single))
+
+    def told_p_value(self, candidate: int, gain: Gain) -> float:
+        """As `p_value`, but no smaller than the placebos back."""
+        return max(self.p_value(candidate, gain), self.rules.least_p)
 
     def left_out_gain(self, chosen: Sequence[int], added: Sequence[int]) -> float:
         """Share by which the RMS error on runs left out falls, on the rows that `added` touches.

@@ -2,10 +2,11 @@
 
 If the noise model were right, the energy that a shifted column explains would be χ² distributed
 with one degree of freedom. Where it is more, tests promise too much, and every χ² is divided by the
-excess.
+excess. So many placebos say nothing of events rarer than one of them: no smaller p is told.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_solve
@@ -20,24 +21,34 @@ from excite_cli.robot.model import Array
 _SHIFTS = 6
 _SEED = 20261121
 _QUANTILE = 0.9
+_FEWEST = 20
 
 
-def inflation_of(
+@dataclass(frozen=True)
+class Placebos:
+    """By how much shifted columns exceed χ², at least 1, and the least p that they back."""
+
+    inflation: float
+    least_p: float
+
+
+def placebos_of(
     data: TrainingData,
     candidates: Sequence[Candidate],
     chosen: Sequence[int],
     noise: NoiseModel,
     white: Evidence,
-) -> float:
-    """By how much shifted columns of local candidates exceed χ², at least 1.
+) -> Placebos:
+    """What shifted columns of local candidates say of tests.
 
     The residual is that of the model with the `chosen` candidates.
     """
     found = placebo_gains(data, candidates, chosen, noise, white)
-    if len(found) < 20:
-        return 1.0
+    least = 1.0 / max(len(found), _FEWEST)
+    if len(found) < _FEWEST:
+        return Placebos(1.0, least)
     excess = np.quantile(found, _QUANTILE) / chi2.ppf(_QUANTILE, 1)
-    return float(max(1.0, excess))
+    return Placebos(float(max(1.0, excess)), least)
 
 
 def placebo_gains(

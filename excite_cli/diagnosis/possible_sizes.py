@@ -3,25 +3,58 @@
 from collections.abc import Callable, Sequence
 
 from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array
 
-Allowed = Callable[[Array, Sequence[int], Sequence[int]], bool]
+Spread = Callable[[Sequence[int]], Array]
 
 
-def possible_sizes(candidates: Sequence[Candidate], early_pass: bool) -> Allowed:
-    """The function allowed(parameters, chosen, added): False if an added one cannot be so.
+class PossibleSizes:
+    """Judges fitted sizes of effects.
 
-    `parameters` end with those of the `chosen` candidates, in their order.
+    `spread(chosen)` is the covariance of the parameters of a model with these candidates; it is
+    asked for only where a value is impossible: what cannot be so, but for the error of the fit, is
+    allowed. It is not significant either. `early_pass`: of a diagnosis, which does not know the
+    torque well yet.
     """
 
-    def allowed(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        start = len(parameters) - sum(candidates[i].width for i in chosen)
-        for i in chosen:
-            width = candidates[i].width
-            own = parameters[start : start + width]
-            if i in added and not candidates[i].effect.possible(own, early_pass):
-                return False
-            start += width
-        return True
+    def __init__(
+        self, candidates: Sequence[Candidate], early_pass: bool, spread: Spread, seen: Seen
+    ) -> None:
+        self._candidates, self._early, self._seen = candidates, early_pass, seen
+        self._spread = spread
 
-    return allowed
+    def __call__(self, parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """Whether all that is `added` can be so; `parameters` end with those of the `chosen`."""
+        return not self.why_not(parameters, chosen, added)
+
+    def why_not(self, parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> str:
+        """Why something `added` cannot be so; empty if all can."""
+        start = len(parameters) - sum(self._candidates[i].width for i in chosen)
+        for i in chosen:
+            own = slice(start, start + self._candidates[i].width)
+            start = own.stop
+            if i not in added:
+                continue
+            effect, values = self._candidates[i].effect, parameters[own]
+            if not effect.possible(values, self._early) and not effect.may_be(
+                values, self._spread(chosen)[own, own], self._early
+            ):
+                return effect.why_not(values)
+            if reason := effect.absurd(values, self._seen):
+                return reason
+        return ""
+
+
+def spread_of(covariance: Callable[[Sequence[int]], Array], inflation: float) -> Spread:
+    """`inflation` times `covariance`; the last one is kept, since it is asked for repeatedly."""
+    last: dict[tuple[int, ...], Array] = {}
+
+    def spread(chosen: Sequence[int]) -> Array:
+        key = tuple(chosen)
+        if key not in last:
+            last.clear()
+            last[key] = inflation * covariance(key)
+        return last[key]
+
+    return spread

@@ -16,13 +16,17 @@ from excite_cli.shown.record import Shown
 
 @dataclass(frozen=True)
 class EffectRecord:
-    """An effect by name: kind, names of its joints, shape, linear parameters, runs (all: empty)."""
+    """An effect by name: kind, names of its joints, shape, linear parameters, runs (all: empty).
+
+    `link`: of something carried, the link in whose frame its numbers are told.
+    """
 
     kind: str
     joints: tuple[str, ...]
     shape: dict[str, float] = field(default_factory=dict)
     values: tuple[float, ...] = ()
     runs: tuple[str, ...] = ()
+    link: str = ""
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,8 @@ class Approximation:
 class NamedEffect(Shown):
     """An effect that the declared model lacks, with its evidence.
 
-    `parameters` as people know them; `p_value` corrected for the family of tests;
+    `parameters` as people know them; `p_value` corrected for the family of tests, told down to
+    `least_p`;
     `share_of_residual` of the energy of the residual before, on the rows it touches;
     `gain` by which the error on runs left out fell; `aliases` what the data cannot tell it from.
     If it is only an approximation, `approximates` says of what.
@@ -50,6 +55,7 @@ class NamedEffect(Shown):
     gain: float
     aliases: tuple[EffectRecord, ...] = ()
     approximates: Approximation | None = None
+    least_p: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -94,13 +100,18 @@ class SealedEnds:
 
 @dataclass(frozen=True)
 class Suspect:
-    """One candidate in one round, with its evidence and what became of it."""
+    """One candidate in one round, with its evidence and what became of it.
+
+    `why`: what makes its size impossible, where that is the verdict.
+    """
 
     effect: EffectRecord
     p_value: float
     share_of_residual: float
     gain: float
     verdict: Verdict
+    least_p: float = 0.0
+    why: str = ""
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,21 @@ def _suspects(
             verdict = judge.verdict(chosen, [i])
             if verdict is Verdict.ACCEPTED:
                 verdict = Verdict.LATER if i in traced.chosen else Verdict.EXPLAINED
-        found.append(Suspect(record_of(candidate.effect, joint_names), p, share, left_out, verdict))
+        why = ""
+        if verdict is Verdict.IMPOSSIBLE_SIGN:
+            together = [*chosen, i]
+            why = traced.sizes.why_not(judge.plain.solve(together), together, [i])
+        found.append(
+            Suspect(
+                record_of(candidate.effect, joint_names),
+                max(p, judge.rules.least_p),
+                share,
+                left_out,
+                verdict,
+                judge.rules.least_p,
+                why,
+            )
+        )
         if len(found) == _SUSPECTS:
             break
     return tuple(found)

@@ -38,7 +38,7 @@ class Search:
             chosen = self._polish(chosen)
             if set(chosen) == before:
                 break
-        return self._completed(self._pruned(chosen))
+        return self._completed(self.pruned(chosen))
 
     def _completed(self, chosen: list[int]) -> list[int]:
         """With all that an effect refines on a joint, where some is in and it completes the rest.
@@ -190,7 +190,7 @@ class Search:
                     best, found = cost, trial
         return found
 
-    def _pruned(self, chosen: list[int]) -> list[int]:
+    def pruned(self, chosen: list[int]) -> list[int]:
         """Without those that, with all others in, are not significant or bring nothing."""
         while True:
             weakest: tuple[float, list[int]] | None = None

@@ -19,13 +19,14 @@ from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.modelled_run import ModelledRun, training_data
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
-from excite_cli.diagnosis.placebo import inflation_of
-from excite_cli.diagnosis.possible_sizes import possible_sizes
+from excite_cli.diagnosis.placebo import placebos_of
+from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
 from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.training import TrainingData
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect, Signals, Tier
+from excite_cli.effects.seen import Seen
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
@@ -48,6 +49,7 @@ class Traced:
     signals: tuple[Signals, ...]
     levels: Array
     inflation: float
+    sizes: PossibleSizes
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -184,15 +186,29 @@ def _one_pass(
     left = data.residuals(candidates, usual, plain.solve(usual))
     noise = fit_noise(left, [run.usable for run in data.runs])
     white = data.evidence(candidates, noise)
-    inflation = inflation_of(data, candidates, usual, noise, white)
-    rules = Rules(spec.significance, spec.gain, inflation)
-    allowed = possible_sizes(candidates, attempt < 2)
-    judge = Judgement(white, plain, candidates, rules, allowed)
+    placebos = placebos_of(data, candidates, usual, noise, white)
+    inflation = placebos.inflation
+    rules = Rules(spec.significance, spec.gain, inflation, placebos.least_p)
+    sizes = PossibleSizes(
+        candidates, attempt < 2, spread_of(white.covariance, inflation), _seen(data, signals)
+    )
+    judge = Judgement(white, plain, candidates, rules, sizes)
     chosen = Search(judge, spec.rounds).run()
     return Traced(
         data, tuple(candidates), noise, judge, tuple(chosen), fit.phi, tuple(signals),
-        fit.levels, inflation,
+        fit.levels, inflation, sizes,
     )  # fmt: skip
+
+
+def _seen(data: TrainingData, signals: Sequence[Signals]) -> Seen:
+    """How large torques and robot are in the training data."""
+    torque = [
+        np.where(run.usable, np.abs(run.tau_fit), 0.0).max(axis=0, initial=0.0) for run in data.runs
+    ]
+    load = np.concatenate([s.load for s in signals])
+    phi = signals[0].body.phi
+    mass = float(np.abs(phi[::PARAMETERS_PER_BODY]).sum())
+    return Seen(np.max(torque, axis=0), np.sqrt(np.mean(load**2, axis=0)), mass)
 
 
 def _carried_over(found: Sequence[Effect], candidates: Sequence[Candidate]) -> list[int]:

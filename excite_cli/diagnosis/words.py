@@ -47,12 +47,16 @@ def place_in_words(record: EffectRecord, joints: int) -> str:
     """Where an effect is, on a robot with so many joints; with its runs, if not in all."""
     whole = len(record.joints) == joints > 2
     where = "all joints" if whole else ", ".join(record.joints)
+    if record.link:
+        where = f"{where}, frame of {record.link}"
     return f"{where} ({', '.join(record.runs)})" if record.runs else where
 
 
-def p_in_words(p: float) -> str:
-    """A p-value; below 1e-16 it is no more than that."""
-    return "< 1e-16" if p < 1e-16 else f"{p:.1e}" if p < 1e-3 else f"{p:.2g}"
+def p_in_words(p: float, least: float) -> str:
+    """A p-value; the `least` that placebos back is no more than a bound."""
+    if p <= max(least, 1e-16):
+        return f"< {max(least, 1e-16):.1g}"
+    return f"{p:.1e}" if p < 1e-3 else f"{p:.2g}"
 
 
 def value_in_words(name: str, value: Value) -> str:

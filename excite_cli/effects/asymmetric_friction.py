@@ -21,8 +21,8 @@ class AsymmetricFriction(Effect):
     signature: ClassVar = "the residual jumps when the joint reverses, to levels of unequal height"
     function_of: ClassVar = ("speed",)
     parameters: ClassVar = (
-        Parameter("forward", "N·m", 0.05, 300.0, nonnegative=True),
-        Parameter("backward", "N·m", 0.05, 300.0, nonnegative=True),
+        Parameter("forward", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),
+        Parameter("backward", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),
     )
     tier: ClassVar = Tier.LAST
     refines: ClassVar = ("coulomb_friction", "torque_offset")

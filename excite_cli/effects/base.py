@@ -17,14 +17,18 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import cache
 from typing import ClassVar, Literal
 
 import numpy as np
 
+from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.effects.parameter import Parameter, Value, deviation
+from excite_cli.effects.seen import Seen
 from excite_cli.effects.signals import Cotangents, Signals
 from excite_cli.effects.simulated_robot import JOINT_PARTS, SimulatedRobot
 from excite_cli.measurement.run_identity import RunId
+from excite_cli.robot.link_frame import LinkFrame
 from excite_cli.robot.model import Array, Robot
 
 Scope = Literal["joint", "pair", "robot"]
@@ -33,6 +37,8 @@ Picture = Literal["cloud", "window"]
 
 # By how much a shape parameter is changed, up and down, once its effect is found.
 _FINER = (1.35, 1.15, 1.06, 1.02)
+# Chance of a true effect to look impossible by the error of the fit, and be refused.
+_CHANCE = 0.01
 
 
 class Tier(IntEnum):
@@ -92,7 +98,8 @@ class Effect(ABC):
     # Its columns look at the campaign's clock; its parameters are changes of those of `refines`.
     of_campaign: ClassVar[bool] = False
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
-    carried: ClassVar[bool] = False  # a body: its torque is part of the load of the joints
+    # A body that one joint carries: part of the load of joints, and named by its link if one likes.
+    carried: ClassVar[bool] = False
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
     why_not_excitable: ClassVar[str] = ""
 
@@ -107,6 +114,12 @@ class Effect(ABC):
     deviates_from: ClassVar[tuple[str, ...]] = ()
     # Many robots have it: it is in the model while the noise is measured, lest it be taken for it.
     usual: ClassVar[bool] = False
+
+    # Share of what it explains that may be lost where fitted numbers are moved to possible ones.
+    forgiven: ClassVar[float] = 0.0
+
+    # Linear parameters that are its size, by name; empty: all of them together.
+    size: ClassVar[tuple[str, ...]] = ()
 
     # In the simulated robot: the number that people know it by, if that is not the first linear
     # parameter; and settings of its mechanism that nobody identifies.
@@ -223,6 +236,58 @@ class Effect(ABC):
         given = zip(self.parameters, values, strict=True)
         return all(parameter.allows(float(value), early) for parameter, value in given)
 
+    def nearest(self, values: Array, covariance: Array) -> Array:
+        """Of the values with signs that physics allows, those at the least χ² distance."""
+        signs = np.array([parameter.nonnegative for parameter in self.parameters])
+        if not (values[signs] < 0.0).any():
+            return values
+        from scipy.optimize import lsq_linear  # slow to import
+
+        whiten = np.linalg.inv(half_of(covariance))
+        low = np.where(signs, 0.0, -np.inf)
+        return np.asarray(lsq_linear(whiten, whiten @ values, (low, np.inf), method="bvls").x)
+
+    def may_be(self, values: Array, covariance: Array, early: bool) -> bool:
+        """Whether values that physics allows are as near as the error of the fit makes likely.
+
+        Refused where the χ² distance is one that chance exceeds in 1 % of all cases, if it is
+        also more than the share `forgiven` of all that the effect explains.
+        """
+        near = self.nearest(values, covariance)
+        if not self.possible(near, early):
+            return False
+        whiten = np.linalg.inv(half_of(covariance))
+        far, whole = (float(np.square(whiten @ x).sum()) for x in (values - near, values))
+        return far <= max(_unlikely(len(values)), self.forgiven * whole)
+
+    def absurd(self, values: Array, seen: Seen) -> str:
+        """Why values that could be are absurd on the robot that was `seen`; empty if they are not.
+
+        The whole search asks it: it must be cheap.
+        """
+        torque = max(seen.torque[j] for j in self.joints)
+        for parameter, value in zip(self.parameters, values, strict=True):
+            if reason := parameter.absurd(float(value), torque):
+                return reason
+        return ""
+
+    def why_not(self, values: Array) -> str:
+        """Why values are not `possible`, as a sentence."""
+        given = zip(self.parameters, values, strict=True)
+        reasons = [parameter.why_not(float(value)) for parameter, value in given]
+        return next((reason for reason in reasons if reason), "no effect of its kind is so")
+
+    def over_error(self, values: Array, covariance: Array) -> float:
+        """Size over error: above 1 beyond two standard deviations, or as rare for several."""
+        names = [parameter.name for parameter in self.parameters]
+        at = [names.index(name) for name in self.size or names]
+        whiten = np.linalg.inv(half_of(covariance[np.ix_(at, at)]))
+        return float(np.linalg.norm(whiten @ values[at])) / _two_deviations(len(at))
+
+    def model_error(self, values: Array) -> Array:
+        """Standard deviations (p,) that the inexactness of its columns gives to its parameters."""
+        return np.zeros(len(values))
+
     def leftover(self, values: Array) -> float:
         """Share of its energy that its columns may leave or add: what is no more is no effect.
 
@@ -256,6 +321,10 @@ class Effect(ABC):
             return None
         name, unit, series = _DRAWN_OVER[self.function_of[0]]
         return Abscissa(name, unit, getattr(signals, series)[:, self.joints[0]])
+
+    def seen_from(self, link: LinkFrame) -> Array:
+        """Linear parameters in the frame of `link`: that matrix (p, p) times `values`."""
+        return np.eye(len(self.parameters))
 
     def report(self, values: Array, covariance: Array) -> dict[str, Value]:
         """Named parameters as people know them, with standard deviations."""
@@ -316,6 +385,22 @@ def neighbours(robot: Robot) -> list[tuple[int, ...]]:
     first = int(robot.model.njoints) - robot.n
     parents = [int(robot.model.parents[first + k]) - first for k in range(robot.n)]
     return [(parent, k) for k, parent in enumerate(parents) if parent >= 0]
+
+
+@cache
+def _two_deviations(count: int) -> float:
+    """Length that `count` unit normals exceed as rarely as one exceeds two deviations."""
+    from scipy.stats import chi2  # slow to import
+
+    return float(np.sqrt(chi2.isf(chi2.sf(4.0, 1), count)))
+
+
+@cache
+def _unlikely(count: int) -> float:
+    """χ² distance of `count` parameters from a bound; of a single one 2.3 standard deviations."""
+    from scipy.stats import chi2  # slow to import
+
+    return float(chi2.isf(2 * _CHANCE, count))
 
 
 def steps_by_ratio(value: float, ratios: Sequence[float]) -> list[float]:

@@ -26,6 +26,7 @@ from excite_cli.effects.friction_drift import FrictionDrift
 from excite_cli.effects.load_dependent_friction import LoadDependentFriction
 from excite_cli.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from excite_cli.effects.payload import Payload
+from excite_cli.effects.placing import ALL, places_named
 from excite_cli.effects.ripple import Ripple
 from excite_cli.effects.spring import Spring
 from excite_cli.effects.stribeck_friction import StribeckFriction
@@ -160,20 +161,8 @@ def declared_effects(specs: tuple[EffectSpec, ...] | None, robot: Robot) -> tupl
 def _built(spec: EffectSpec, index: int, robot: Robot) -> list[Effect]:
     where = f"effects[{index}]"
     kind = kind_named(spec.kind, f"{where}.kind")
-    names = list(robot.joint_names)
-    if spec.joints == "all":
-        places = [tuple(range(robot.n))] if kind.scope == "robot" else kind.places(robot)
-    else:
-        for joint in spec.joints:
-            if joint not in names:
-                raise ConfigError(
-                    f"{where}.joints: no moved joint '{joint}'.{nearest(joint, names)} "
-                    f"Moved joints: {', '.join(names)}."
-                )
-        chosen = tuple(names.index(joint) for joint in spec.joints)
-        if kind.scope == "pair" and len(chosen) != 2:
-            raise ConfigError(f"{where}.joints: {spec.kind} acts on two joints; name exactly two.")
-        places = [(j,) for j in chosen] if kind.scope == "joint" else [chosen]
+    names = (ALL,) if spec.joints == "all" else spec.joints
+    places = places_named(kind, names, robot, f"{where}.joints")
     known = {parameter.name: parameter for parameter in kind.shapes}
     for name in spec.shape:
         if name not in known:

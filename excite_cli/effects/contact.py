@@ -20,12 +20,14 @@ from excite_cli.effects.base import (
     Tier,
     steps_by_ratio,
 )
+from excite_cli.effects.seen import Seen
 from excite_cli.effects.simulated_robot import Push, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 _CELLS = 96  # per run, for the search of the window
 _SHORTEST = 0.1  # s: what is shorter is a blow or a fault of the record
 _FINER = (1.35, 1.15, 1.06, 1.02)
+_LEAST = 1.0  # N: the weight of a cup; friction of a gear is a hundred times that at the tip
 _LONGEST = 0.5  # of the run; what lasts longer is no touch
 
 
@@ -92,6 +94,11 @@ class Contact(Effect):
         if inside.any():
             columns[inside] = _columns(signals, inside)
         return columns
+
+    def absurd(self, values: Array, seen: Seen) -> str:
+        """A touch that nobody feels is none."""
+        force = float(np.linalg.norm(values))
+        return f"a force of {force:.2g} N is no touch" if force < _LEAST else ""
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """Time: the touch begins and ends."""

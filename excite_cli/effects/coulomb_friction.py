@@ -14,7 +14,9 @@ class CoulombFriction(Effect):
     title: ClassVar = "Coulomb friction"
     signature: ClassVar = "the residual jumps when the joint reverses and is flat in between"
     function_of: ClassVar = ("speed",)
-    parameters: ClassVar = (Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True),)
+    parameters: ClassVar = (
+        Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),
+    )
     surprise: ClassVar = 0.0  # every joint has it
     tier: ClassVar = Tier.EVERY_ROBOT
     usual: ClassVar = True

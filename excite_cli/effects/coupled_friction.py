@@ -31,7 +31,7 @@ class CoupledFriction(Effect):
     scope: ClassVar[Scope] = "pair"
     parameters: ClassVar = (
         Parameter("viscous", "N·m·s/rad", 0.1, 100.0, nonnegative=True),
-        Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True),
+        Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),
     )
     shapes: ClassVar = (Parameter("direction", "1", -1.0, 1.0),)
     defaults: ClassVar[Mapping[str, float]] = {"direction": 1.0}

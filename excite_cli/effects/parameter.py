@@ -13,8 +13,9 @@ Range = tuple[float, float]
 class Parameter:
     """A parameter: name, unit, and the range of sizes that is usual for a robot arm.
 
-    `believed`: outside of it no fit is believed, however good; for sizes that do not depend on how
-    large the robot is. `believed_early` takes its place in the first passes of a diagnosis.
+    `believed`: outside of it no fit is believed, however good, for the reason `because`; for sizes
+    that do not depend on how large the robot is. `believed_early` takes its place in the first
+    passes of a diagnosis. `part_of_torque`: more than the largest torque of its joint is absurd.
     """
 
     name: str
@@ -24,6 +25,8 @@ class Parameter:
     nonnegative: bool = False
     believed: Range | None = None
     believed_early: Range | None = None
+    because: str = ""
+    part_of_torque: bool = False
 
     def allows(self, value: float, early: bool) -> bool:
         """Whether a fitted value can be so, in an `early` pass or a later one."""
@@ -32,6 +35,23 @@ class Parameter:
         limits = self.believed_early if early and self.believed_early else self.believed
         return limits is None or limits[0] <= value <= limits[1]
 
+    def why_not(self, value: float) -> str:
+        """Why no fit with this value is believed; empty if it may be."""
+        if self.nonnegative and value < 0:
+            return f"{self.name} of {value:.3g} {self.unit} cannot be negative"
+        if not self.allows(value, early=False):
+            return f"{self.name} of {value:.3g} {self.unit}: {self.because or 'out of range'}"
+        return ""
+
+    def absurd(self, value: float, torque: float) -> str:
+        """Why it is too large for a joint whose largest torque [N·m] is this; empty if not."""
+        if not self.part_of_torque or abs(value) <= torque:
+            return ""
+        return (
+            f"{self.name} of {value:.3g} {self.unit} is more than the largest torque of its joint, "
+            f"{torque:.3g} N·m"
+        )
+
 
 def whole_share(name: str) -> Parameter:
     """A share of something that is either taken away or not: one by nature.
@@ -39,8 +59,9 @@ def whole_share(name: str) -> Parameter:
     In early passes torque that is cut or missing takes part in the fit of what it is a share of.
     """
     return Parameter(
-        name, "1", 0.3, 1.5, nonnegative=True, believed=(0.6, 1.5), believed_early=(0.18, 6.0)
-    )
+        name, "1", 0.3, 1.5, nonnegative=True, believed=(0.6, 1.5), believed_early=(0.18, 6.0),
+        because="what is taken away is taken away wholly, so it is near 1",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

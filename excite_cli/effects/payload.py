@@ -1,7 +1,11 @@
-"""A body on the flange that the model does not have: the last body's ten columns of Y.
+"""A body that the model does not have, on a hand: ten columns of Y, those of the carrying body.
 
-The last body is that of the last moved joint. In runs that all carry it, it is absorbed by the last
-body's own parameters; it shows where some runs carry it and others do not.
+It is looked for on every leaf of the tree of moved joints. In runs that all carry it, it is
+absorbed by that body's own parameters; it shows where some runs carry it and others do not.
+
+Ten fitted numbers are those of no body as soon as an inertia is known worse than it is large. So
+they are judged by their χ² distance to the numbers that bodies have (`nearest_inertias`), and what
+is told are the nearest of these.
 """
 
 from collections.abc import Mapping
@@ -9,6 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from excite_cli.dynamics.nearest_inertias import half_of, nearest_inertias
+from excite_cli.dynamics.pseudo_inertia import moved, smallest_eigenvalues
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.effects.base import (
     Cotangents,
@@ -19,14 +25,22 @@ from excite_cli.effects.base import (
     Value,
     deviation,
 )
+from excite_cli.effects.seen import Seen
 from excite_cli.effects.simulated_robot import SimulatedRobot
-from excite_cli.robot.model import Array
+from excite_cli.robot.link_frame import LinkFrame, leaves
+from excite_cli.robot.model import Array, Robot
 
 _RADIUS = 0.05  # m, of the sphere that is planted
+_LENGTH = np.array([0.1])  # m, in which eigenvalues of inertias are told in kg
+_NOTHING = 2e-3  # of the robot's mass: its own screws are more
+_ROUNDING, _LIGHTEST = 1e-6, 1e-3  # of the mass; kg
 
 
 class Payload(Effect):
-    """Mass, first moments and inertia of an added body, about the last joint's frame."""
+    """Mass, first moments and inertia of an added body, about the frame of the joint it hangs on.
+
+    Files of earlier versions name all joints, and mean the last one.
+    """
 
     kind: ClassVar = "payload"
     title: ClassVar = "payload that the model does not have"
@@ -44,29 +58,71 @@ class Payload(Effect):
     per_run: ClassVar = True
     carried: ClassVar = True
     usual: ClassVar = True
+    size: ClassVar = ("mass",)
+    forgiven: ClassVar = 0.05  # it is seen by its weight; of its inertia, models know little
+
+    @classmethod
+    def places(cls, robot: Robot) -> list[tuple[int, ...]]:
+        """Every leaf."""
+        return [(j,) for j in leaves(robot)]
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
     ) -> None:
-        """The body that the last joint carries has more inertia."""
-        robot.phi[-PARAMETERS_PER_BODY:] += values
+        """The body that carries it has more inertia."""
+        robot.phi[self._ten(robot.robot.n, len(robot.phi))] += values
 
     def rows(self, n: int) -> tuple[int, ...]:
         """All joints."""
         return tuple(range(n))
 
     def columns(self, signals: Signals) -> Array:
-        """The last ten columns of Y, (T, n, 10)."""
-        return signals.body.regressor[:, :, -PARAMETERS_PER_BODY:]
+        """Ten columns of Y, (T, n, 10)."""
+        regressor = signals.body.regressor
+        return regressor[:, :, self._ten(regressor.shape[1], regressor.shape[2])]
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
-        """The weights, in the last ten columns of Y."""
+        """The weights, in the ten columns of Y."""
         back = np.zeros_like(signals.body.regressor)
-        back[:, :, -PARAMETERS_PER_BODY:] = weights
+        back[:, :, self._ten(back.shape[1], back.shape[2])] = weights
         return Cotangents(regressor=back)
 
+    def _ten(self, n: int, count: int) -> slice:
+        """Where φ, of `count` entries, has the body that carries it; moved bodies are the last."""
+        first = count + PARAMETERS_PER_BODY * (self.joints[-1] - n)
+        return slice(first, first + PARAMETERS_PER_BODY)
+
+    def seen_from(self, link: LinkFrame) -> Array:
+        """Mass, first moments and inertia about the link's frame."""
+        return moved(link.rotation, link.translation)
+
+    def possible(self, values: Array, early: bool) -> bool:
+        """Whether some body has these numbers."""
+        least = smallest_eigenvalues(values, _LENGTH)[0]
+        return bool(values[0] >= 0.0 and least >= -_ROUNDING * max(abs(values[0]), _LIGHTEST))
+
+    def why_not(self, values: Array) -> str:
+        """No body is so, and none near it."""
+        return f"no body has this mass ({values[0]:.3g} kg), centre and inertia, or nearly so"
+
+    def absurd(self, values: Array, seen: Seen) -> str:
+        """Nobody lets a robot carry more than it weighs, or notices what weighs next to nothing."""
+        mass = float(values[0])
+        if mass > seen.mass:
+            return f"mass of {mass:.3g} kg is more than the robot's own {seen.mass:.3g} kg"
+        if mass < _NOTHING * seen.mass:
+            return f"mass of {mass:.2g} kg is next to nothing beside {seen.mass:.3g} kg of robot"
+        return ""
+
+    def nearest(self, values: Array, covariance: Array) -> Array:
+        """Those of the body nearest to `values`."""
+        margin = _ROUNDING * max(abs(float(values[0])), _LIGHTEST)
+        back, no_signs = half_of(covariance), np.zeros(0, dtype=np.intp)
+        found = nearest_inertias(back, values, _LENGTH, no_signs, margin)
+        return found.x if found.solved else values
+
     def report(self, values: Array, covariance: Array) -> dict[str, Value]:
-        """Also the centre of mass `cx, cy, cz` in the last joint's frame."""
+        """Also the centre of mass `cx, cy, cz` in the joint's frame."""
         found = super().report(values, covariance)
         mass = float(values[0])
         if mass != 0.0:

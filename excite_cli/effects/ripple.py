@@ -46,8 +46,8 @@ class Ripple(Effect):
     signature: ClassVar = "the residual repeats at the same angles, in both directions of travel"
     function_of: ClassVar = ("position",)
     parameters: ClassVar = (
-        Parameter("cos", "N·m", 0.02, 20.0),
-        Parameter("sin", "N·m", 0.02, 20.0),
+        Parameter("cos", "N·m", 0.02, 20.0, part_of_torque=True),
+        Parameter("sin", "N·m", 0.02, 20.0, part_of_torque=True),
     )
     shapes: ClassVar = (Parameter("periods", "1/turn", 1.0, _MOST),)
     defaults: ClassVar[Mapping[str, float]] = {"periods": 20.0}

@@ -13,6 +13,7 @@ class Spring(Effect):
     """τ_j = stiffness · q_j + preload; the spring rests at q_0 = −preload/stiffness."""
 
     kind: ClassVar = "spring"
+    size: ClassVar = ("stiffness",)
     title: ClassVar = "spring at the joint"
     signature: ClassVar = "the residual is a straight line over the joint's angle"
     function_of: ClassVar = ("position",)

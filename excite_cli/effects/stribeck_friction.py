@@ -20,7 +20,9 @@ class StribeckFriction(Effect):
     title: ClassVar = "Stribeck friction"
     signature: ClassVar = "friction is highest just after a reversal and falls with speed"
     function_of: ClassVar = ("speed",)
-    parameters: ClassVar = (Parameter("excess", "N·m", 0.05, 100.0, nonnegative=True),)
+    parameters: ClassVar = (
+        Parameter("excess", "N·m", 0.05, 100.0, nonnegative=True, part_of_torque=True),
+    )
     shapes: ClassVar = (Parameter("stribeck_speed", "rad/s", _LEAST_SPEED, 1.0),)
     defaults: ClassVar = {"stribeck_speed": 0.1}
     surprise: ClassVar = 2.0

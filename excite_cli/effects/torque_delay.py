@@ -13,6 +13,7 @@ from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Sco
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
+_MISSED = 3e-3  # of the delay, one standard deviation; measured on simulated arms
 _SHORTEST_ALONE = 1.5e-3  # s
 
 
@@ -24,7 +25,12 @@ class TorqueDelay(Effect):
     signature: ClassVar = "the residual is the torque's rate of change, on all joints alike"
     function_of: ClassVar = ("load",)
     scope: ClassVar[Scope] = "robot"
-    parameters: ClassVar = (Parameter("delay", "s", 5e-4, 0.1, believed=(-0.1, 0.1)),)
+    parameters: ClassVar = (
+        Parameter(
+            "delay", "s", 5e-4, 0.1, believed=(-0.1, 0.1),
+            because="no controller closes its loop with more than 0.1 s",
+        ),
+    )  # fmt: skip
     data_defect: ClassVar = True
 
     @classmethod
@@ -37,6 +43,10 @@ class TorqueDelay(Effect):
         """Of one joint alone, less than a moment is friction that lags a little."""
         alone = len(self.joints) == 1
         return super().possible(values, early) and not (alone and values[0] < _SHORTEST_ALONE)
+
+    def model_error(self, values: Array) -> Array:
+        """What the second order makes of it."""
+        return _MISSED * np.abs(values)
 
     def leftover(self, values: Array) -> float:
         """Of a delay the columns are the first order only."""

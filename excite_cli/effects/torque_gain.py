@@ -21,7 +21,12 @@ class TorqueGain(Effect):
     title: ClassVar = "wrong gain of the measured torque"
     signature: ClassVar = "the residual has the shape of the torque itself"
     function_of: ClassVar = ("load",)
-    parameters: ClassVar = (Parameter("gain", "1", 0.005, 0.5, believed=(-0.5, 0.5)),)
+    parameters: ClassVar = (
+        Parameter(
+            "gain", "1", 0.005, 0.5, believed=(-0.5, 0.5),
+            because="half of the torque is no wrong constant but another unit or gear ratio",
+        ),
+    )  # fmt: skip
     data_defect: ClassVar = True
     usual: ClassVar = True
     changes_between_runs: ClassVar = True

@@ -16,7 +16,7 @@ class TorqueOffset(Effect):
     kind: ClassVar = "torque_offset"
     title: ClassVar = "offset of the measured torque"
     signature: ClassVar = "the residual is the same wherever the joint is and however it moves"
-    parameters: ClassVar = (Parameter("offset", "N·m", 0.05, 50.0),)
+    parameters: ClassVar = (Parameter("offset", "N·m", 0.05, 50.0, part_of_torque=True),)
     data_defect: ClassVar = True
     surprise: ClassVar = 1.0
     usual: ClassVar = True

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from excite_cli.dynamics.pseudo_inertia import smallest_eigenvalues
 from excite_cli.dynamics.regressor import payload_parameters, standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.errors import RobotError
@@ -24,7 +25,6 @@ from excite_cli.export.exported import (
     ten_as_body,
     vector,
 )
-from excite_cli.identification.pseudo_inertia import smallest_eigenvalues
 from excite_cli.robot.model import Array, Robot
 
 _INERTIA = (

@@ -6,25 +6,23 @@
 R, z are the triangular factor of the regression in units of its noise, the second term is the
 prior. Unknowns are scaled by the prior, then turned by the factor T of the whole least-squares
 term, w = T u − d, so that the objective is ‖w‖² and its minimum without constraints is w = 0.
-Solved as a semidefinite program (Sousa & Cortesão 2014; Wensing, Kim & Slotine 2018) by Clarabel.
+That is `nearest_inertias`.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.sparse import csc_matrix, eye
 
 from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.nearest_inertias import nearest_inertias
+from excite_cli.dynamics.pseudo_inertia import smallest_eigenvalues
 from excite_cli.identification.factors import Mask, triangle_of
 from excite_cli.identification.prior import InertialPrior
-from excite_cli.identification.pseudo_inertia import scaled_basis, smallest_eigenvalues
 from excite_cli.robot.model import Array
 
 # Least eigenvalue required, as a share of the mean mass of a body.
 _MARGIN = 1e-6
-_ROOT2 = float(np.sqrt(2.0))
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,11 @@ def consistent_parameters(
     turned, d = _turned(objective, target)
     scale = np.concatenate([prior.std, effect_scale])
     center = np.concatenate([prior.mean, np.zeros(k)])
-    x, status, solved = _solve(turned, d, scale, center, lengths, nonnegative)
+    back = solve_triangular(turned, np.eye(len(scale))) * scale[:, None]
+    margin = _MARGIN * max(float(np.abs(center[:count:10]).mean()), 1e-6)
+    signs = np.flatnonzero(nonnegative) + count
+    nearest = nearest_inertias(back, center + back @ d, lengths, signs, margin)
+    x = nearest.x
     free = np.linalg.lstsq(triangle, right, rcond=None)[0]
     at = np.concatenate([base.mapping @ x[:count], x[count:]])
     missed = [np.square(triangle @ point - right).sum() for point in (at, free)]
@@ -83,8 +85,8 @@ def consistent_parameters(
         effects=x[count:],
         eigenvalues=smallest_eigenvalues(x[:count], lengths),
         cost=float(missed[0] - missed[1]),
-        status=status,
-        solved=solved,
+        status=nearest.status,
+        solved=nearest.solved,
     )
 
 
@@ -98,67 +100,3 @@ def _turned(objective: Array, target: Array) -> tuple[Array, Array]:
     triangle = triangle_of(np.column_stack([objective, target]))
     size = objective.shape[1]
     return triangle[:size, :size], triangle[:size, size]
-
-
-def _solve(
-    turned: Array, d: Array, scale: Array, center: Array, lengths: Array, nonnegative: Mask
-) -> tuple[Array, str, bool]:
-    """x = center + scale ∘ T⁻¹(w + d), w of least norm within the cones."""
-    size, k, bodies = len(scale), len(nonnegative), len(lengths)
-    back = solve_triangular(turned, np.eye(size)) * scale[:, None]
-    start = center + back @ d
-    margin = _MARGIN * max(float(np.abs(center[: 10 * bodies : 10]).mean()), 1e-6)
-    signs = np.flatnonzero(nonnegative) + 10 * bodies
-    if not _broken(start, lengths, signs, margin, 10 * bodies):
-        return start, "no constraint is active", True
-    rows = [-_unit(back[signs])[0]]
-    bounds = [start[signs] * _unit(back[signs])[1]]
-    for b in range(bodies):
-        of_body = slice(10 * b, 10 * b + 10)
-        vector = _triangle_vectors(scaled_basis(lengths[b]))
-        rows.append(-vector.T @ back[of_body])
-        bounds.append(vector.T @ start[of_body] - margin * _triangle_vectors(np.eye(4)[None])[0])
-    import clarabel
-
-    cones: list[object] = [clarabel.NonnegativeConeT(len(signs))] if len(signs) else []
-    cones += [clarabel.PSDTriangleConeT(4)] * bodies
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.max_iter = 200
-    solver = clarabel.DefaultSolver(
-        csc_matrix(eye(size)),
-        np.zeros(size),
-        csc_matrix(np.vstack(rows)),
-        np.concatenate(bounds),
-        cones,
-        settings,
-    )
-    found = solver.solve()
-    status = str(found.status)
-    x = start + back @ np.asarray(found.x)
-    if k:  # a zero is a zero, not -1e-12
-        x[signs] = np.maximum(x[signs], 0.0)
-    solved = status in ("Solved", "AlmostSolved")
-    eigenvalues = smallest_eigenvalues(x[: 10 * bodies], lengths)
-    if solved and eigenvalues.min() <= 0:
-        return x, f"{status}, but a body is left with a negative eigenvalue", False
-    return x, status, solved
-
-
-def _broken(x: Array, lengths: Array, signs: NDArray[np.intp], margin: float, count: int) -> bool:
-    if (x[signs] < 0).any():
-        return True
-    return bool(smallest_eigenvalues(x[:count], lengths).min() < margin)
-
-
-def _unit(rows: Array) -> tuple[Array, Array]:
-    """Rows of unit norm, and what they were divided by, inverted."""
-    norms = np.linalg.norm(rows, axis=1)
-    factor = 1.0 / np.where(norms > 0, norms, 1.0)
-    return rows * factor[:, None], factor
-
-
-def _triangle_vectors(matrices: Array) -> Array:
-    """Upper triangles (…, 10) column by column, off-diagonal entries times √2."""
-    columns, rows = np.tril_indices(4)
-    return matrices[..., rows, columns] * np.where(rows == columns, 1.0, _ROOT2)

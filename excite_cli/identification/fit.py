@@ -13,6 +13,7 @@ import numpy as np
 
 from excite_cli.config.data_spec import IdentificationSpec
 from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.effects.base import Effect, Parameter, Signals, Value
 from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
@@ -21,7 +22,6 @@ from excite_cli.identification.essential import essential_parameters
 from excite_cli.identification.factors import Mask, solve
 from excite_cli.identification.least_squares import LinearFit, fit_rows
 from excite_cli.identification.prior import InertialPrior, inertial_prior
-from excite_cli.identification.pseudo_inertia import body_lengths
 from excite_cli.identification.regression import (
     Regression,
     RunColumns,

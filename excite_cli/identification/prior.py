@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.identification.pseudo_inertia import body_lengths
+from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.robot.model import Array, Robot
 
 # Floors: of m in shares of the mean mass, of the others in shares of m ℓ and m ℓ².

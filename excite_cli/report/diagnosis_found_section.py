@@ -110,7 +110,7 @@ def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:
         title_of(named.effect.kind),
         place_in_words(named.effect, everything),
         "; ".join(value_in_words(name, value) for name, value in named.parameters.items()),
-        p_in_words(named.p_value),
+        p_in_words(named.p_value, named.least_p),
         f"{named.share_of_residual:.2%}",
         f"{named.gain:.1%}",
         others or "–",

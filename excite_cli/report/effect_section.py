@@ -99,8 +99,9 @@ def _capital(text: str) -> str:
 def _caption(found: Diagnosis, named: NamedEffect) -> str:
     values = "; ".join(value_in_words(name, value) for name, value in named.parameters.items())
     text = (
-        f"{values}. p {p_in_words(named.p_value)}; explains {named.share_of_residual:.2%} of the "
-        f"residual; lowers the error on runs left out by {named.gain:.1%}."
+        f"{values}. p {p_in_words(named.p_value, named.least_p)}; explains "
+        f"{named.share_of_residual:.2%} of the residual; "
+        f"lowers the error on runs left out by {named.gain:.1%}."
     )
     if _has_a_line(found, named):
         line = " and ".join(map(title_of, _deviates_from(named)))

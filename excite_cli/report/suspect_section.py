@@ -34,10 +34,10 @@ def _round(found: Diagnosis, each: Round) -> Table:
         (
             title_of(suspect.effect.kind),
             place_in_words(suspect.effect, joints),
-            p_in_words(suspect.p_value),
+            p_in_words(suspect.p_value, suspect.least_p),
             f"{suspect.share_of_residual:.1%}",
             f"{suspect.gain:.1%}",
-            suspect.verdict,
+            f"{suspect.verdict}: {suspect.why}" if suspect.why else suspect.verdict,
         )
         for suspect in each.suspects
     )

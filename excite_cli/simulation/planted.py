@@ -2,7 +2,7 @@
 
 `kind@joint[,joint…]=value[,name:value…][;runs:name|name]`, for example
 `coulomb_friction@elbow_joint=4`, `stribeck_friction@j2=3,stribeck_speed:0.05` or
-`payload@all=1.5;runs:motion_2`.
+`payload@gripper_link=1.5;runs:motion_2`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,6 +13,7 @@ import numpy as np
 
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
+from excite_cli.effects.placing import places_named
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.robot.model import Array, Robot
 
@@ -98,7 +99,8 @@ def parse_planted(
     kind = kind_named(kind_name.strip(), where)
     value, others = _numbers(numbers, kind, where)
     chosen = _runs(clauses, takes, where)
-    places = _places(joints_text, kind, robot, where)
+    names = [name.strip() for name in joints_text.split(",")]
+    places = places_named(kind, names, robot, where)
     return tuple(plant(kind, joints, value, others, chosen) for joints in places)
 
 
@@ -162,24 +164,3 @@ def _runs(
                 )
             chosen += known[name]
     return tuple(dict.fromkeys(chosen))
-
-
-def _places(text: str, kind: type[Effect], robot: Robot, where: str) -> list[tuple[int, ...]]:
-    everything = tuple(range(robot.n))
-    names = [name.strip() for name in text.split(",")]
-    if names == ["all"]:
-        if kind.scope == "pair":
-            return kind.places(robot)
-        return [(j,) for j in everything] if kind.scope == "joint" else [everything]
-    for name in names:
-        if name not in robot.joint_names:
-            raise ConfigError(
-                f"{where}: no moved joint '{name}'.{nearest(name, robot.joint_names)} "
-                f"Moved joints: {', '.join(robot.joint_names)}; or 'all'."
-            )
-    joints = tuple(dict.fromkeys(robot.joint_names.index(name) for name in names))
-    if kind.scope == "joint":
-        return [(j,) for j in joints]
-    if kind.scope == "pair" and len(joints) != 2:
-        raise ConfigError(f"{where}: {kind.kind} acts on two joints; name exactly two.")
-    return [joints]

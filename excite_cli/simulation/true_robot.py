@@ -7,6 +7,7 @@ mass gives: if P ⪰ 0, so is L P Lᵀ.
 
 import numpy as np
 
+from excite_cli.dynamics.pseudo_inertia import pseudo_inertias, ten_parameters
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.robot.model import Array, Robot
 
@@ -36,29 +37,10 @@ def _changed(ten: Array, error: float, rng: np.random.Generator) -> Array:
     mass = float(ten[0])
     if mass <= _LEAST_MASS:
         return np.array(ten)
-    pseudo = pseudo_inertia(ten)
+    pseudo = pseudo_inertias(ten)[0]
     lever = ten[1:4] / mass
     spread = np.sqrt(max(np.trace(pseudo[:3, :3]) / mass - lever @ lever, 0.0))
     change = np.eye(4)
     change[:3, :3] += stretch
     change[:3, 3] = _LEVER_SHARE * error * spread * direction / np.linalg.norm(direction)
     return max(scale, 0.05) * ten_parameters(change @ pseudo @ change.T)
-
-
-def pseudo_inertia(ten: Array) -> Array:
-    """P (4, 4) of ten standard parameters."""
-    mass, first = ten[0], ten[1:4]
-    ixx, ixy, iyy, ixz, iyz, izz = ten[4:]
-    inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    return np.block([[second, first[:, None]], [first[None, :], np.array([[mass]])]])
-
-
-def ten_parameters(pseudo: Array) -> Array:
-    """Ten standard parameters of P (4, 4)."""
-    second = pseudo[:3, :3]
-    inertia = np.trace(second) * np.eye(3) - second
-    lower = np.array(
-        [inertia[0, 0], inertia[0, 1], inertia[1, 1], inertia[0, 2], inertia[1, 2], inertia[2, 2]]
-    )
-    return np.concatenate([[pseudo[3, 3]], pseudo[:3, 3], lower])

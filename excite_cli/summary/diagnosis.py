@@ -96,10 +96,10 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
         (
             suspect.effect.kind,
             place_in_words(suspect.effect, len(found.joint_names)),
-            p_in_words(suspect.p_value),
+            p_in_words(suspect.p_value, suspect.least_p),
             f"{suspect.share_of_residual:.1%}",
             f"{suspect.gain:.1%}",
-            suspect.verdict,
+            f"{suspect.verdict}: {suspect.why}" if suspect.why else suspect.verdict,
         )
         for suspect in each.suspects
     )
@@ -136,7 +136,7 @@ def _effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) 
             named.effect.kind,
             place_in_words(named.effect, everything),
             "\n".join(value_in_words(name, value) for name, value in named.parameters.items()),
-            *([p_in_words(named.p_value)] if verbose else []),
+            *([p_in_words(named.p_value, named.least_p)] if verbose else []),
             f"{named.share_of_residual:.2%}",
         )
         for named in shown
@@ -285,6 +285,7 @@ def _named(named: NamedEffect, runs: list[str]) -> dict[str, Any]:
     return {
         "kind": named.effect.kind,
         "joints": list(named.effect.joints),
+        **({"link": named.effect.link} if named.effect.link else {}),
         "parameters": {name: asdict(value) for name, value in named.parameters.items()},
         "p_value": named.p_value,
         "share_of_residual": named.share_of_residual,

@@ -10,11 +10,13 @@ from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.diagnosis.records import Approximation, Unexplained
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import FIXED, FOLDS, anything, prepared
 
@@ -50,8 +52,9 @@ def traced(
     plain = data.evidence(candidates, ONE)
     judge = Judgement(plain, plain, candidates, Rules(0.01, 0.01), allowed)
     return Traced(
-        data, tuple(candidates), ONE, judge, tuple(chosen), np.zeros(0), (), np.ones(2), 1.0
-    )
+        data, tuple(candidates), ONE, judge, tuple(chosen), np.zeros(0), (), np.ones(2), 1.0,
+        PossibleSizes(candidates, False, plain.covariance, Seen(np.ones(2), np.ones(2), 1.0)),
+    )  # fmt: skip
 
 
 def planted(

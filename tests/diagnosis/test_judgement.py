@@ -11,11 +11,12 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Gain
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.possible_sizes import possible_sizes
+from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
+from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import (
     FIXED,
@@ -30,6 +31,7 @@ from tests.diagnosis.explicit_data import (
     rows_of,
 )
 
+LARGE = Seen(np.full(2, 1e12), np.zeros(2), 1e12)
 SAMPLES = 50
 TOTAL = SAMPLES * len(FOLDS)
 RULES = Rules(0.01, 0.01)
@@ -78,7 +80,8 @@ def judge_of(
 ) -> Judgement:
     """Samples are independent and of unit noise; sizes are those that are possible."""
     plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
-    veto = possible_sizes(candidates, False) if allowed is None else allowed
+    sizes = PossibleSizes(candidates, False, spread_of(plain.covariance, 1.0), LARGE)
+    veto = sizes if allowed is None else allowed
     return Judgement(plain, plain, candidates, rules, veto)
 
 

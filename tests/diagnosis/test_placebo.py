@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
-from excite_cli.diagnosis.placebo import inflation_of, placebo_gains
+from excite_cli.diagnosis.placebo import placebo_gains, placebos_of
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.viscous_friction import ViscousFriction
 from tests.diagnosis.explicit_data import FIXED, prepared
@@ -40,7 +40,7 @@ def data_with_memory(memory: float, seed: int = 0) -> tuple[TrainingData, list[C
 
 def inflation(data: TrainingData, candidates: list[Candidate], noise: NoiseModel) -> float:
     white = data.evidence(candidates, noise)
-    return inflation_of(data, candidates, (), noise, white)
+    return placebos_of(data, candidates, (), noise, white).inflation
 
 
 def fitted(data: TrainingData) -> NoiseModel:
@@ -84,9 +84,9 @@ def test_an_effect_that_is_in_the_model_is_not_in_the_residual() -> None:
     data = replace(data, tau=strong)
     noise = NoiseModel.white(np.ones(2))
     white = data.evidence(candidates, noise)
-    without = inflation_of(data, candidates, (), noise, white)
+    without = placebos_of(data, candidates, (), noise, white).inflation
     assert without > 50
-    assert inflation_of(data, candidates, (0,), noise, white) < 1.7
+    assert placebos_of(data, candidates, (0,), noise, white).inflation < 1.7
 
 
 def test_few_placebos_say_nothing() -> None:

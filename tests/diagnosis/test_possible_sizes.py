@@ -6,10 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.possible_sizes import possible_sizes
+from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.effects.payload import Payload
+from excite_cli.effects.seen import Seen
 
+# A robot on which no size is absurd.
+LARGE = Seen(np.full(2, 1e12), np.zeros(2), 40.0)
 NONNEGATIVE = (
     "viscous_friction", "coulomb_friction", "nonlinear_viscous_friction", "stribeck_friction",
     "load_dependent_friction", "armature", "elasticity",
@@ -17,7 +21,7 @@ NONNEGATIVE = (
 # Of those with several parameters, which cannot be negative.
 SOME_NONNEGATIVE = {
     "asymmetric_friction": (0, 1), "coupled_friction": (0, 1), "spring": (0,),
-    "payload": (0, 4, 6, 9), "ripple": (), "cable_force": (), "friction_drift": (), "contact": (),
+    "ripple": (), "cable_force": (), "friction_drift": (), "contact": (),
 }  # fmt: skip
 WHOLE = ("torque_saturation", "backlash")
 # Candidates of 1, 2, 10, 1 and 3 columns, and values with which each is possible.
@@ -30,10 +34,19 @@ def candidate(kind: str, joints: tuple[int, ...] = (0,)) -> Candidate:
 
 
 def possible(
-    kind: str, *values: float, joints: tuple[int, ...] = (0,), early: bool = False
+    kind: str,
+    *values: float,
+    joints: tuple[int, ...] = (0,),
+    early: bool = False,
+    error: float = 1e-15,
+    seen: Seen = LARGE,
 ) -> bool:
-    """Whether the candidate may be so, beside three parameters of the declared model."""
-    allowed = possible_sizes([candidate(kind, joints)], early)
+    """Whether the candidate may be so, beside three parameters of the declared model.
+
+    All parameters have this standard `error`.
+    """
+    spread = error**2 * np.eye(3 + len(values))
+    allowed = PossibleSizes([candidate(kind, joints)], early, lambda _: spread, seen)
     return allowed(np.array([-1.0, -1e9, 7.0, *values]), [0], [0])
 
 
@@ -43,6 +56,56 @@ def test_friction_and_inertia_are_never_negative(kind: str) -> None:
     assert possible(kind, 0.0)
     assert possible(kind, 1e9)  # how large depends on the robot
     assert not possible(kind, -1e-9)
+
+
+@pytest.mark.parametrize("kind", NONNEGATIVE)
+def test_a_sign_that_may_be_the_error_of_the_fit_is_no_reason(kind: str) -> None:
+    assert possible(kind, -0.1, error=1.0)
+    assert possible(kind, -2.3, error=1.0)
+    assert not possible(kind, -2.4, error=1.0)
+
+
+def test_a_payload_is_refused_where_no_body_is_near() -> None:
+    """The inertia of a real one of 2.7 kg came out at -0.007 kg·m², a third of one deviation."""
+    _, sphere = Payload.planted(2.7, {})
+    flat = sphere.copy()
+    flat[4] = -0.007
+    assert possible("payload", *sphere)
+    assert possible("payload", *flat, error=0.02)
+    assert possible("payload", *flat, error=1e-5)  # what it explains is its weight
+    assert not possible("payload", -2.7, *sphere[1:], error=0.1)
+    plate = [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 5.0]  # no sign is wrong
+    assert not possible("payload", *plate, error=0.01)
+    assert possible("payload", *plate, error=2.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [("coulomb_friction", 1.0), ("stribeck_friction", 1.0), ("torque_offset", -1.0)],
+)
+def test_no_part_of_a_torque_is_larger_than_the_torque(kind: str, value: float) -> None:
+    robot = Seen(np.array([80.0, 1e6]), np.ones(2), 30.0)
+    assert possible(kind, 79.9 * value, seen=robot)
+    assert not possible(kind, 80.1 * value, seen=robot)
+
+
+def test_absurd_sizes_are_told_with_their_reason() -> None:
+    robot = Seen(np.full(2, 80.0), np.array([20.0, 1.0]), 30.0)
+    _, heavy = Payload.planted(31.0, {})
+    for kind, values, words in (
+        ("payload", heavy / 1e3, "next to nothing"),
+        ("payload", heavy, "more than the robot's own 30 kg"),
+        ("contact", np.array([3e-3, 0.0, 0.0]), "no touch"),
+        ("elasticity", np.array([1.0 / 54.0]), "54 N·m/rad would bend by 0.37 rad"),
+        ("stribeck_friction", np.array([243.0]), "more than the largest torque"),
+        ("base_tilt", np.array([0.3, 0.0]), "nobody overlooks"),
+        ("viscous_friction", np.array([-3.0]), "cannot be negative"),
+    ):
+        spread = 1e-20 * np.eye(len(values))
+        judge = PossibleSizes([candidate(kind)], False, lambda _, s=spread: s, robot)
+        assert words in judge.why_not(values, [0], [0])
+    assert possible("elasticity", 1e-3, seen=robot)
+    assert possible("contact", 3.0, 0.0, 0.0, seen=robot)
 
 
 @pytest.mark.parametrize("kind", SOME_NONNEGATIVE)
@@ -117,8 +180,11 @@ def test_only_the_added_are_judged_each_by_its_own_parameters(
     added = [i for i in chosen if i in some]
     wrong = data.draw(st.sampled_from(chosen))
     values = {i: np.full(candidates[i].width, 0.1) for i in chosen}
+    if 2 in values:
+        values[2] = Payload.planted(0.1, {})[1]
     declared = np.full(data.draw(st.integers(0, 4)), -5.0)
-    allowed = possible_sizes(candidates, False)
+    spread = 1e-30 * np.eye(100)
+    allowed = PossibleSizes(candidates, False, lambda _: spread, LARGE)
     assert allowed(np.concatenate([declared, *(values[i] for i in chosen)]), chosen, added)
     # Impossible for friction and for an encoder, but not for the force of a cable.
     values[wrong][0] = -5.0

@@ -11,13 +11,15 @@ from scipy.stats import chi2
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.possible_sizes import possible_sizes
+from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
+from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import FIXED, FOLDS, Rows, anything, effect, prepared, rows_of
 
+LARGE = Seen(np.full(2, 1e12), np.zeros(2), 1e12)
 SAMPLES = 40
 ONE = NoiseModel.white(np.ones(2))
 NO_VETO = Rules(0.01, -1.0)
@@ -61,7 +63,8 @@ def search(
     most: int = 80,
 ) -> set[int]:
     evidence = data.evidence(candidates, ONE)
-    allowed = possible_sizes(candidates, False) if signs else anything
+    sizes = PossibleSizes(candidates, False, spread_of(evidence.covariance, 1.0), LARGE)
+    allowed = sizes if signs else anything
     found = Search(Judgement(evidence, evidence, candidates, rules, allowed), most).run()
     assert len(found) == len(set(found))
     return set(found)
@@ -210,8 +213,9 @@ def test_an_impossible_sign_is_never_chosen(sign: float) -> None:
 def test_all_that_is_chosen_has_a_possible_sign_beside_all_others(seed: int) -> None:
     data, candidates = random_case(LOCAL_AND_COHERENT, seed, 0.1)
     found = sorted(search(data, candidates, signs=True))
-    values = data.evidence(candidates, ONE).solve(found)
-    assert possible_sizes(candidates, False)(values, found, found)
+    evidence = data.evidence(candidates, ONE)
+    sizes = PossibleSizes(candidates, False, spread_of(evidence.covariance, 1.0), LARGE)
+    assert sizes(evidence.solve(found), found, found)
 
 
 @pytest.mark.parametrize("most", [0, 1, 2, 3])

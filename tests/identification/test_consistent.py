@@ -5,15 +5,15 @@ import pytest
 from scipy.optimize import minimize
 
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
-from excite_cli.dynamics.regressor import Regressor, standard_parameters
-from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
-from excite_cli.identification.prior import InertialPrior, inertial_prior
-from excite_cli.identification.pseudo_inertia import (
+from excite_cli.dynamics.pseudo_inertia import (
     BASIS,
     body_lengths,
     pseudo_inertias,
     smallest_eigenvalues,
 )
+from excite_cli.dynamics.regressor import Regressor, standard_parameters
+from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
+from excite_cli.identification.prior import InertialPrior, inertial_prior
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.true_robot import true_inertias
 from tests.robot.random_robots import random_robot

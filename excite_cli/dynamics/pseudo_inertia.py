@@ -35,6 +35,24 @@ def pseudo_inertias(phi: Array) -> Array:
     return np.einsum("bi,ijk->bjk", phi.reshape(-1, 10), BASIS)
 
 
+def ten_parameters(pseudo: Array) -> Array:
+    """Ten standard parameters of J (4, 4)."""
+    second = pseudo[:3, :3]
+    inertia = np.trace(second) * np.eye(3) - second
+    at = [inertia[row, column] for row, column in _INERTIA_AT]
+    return np.array([pseudo[3, 3], *pseudo[:3, 3], *at])
+
+
+def moved(rotation: Array, translation: Array) -> Array:
+    """Matrix (10, 10) that turns standard parameters about a frame into those about another.
+
+    The other stands there at `rotation` (3, 3) and `translation` (3,) [m].
+    """
+    change = np.eye(4)
+    change[:3, :3], change[:3, 3] = rotation.T, -rotation.T @ translation
+    return np.stack([ten_parameters(change @ one @ change.T) for one in BASIS], axis=1)
+
+
 def scaled_basis(length: float) -> Array:
     """∂(D J D)/∂φ (10, 4, 4) of a body of this length [m]."""
     d = np.array([1.0 / length] * 3 + [1.0])

@@ -1,0 +1,79 @@
+"""The fit that is told: robust, of possible sizes, and without names that mean nothing.
+
+What a search has named is fitted once more (`robust_solve`), with standard deviations that respect
+serial correlation and what the columns of first-order effects leave. Sizes that no effect can have
+are moved to the nearest possible ones, all other parameters with them as the covariance says. A
+name whose size is within two standard deviations of zero goes, the weakest first, and the others
+are judged anew.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from excite_cli.diagnosis.correlated_covariance import covariance_of
+from excite_cli.diagnosis.friction_line import friction_lines
+from excite_cli.diagnosis.robust_fit import robust_solve
+from excite_cli.diagnosis.search import Search
+from excite_cli.diagnosis.tracing import Traced
+from excite_cli.dynamics.nearest_inertias import half_of
+from excite_cli.robot.model import Array
+
+
+@dataclass(frozen=True)
+class FinalFit:
+    """What is `traced` and told, with `parameters` (k,) of the whole model and `covariance`."""
+
+    traced: Traced
+    parameters: Array
+    covariance: Array
+
+
+def final_fit(traced: Traced) -> FinalFit:
+    """Fit what was found, without what turns out to be insignificant."""
+    while True:
+        found = _fitted(traced)
+        sizes = _over_error(found)
+        weakest = min(sizes, key=lambda i: sizes[i], default=None)
+        if weakest is None or sizes[weakest] > 1.0:
+            return found
+        rest = [i for i in traced.chosen if i != weakest]
+        traced = replace(traced, chosen=tuple(Search(traced.judge).pruned(rest)))
+
+
+def _fitted(traced: Traced) -> FinalFit:
+    parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
+    covariance = covariance_of(
+        traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
+    )
+    for i, own in _places(traced, len(parameters)):
+        error = traced.candidates[i].effect.model_error(parameters[own])
+        covariance[own, own] += np.diag(error**2)
+    for i, own in _places(traced, len(parameters)):
+        effect, values = traced.candidates[i].effect, parameters[own]
+        if not effect.possible(values, early=False):
+            whiten = np.linalg.inv(half_of(covariance[own, own]))
+            shift = whiten.T @ (whiten @ (effect.nearest(values, covariance[own, own]) - values))
+            parameters = parameters + covariance[:, own] @ shift
+    return FinalFit(traced, parameters, covariance)
+
+
+def _over_error(found: FinalFit) -> dict[int, float]:
+    """Size over error of every effect that was found, as it is told."""
+    traced, count = found.traced, len(found.parameters)
+    start = count - sum(traced.candidates[i].width for i in traced.chosen)
+    lines = friction_lines(traced, start)
+    shown, spread = lines @ found.parameters, lines @ found.covariance @ lines.T
+    return {
+        i: traced.candidates[i].effect.over_error(shown[own], spread[own, own])
+        for i, own in _places(traced, count)
+    }
+
+
+def _places(traced: Traced, count: int) -> Iterator[tuple[int, slice]]:
+    """Chosen candidates, and where among all parameters theirs are."""
+    at = count - sum(traced.candidates[i].width for i in traced.chosen)
+    for i in traced.chosen:
+        yield i, slice(at, at + traced.candidates[i].width)
+        at += traced.candidates[i].width

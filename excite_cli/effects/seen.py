@@ -1,0 +1,17 @@
+"""How large the robot and its torques are, as the data show: what sizes of effects are held to."""
+
+from dataclasses import dataclass
+
+from excite_cli.robot.model import Array
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Of each moved joint (n,) [N·m]: the largest measured `torque`, and RMS of the rigid `load`.
+
+    `mass` of the robot [kg].
+    """
+
+    torque: Array
+    load: Array
+    mass: float

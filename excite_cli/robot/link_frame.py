@@ -1,0 +1,81 @@
+"""A link by its name: the moved joint that carries it, and its frame in that joint's."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from excite_cli.errors import ConfigError, nearest
+from excite_cli.robot.model import Array, Robot
+
+
+@dataclass(frozen=True, eq=False)
+class LinkFrame:
+    """Link `name` is carried by the moved `joint`, in whose frame it stands at a placement.
+
+    `rotation` (3, 3) and `translation` (3,) [m]: p_joint = rotation p_link + translation.
+    """
+
+    name: str
+    joint: int
+    rotation: Array
+    translation: Array
+
+    def point(self, of_joint: Array) -> Array:
+        """The same point, (3,) in the joint's frame, in the link's."""
+        return np.asarray(self.rotation.T @ (of_joint - self.translation))
+
+
+def link_frame(robot: Robot, link: str, where: str) -> LinkFrame:
+    """The link that `where` names.
+
+    Raises
+    ------
+    ConfigError
+        There is none, or it is fixed to what does not move.
+    """
+    frames = _links(robot)
+    if link not in frames:
+        raise ConfigError(
+            f"{where}: the robot has no link '{link}'.{nearest(link, frames)} "
+            f"Its links: {', '.join(sorted(frames))}."
+        )
+    frame = frames[link]
+    joint = int(frame.parentJoint) - _first(robot)
+    if joint < 0:
+        raise ConfigError(
+            f"{where}: no moved joint carries link '{link}', so its load shows in no torque. "
+            f"Links that are moved: {', '.join(sorted(n for n in frames if _moved(robot, n)))}."
+        )
+    placement = frame.placement
+    return LinkFrame(link, joint, np.array(placement.rotation), np.array(placement.translation))
+
+
+def own_link(robot: Robot, joint: int) -> LinkFrame:
+    """The link that stands in the frame of moved `joint`: the child of that joint."""
+    names = [
+        name
+        for name, frame in _links(robot).items()
+        if int(frame.parentJoint) - _first(robot) == joint and frame.placement.isIdentity()
+    ]
+    name = names[0] if names else robot.joint_names[joint]
+    return LinkFrame(name, joint, np.eye(3), np.zeros(3))
+
+
+def leaves(robot: Robot) -> tuple[int, ...]:
+    """Moved joints that carry no other moved joint."""
+    parents = {int(robot.model.parents[_first(robot) + j]) - _first(robot) for j in range(robot.n)}
+    return tuple(j for j in range(robot.n) if j not in parents)
+
+
+def _first(robot: Robot) -> int:
+    """Index of the first moved joint in Pinocchio's model."""
+    return int(robot.model.njoints) - robot.n
+
+
+def _links(robot: Robot) -> dict[str, pin.Frame]:
+    return {str(f.name): f for f in robot.model.frames if f.type == pin.FrameType.BODY}
+
+
+def _moved(robot: Robot, link: str) -> bool:
+    return int(_links(robot)[link].parentJoint) >= _first(robot)
