@@ -82,6 +82,7 @@ def diagnose(
     with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
     if with_ends.ends:
         parts = with_ends
+        del training, traced  # gigabytes, of large data: not beside the next ones
         training, processing, traced = _searched(model, spec, parts, progress)
     progress("naming", 8)
     final = final_fit(traced)

@@ -12,6 +12,7 @@ model has taken its part, z = G_cy − G_cS N⁻¹ G_Sy its product with the res
 energy that it explains: χ² distributed for unit noise if the candidate is not there.
 """
 
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -253,7 +254,9 @@ class Schur:
     """Candidates after projection off a model."""
 
     def __init__(self, evidence: Evidence, left: Array, cross: Array) -> None:
-        self.evidence, self.matrix, self.cross = evidence, left, cross
+        # The evidence keeps this: in a circle, both would outlive a pass, and so would all it has.
+        self.evidence: Evidence = weakref.proxy(evidence)
+        self.matrix, self.cross = left, cross
 
     def gain(self, *candidates: int, absorbed: float = ABSORBED) -> Gain:
         """χ², degrees of freedom and the largest share left of candidates taken together.
@@ -301,7 +304,7 @@ class Singles:
 
     def __init__(self, schur: Schur) -> None:
         e = schur.evidence
-        self._schur = schur
+        self._schur: Schur = weakref.proxy(schur)
         self._first = np.array([b[0] for b in e.blocks], dtype=int) - e.fixed
         self._single = np.array([len(b) == 1 for b in e.blocks])
         own = np.diag(e.total)[e.fixed : e.torque][self._first]

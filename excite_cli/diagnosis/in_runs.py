@@ -21,6 +21,7 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.declared_states import States, declared_sets
 from excite_cli.robot.model import Array, Robot
 
+_CHANGES = 3  # sets of runs in which one joint's friction, offset or gain may have changed
 _LOOKED_AT = 1000  # samples of a part, at most, from which the runs of an effect are told
 
 Runs = tuple[str, ...]
@@ -88,7 +89,7 @@ def changes(
     tests = len(places) * sets_looked_at(len(seen.trained))
     found: list[tuple[Effect, int]] = []
     for place in places:
-        told = _told(kind(place, {}), seen, False) if sets is None else sets
+        told = _told(kind(place, {}), seen, False, _CHANGES) if sets is None else sets
         for runs in told:
             rest = tuple(run for run in seen.trained if run not in runs)
             change = kind(place, {}, runs)
@@ -103,13 +104,13 @@ def changes(
     ]
 
 
-def _told(effect: Effect, seen: SeenRuns, positive: bool) -> list[Runs]:
+def _told(effect: Effect, seen: SeenRuns, positive: bool, most: int = MOST) -> list[Runs]:
     """The sets of runs that explain most."""
     trained = seen.trained
     if len(trained) < 2:
         return []
     found = seen.evidence(effect, [(run,) for run in trained], positive)
-    return [tuple(trained[k] for k in chosen) for chosen in run_sets(found)]
+    return [tuple(trained[k] for k in chosen) for chosen in run_sets(found, most)]
 
 
 def _shaped(

@@ -19,6 +19,7 @@ from scipy.cluster.hierarchy import linkage
 from excite_cli.robot.model import Array
 
 MOST = 6  # sets that become candidates
+_LEAST = 25.0  # what a set must explain, in units of the squared median of what is left
 _RIDGE = 1e-9
 _CLIMBS = 3  # best sets that are improved run by run
 
@@ -83,14 +84,18 @@ def evidence_by_run(
     return RunEvidence(grams, cross, positive)
 
 
-def run_sets(found: RunEvidence) -> list[tuple[int, ...]]:
-    """The sets of runs that explain most, best first; none where there is one run only."""
+def run_sets(found: RunEvidence, most: int = MOST) -> list[tuple[int, ...]]:
+    """The sets of runs that explain most, best first; none where there is one run only.
+
+    What explains next to nothing becomes no candidate: of all places and kinds, few are left.
+    """
     if found.runs < 2:
         return []
     ranked = _ranked(found, _looked_at(found))
     better = [_improved(found, chosen) for chosen in ranked[:_CLIMBS]]
-    best = _ranked(found, [*better, *ranked])[:MOST]
-    return [tuple(sorted(_meant(found, chosen))) for chosen in best]
+    best = _ranked(found, [*better, *ranked])[:most]
+    worth = [chosen for chosen in best if found.explained(sorted(chosen)) > _LEAST]
+    return [tuple(sorted(_meant(found, chosen))) for chosen in worth]
 
 
 def sets_looked_at(runs: int) -> int:
