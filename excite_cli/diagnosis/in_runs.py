@@ -10,6 +10,8 @@ set that data tell.
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from excite_cli.diagnosis.run_sets import (
     MOST,
     RunEvidence,
@@ -123,6 +125,7 @@ def _shaped(
         signals, residuals = [seen.signals[i] for i in own], [seen.residuals[i] for i in own]
         for shape in kind.tuned(seen.robot, place, signals, residuals):
             effect = kind(place, shape, (run,))
-            found.append((seen.evidence(effect, [(run,)], False).energy([0]), effect))
+            explained = seen.evidence(effect, [(run,)], False).energy(np.ones((1, 1), bool))
+            found.append((float(explained[0]), effect))
     found.sort(key=lambda each: -each[0])
     return [effect for _, effect in found[:MOST]]

@@ -10,10 +10,11 @@ looked at: single runs, all runs from one on, and the clusters of what each run 
 number, and that of the candidates, grows linearly with the runs, or not at all.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.cluster.hierarchy import linkage
 
 from excite_cli.robot.model import Array
@@ -23,7 +24,7 @@ _LEAST = 25.0  # what a set must explain, in units of the squared median of what
 _RIDGE = 1e-9
 _CLIMBS = 3  # best sets that are improved run by run
 
-RunSet = frozenset[int]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -43,27 +44,26 @@ class RunEvidence:
         """R."""
         return len(self.cross)
 
-    def values(self, chosen: Sequence[int]) -> Array:
-        """Values (p,) fitted to some runs."""
-        return np.asarray(np.linalg.solve(*self._sums(chosen)))
+    def values(self, sets: Mask) -> Array:
+        """Values (S, p) fitted to sets (S, R) of runs."""
+        gram, cross = self._sums(sets)
+        return np.asarray(np.linalg.solve(gram, cross[:, :, None])[:, :, 0])
 
-    def explained(self, chosen: Sequence[int]) -> float:
-        """E(S), for all columns."""
-        rest = [r for r in range(self.runs) if r not in set(chosen)]
-        whole = range(self.runs)
-        return self.energy(chosen) + self.energy(rest) - self.energy(whole)
+    def energy(self, sets: Mask) -> Array:
+        """What values fitted to sets (S, R) of runs explain in them, (S,)."""
+        return np.einsum("sp,sp->s", self.values(sets), self._sums(sets)[1])
 
-    def _sums(self, chosen: Sequence[int]) -> tuple[Array, Array]:
-        at = list(chosen)
-        gram = self.grams[at].sum(axis=0)
-        scale = np.diag(self.grams.sum(axis=0))
-        gram[np.diag_indices(len(gram))] += _RIDGE * scale + 1e-300
-        return gram, self.cross[at].sum(axis=0)
+    def explained(self, sets: Mask) -> Array:
+        """E(S) of sets (S, R), (S,)."""
+        whole = np.ones((1, self.runs), bool)
+        return self.energy(sets) + self.energy(~sets) - self.energy(whole)
 
-    def energy(self, chosen: Sequence[int]) -> float:
-        """What values fitted to some runs explain in them."""
-        gram, cross = self._sums(chosen)
-        return float(cross @ np.linalg.solve(gram, cross))
+    def _sums(self, sets: Mask) -> tuple[Array, Array]:
+        member = sets.astype(float)
+        gram = np.tensordot(member, self.grams, axes=1)
+        at = np.arange(gram.shape[1])
+        gram[:, at, at] += _RIDGE * np.diag(self.grams.sum(axis=0)) + 1e-300
+        return gram, member @ self.cross
 
 
 def evidence_by_run(
@@ -93,9 +93,9 @@ def run_sets(found: RunEvidence, most: int = MOST) -> list[tuple[int, ...]]:
         return []
     ranked = _ranked(found, _looked_at(found))
     better = [_improved(found, chosen) for chosen in ranked[:_CLIMBS]]
-    best = _ranked(found, [*better, *ranked])[:most]
-    worth = [chosen for chosen in best if found.explained(sorted(chosen)) > _LEAST]
-    return [tuple(sorted(_meant(found, chosen))) for chosen in worth]
+    best = _ranked(found, np.array([*better, *ranked]))[:most]
+    worth = best[found.explained(best) > _LEAST]
+    return [tuple(np.flatnonzero(_meant(found, chosen)).tolist()) for chosen in worth]
 
 
 def sets_looked_at(runs: int) -> int:
@@ -103,59 +103,50 @@ def sets_looked_at(runs: int) -> int:
     return max(3 * runs - 2, 1)
 
 
-def _looked_at(found: RunEvidence) -> Iterator[RunSet]:
-    count = found.runs
-    for r in range(count):
-        yield frozenset({r})
-    for r in range(1, count):
-        yield frozenset(range(r, count))
-    yield from _clusters(found)
+def _looked_at(found: RunEvidence) -> Mask:
+    """Single runs, all from one on, clusters: (S, R)."""
+    single = np.eye(found.runs, dtype=bool)
+    later = np.triu(np.ones((found.runs, found.runs), bool))[1:]
+    return np.concatenate([single, later, _clusters(found)])
 
 
-def _clusters(found: RunEvidence) -> Iterator[RunSet]:
-    """Of what every run says alone, in units of what an average run can tell."""
-    gram = found.grams.mean(axis=0)
-    sizes, vectors = np.linalg.eigh(gram)
+def _clusters(found: RunEvidence) -> Mask:
+    """Of what every run says alone, in units of what an average run can tell: (S, R)."""
+    sizes, vectors = np.linalg.eigh(found.grams.mean(axis=0))
     root = vectors * np.sqrt(np.maximum(sizes, 0.0))
-    said = np.stack([found.values([r]) for r in range(found.runs)]) @ root
-    members = [frozenset({r}) for r in range(found.runs)]
-    for a, b, *_ in linkage(said, method="ward"):
+    members = list(np.eye(found.runs, dtype=bool))
+    for a, b, *_ in linkage(found.values(np.eye(found.runs, dtype=bool)) @ root, method="ward"):
         members.append(members[int(a)] | members[int(b)])
-        if len(members[-1]) < found.runs:
-            yield members[-1]
+    return np.array(members[found.runs : -1], dtype=bool).reshape(-1, found.runs)
 
 
-def _ranked(found: RunEvidence, sets: Sequence[RunSet] | Iterator[RunSet]) -> list[RunSet]:
+def _ranked(found: RunEvidence, sets: Mask) -> Mask:
     """Best first, without empty ones; a set and all other runs are one and the same."""
-    everything = frozenset(range(found.runs))
-    scores: dict[RunSet, float] = {}
-    for chosen in sets:
-        if not chosen or chosen == everything or everything - chosen in scores:
-            continue
-        scores.setdefault(chosen, found.explained(sorted(chosen)))
-    return sorted(scores, key=lambda chosen: -scores[chosen])
+    sets = sets[sets.any(axis=1) & ~sets.all(axis=1)]
+    _, first = np.unique(sets ^ sets[:, :1], axis=0, return_index=True)
+    sets = sets[np.sort(first)]
+    return np.asarray(sets[np.argsort(-found.explained(sets), kind="stable")])
 
 
-def _improved(found: RunEvidence, chosen: RunSet) -> RunSet:
+def _improved(found: RunEvidence, chosen: Mask) -> Mask:
     """Runs are taken in or out, one at a time, while that explains more."""
-    best = found.explained(sorted(chosen))
+    best = found.explained(chosen[None])[0]
     for _ in range(found.runs):
-        moves = [chosen ^ {r} for r in range(found.runs)]
-        moves = [move for move in moves if move and len(move) < found.runs]
-        scores = [found.explained(sorted(move)) for move in moves]
-        at = int(np.argmax(scores)) if scores else -1
-        if at < 0 or scores[at] <= best * (1.0 + 1e-9):
+        moves = chosen ^ np.eye(found.runs, dtype=bool)
+        moves = moves[moves.any(axis=1) & ~moves.all(axis=1)]
+        scores = found.explained(moves)
+        if not len(scores) or scores.max() <= best * (1.0 + 1e-9):
             return chosen
-        best, chosen = scores[at], moves[at]
+        best, chosen = scores.max(), moves[np.argmax(scores)]
     return chosen
 
 
-def _meant(found: RunEvidence, chosen: RunSet) -> RunSet:
+def _meant(found: RunEvidence, chosen: Mask) -> Mask:
     """The set or all other runs: those with more, or else the fewer; at a tie the later ones."""
-    rest = frozenset(range(found.runs)) - chosen
     if found.positive:
-        difference = found.values(sorted(chosen))[0] - found.values(sorted(rest))[0]
-        return chosen if difference > 0 else rest
-    if len(chosen) != len(rest):
-        return min(chosen, rest, key=len)
-    return max(chosen, rest, key=sum)
+        own, others = found.values(np.array([chosen, ~chosen]))[:, 0]
+        return chosen if own > others else ~chosen
+    count, places = chosen.sum(), np.arange(found.runs)
+    if 2 * count != found.runs:
+        return chosen if 2 * count < found.runs else ~chosen
+    return chosen if places[chosen].sum() > places[~chosen].sum() else ~chosen
