@@ -12,6 +12,7 @@ from excite_cli.diagnosis.tracing import Traced
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace
@@ -28,26 +29,59 @@ class FittedModel:
 
 
 @dataclass(frozen=True)
+class Played:
+    """Runs that models are tried on, with their regressors: these do not depend on the model."""
+
+    robot: Robot
+    runs: Sequence[PreparedRun]
+    regressors: Sequence[Array]
+
+    def predictions(self, fitted: FittedModel) -> list[Prediction]:
+        """What a model says of every run."""
+        return [
+            _predicted(self.robot, fitted, *pair)
+            for pair in zip(self.runs, self.regressors, strict=True)
+        ]
+
+    def errors(self, predictions: Sequence[Prediction]) -> Errors:
+        """Errors of predictions for all runs."""
+        return errors_on(self.robot, self.runs, predictions)
+
+    def traces(
+        self, before: Sequence[Prediction], after: Sequence[Prediction], sealed: bool
+    ) -> tuple[TorqueTrace, ...]:
+        """Torque over time, measured and by both predictions."""
+        return tuple(
+            torque_trace(run, new.load, new.torque, old.torque, sealed)
+            for run, old, new in zip(self.runs, before, after, strict=True)
+        )
+
+
+@dataclass(frozen=True)
 class BeforeAfter:
-    """Both models on some runs: errors, and torque over time."""
+    """Models on sealed runs: errors of both and of the untouched URDF, and torque over time."""
 
     before: Errors
     after: Errors
+    untouched: Errors | None
     traces: tuple[TorqueTrace, ...]
 
 
 def both_models(model: Model, traced: Traced, parameters: Array) -> tuple[FittedModel, FittedModel]:
     """The declared model fitted to the training data, and the one with `parameters`."""
-    declared = robust_solve(traced.data, traced.candidates, (), traced.levels)
-    width, found = model.declared_width, width_of(traced.effects)
+    return refitted(model, traced, ()), _fitted(model, traced, traced.chosen, parameters)
 
-    def fitted(x: Array, effects: tuple[Effect, ...], count: int) -> FittedModel:
-        return FittedModel(model.full_inertias(x), effects, x[len(x) - count :])
 
-    return (
-        fitted(declared, model.declared, width),
-        fitted(parameters, (*model.declared, *traced.effects), width + found),
-    )
+def refitted(model: Model, traced: Traced, chosen: Sequence[int]) -> FittedModel:
+    """The model with these of the candidates, fitted to the training data."""
+    parameters = robust_solve(traced.data, traced.candidates, chosen, traced.levels)
+    return _fitted(model, traced, chosen, parameters)
+
+
+def _fitted(model: Model, traced: Traced, chosen: Sequence[int], parameters: Array) -> FittedModel:
+    effects = (*model.declared, *(traced.candidates[i].effect for i in chosen))
+    values = parameters[len(parameters) - width_of(effects) :]
+    return FittedModel(model.full_inertias(parameters), effects, values)
 
 
 def training_traces(
@@ -55,35 +89,35 @@ def training_traces(
 ) -> tuple[TorqueTrace, ...]:
     """Torque over time of the training parts."""
     regressors = [signals.body.regressor for signals in traced.signals]
-    return _compared(robot, models, traced.data.runs, regressors, sealed=False)[2]
+    played = Played(robot, traced.data.runs, regressors)
+    before, after = map(played.predictions, models)
+    return played.traces(before, after, sealed=False)
 
 
-def on_sealed(
-    robot: Robot, models: tuple[FittedModel, FittedModel], runs: Sequence[PreparedRun]
-) -> BeforeAfter:
-    """Errors and torque over time of the sealed part, used once."""
+def sealed_runs(robot: Robot, runs: Sequence[PreparedRun]) -> Played:
+    """The sealed part, for the models to be tried on."""
     cad = standard_parameters(robot)
     regressors = [RigidBody(robot, cad, run.q, run.v, run.a).regressor for run in runs]
-    before, after, traces = _compared(robot, models, runs, regressors, sealed=True)
-    return BeforeAfter(errors_on(robot, runs, before), errors_on(robot, runs, after), traces)
+    return Played(robot, runs, regressors)
 
 
-def _compared(
-    robot: Robot,
-    models: tuple[FittedModel, FittedModel],
-    runs: Sequence[PreparedRun],
-    regressors: Sequence[Array],
-    sealed: bool,
-) -> tuple[list[Prediction], list[Prediction], tuple[TorqueTrace, ...]]:
-    before, after = (
-        [_predicted(robot, fitted, *pair) for pair in zip(runs, regressors, strict=True)]
-        for fitted in models
+def on_sealed(played: Played, models: tuple[FittedModel, FittedModel]) -> BeforeAfter:
+    """Errors and torque over time of the sealed part, used once."""
+    before, after = map(played.predictions, models)
+    return BeforeAfter(
+        played.errors(before),
+        played.errors(after),
+        _untouched(played),
+        played.traces(before, after, sealed=True),
     )
-    traces = tuple(
-        torque_trace(run, new.load, new.torque, old.torque, sealed)
-        for run, old, new in zip(runs, before, after, strict=True)
-    )
-    return before, after, traces
+
+
+def _untouched(played: Played) -> Errors | None:
+    """Errors of the URDF as given, with the friction of its <dynamics>; None if it has no mass."""
+    phi = standard_parameters(played.robot)
+    if not phi.any():
+        return None
+    return played.errors(played.predictions(FittedModel(phi, *urdf_friction(played.robot))))
 
 
 def _predicted(robot: Robot, fitted: FittedModel, run: PreparedRun, regressor: Array) -> Prediction:

@@ -11,7 +11,12 @@ from scipy.linalg import cholesky
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import Alias, aliases_of
-from excite_cli.diagnosis.before_after import both_models, on_sealed, training_traces
+from excite_cli.diagnosis.before_after import (
+    both_models,
+    on_sealed,
+    sealed_runs,
+    training_traces,
+)
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.correlated_covariance import covariance_of
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
@@ -32,6 +37,7 @@ from excite_cli.diagnosis.records import (
 )
 from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.rounds import rounds_of
+from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.unexplained import unexplained_structure
@@ -44,6 +50,7 @@ from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
+from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding
@@ -77,6 +84,7 @@ def diagnose(
     model = _model(robot, base, spec)
     parts = split(dataset, sealed, spec.diagnosis.block)
     check_left_to_fit(spec.effects, parts)
+    refuse_sealed_copies(parts)
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )
@@ -95,9 +103,11 @@ def diagnose(
     )
     unexplained, dependence = _unexplained(traced, robot)
     doubts = approximations(traced, unexplained, robot.joint_names)
-    named, rivals = _named(model, traced, parameters, covariance, doubts)
     models = both_models(model, traced, parameters)
-    sealed_part = on_sealed(robot, models, [prepare(run, processing) for run in parts.sealed])
+    sealed_data = sealed_runs(robot, [prepare(run, processing) for run in parts.sealed])
+    sealed_part = on_sealed(sealed_data, models)
+    worth = worth_on_sealed(sealed_data, model, traced, models[1])
+    named, rivals = _named(model, traced, parameters, covariance, doubts, worth)
     base_values, base_std = _base_parameters(model, parameters, covariance)
     floor, assumed = noise_floor(parts.training, processing), _assumed(traced, parts)
     return Diagnosis(
@@ -131,6 +141,7 @@ def diagnose(
         ),
         sealed_traces=sealed_part.traces,
         assumed=assumed,
+        untouched=sealed_part.untouched,
     )
 
 
@@ -186,6 +197,7 @@ def _named(
     parameters: Array,
     covariance: Array,
     doubts: Mapping[int, Approximation],
+    worth: Mapping[int, Worth],
 ) -> tuple[tuple[NamedEffect, ...], list[tuple[Alias, Array]]]:
     """Named effects with values, evidence and aliases; and the aliases with their own values."""
     judge, names = traced.judge, model.robot.joint_names
@@ -236,6 +248,8 @@ def _named(
                 gain=float(judge.left_out_gain(rest, [i])),
                 aliases=tuple(records),
                 approximates=doubts.get(i),
+                verdict=worth[i].verdict,
+                removes=worth[i].removes,
             )
         )
     order = np.argsort([-each for each in strength], kind="stable")

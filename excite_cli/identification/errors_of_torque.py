@@ -1,9 +1,10 @@
 """Errors of a predicted torque: per joint, relative and in N·m, with an interval of their mean."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.identification.factors import Mask
 from excite_cli.robot.model import Array
@@ -16,7 +17,8 @@ _BLOCK = 1.0  # s, longer than what noise of the filtered torque remembers
 class Errors:
     """Of the torque on the sealed data: per joint, relative (RMS/RMS) and in N·m.
 
-    `interval` is the 95 % block-bootstrap interval of the mean relative error.
+    `interval` is the 95 % block-bootstrap interval of the mean relative error; `samples` says how
+    many filtered ones count, for files of earlier versions it is empty.
     """
 
     mean_relative: float
@@ -26,6 +28,7 @@ class Errors:
     rms: dict[str, float]
     rms_raw: dict[str, float]
     interval: tuple[float, float]
+    samples: dict[str, int] = field(default_factory=dict)
 
     def as_data(self) -> dict[str, object]:
         """Plain values for files and JSON."""
@@ -66,6 +69,7 @@ def torque_errors(
         rms=_named(joint_names, rms),
         rms_raw=_named(joint_names, _raw_rms(raw, raw_predicted, len(joint_names))),
         interval=_interval(sums[0], sums[1]),
+        samples={name: int(each) for name, each in zip(joint_names, count, strict=True)},
     )
 
 
@@ -75,9 +79,19 @@ def _block_sums(tau: Array, predicted: Array, usable: Mask, moving: Mask, step: 
     error = np.square(np.where(usable, tau - predicted, 0.0))
     size = np.square(np.where(usable, tau, 0.0))
     rows = np.stack([error, size, error * slow, size * slow, good])
-    length = max(1, round(_BLOCK / step))
-    edges = np.arange(0, max(len(tau) - length // 2, 1), length)
-    return np.add.reduceat(rows, edges, axis=1)
+    return np.add.reduceat(rows, block_starts(len(tau), step, _BLOCK), axis=1)
+
+
+def block_starts(samples: int, step: float, seconds: float) -> NDArray[np.intp]:
+    """Where blocks of about so many seconds begin; the last has at least half the length."""
+    length = max(1, round(seconds / step))
+    return np.arange(0, max(samples - length // 2, 1), length)
+
+
+def drawn_blocks(count: int) -> NDArray[np.int64]:
+    """How often each of so many blocks is drawn, with replacement, in every draw: (draws, count)."""
+    rng = np.random.default_rng(_SEED)
+    return rng.multinomial(count, np.full(count, 1 / count), _DRAWS)
 
 
 def _ratio(wrong: Array, size: Array) -> Array:
@@ -108,7 +122,7 @@ def _interval(wrong: Array, size: Array) -> tuple[float, float]:
     blocks = len(wrong)
     if blocks < 2:
         return float("nan"), float("nan")
-    draws = np.random.default_rng(_SEED).multinomial(blocks, np.full(blocks, 1 / blocks), _DRAWS)
+    draws = drawn_blocks(blocks)
     ratios = _ratio(draws @ wrong, draws @ size)
     good = np.isfinite(ratios)
     count = good.sum(axis=1)
