@@ -1,14 +1,10 @@
 """What every effect is worth on data that took no part: the error there with it and without it.
 
 Without it, the model is fitted anew to the training data: so is what refines it left out, which
-would take its place. Let e and e' be the errors of the torque with and without it, in block b of
-the sealed part and on joint j. The effect removes
-
-    d_b = Σ_j Σ_(t in b) (e'_tj² - e_tj²) / Σ_t (e'_tj² + e_tj²)
-
-so that every joint counts by what is left on it. Whether Σ_b d_b is above or below zero beyond
-chance is judged by drawing blocks with replacement. Samples in which a joint stands do not count:
-its stiction may be any, and no model says it. Nothing is chosen or fitted by this.
+would take its place. What the effect removes is the difference of the mean relative errors of the
+torque, where joints move: of one that stands the stiction may be any, and no model says it. Blocks
+of the sealed part are drawn with replacement, the same for both errors, and say whether it is above
+or below zero beyond chance. Nothing is chosen or fitted by this.
 """
 
 from collections.abc import Sequence
@@ -22,7 +18,8 @@ from excite_cli.diagnosis.prediction import Prediction
 from excite_cli.diagnosis.records import Removed
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.verdict import SealedVerdict
-from excite_cli.identification.errors_of_torque import Errors, block_starts, drawn_blocks
+from excite_cli.identification.errors_of_torque import Errors, block_sums, drawn_means
+from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
 _BLOCK = 0.5  # s, longer than what noise of the filtered torque remembers
@@ -49,21 +46,21 @@ def worth_on_sealed(
         rest = traced.judge.without(i, traced.chosen)
         without = played.predictions(refitted(model, traced, rest))
         errors_without = played.errors(without)
-        removed = _removed_by_block(played, without, with_all)
+        removed = removed_in_draws(played.runs, without, with_all)
         lower = errors_without.mean_relative - errors.mean_relative
         found[i] = Worth(sealed_verdict(removed, lower), _removes(errors_without, errors))
     return found
 
 
 def sealed_verdict(removed: Array, lower: float) -> SealedVerdict:
-    """Judge an effect by what it removes in every block (B,).
+    """Judge an effect by what it removes in many draws of blocks (draws,), none if there are few.
 
     `lower`: by how much it lowers the mean error over all samples, also where joints stand; a
     verdict that this contradicts is not given.
     """
-    if len(removed) < _FEWEST:
+    if not len(removed):
         return SealedVerdict.NOT_CONFIRMED
-    low, high = np.percentile(drawn_blocks(len(removed)) @ removed, [2.5, 97.5])
+    low, high = np.percentile(removed, [2.5, 97.5])
     if low > 0.0 and lower > 0.0:
         return SealedVerdict.CONFIRMED
     if high < 0.0 and lower < 0.0:
@@ -71,22 +68,28 @@ def sealed_verdict(removed: Array, lower: float) -> SealedVerdict:
     return SealedVerdict.NOT_CONFIRMED
 
 
-def _removed_by_block(
-    played: Played, without: Sequence[Prediction], with_it: Sequence[Prediction]
+def removed_in_draws(
+    runs: Sequence[PreparedRun], without: Sequence[Prediction], with_it: Sequence[Prediction]
 ) -> Array:
-    """d (B,), of the blocks in which a joint moves."""
-    blocks = []
-    for run, one, other in zip(played.runs, without, with_it, strict=True):
-        counts = run.valid & run.moving
-        worse, better = (
-            np.where(counts, run.tau - run.averaged(each.torque), 0.0) ** 2 for each in (one, other)
-        )
-        rows = np.stack([worse - better, worse + better, counts])
-        blocks.append(np.add.reduceat(rows, block_starts(len(counts), run.step, _BLOCK), axis=1))
-    difference, total, count = np.concatenate(blocks, axis=1)
-    scale = total.sum(axis=0)
-    shares = np.divide(difference, scale, out=np.zeros_like(difference), where=scale > 0.0)
-    return np.asarray(shares.sum(axis=1)[count.any(axis=1)])
+    """What is removed from the mean relative error where joints move; (0,) of too few blocks."""
+    (worse, size), (better, _) = (_moving_sums(runs, each) for each in (without, with_it))
+    moves = size.any(axis=1)
+    if np.count_nonzero(moves) < _FEWEST:
+        return np.zeros(0)
+    draws = drawn_means(worse[moves], size[moves]) - drawn_means(better[moves], size[moves])
+    return draws[np.isfinite(draws)]
+
+
+def _moving_sums(
+    runs: Sequence[PreparedRun], predictions: Sequence[Prediction]
+) -> tuple[Array, Array]:
+    """‖e‖² and ‖τ‖² of every block, where the joints move: (B, n) each."""
+    sums = [
+        block_sums(run.tau, run.averaged(each.torque), run.valid, run.moving, run.step, _BLOCK)
+        for run, each in zip(runs, predictions, strict=True)
+    ]
+    _, _, wrong, size, _ = np.concatenate(sums, axis=1)
+    return wrong, size
 
 
 def _removes(without: Errors, with_it: Errors) -> dict[str, Removed]:

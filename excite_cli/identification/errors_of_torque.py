@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from excite_cli.identification.factors import Mask
 from excite_cli.robot.model import Array
@@ -55,7 +54,7 @@ def torque_errors(
 
     A joint without a (moving) sample has NaN and does not enter the mean.
     """
-    blocks = [_block_sums(*run, step) for run in zip(tau, predicted, usable, moving, strict=True)]
+    blocks = [block_sums(*run, step) for run in zip(tau, predicted, usable, moving, strict=True)]
     sums = np.concatenate(blocks, axis=1)  # (5, blocks, n)
     wrong, size, wrong_moving, size_moving, count = sums.sum(axis=1)
     relative, relative_moving = _ratio(wrong, size), _ratio(wrong_moving, size_moving)
@@ -73,25 +72,20 @@ def torque_errors(
     )
 
 
-def _block_sums(tau: Array, predicted: Array, usable: Mask, moving: Mask, step: float) -> Array:
-    """Per block of about 1 s: ‖e‖², ‖τ‖², the same where moving, and the count; (5, blocks, n)."""
+def block_sums(
+    tau: Array, predicted: Array, usable: Mask, moving: Mask, step: float, seconds: float = _BLOCK
+) -> Array:
+    """Per block of about so many seconds, of the samples (M, n) of a run: (5, blocks, n).
+
+    ‖e‖², ‖τ‖², the same where moving, and the count. The last block has at least half the length.
+    """
     good, slow = usable.astype(float), (usable & moving).astype(float)
     error = np.square(np.where(usable, tau - predicted, 0.0))
     size = np.square(np.where(usable, tau, 0.0))
     rows = np.stack([error, size, error * slow, size * slow, good])
-    return np.add.reduceat(rows, block_starts(len(tau), step, _BLOCK), axis=1)
-
-
-def block_starts(samples: int, step: float, seconds: float) -> NDArray[np.intp]:
-    """Where blocks of about so many seconds begin; the last has at least half the length."""
     length = max(1, round(seconds / step))
-    return np.arange(0, max(samples - length // 2, 1), length)
-
-
-def drawn_blocks(count: int) -> NDArray[np.int64]:
-    """How often each of so many blocks is drawn, with replacement, in every draw: (draws, count)."""
-    rng = np.random.default_rng(_SEED)
-    return rng.multinomial(count, np.full(count, 1 / count), _DRAWS)
+    edges = np.arange(0, max(len(tau) - length // 2, 1), length)
+    return np.add.reduceat(rows, edges, axis=1)
 
 
 def _ratio(wrong: Array, size: Array) -> Array:
@@ -118,16 +112,26 @@ def _raw_rms(raw: Sequence[Array], predicted: Sequence[Array], n: int) -> Array:
 
 
 def _interval(wrong: Array, size: Array) -> tuple[float, float]:
-    """2.5 and 97.5 % of the mean relative error over blocks (B, n) drawn with replacement."""
-    blocks = len(wrong)
-    if blocks < 2:
+    """2.5 and 97.5 % of the mean relative error."""
+    if len(wrong) < 2:
         return float("nan"), float("nan")
-    draws = drawn_blocks(blocks)
-    ratios = _ratio(draws @ wrong, draws @ size)
-    good = np.isfinite(ratios)
-    count = good.sum(axis=1)
-    means = np.where(good, ratios, 0.0).sum(axis=1)[count > 0] / count[count > 0]
+    means = drawn_means(wrong, size)
+    means = means[np.isfinite(means)]
     if not len(means):
         return float("nan"), float("nan")
     low, high = np.percentile(means, [2.5, 97.5])
     return float(low), float(high)
+
+
+def drawn_means(wrong: Array, size: Array) -> Array:
+    """Mean relative error of each of many draws of blocks (B, n) with replacement: (draws,).
+
+    ‖e‖² and ‖τ‖² of the blocks are given. Draws are the same for the same B; one without any
+    torque has NaN.
+    """
+    blocks = len(wrong)
+    draws = np.random.default_rng(_SEED).multinomial(blocks, np.full(blocks, 1 / blocks), _DRAWS)
+    ratios = _ratio(draws @ wrong, draws @ size)
+    good = np.isfinite(ratios)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(good, ratios, 0.0).sum(axis=1) / good.sum(axis=1))

@@ -62,6 +62,7 @@ _RECORDS: dict[str, Any] = {
 _LATER: dict[str, Any] = {
     "noise_floor": dict[str, float] | None,
     "assumed": tuple[Assumption, ...],
+    "untouched": Errors | None,
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
@@ -129,8 +130,8 @@ def _read(file: Any, path: Path) -> Diagnosis:
     fields["phi"] = checked.array(file["phi"], (None,))
     fields.update({name: checked.array(file[name], base, finite=False) for name in _OF_BASE})
     for name, kind in _LATER.items():
-        stored = f"records/{name}" in file
-        fields[name] = _record(file, f"records/{name}", kind) if stored else None
+        if f"records/{name}" in file:
+            fields[name] = _record(file, f"records/{name}", kind)
     # Files of earlier versions have no traces.
     fields["traces"] = read_traces(file["traces"], joints) if "traces" in file else None
     if "sealed_traces" in file:
@@ -141,7 +142,8 @@ def _read(file: Any, path: Path) -> Diagnosis:
         information=_information(file["information"], len(joints)),
         **fields,
     )
-    require_joints(joints, (found.before, found.after), found.noise_floor)
+    errors = (found.before, found.after, *([found.untouched] if found.untouched else []))
+    require_joints(joints, errors, found.noise_floor)
     if not _named_joints(found) <= set(joints):
         raise ValueError("it names joints that are not its own")
     return found
@@ -173,6 +175,7 @@ def _named_joints(found: Diagnosis) -> set[str]:
     ]
     return {
         *(joint for each in records for joint in each.joints),
+        *(joint for each in found.effects for joint in each.removes),
         *(each.joint for each in found.unexplained),
         *(joint for each in found.rounds for joint in each.residual),
     }

@@ -33,7 +33,7 @@ def test_an_approximation_is_no_name_for_scripts(doubted: Diagnosis) -> None:
 
 def test_an_approximation_has_a_table_of_its_own(doubted: Diagnosis) -> None:
     text = printed(doubted)
-    assert "Approximations: they lower the error, but something else is there" in text
+    assert "Approximations: they come near something else that is there" in text
     assert REASON in text
     assert "What the declared model lacks" not in text
     assert "0 effects, 1 approximation" in text
