@@ -18,11 +18,12 @@ from excite_cli.diagnosis.prediction import Prediction
 from excite_cli.diagnosis.records import Removed
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.verdict import SealedVerdict
-from excite_cli.identification.errors_of_torque import Errors, block_sums, drawn_means
+from excite_cli.identification.errors_of_torque import Errors, block_sums, drawn_blocks
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
-_BLOCK = 0.5  # s, longer than what noise of the filtered torque remembers
+# Blocks are longer than what noise of the filtered torque remembers [s]; of little data, shorter.
+_SHORTEST, _LONGEST, _WANTED = 0.2, 0.5, 8
 _FEWEST = 5  # blocks: of fewer, all of them agree by chance too often
 _NIL = 1e-6  # of the torque
 
@@ -72,20 +73,25 @@ def removed_in_draws(
     runs: Sequence[PreparedRun], without: Sequence[Prediction], with_it: Sequence[Prediction]
 ) -> Array:
     """What is removed from the mean relative error where joints move; (0,) of too few blocks."""
-    (worse, size), (better, _) = (_moving_sums(runs, each) for each in (without, with_it))
+    moving = sum(run.step * (run.valid & run.moving).any(axis=1).sum() for run in runs)
+    block = min(max(moving / _WANTED, _SHORTEST), _LONGEST)
+    (worse, size), (better, _) = (_moving_sums(runs, each, block) for each in (without, with_it))
     moves = size.any(axis=1)
     if np.count_nonzero(moves) < _FEWEST:
         return np.zeros(0)
-    draws = drawn_means(worse[moves], size[moves]) - drawn_means(better[moves], size[moves])
-    return draws[np.isfinite(draws)]
+    # The torque's size is not drawn anew: few blocks may hold next to none of a joint's.
+    moved = size.any(axis=0)
+    whole, draws = size.sum(axis=0)[moved], drawn_blocks(np.count_nonzero(moves))
+    relative = [np.sqrt(draws @ each[moves][:, moved] / whole) for each in (worse, better)]
+    return np.asarray((relative[0] - relative[1]).mean(axis=1))
 
 
 def _moving_sums(
-    runs: Sequence[PreparedRun], predictions: Sequence[Prediction]
+    runs: Sequence[PreparedRun], predictions: Sequence[Prediction], block: float
 ) -> tuple[Array, Array]:
     """‖e‖² and ‖τ‖² of every block, where the joints move: (B, n) each."""
     sums = [
-        block_sums(run.tau, run.averaged(each.torque), run.valid, run.moving, run.step, _BLOCK)
+        block_sums(run.tau, run.averaged(each.torque), run.valid, run.moving, run.step, block)
         for run, each in zip(runs, predictions, strict=True)
     ]
     _, _, wrong, size, _ = np.concatenate(sums, axis=1)

@@ -29,6 +29,8 @@ _QUANTITIES: dict[Quantity, str] = {
 
 def is_small(named: NamedEffect) -> bool:
     """Whether few words will do. Beside kept inertias a large effect may explain little itself."""
+    if named.verdict is SealedVerdict.HARMFUL:
+        return False
     return named.share_of_residual < SMALL_SHARE and named.gain < _SMALL_GAIN
 
 

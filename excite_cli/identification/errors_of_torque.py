@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.identification.factors import Mask
 from excite_cli.robot.model import Array
@@ -112,26 +113,21 @@ def _raw_rms(raw: Sequence[Array], predicted: Sequence[Array], n: int) -> Array:
 
 
 def _interval(wrong: Array, size: Array) -> tuple[float, float]:
-    """2.5 and 97.5 % of the mean relative error."""
+    """2.5 and 97.5 % of the mean relative error over blocks (B, n) drawn with replacement."""
     if len(wrong) < 2:
         return float("nan"), float("nan")
-    means = drawn_means(wrong, size)
-    means = means[np.isfinite(means)]
+    draws = drawn_blocks(len(wrong))
+    ratios = _ratio(draws @ wrong, draws @ size)
+    good = np.isfinite(ratios)
+    count = good.sum(axis=1)
+    means = np.where(good, ratios, 0.0).sum(axis=1)[count > 0] / count[count > 0]
     if not len(means):
         return float("nan"), float("nan")
     low, high = np.percentile(means, [2.5, 97.5])
     return float(low), float(high)
 
 
-def drawn_means(wrong: Array, size: Array) -> Array:
-    """Mean relative error of each of many draws of blocks (B, n) with replacement: (draws,).
-
-    ‖e‖² and ‖τ‖² of the blocks are given. Draws are the same for the same B; one without any
-    torque has NaN.
-    """
-    blocks = len(wrong)
-    draws = np.random.default_rng(_SEED).multinomial(blocks, np.full(blocks, 1 / blocks), _DRAWS)
-    ratios = _ratio(draws @ wrong, draws @ size)
-    good = np.isfinite(ratios)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(good, ratios, 0.0).sum(axis=1) / good.sum(axis=1))
+def drawn_blocks(count: int) -> NDArray[np.int64]:
+    """How often each of so many blocks is drawn, with replacement: (draws, count)."""
+    rng = np.random.default_rng(_SEED)
+    return rng.multinomial(count, np.full(count, 1 / count), _DRAWS)

@@ -7,7 +7,7 @@ from typing import Any
 
 from excite_cli.diagnosis.next_motion import next_experiment
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Round
-from excite_cli.diagnosis.verdict import Verdict
+from excite_cli.diagnosis.verdict import SealedVerdict, Verdict
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
     approximation_in_words,
@@ -113,7 +113,11 @@ def _effects(found: Diagnosis, verbose: bool) -> Parts:
     shown = [each for each in ranked if not any(each is other for other in small)]
     parts: Parts = [_effect_table(shown, everything, verbose)]
     if small:
-        listed = ", ".join(_what(each.effect, everything) for each in small)
+        listed = ", ".join(
+            _what(each.effect, everything)
+            + f" ({each.verdict})" * (each.verdict is SealedVerdict.NOT_CONFIRMED)
+            for each in small
+        )
         parts.append(
             f"and {len(small)} small ones (each below {SMALL_SHARE:.1%}): {listed} "
             "(--verbose: sizes)"
