@@ -103,7 +103,7 @@ def assumption_in_words(assumed: Assumption) -> str:
 
 
 def sealed_in_words(named: NamedEffect) -> str:
-    """`confirmed, -4.78 points`: verdict on sealed data, and by how much the error there changes.
+    """`confirmed -4.78 pp`: verdict on sealed data, and by how much the error there changes.
 
     Percentage points of the relative error where the joint moves, of the joint where it changes
     most; that joint is named where the effect is not on it alone.
@@ -116,7 +116,7 @@ def sealed_in_words(named: NamedEffect) -> str:
         return named.verdict
     joint = max(moved, key=lambda name: abs(moved[name]))
     where = "" if named.effect.joints == (joint,) else f" on {joint}"
-    return f"{named.verdict}, {-100 * moved[joint]:+.2f} points{where}"
+    return f"{named.verdict} {-100 * moved[joint]:+.2f} pp{where}"
 
 
 def no_gain_in_words(found: Diagnosis) -> str:

@@ -138,7 +138,7 @@ def _effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) 
         for named in shown
     )
     return Table(
-        "What the declared model lacks (share: of the residual; sealed: change of the error there)",
+        "What the declared model lacks (share: of the residual; sealed: change of error)",
         ("effect", "where", "size", *(["p"] if verbose else []), "share", "sealed"),
         rows,
         left=("effect",),

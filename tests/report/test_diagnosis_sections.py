@@ -185,9 +185,9 @@ def test_verdicts_on_sealed_data_stand_in_the_table_and_on_the_card(
     diagnosis: Diagnosis, sections: dict[str, Section]
 ) -> None:
     table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, Table))
-    assert table.rows[0][table.columns.index("sealed")] == "confirmed, -6.00 points"
+    assert table.rows[0][table.columns.index("sealed")] == "confirmed -6.00 pp"
     (chart,) = charts_of(sections["diagnosis-evidence"])
-    assert "On sealed data: confirmed, -6.00 points." in chart.caption
+    assert "On sealed data: confirmed -6.00 pp." in chart.caption
     assert found_section(diagnosis).lead.count("which took no part, goes from") == 1
 
 

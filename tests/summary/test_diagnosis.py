@@ -135,14 +135,14 @@ def test_every_effect_shows_what_it_is_worth_on_sealed_data(
 ) -> None:
     """In percentage points where it is most; a harmful effect is never too small to be shown."""
     text = printed(bad)
-    assert "0.00% harmful, +40.00 points\n" in text
+    assert "0.00% harmful +40.00 pp\n" in text
     assert "2 small ones" in text
     assert "viscous_friction on elbow (not confirmed)" in text
     elsewhere = replace(bad.effects[0], removes={"slide": Removed(0.01, 0.02, 0.1)})
-    assert "harmful, -2.00 points on slide\n" in printed(replace(bad, effects=(elsewhere,)))
-    assert "confirmed, -6.00 points a function of v[elbow]" in printed(doubted)
+    assert "harmful -2.00 pp on slide\n" in printed(replace(bad, effects=(elsewhere,)))
+    assert "confirmed -6.00 pp a function of v[elbow]" in printed(doubted)
     older = replace(bad.effects[0], verdict=None, removes={})
-    assert "points" not in printed(replace(bad, effects=(older,)))
+    assert " pp" not in printed(replace(bad, effects=(older,)))
 
 
 def test_scripts_see_verdicts_and_the_untouched_urdf(bad: Diagnosis) -> None:
