@@ -11,14 +11,22 @@ from excite_cli.atomic import write_text_atomically
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.diagnosis.diagnose import diagnose as diagnose_dataset
 from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.words import no_gain_in_words
+from excite_cli.errors import ConfigError
 from excite_cli.excitation.problem import Problem
 from excite_cli.export.found_config import found_config
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.shown.note import Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import write_diagnosis
 from excite_cli.store.versions import versions
 from excite_cli.summary.diagnosis import diagnosis_answer as diagnosis_answer
+
+_HAVE_IT = (
+    "What was found does not lower the error on sealed data. To have it in a config all the same: "
+    "--apply-unconfirmed (in Python apply_unconfirmed=True of diagnose, unconfirmed=True of "
+    "save_config)."
+)
 
 
 @checked()
@@ -29,6 +37,7 @@ def diagnose(
     *,
     output: str | Path | None = None,
     apply: str | Path | None = None,
+    apply_unconfirmed: bool = False,
     overwrite: bool = False,
     progress: Callable[[str, int], None] = lambda text, done: None,
     tell: Tell = log_note,
@@ -36,21 +45,24 @@ def diagnose(
     """What the declared model lacks: `excite diagnose`.
 
     `data` are measured data or their files. Written to `output` (HDF5) if that is given, and the
-    config with what was found to `apply` (YAML).
+    config with what was found to `apply` (YAML); where the error on sealed data did not fall
+    (`good` is false), that is written with `apply_unconfirmed` only.
 
     Returns
     -------
     Diagnosis
         `effects` (kind, joints, parameters with standard deviations, p-value, aliases), `absorbed`,
         `unexplained`, and the errors `before` and `after` on the run `sealed` (default: the last),
-        which nothing else saw.
+        which nothing else saw; `verdict` and `removes` say what every effect is worth there.
 
     Raises
     ------
     ConfigError, FileError
-        Config and data do not fit; order or signs of torques cannot be right; data too short; a
-        file exists already.
+        Config and data do not fit; order or signs of torques cannot be right; data too short, or
+        sealed ones a copy of others; a file exists already.
     """
+    if apply_unconfirmed and apply is None:
+        raise ConfigError("--apply-unconfirmed says nothing without --apply NEW.yaml.")
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, "apply": apply}, overwrite, inputs):
         dataset = dataset_of(problem, data, tell)
@@ -65,20 +77,28 @@ def diagnose(
         )
         if output is not None:
             write_diagnosis(Path(output), found)
-        if apply is not None:
-            save_config(apply, problem, found)
+        if apply is not None and (found.good or apply_unconfirmed):
+            save_config(apply, problem, found, unconfirmed=True)
+        elif apply is not None:
+            tell(Note(Level.WARNING, f"{apply} is not written. {_HAVE_IT}"))
         return found
 
 
 @checked()
-def save_config(path: str | Path, problem: Problem | Case, found: Diagnosis) -> None:
+def save_config(
+    path: str | Path, problem: Problem | Case, found: Diagnosis, *, unconfirmed: bool = False
+) -> None:
     """Write the config with the effects that a diagnosis found: `excite diagnose --apply`.
 
     Raises
     ------
+    ConfigError
+        The error on sealed data did not fall, and it is not asked for what is `unconfirmed`.
     FileError
         It cannot be written.
     """
+    if not (found.good or unconfirmed):
+        raise ConfigError(f"{path} is not written. {no_gain_in_words(found)} {_HAVE_IT}")
     refuse_inputs_as_outputs({"path": Path(path)}, inputs_of(problem))
     text = found_config(problem.spec, problem.folder, found, Path(path))
     write_text_atomically(Path(path), text)

@@ -13,6 +13,7 @@ from excite_cli.api.working import tell_idle
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
 from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.words import no_gain_in_words
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Progress as Progress
 from excite_cli.excitation.result import Result
@@ -143,6 +144,8 @@ def plan_after(
     following = replace(following, model=replace(following.model, file=problem.file))
     if not isinstance(found, Diagnosis):
         following = replace(following, name=str(found))
+    if not read.good:
+        tell(Note(Level.WARNING, no_gain_in_words(read)))
     for note in problem_notes(following.model):
         tell(note)
     for message in following.messages:

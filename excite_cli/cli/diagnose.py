@@ -25,10 +25,18 @@ def diagnose(
         typer.Option(
             "--apply",
             metavar="NEW.yaml",
-            help="Write the config with what was found.",
+            help="Write the config with what was found, if the error on sealed data fell.",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
+    apply_unconfirmed: Annotated[
+        bool,
+        typer.Option(
+            "--apply-unconfirmed",
+            help="Let --apply write it even where that error did not fall.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = False,
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,
     as_json: options.Json = False,
@@ -40,8 +48,10 @@ def diagnose(
 
     The declared model is fitted to all runs but the held-out (sealed) one; its residual is traced
     to named effects, with their size, certainty, and what these data cannot tell them from. The
-    sealed run is used once, for the error before and after. A single run is cut into blocks, every
-    third sealed.
+    sealed run is used once, for the error before and after, and for the verdict on every effect. A
+    single run is cut into blocks, every third sealed.
+
+    Exit status 1: effects were found, but the error on the sealed run did not fall.
 
     Examples:
       excite diagnose ur10.yaml measured.h5 -o diagnosis.h5 --apply better.yaml
@@ -59,9 +69,10 @@ def diagnose(
             sealed,
             output=output,
             apply=apply,
+            apply_unconfirmed=apply_unconfirmed,
             overwrite=overwrite,
             progress=line,
             tell=terminal.tell,
         )
-    written = {"diagnosis": output, "config": apply}
+    written = {"diagnosis": output, "config": apply if found.good or apply_unconfirmed else None}
     terminal.show(diagnosis_answer(found, str(config), written, verbose))

@@ -9,8 +9,10 @@ from excite_cli.diagnosis.declared_model import Model, width_of
 from excite_cli.diagnosis.prediction import Prediction, errors_on, predicted
 from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.tracing import Traced
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace
@@ -27,55 +29,83 @@ class FittedModel:
 
 
 @dataclass(frozen=True)
+class Played:
+    """Runs that models are tried on."""
+
+    robot: Robot
+    runs: Sequence[PreparedRun]
+
+    def predictions(self, fitted: FittedModel) -> list[Prediction]:
+        """What a model says of every run."""
+        return [_predicted(self.robot, fitted, run) for run in self.runs]
+
+    def errors(self, predictions: Sequence[Prediction]) -> Errors:
+        """Errors of predictions for all runs."""
+        return errors_on(self.robot, self.runs, predictions)
+
+    def traces(
+        self, before: Sequence[Prediction], after: Sequence[Prediction], sealed: bool
+    ) -> tuple[TorqueTrace, ...]:
+        """Torque over time, measured and by both predictions."""
+        return tuple(
+            torque_trace(run, new.load, new.torque, old.torque, sealed)
+            for run, old, new in zip(self.runs, before, after, strict=True)
+        )
+
+
+@dataclass(frozen=True)
 class BeforeAfter:
-    """Both models on some runs: errors, and torque over time."""
+    """Models on sealed runs: errors of both and of the untouched URDF, and torque over time."""
 
     before: Errors
     after: Errors
+    untouched: Errors | None
     traces: tuple[TorqueTrace, ...]
 
 
 def both_models(model: Model, traced: Traced, parameters: Array) -> tuple[FittedModel, FittedModel]:
     """The declared model fitted to the training data, and the one with `parameters`."""
-    declared = robust_solve(traced.data, traced.candidates, (), traced.levels)
-    width, found = model.declared_width, width_of(traced.effects)
+    return refitted(model, traced, ()), _fitted(model, traced, traced.chosen, parameters)
 
-    def fitted(x: Array, effects: tuple[Effect, ...], count: int) -> FittedModel:
-        return FittedModel(model.full_inertias(x), effects, x[len(x) - count :])
 
-    return (
-        fitted(declared, model.declared, width),
-        fitted(parameters, (*model.declared, *traced.effects), width + found),
-    )
+def refitted(model: Model, traced: Traced, chosen: Sequence[int]) -> FittedModel:
+    """The model with these of the candidates, fitted to the training data."""
+    parameters = robust_solve(traced.data, traced.candidates, chosen, traced.levels)
+    return _fitted(model, traced, chosen, parameters)
+
+
+def _fitted(model: Model, traced: Traced, chosen: Sequence[int], parameters: Array) -> FittedModel:
+    effects = (*model.declared, *(traced.candidates[i].effect for i in chosen))
+    values = parameters[len(parameters) - width_of(effects) :]
+    return FittedModel(model.full_inertias(parameters), effects, values)
 
 
 def training_traces(
     robot: Robot, models: tuple[FittedModel, FittedModel], traced: Traced
 ) -> tuple[TorqueTrace, ...]:
     """Torque over time of the training parts."""
-    return _compared(robot, models, traced.data.runs, sealed=False)[2]
+    played = Played(robot, traced.data.runs)
+    before, after = map(played.predictions, models)
+    return played.traces(before, after, sealed=False)
 
 
-def on_sealed(
-    robot: Robot, models: tuple[FittedModel, FittedModel], runs: Sequence[PreparedRun]
-) -> BeforeAfter:
+def on_sealed(played: Played, models: tuple[FittedModel, FittedModel]) -> BeforeAfter:
     """Errors and torque over time of the sealed part, used once."""
-    before, after, traces = _compared(robot, models, runs, sealed=True)
-    return BeforeAfter(errors_on(robot, runs, before), errors_on(robot, runs, after), traces)
-
-
-def _compared(
-    robot: Robot,
-    models: tuple[FittedModel, FittedModel],
-    runs: Sequence[PreparedRun],
-    sealed: bool,
-) -> tuple[list[Prediction], list[Prediction], tuple[TorqueTrace, ...]]:
-    before, after = ([_predicted(robot, fitted, run) for run in runs] for fitted in models)
-    traces = tuple(
-        torque_trace(run, new.load, new.torque, old.torque, sealed)
-        for run, old, new in zip(runs, before, after, strict=True)
+    before, after = map(played.predictions, models)
+    return BeforeAfter(
+        played.errors(before),
+        played.errors(after),
+        _untouched(played),
+        played.traces(before, after, sealed=True),
     )
-    return before, after, traces
+
+
+def _untouched(played: Played) -> Errors | None:
+    """Errors of the URDF as given, with the friction of its <dynamics>; None if it has no mass."""
+    phi = standard_parameters(played.robot)
+    if not phi.any():
+        return None
+    return played.errors(played.predictions(FittedModel(phi, *urdf_friction(played.robot))))
 
 
 def _predicted(robot: Robot, fitted: FittedModel, run: PreparedRun) -> Prediction:

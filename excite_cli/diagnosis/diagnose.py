@@ -11,7 +11,7 @@ from scipy.linalg import cholesky
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import Alias, aliases_of
-from excite_cli.diagnosis.before_after import both_models, on_sealed, training_traces
+from excite_cli.diagnosis.before_after import Played, both_models, on_sealed, training_traces
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
 from excite_cli.diagnosis.doubt import approximations
@@ -31,6 +31,7 @@ from excite_cli.diagnosis.records import (
     Unexplained,
 )
 from excite_cli.diagnosis.rounds import rounds_of
+from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
 from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
@@ -45,6 +46,7 @@ from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
+from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split, with_ends_sealed
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding
@@ -78,6 +80,7 @@ def diagnose(
     model = _model(robot, base, spec)
     parts = split(dataset, sealed, spec.diagnosis.block)
     check_left_to_fit(spec.effects, parts)
+    refuse_sealed_copies(parts)
     training, processing, traced = _searched(model, spec, parts, progress)
     with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
     if with_ends.ends:
@@ -89,11 +92,13 @@ def diagnose(
     traced, parameters, covariance = final.traced, final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
     doubts = approximations(traced, unexplained, robot.joint_names)
-    named, rivals = _named(
-        model, traced, parameters, covariance, doubts, spec.diagnosis.payload_links
-    )
     models = both_models(model, traced, parameters)
-    sealed_part = on_sealed(robot, models, [prepare(run, processing) for run in parts.sealed])
+    kept, ends = ([prepare(run, processing) for run in runs] for runs in (parts.sealed, parts.ends))
+    sealed_part = on_sealed(Played(robot, kept), models)
+    worth = worth_on_sealed(Played(robot, [*kept, *ends]), model, traced, models[1])
+    named, rivals = _named(
+        model, traced, (parameters, covariance), doubts, worth, spec.diagnosis.payload_links
+    )
     base_values, base_std = _base_parameters(model, parameters, covariance)
     floor = noise_floor(parts.training, processing)
     assumed = assumptions(traced.effects, parts, model)
@@ -129,6 +134,7 @@ def diagnose(
         sealed_traces=sealed_part.traces,
         assumed=assumed,
         parts=on_sealed_ends(model, models, parts.ends, processing),
+        untouched=sealed_part.untouched,
     )
 
 
@@ -199,13 +205,16 @@ def _column_names(model: Model) -> list[str]:
 def _named(
     model: Model,
     traced: Traced,
-    parameters: Array,
-    covariance: Array,
+    fitted: tuple[Array, Array],
     doubts: Mapping[int, Approximation],
+    worth: Mapping[int, Worth],
     links: Sequence[str],
 ) -> tuple[tuple[NamedEffect, ...], list[tuple[Alias, Array]]]:
-    """Named effects with values, evidence and aliases; and the aliases with their own values."""
-    judge, names = traced.judge, model.robot.joint_names
+    """Named effects with values, evidence and aliases; and the aliases with their own values.
+
+    `fitted`: parameters and their covariance.
+    """
+    (parameters, covariance), judge, names = fitted, traced.judge, model.robot.joint_names
     start = len(parameters) - sum(traced.candidates[i].width for i in traced.chosen)
     transform = friction_lines(traced, start)
     shown, spread = transform @ parameters, transform @ covariance @ transform.T
@@ -258,6 +267,8 @@ def _named(
                 aliases=tuple(records),
                 approximates=doubts.get(i),
                 least_p=judge.rules.least_p,
+                verdict=worth[i].verdict,
+                removes=worth[i].removes,
             )
         )
     order = np.argsort([-each for each in strength], kind="stable")

@@ -5,7 +5,7 @@ from typing import Any
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.traces import Traces
-from excite_cli.diagnosis.verdict import Verdict
+from excite_cli.diagnosis.verdict import SealedVerdict, Verdict
 from excite_cli.effects.base import Value
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
@@ -37,6 +37,15 @@ class Approximation:
     kind: str = ""
 
 
+@dataclass(frozen=True)
+class Removed:
+    """By how much an effect lowers a joint's error on sealed data: relative, and RMS [N·m]."""
+
+    relative: float
+    relative_moving: float
+    rms: float
+
+
 @dataclass(frozen=True, repr=False)
 class NamedEffect(Shown):
     """An effect that the declared model lacks, with its evidence.
@@ -45,7 +54,8 @@ class NamedEffect(Shown):
     `least_p`;
     `share_of_residual` of the energy of the residual before, on the rows it touches;
     `gain` by which the error on runs left out fell; `aliases` what the data cannot tell it from.
-    If it is only an approximation, `approximates` says of what.
+    If it is only an approximation, `approximates` says of what. `verdict` and `removes` (by joint)
+    tell the error on sealed data without it from that with it; files of earlier versions have none.
     """
 
     effect: EffectRecord
@@ -56,6 +66,8 @@ class NamedEffect(Shown):
     aliases: tuple[EffectRecord, ...] = ()
     approximates: Approximation | None = None
     least_p: float = 0.0
+    verdict: SealedVerdict | None = None
+    removes: dict[str, Removed] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -148,6 +160,8 @@ class Diagnosis(Shown):
     what changes from period to period in training runs, filtered as for the errors; None if no
     motion was repeated. `parts`: errors on what is sealed beside the sealed run. `traces` of the
     training data, `sealed_traces` of the sealed ones; files of earlier versions have none.
+    `untouched`: errors on the sealed data of the URDF as given, with the friction of its
+    <dynamics>; None where it has no mass, or in earlier files.
     """
 
     config: str
@@ -176,6 +190,17 @@ class Diagnosis(Shown):
     sealed_traces: tuple[TorqueTrace, ...] = ()
     assumed: tuple[Assumption, ...] = ()
     parts: tuple[SealedEnds, ...] = ()
+    untouched: Errors | None = None
+
+    @property
+    def good(self) -> bool:
+        """Whether what was found, if anything, lowers the mean error on the sealed data."""
+        return not self.effects or not self.after.mean_relative >= self.before.mean_relative
+
+    @property
+    def harmful(self) -> tuple[NamedEffect, ...]:
+        """Effects without which the error on the sealed data is lower."""
+        return tuple(each for each in self.effects if each.verdict is SealedVerdict.HARMFUL)
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:

@@ -7,7 +7,7 @@ measured.
 
 from collections.abc import Sequence
 
-from excite_cli.diagnosis.before_after import FittedModel, on_sealed
+from excite_cli.diagnosis.before_after import FittedModel, Played, on_sealed
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.records import Assumption, SealedEnds
@@ -54,7 +54,7 @@ def on_sealed_ends(
     found = []
     for active, runs in alike.items():
         own = [effect for effect, here in zip(single, active, strict=True) if here]
-        errors = on_sealed(model.robot, models, [prepare(run, processing) for run in runs])
+        errors = on_sealed(Played(model.robot, [prepare(run, processing) for run in runs]), models)
         found.append(
             SealedEnds(
                 tuple(dict.fromkeys(run.id.key for run in runs)),

@@ -1,4 +1,4 @@
-"""What became of a candidate, as files and JSON call it."""
+"""What became of a candidate, and what an effect is worth, as files and JSON call it."""
 
 from enum import StrEnum
 
@@ -14,3 +14,11 @@ class Verdict(StrEnum):
     NO_GAIN = "no gain on runs left out"
     LATER = "later"
     EXPLAINED = "another explains it"
+
+
+class SealedVerdict(StrEnum):
+    """Whether the error on sealed data is lower with an effect, or higher, beyond chance."""
+
+    CONFIRMED = "confirmed"
+    NOT_CONFIRMED = "not confirmed"
+    HARMFUL = "harmful"

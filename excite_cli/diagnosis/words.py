@@ -6,10 +6,12 @@ from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import (
     Approximation,
     Assumption,
+    Diagnosis,
     EffectRecord,
     NamedEffect,
     SealedEnds,
 )
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.effects.base import Quantity, Value
 from excite_cli.effects.catalogue import catalogue
 
@@ -28,6 +30,8 @@ _QUANTITIES: dict[Quantity, str] = {
 
 def is_small(named: NamedEffect) -> bool:
     """Whether few words will do. Beside kept inertias a large effect may explain little itself."""
+    if named.verdict is SealedVerdict.HARMFUL:
+        return False
     return named.share_of_residual < SMALL_SHARE and named.gain < _SMALL_GAIN
 
 
@@ -115,6 +119,55 @@ def ends_in_words(part: SealedEnds) -> str:
         f"The ends of {', '.join(part.runs)}{f' (with {kinds})' if kinds else ''} took no part, "
         f"either: mean error there {part.before.mean_relative_moving:.2%} → "
         f"{part.after.mean_relative_moving:.2%} where joints move."
+    )
+
+
+def sealed_in_words(named: NamedEffect) -> str:
+    """`confirmed -4.78 pp`: verdict on sealed data, and by how much the error there changes.
+
+    Percentage points of the relative error where the joint moves, of the joint where it changes
+    most; that joint is named where the effect is not on it alone.
+    """
+    if named.verdict is None:
+        return ""
+    moved = {joint: each.relative_moving for joint, each in named.removes.items()}
+    moved = {joint: each for joint, each in moved.items() if each == each}
+    if not moved:
+        return named.verdict
+    joint = max(moved, key=lambda name: abs(moved[name]))
+    where = "" if named.effect.joints == (joint,) else f" on {joint}"
+    return f"{named.verdict} {-100 * moved[joint]:+.2f} pp{where}"
+
+
+def no_gain_in_words(found: Diagnosis) -> str:
+    """That the error on sealed data did not fall with what was found, and by what; empty if it did.
+
+    To be said before anything else.
+    """
+    if found.good:
+        return ""
+    joints = len(found.joint_names)
+    guilty = found.harmful or tuple(
+        each for each in found.effects if each.verdict is SealedVerdict.NOT_CONFIRMED
+    )
+    what = "Harmful" if found.harmful else "None is harmful beyond doubt; not confirmed"
+    listed = ", ".join(
+        f"{each.effect.kind} on {place_in_words(each.effect, joints)}" for each in guilty
+    )
+    return (
+        f"The sealed error did not fall: {found.before.mean_relative:.2%} before, "
+        f"{found.after.mean_relative:.2%} after (mean over joints, all samples of "
+        f"{found.sealed_run})." + f" {what}: {listed}." * bool(listed)
+    )
+
+
+def untouched_in_words(found: Diagnosis) -> str:
+    """What the URDF says of the sealed data by itself; empty where that is not known."""
+    if found.untouched is None:
+        return ""
+    return (
+        "The URDF as given, with the friction of its <dynamics> and nothing fitted: "
+        f"{found.untouched.mean_relative_moving:.2%}."
     )
 
 

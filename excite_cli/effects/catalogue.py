@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
+import numpy as np
+
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.armature import Armature
 from excite_cli.effects.asymmetric_friction import AsymmetricFriction
@@ -36,7 +38,7 @@ from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.effects.torque_saturation import TorqueSaturation
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.errors import ConfigError, ExciteWarning, nearest
-from excite_cli.robot.model import Robot
+from excite_cli.robot.model import Array, Robot
 
 GROUP = "excite.effects"
 _OURS: tuple[type[Effect], ...] = (
@@ -148,14 +150,19 @@ def declared_effects(specs: tuple[EffectSpec, ...] | None, robot: Robot) -> tupl
         A kind, joint or shape is unknown, or the joints do not fit the kind.
     """
     if specs is None:
-        model, moved = robot.model, robot.moved
-        damped = [j for j in range(robot.n) if model.damping[moved[j]] > 0]
-        dry = [j for j in range(robot.n) if model.friction[moved[j]] > 0]
-        return (
-            *(ViscousFriction((j,)) for j in damped),
-            *(CoulombFriction((j,)) for j in dry),
-        )
+        return urdf_friction(robot)[0]
     return tuple(effect for i, spec in enumerate(specs) for effect in _built(spec, i, robot))
+
+
+def urdf_friction(robot: Robot) -> tuple[tuple[Effect, ...], Array]:
+    """Effects of the URDF's <dynamics> (damping, friction), and their parameters (k,) there."""
+    damping, friction = (x[robot.moved] for x in (robot.model.damping, robot.model.friction))
+    damped, dry = np.flatnonzero(damping > 0), np.flatnonzero(friction > 0)
+    effects = (
+        *(ViscousFriction((int(j),)) for j in damped),
+        *(CoulombFriction((int(j),)) for j in dry),
+    )
+    return effects, np.concatenate([damping[damped], friction[dry]])
 
 
 def _built(spec: EffectSpec, index: int, robot: Robot) -> list[Effect]:

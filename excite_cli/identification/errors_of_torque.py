@@ -1,9 +1,10 @@
 """Errors of a predicted torque: per joint, relative and in N·m, with an interval of their mean."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.identification.factors import Mask
 from excite_cli.robot.model import Array
@@ -16,7 +17,8 @@ _BLOCK = 1.0  # s, longer than what noise of the filtered torque remembers
 class Errors:
     """Of the torque on the sealed data: per joint, relative (RMS/RMS) and in N·m.
 
-    `interval` is the 95 % block-bootstrap interval of the mean relative error.
+    `interval` is the 95 % block-bootstrap interval of the mean relative error; `samples` says how
+    many filtered ones count, for files of earlier versions it is empty.
     """
 
     mean_relative: float
@@ -26,6 +28,7 @@ class Errors:
     rms: dict[str, float]
     rms_raw: dict[str, float]
     interval: tuple[float, float]
+    samples: dict[str, int] = field(default_factory=dict)
 
     def as_data(self) -> dict[str, object]:
         """Plain values for files and JSON."""
@@ -52,7 +55,7 @@ def torque_errors(
 
     A joint without a (moving) sample has NaN and does not enter the mean.
     """
-    blocks = [_block_sums(*run, step) for run in zip(tau, predicted, usable, moving, strict=True)]
+    blocks = [block_sums(*run, step) for run in zip(tau, predicted, usable, moving, strict=True)]
     sums = np.concatenate(blocks, axis=1)  # (5, blocks, n)
     wrong, size, wrong_moving, size_moving, count = sums.sum(axis=1)
     relative, relative_moving = _ratio(wrong, size), _ratio(wrong_moving, size_moving)
@@ -66,16 +69,22 @@ def torque_errors(
         rms=_named(joint_names, rms),
         rms_raw=_named(joint_names, _raw_rms(raw, raw_predicted, len(joint_names))),
         interval=_interval(sums[0], sums[1]),
+        samples={name: int(each) for name, each in zip(joint_names, count, strict=True)},
     )
 
 
-def _block_sums(tau: Array, predicted: Array, usable: Mask, moving: Mask, step: float) -> Array:
-    """Per block of about 1 s: ‖e‖², ‖τ‖², the same where moving, and the count; (5, blocks, n)."""
+def block_sums(
+    tau: Array, predicted: Array, usable: Mask, moving: Mask, step: float, seconds: float = _BLOCK
+) -> Array:
+    """Per block of about so many seconds, of the samples (M, n) of a run: (5, blocks, n).
+
+    ‖e‖², ‖τ‖², the same where moving, and the count. The last block has at least half the length.
+    """
     good, slow = usable.astype(float), (usable & moving).astype(float)
     error = np.square(np.where(usable, tau - predicted, 0.0))
     size = np.square(np.where(usable, tau, 0.0))
     rows = np.stack([error, size, error * slow, size * slow, good])
-    length = max(1, round(_BLOCK / step))
+    length = max(1, round(seconds / step))
     edges = np.arange(0, max(len(tau) - length // 2, 1), length)
     return np.add.reduceat(rows, edges, axis=1)
 
@@ -105,10 +114,9 @@ def _raw_rms(raw: Sequence[Array], predicted: Sequence[Array], n: int) -> Array:
 
 def _interval(wrong: Array, size: Array) -> tuple[float, float]:
     """2.5 and 97.5 % of the mean relative error over blocks (B, n) drawn with replacement."""
-    blocks = len(wrong)
-    if blocks < 2:
+    if len(wrong) < 2:
         return float("nan"), float("nan")
-    draws = np.random.default_rng(_SEED).multinomial(blocks, np.full(blocks, 1 / blocks), _DRAWS)
+    draws = drawn_blocks(len(wrong))
     ratios = _ratio(draws @ wrong, draws @ size)
     good = np.isfinite(ratios)
     count = good.sum(axis=1)
@@ -117,3 +125,9 @@ def _interval(wrong: Array, size: Array) -> tuple[float, float]:
         return float("nan"), float("nan")
     low, high = np.percentile(means, [2.5, 97.5])
     return float(low), float(high)
+
+
+def drawn_blocks(count: int) -> NDArray[np.int64]:
+    """How often each of so many blocks is drawn, with replacement: (draws, count)."""
+    rng = np.random.default_rng(_SEED)
+    return rng.multinomial(count, np.full(count, 1 / count), _DRAWS)

@@ -32,6 +32,7 @@ from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import prepare
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import Regression, build_regression
+from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
@@ -84,6 +85,7 @@ def identify(
     check_declared_runs(spec, dataset)
     parts = split(dataset, sealed, spec.diagnosis.block)
     check_left_to_fit(spec.effects, parts)
+    refuse_sealed_copies(parts)
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )

@@ -40,7 +40,8 @@ class Run(Shown):
     `name` is the recording's, `part` says which part of it. `valid` (T, n): samples that may be
     used, per joint (false where saturated, stuck or bridged). `extra` holds further channels of the
     file, (T,) or (T, m), untouched. `epoch`: seconds from 1970 (UTC) to t = 0, where the data know;
-    `start`: the campaign's time at t = 0 [s], once it is known (`campaign_clock`).
+    `start`: the campaign's time at t = 0 [s], once it is known (`campaign_clock`). `recorded` (T,):
+    where samples were interpolated, the hash of the nearest one in the file.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Run(Shown):
     part: Part = field(default_factory=Part)
     epoch: float | None = None
     start: float = 0.0
+    recorded: NDArray[np.uint64] | None = None
 
     @property
     def id(self) -> RunId:
@@ -93,6 +95,7 @@ class Run(Shown):
             dq=None if self.dq is None else self.dq[cut],
             valid=None if self.valid is None else self.valid[cut],
             extra={key: value[cut] for key, value in self.extra.items()},
+            recorded=None if self.recorded is None else self.recorded[cut],
         )
 
 

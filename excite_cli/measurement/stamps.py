@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.missing_values import BEYOND, rows_of
+from excite_cli.measurement.row_hashes import row_hashes
 from excite_cli.measurement.run_identity import Part
 
 _EVEN = 0.05  # of a step
@@ -253,7 +255,13 @@ def _resampled(run: Run, notes: _Notes) -> Run:
         dq=None if run.dq is None else _linear(run.t, run.dq, grid),
         valid=None if valid.all() else valid,
         extra={key: _linear(run.t, value, grid) for key, value in run.extra.items()},
+        recorded=row_hashes(run)[_nearest(run.t, grid)],
     )
+
+
+def _nearest(t: Array, grid: Array) -> NDArray[np.intp]:
+    """The sample nearest to each instant."""
+    return np.searchsorted((t[1:] + t[:-1]) / 2, grid)
 
 
 def _on_grid(run: Run, grid: Array) -> Mask:

@@ -10,15 +10,17 @@ from excite_cli.diagnosis.words import (
     counted,
     covariate_in_words,
     is_small,
+    no_gain_in_words,
     other_name_of,
     p_in_words,
     place_in_words,
+    sealed_in_words,
     title_of,
     value_in_words,
 )
 from excite_cli.report.page import Block, Section, Table, Text
 
-_COLUMNS = ("effect", "where", "size ± 2 standard deviations", "p", "share", "gain")
+_COLUMNS = ("effect", "where", "size ± 2 standard deviations", "p", "share", "gain", "sealed")
 
 
 def found_section(found: Diagnosis) -> Section:
@@ -28,7 +30,7 @@ def found_section(found: Diagnosis) -> Section:
     small = [each for each in ranked if is_small(each)]
     if len(small) < 2 or not large:
         large, small = ranked, []
-    blocks: list[Block] = []
+    blocks: list[Block] = [] if found.good else [Text(no_gain_in_words(found), "bad")]
     if large:
         blocks.append(
             Table(
@@ -38,7 +40,8 @@ def found_section(found: Diagnosis) -> Section:
                 right=frozenset({3, 4, 5}),
                 note=(
                     "share: of the energy of the residual before; gain: by which the error on runs "
-                    "left out falls."
+                    "left out falls; sealed: whether the effect lowers the error on sealed data, "
+                    "and the change there in percentage points."
                 ),
             )
         )
@@ -57,7 +60,7 @@ def found_section(found: Diagnosis) -> Section:
             Table(
                 (*_COLUMNS, "stands for"),
                 tuple(_row(found, each) for each in found.approximations),
-                title="Approximations: they lower the error, but something else is there",
+                title="Approximations: they come near something else that is there",
                 right=frozenset({3, 4, 5}),
             )
         )
@@ -73,9 +76,8 @@ def verdict(found: Diagnosis) -> str:
     approximations = counted(len(found.approximations), "approximation")
     what = counted(len(found.named), "effect")
     what += f" and {approximations}" * bool(found.approximations)
-    lower = "lower" if len(found.effects) > 1 else "lowers"
     return (
-        f"{what} {lower} the mean error of the torque on {found.sealed_run}, which took no part, "
+        f"With {what} the mean error of the torque on {found.sealed_run}, which took no part, goes "
         f"from {found.before.mean_relative_moving:.2%} to {found.after.mean_relative_moving:.2%} "
         f"where joints move (over all samples from {found.before.mean_relative:.2%} to "
         f"{found.after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%})."
@@ -113,6 +115,7 @@ def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:
         p_in_words(named.p_value, named.least_p),
         f"{named.share_of_residual:.2%}",
         f"{named.gain:.1%}",
+        sealed_in_words(named) or "–",
         others or "–",
     )
 

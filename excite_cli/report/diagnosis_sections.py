@@ -4,7 +4,13 @@ from typing import Any
 
 from excite_cli.diagnosis.next_motion import next_experiment
 from excite_cli.diagnosis.records import Diagnosis
-from excite_cli.diagnosis.words import counted, ends_in_words, title_of
+from excite_cli.diagnosis.words import (
+    counted,
+    ends_in_words,
+    no_gain_in_words,
+    title_of,
+    untouched_in_words,
+)
 from excite_cli.report.dependence_section import dependence_section
 from excite_cli.report.diagnosis_found_section import found_section
 from excite_cli.report.effect_section import effect_section
@@ -22,7 +28,9 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
     names = [title_of(each.effect.kind) for each in diagnosis.named]
     kinds = ", ".join(dict.fromkeys(names[:3])) + (" …" if len(set(names)) > 3 else "")
     open_questions = sum(bool(each.aliases) for each in diagnosis.effects)
+    bad = KeyFigure("verdict", "the sealed error did not fall", no_gain_in_words(diagnosis))
     return (
+        *([] if diagnosis.good else [bad]),
         KeyFigure(
             "error on sealed data, moving",
             f"{before.mean_relative_moving:.2%} → {after.mean_relative_moving:.2%}",
@@ -78,7 +86,7 @@ def _errors(diagnosis: Diagnosis) -> Section:
         f"On {diagnosis.sealed_run}, which took no part in choosing or fitting. Before: the "
         "declared model, fitted to the same training data; after: with the effects that were "
         f"found. Mean over all samples after: {diagnosis.after.mean_relative:.2%}, 95 % interval "
-        f"{low:.2%} to {high:.2%}."
+        f"{low:.2%} to {high:.2%}. {untouched_in_words(diagnosis)}"
     )
     return Section("diagnosis-errors", "Error before and after", blocks, lead)
 

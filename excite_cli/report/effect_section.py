@@ -14,6 +14,7 @@ from excite_cli.diagnosis.words import (
     is_small,
     p_in_words,
     place_in_words,
+    sealed_in_words,
     title_of,
     value_in_words,
 )
@@ -103,6 +104,8 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
         f"{named.share_of_residual:.2%} of the residual; "
         f"lowers the error on runs left out by {named.gain:.1%}."
     )
+    if told := sealed_in_words(named):
+        text += f" On sealed data: {told}."
     if _has_a_line(found, named):
         line = " and ".join(map(title_of, _deviates_from(named)))
         text += f" Drawn is what deviates from the straight line of {line}."

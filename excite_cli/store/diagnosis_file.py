@@ -64,6 +64,7 @@ _LATER: dict[str, Any] = {
     "noise_floor": dict[str, float] | None,
     "assumed": tuple[Assumption, ...],
     "parts": tuple[SealedEnds, ...],
+    "untouched": Errors | None,
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
@@ -144,7 +145,8 @@ def _read(file: Any, path: Path) -> Diagnosis:
         **fields,
     )
     ends = [error for part in found.parts for error in (part.before, part.after)]
-    require_joints(joints, (found.before, found.after, *ends), found.noise_floor)
+    untouched = [found.untouched] if found.untouched else []
+    require_joints(joints, (found.before, found.after, *ends, *untouched), found.noise_floor)
     if not _named_joints(found) <= set(joints):
         raise ValueError("it names joints that are not its own")
     return found
@@ -177,6 +179,7 @@ def _named_joints(found: Diagnosis) -> set[str]:
     ]
     return {
         *(joint for each in records for joint in each.joints),
+        *(joint for each in found.effects for joint in each.removes),
         *(each.joint for each in found.unexplained),
         *(joint for each in found.rounds for joint in each.residual),
     }

@@ -14,6 +14,7 @@ def require_joints(
         for each in errors
         for mapping in (each.relative, each.relative_moving, each.rms, each.rms_raw)
     ]
-    others = set(noise_floor or ()) - set(joints)
+    others = {*(noise_floor or ()), *(joint for each in errors for joint in each.samples)}
+    others -= set(joints)
     if others or any(set(mapping) != set(joints) for mapping in found):
         raise ValueError("its errors are those of other joints")

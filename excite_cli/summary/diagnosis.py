@@ -14,7 +14,7 @@ from excite_cli.diagnosis.records import (
     Round,
     SealedEnds,
 )
-from excite_cli.diagnosis.verdict import Verdict
+from excite_cli.diagnosis.verdict import SealedVerdict, Verdict
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
     approximation_in_words,
@@ -23,9 +23,12 @@ from excite_cli.diagnosis.words import (
     covariate_in_symbols,
     ends_in_words,
     is_small,
+    no_gain_in_words,
     other_name_of,
     p_in_words,
     place_in_words,
+    sealed_in_words,
+    untouched_in_words,
     value_in_words,
 )
 from excite_cli.identification.fit_words import above_the_floor
@@ -52,12 +55,12 @@ def diagnosis_answer(
         rounds = counted(len(found.rounds), "round")
         parts.append(f"({rounds} of tests; --verbose shows the suspects of each, and why not.)")
     parts.append(_next(experiment))
-    return Answer(tuple(parts), {**_data(found, experiment), "output": files})
+    return Answer(tuple(parts), {**_data(found, experiment), "output": files}, found.good)
 
 
 def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
     """What is missing, absorbed or unexplained, before and after."""
-    parts: Parts = []
+    parts: Parts = [] if found.good else [no_gain_in_words(found)]
     if verbose:
         parts.append(_data_in_words(found))
         parts += [_round_table(found, each) for each in found.rounds]
@@ -122,7 +125,11 @@ def _effects(found: Diagnosis, verbose: bool) -> Parts:
     shown = [each for each in ranked if not any(each is other for other in small)]
     parts: Parts = [_effect_table(shown, everything, verbose)]
     if small:
-        listed = ", ".join(_what(each.effect, everything) for each in small)
+        listed = ", ".join(
+            _what(each.effect, everything)
+            + f" ({each.verdict})" * (each.verdict is SealedVerdict.NOT_CONFIRMED)
+            for each in small
+        )
         parts.append(
             f"and {len(small)} small ones (each below {SMALL_SHARE:.1%}): {listed} "
             "(--verbose: sizes)"
@@ -138,15 +145,16 @@ def _effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) 
             "\n".join(value_in_words(name, value) for name, value in named.parameters.items()),
             *([p_in_words(named.p_value, named.least_p)] if verbose else []),
             f"{named.share_of_residual:.2%}",
+            sealed_in_words(named),
         )
         for named in shown
     )
     return Table(
-        "What the declared model lacks (share: of the residual)",
-        ("effect", "where", "size", *(["p"] if verbose else []), "share"),
+        "What the declared model lacks (share: of the residual; sealed: change of error)",
+        ("effect", "where", "size", *(["p"] if verbose else []), "share", "sealed"),
         rows,
         left=("effect",),
-        words=("where", "size"),
+        words=("where", "size", "sealed"),
     )
 
 
@@ -172,16 +180,17 @@ def _approximation_table(found: Diagnosis) -> Table:
             place_in_words(each.effect, len(found.joint_names)),
             "\n".join(value_in_words(name, value) for name, value in each.parameters.items()),
             f"{each.share_of_residual:.2%}",
+            sealed_in_words(each),
             approximation_in_words(each.approximates) if each.approximates else "",
         )
         for each in found.approximations
     )
     return Table(
-        "Approximations: they lower the error, but something else is there",
-        ("effect", "where", "size", "share", "stands for"),
+        "Approximations: they come near something else that is there",
+        ("effect", "where", "size", "share", "sealed", "stands for"),
         rows,
         left=("effect",),
-        words=("where", "size", "stands for"),
+        words=("where", "size", "sealed", "stands for"),
     )
 
 
@@ -258,7 +267,7 @@ def _verdict(found: Diagnosis) -> str:
         f"{found.before.mean_relative_moving:.2%} → "
         f"{found.after.mean_relative_moving:.2%} where joints move (over all samples "
         f"{found.after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}). "
-        f"{found.seconds:.1f} s."
+        f"{untouched_in_words(found)} {found.seconds:.1f} s."
     )
 
 
@@ -292,6 +301,8 @@ def _named(named: NamedEffect, runs: list[str]) -> dict[str, Any]:
         "gain": named.gain,
         "alias_set": [_record(alias) for alias in named.aliases],
         "runs": list(named.effect.runs) or runs,
+        "verdict": named.verdict,
+        "removes": {joint: asdict(each) for joint, each in named.removes.items()},
     }
 
 
@@ -308,6 +319,8 @@ def _data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
     """The answer for `--json`."""
     runs = [str(name) for name in found.processing.get("runs", [])]
     return {
+        "good": found.good,
+        "reason": no_gain_in_words(found),
         "declared_effects": [_record(record) for record in found.declared],
         "effects": [_named(each, runs) for each in found.named],
         "approximations": [
@@ -328,6 +341,8 @@ def _data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
             "before": found.before.as_data(),
             "after": found.after.as_data(),
             "parts": [_ends(part) for part in found.parts],
+            "untouched": found.untouched.as_data() if found.untouched else None,
+            "samples": found.after.samples,
         },
         "assumed": [asdict(each) for each in found.assumed],
         "noise_floor": found.noise_floor,

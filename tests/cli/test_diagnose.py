@@ -1,9 +1,12 @@
 """`excite diagnose` as a user runs it, on simulated data of the smoke arm."""
 
+import json
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
 import pytest
 import yaml
 
@@ -20,6 +23,7 @@ QUICK = ("--set", f"diagnosis.kinds={KINDS}")
 PLANTED = {("coulomb_friction", "elbow"), ("viscous_friction", "shoulder_pitch")}
 E_NAMES = {
     "mean_relative", "mean_relative_moving", "relative", "relative_moving", "rms", "rms_raw",
+    "samples",
 }  # fmt: skip
 
 
@@ -69,7 +73,12 @@ def test_json_is_as_promised(outcome: Outcome) -> None:
     for effect in answer["effects"]:
         assert set(effect) >= {
             "kind", "joints", "parameters", "p_value", "share_of_residual", "alias_set", "runs",
+            "verdict", "removes",
         }  # fmt: skip
+        assert effect["verdict"] == "confirmed"
+        joint = effect["joints"][0]
+        assert set(effect["removes"][joint]) == {"relative", "relative_moving", "rms"}
+        assert effect["removes"][joint]["rms"] > 0.1
         for value in effect["parameters"].values():
             assert set(value) == {"value", "std", "unit"}
         assert 0 <= effect["p_value"] <= 0.01
@@ -84,7 +93,8 @@ def test_json_is_as_promised(outcome: Outcome) -> None:
         assert set(each) >= {"joint", "depends_on", "share_of_residual"}
     error = answer["error"]
     assert error["sealed_run"] == "motion_2_take_2"
-    for when in ("before", "after"):
+    assert error["samples"] == error["after"]["samples"]
+    for when in ("before", "after", "untouched"):
         assert set(error[when]) >= E_NAMES
         for name in E_NAMES - {"mean_relative", "mean_relative_moving"}:
             assert list(error[when][name]) == JOINTS
@@ -189,6 +199,75 @@ def test_bad_requests_get_one_message(
     assert run.stdout == ""
     assert "Traceback" not in run.stderr
     assert run.stderr.count("\n") == run.stderr.rstrip().count("\n") + 1
+
+
+@pytest.fixture(scope="session")
+def mended(
+    tmp_path_factory: pytest.TempPathFactory, cache: Path, data: Path, two_motions: Run
+) -> Path:
+    """The friction is gone when the last run is recorded, which will be sealed."""
+    folder = tmp_path_factory.mktemp("mended")
+    path = folder / "data.h5"
+    later = folder / "later.h5"
+    Program(folder, cache).answer(
+        "simulate", SMOKE, two_motions.path, "-o", later, "--rate", "200", "--seed", "2"
+    )
+    shutil.copy(data, path)
+    with h5py.File(path, "a") as file, h5py.File(later) as new:
+        del file["runs/motion_2_take_2"]
+        new.copy("runs/motion_2", file, "runs/motion_2_take_2")
+    return path
+
+
+def test_a_sealed_error_that_does_not_fall_is_a_bad_answer(mended: Path, excite: Program) -> None:
+    """Exit status 1, said first, and nothing is written unasked."""
+    better = excite.folder / "better.yaml"
+    run = excite("diagnose", SMOKE, mended, *QUICK, "--apply", better, "-o", "found.h5", "--json")
+    assert run.returncode == 1, run.stderr
+    answer = json.loads(run.stdout)
+    assert (next(iter(answer)), answer["good"]) == ("good", False)
+    error = answer["error"]
+    assert error["after"]["mean_relative"] > error["before"]["mean_relative"]
+    assert "The sealed error did not fall" in answer["reason"]
+    harmful = {each["kind"] for each in answer["effects"] if each["verdict"] == "harmful"}
+    assert "coulomb_friction" in harmful
+    assert answer["output"] == {"diagnosis": "found.h5"}
+    assert not better.exists()
+    assert f"{better} is not written" in run.stderr
+    assert "--apply-unconfirmed" in run.stderr
+
+
+def test_what_is_not_confirmed_is_written_where_that_is_asked_for(
+    mended: Path, excite: Program
+) -> None:
+    better = excite.folder / "better.yaml"
+    run = excite("diagnose", SMOKE, mended, *QUICK, "--apply", better, "--apply-unconfirmed")
+    assert run.returncode == 1, run.stderr
+    assert run.stdout.startswith("The sealed error did not fall: ")
+    spec = load_spec(better)
+    assert spec.effects is not None
+    assert ("coulomb_friction", "elbow") in {(e.kind, e.joints[0]) for e in spec.effects}
+    alone = excite("diagnose", SMOKE, mended, *QUICK, "--apply-unconfirmed")
+    assert alone.returncode == 2
+    assert "says nothing without --apply" in alone.stderr
+
+
+@pytest.mark.parametrize("command", ["diagnose", "identify"])
+def test_copies_of_training_data_are_refused_as_sealed(
+    data: Path, excite: Program, command: str
+) -> None:
+    copy = excite.folder / "copy.h5"
+    shutil.copy(data, copy)
+    run = excite(command, SMOKE, data, copy)
+    assert run.returncode == 2
+    assert "hold the same samples to the last digit" in run.stderr
+    assert "motion_2_take_2" in run.stderr
+    assert str(copy) in run.stderr
+    link = excite.folder / "link.h5"
+    link.symlink_to(data)
+    run = excite(command, SMOKE, data, link)
+    assert run.returncode == 2
+    assert "is given twice" in run.stderr
 
 
 def test_help_has_an_example(excite: Program) -> None:

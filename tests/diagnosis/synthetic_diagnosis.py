@@ -1,7 +1,7 @@
 """Diagnoses made up from a planned motion on a known model, without any data."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +17,13 @@ from excite_cli.diagnosis.records import (
     EffectRecord,
     Information,
     NamedEffect,
+    Removed,
     Round,
     Suspect,
     Unexplained,
 )
 from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
-from excite_cli.diagnosis.verdict import Verdict
+from excite_cli.diagnosis.verdict import SealedVerdict, Verdict
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.base import Value
 from excite_cli.excitation.effect_columns import EffectColumns
@@ -99,7 +100,14 @@ def make_diagnosis(
         declared=(),
         effects=(
             NamedEffect(
-                model[0], {"viscous": Value(2.0, 0.1, "N·m·s/rad")}, 1e-9, 0.4, 0.2, tuple(rivals)
+                model[0],
+                {"viscous": Value(2.0, 0.1, "N·m·s/rad")},
+                1e-9,
+                0.4,
+                0.2,
+                tuple(rivals),
+                verdict=SealedVerdict.CONFIRMED,
+                removes={"elbow": Removed(0.05, 0.06, 1.5), names[0]: Removed(-0.01, -0.01, -0.1)},
             ),
         ),
         absorbed=(Absorbed("armature", (names[0],), ("Izz[shoulder_yaw]",), 1e-5),),
@@ -109,7 +117,7 @@ def make_diagnosis(
             ),
         ),
         sealed_run="run_3",
-        before=errors,
+        before=replace(errors, mean_relative=0.2),
         after=errors,
         rounds=(Round(1, dict.fromkeys(names, 1.0), (suspect,), "viscous friction named"),),
         findings=(Finding("jitter", "note", "time stamps jitter by 3 %", "run_1", ("elbow",)),),

@@ -10,6 +10,7 @@ from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Assumption, Diagnosis
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.effects.catalogue import kind_named
@@ -21,14 +22,14 @@ from tests.cli.program import SMOKE
 pytest.importorskip("mujoco")
 
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import plant
+from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.fourier import FourierTrajectory
 
 SECONDS, RATE = 5.0, 200.0
 # What may differ: what is measured on the sealed part, and the time it took.
-FREE = {"before", "after", "sealed_traces", "seconds"}
+FREE = {"before", "after", "untouched", "sealed_traces", "seconds"}
 
 
 @pytest.fixture(scope="module")
@@ -66,18 +67,29 @@ def dataset(robot: Robot) -> Dataset:
     payload = replace(
         payload, effect=replace(payload.effect, runs=("motion_2", "motion_3"))
     )  # fmt: skip
-    friction = plant(kind_named("coulomb_friction"), (2,), 1.5, {})
     settings = SimulationSettings(rate=RATE, lead_in=0.5)
-    return simulate(robot, motions, settings, [friction, payload]).dataset
+    return simulate(robot, motions, settings, [friction(), payload]).dataset
+
+
+def friction() -> Planted:
+    """Of the elbow."""
+    return plant(kind_named("coulomb_friction"), (2,), 1.5, {})
 
 
 def differences(one: Diagnosis, other: Diagnosis) -> list[str]:
-    """Fields that are not the same, bit by bit."""
+    """Fields that are not the same, bit by bit; verdicts of effects are left out."""
+    one, other = unjudged(one), unjudged(other)
     return [
         field.name
         for field in fields(Diagnosis)
         if not same(getattr(one, field.name), getattr(other, field.name))
     ]
+
+
+def unjudged(found: Diagnosis) -> Diagnosis:
+    return replace(
+        found, effects=tuple(replace(each, verdict=None, removes={}) for each in found.effects)
+    )
 
 
 def same(one: Any, other: Any) -> bool:
@@ -130,6 +142,51 @@ def test_a_sealed_run_is_used_for_the_errors_only(
     assert one.effects  # something was chosen and fitted
     assert set(differences(one, other)) == FREE
     assert other.after.mean_relative > 2 * one.after.mean_relative
+
+
+def test_what_is_there_is_confirmed_on_the_sealed_run(baseline: Diagnosis) -> None:
+    assert baseline.good
+    assert {each.effect.kind: each.verdict for each in baseline.effects} == {
+        "coulomb_friction": SealedVerdict.CONFIRMED,
+        "payload": SealedVerdict.CONFIRMED,
+    }
+    for each in baseline.effects:
+        assert max(removed.rms for removed in each.removes.values()) > 0.1
+    assert baseline.untouched is not None
+    assert baseline.untouched.mean_relative > baseline.after.mean_relative
+
+
+@pytest.fixture(scope="module")
+def lubricated(robot: Robot, base: BaseParameters, spec: Spec, dataset: Dataset) -> Diagnosis:
+    """The dry friction is gone when the sealed run is recorded."""
+    settings = SimulationSettings(rate=RATE, lead_in=0.5)
+    last = simulate(robot, [motion(robot, 3)], settings, []).dataset.runs
+    only = spec.model_copy(
+        update={"diagnosis": spec.diagnosis.model_copy(update={"kinds": ("coulomb_friction",)})}
+    )
+    first = simulate(robot, [motion(robot, i) for i in (1, 2)], settings, [friction()]).dataset
+    return diagnose(robot, base, replace(dataset, runs=(*first.runs, *last)), only)
+
+
+def test_what_the_sealed_run_lacks_is_harmful(lubricated: Diagnosis) -> None:
+    (named,) = lubricated.effects
+    assert (named.effect.kind, named.effect.joints) == ("coulomb_friction", ("elbow",))
+    assert named.verdict is SealedVerdict.HARMFUL
+    assert lubricated.harmful == (named,)
+    assert not lubricated.good
+
+
+def test_one_effect_removes_all_that_is_removed(lubricated: Diagnosis) -> None:
+    """Before is the same model without it, fitted to the same data in the same way."""
+    before, after = lubricated.before, lubricated.after
+    (named,) = lubricated.effects
+    assert named.removes["elbow"].rms < -0.5
+    for joint, removed in named.removes.items():
+        assert removed.relative == before.relative[joint] - after.relative[joint]
+        assert removed.rms == before.rms[joint] - after.rms[joint]
+        assert removed.relative_moving == (
+            before.relative_moving[joint] - after.relative_moving[joint]
+        )
 
 
 def test_what_is_assumed_of_the_sealed_run_is_told(baseline: Diagnosis) -> None:

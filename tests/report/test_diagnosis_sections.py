@@ -181,6 +181,30 @@ def test_small_effects_are_folded_unless_they_matter(
     assert spring.folded == folded
 
 
+def test_verdicts_on_sealed_data_stand_in_the_table_and_on_the_card(
+    diagnosis: Diagnosis, sections: dict[str, Section]
+) -> None:
+    table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, Table))
+    assert table.rows[0][table.columns.index("sealed")] == "confirmed -6.00 pp"
+    (chart,) = charts_of(sections["diagnosis-evidence"])
+    assert "On sealed data: confirmed -6.00 pp." in chart.caption
+    assert found_section(diagnosis).lead.count("which took no part, goes from") == 1
+
+
+def test_a_sealed_error_that_did_not_fall_is_told_first(diagnosis: Diagnosis) -> None:
+    after = replace(diagnosis.after, mean_relative=diagnosis.before.mean_relative)
+    bad = replace(diagnosis, after=after)
+    first = diagnosis_figures(bad)[0]
+    assert first.value == "the sealed error did not fall"
+    (text, *_) = found_section(bad).blocks
+    assert isinstance(text, Text)
+    assert (text.kind, text.text) == ("bad", first.remark)
+    assert "20.00% before, 20.00% after" in text.text
+    assert "did not fall" not in render(
+        Page("d", "", diagnosis_figures(diagnosis), (found_section(diagnosis),))
+    )
+
+
 def test_nothing_found(diagnosis: Diagnosis) -> None:
     nothing = replace(diagnosis, effects=())
     assert "Nothing is missing" in found_section(nothing).lead

@@ -10,6 +10,7 @@ import pytest
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import Approximation, Diagnosis
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.errors import FileError
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis, write_diagnosis
 from excite_cli.store.result_file import is_result, read_result
@@ -105,6 +106,41 @@ def test_the_noise_floor_comes_back_and_older_files_have_none(
     with h5py.File(path, "a") as file:
         del file["records/noise_floor"]
     assert read_diagnosis(path).noise_floor is None
+
+
+def test_verdicts_come_back_and_older_files_have_none(diagnosis: Diagnosis, path: Path) -> None:
+    found = read_diagnosis(path).effects[0]
+    assert (found.verdict, found.removes) == (
+        SealedVerdict.CONFIRMED,
+        diagnosis.effects[0].removes,
+    )
+    with h5py.File(path, "a") as file:
+        (record,) = json.loads(file["records/effects"][()])
+        for name in ("verdict", "removes"):
+            del record[name]
+        del file["records/effects"], file["records/untouched"], file["records/assumed"]
+        file["records/effects"] = json.dumps([record])
+    older = read_diagnosis(path)
+    assert (older.effects[0].verdict, older.effects[0].removes) == (None, {})
+    assert (older.untouched, older.assumed) == (None, ())
+
+
+@pytest.mark.parametrize("record", ["effects", "untouched", "after"])
+def test_verdicts_and_errors_of_joints_that_are_not_its_own_are_damage(
+    diagnosis: Diagnosis, tmp_path: Path, record: str
+) -> None:
+    path = tmp_path / "diagnosis.h5"
+    after = replace(diagnosis.after, samples=dict.fromkeys(diagnosis.joint_names, 9))
+    write_diagnosis(path, replace(diagnosis, untouched=diagnosis.after, after=after))
+    read_diagnosis(path)
+    with h5py.File(path, "a") as file:
+        text = file[f"records/{record}"][()].decode()
+        part = {"effects": '"removes": ', "untouched": '"rms": ', "after": '"samples": '}[record]
+        ahead, rest = text.split(part)
+        del file[f"records/{record}"]
+        file[f"records/{record}"] = ahead + part + rest.replace('"elbow"', '"knee"', 1)
+    with pytest.raises(FileError, match="damaged"):
+        read_diagnosis(path)
 
 
 def test_traces_come_back_and_older_files_have_none(diagnosis: Diagnosis, tmp_path: Path) -> None:

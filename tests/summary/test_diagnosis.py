@@ -1,11 +1,13 @@
 """What people and scripts see of a diagnosis: names apart from approximations."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.records import Approximation, Diagnosis
+from excite_cli.diagnosis.records import Approximation, Diagnosis, Removed
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.shown.table import Table
 from excite_cli.summary.diagnosis import diagnosis_answer
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
@@ -33,7 +35,7 @@ def test_an_approximation_is_no_name_for_scripts(doubted: Diagnosis) -> None:
 
 def test_an_approximation_has_a_table_of_its_own(doubted: Diagnosis) -> None:
     text = printed(doubted)
-    assert "Approximations: they lower the error, but something else is there" in text
+    assert "Approximations: they come near something else that is there" in text
     assert REASON in text
     assert "What the declared model lacks" not in text
     assert "0 effects, 1 approximation" in text
@@ -75,3 +77,83 @@ def test_the_noise_floor_stands_beside_the_errors(doubted: Diagnosis) -> None:
 def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -> None:
     assert "noise" not in printed(doubted)
     assert diagnosis_answer(doubted, "arm.yaml", {}).data["noise_floor"] is None
+
+
+@pytest.fixture(scope="module")
+def bad() -> Diagnosis:
+    """What was found makes the sealed error larger; its one effect is harmful, and small."""
+    found = make_diagnosis(rivals=())
+    (named,) = found.effects
+    harmful = replace(
+        named,
+        share_of_residual=1e-5,
+        gain=0.01,
+        verdict=SealedVerdict.HARMFUL,
+        removes={"elbow": Removed(-0.3, -0.4, -2.0), "slide": Removed(0.01, 0.02, 0.1)},
+    )
+    other = replace(named, share_of_residual=1e-4, gain=0.01, verdict=SealedVerdict.NOT_CONFIRMED)
+    after = replace(found.after, mean_relative=0.435, samples=dict.fromkeys(found.joint_names, 80))
+    return replace(
+        found,
+        effects=(harmful, other, other),
+        before=replace(found.before, mean_relative=0.092),
+        after=after,
+        untouched=replace(found.after, mean_relative=0.5, mean_relative_moving=0.61),
+    )
+
+
+def test_a_sealed_error_that_did_not_fall_is_told_first(bad: Diagnosis) -> None:
+    answer = diagnosis_answer(bad, "arm.yaml", {})
+    assert not answer.good
+    assert answer.parts[0] == (
+        "The sealed error did not fall: 9.20% before, 43.50% after (mean over joints, all samples "
+        "of run_3). Harmful: viscous_friction on elbow."
+    )
+    assert list(answer.data)[:2] == ["good", "reason"]
+    assert (answer.data["good"], answer.data["reason"]) == (False, answer.parts[0])
+
+
+def test_without_a_harmful_effect_those_not_confirmed_are_told(bad: Diagnosis) -> None:
+    (first, *_) = diagnosis_answer(replace(bad, effects=bad.effects[1:2]), "arm.yaml", {}).parts
+    assert "None is harmful beyond doubt; not confirmed: viscous_friction on elbow." in str(first)
+
+
+@pytest.mark.parametrize("change", [{"effects": ()}, {"after": None}])
+def test_nothing_missing_or_an_error_that_fell_is_a_good_answer(
+    bad: Diagnosis, change: dict[str, Any]
+) -> None:
+    if "after" in change:
+        change = {"after": replace(bad.after, mean_relative=0.0919)}
+    answer = diagnosis_answer(replace(bad, **change), "arm.yaml", {})
+    assert answer.good
+    assert "did not fall" not in str(answer.parts)
+    assert (answer.data["good"], answer.data["reason"]) == (True, "")
+
+
+def test_every_effect_shows_what_it_is_worth_on_sealed_data(
+    bad: Diagnosis, doubted: Diagnosis
+) -> None:
+    """In percentage points where it is most; a harmful effect is never too small to be shown."""
+    text = printed(bad)
+    assert "0.00% harmful +40.00 pp\n" in text
+    assert "2 small ones" in text
+    assert "viscous_friction on elbow (not confirmed)" in text
+    elsewhere = replace(bad.effects[0], removes={"slide": Removed(0.01, 0.02, 0.1)})
+    assert "harmful -2.00 pp on slide\n" in printed(replace(bad, effects=(elsewhere,)))
+    assert "confirmed -6.00 pp a function of v[elbow]" in printed(doubted)
+    older = replace(bad.effects[0], verdict=None, removes={})
+    assert " pp" not in printed(replace(bad, effects=(older,)))
+
+
+def test_scripts_see_verdicts_and_the_untouched_urdf(bad: Diagnosis) -> None:
+    data = diagnosis_answer(bad, "arm.yaml", {}).data
+    effect = data["effects"][0]
+    assert effect["verdict"] == "harmful"
+    assert effect["removes"]["elbow"] == {"relative": -0.3, "relative_moving": -0.4, "rms": -2.0}
+    assert data["error"]["untouched"]["mean_relative"] == 0.5
+    assert data["error"]["samples"]["elbow"] == 80
+    assert "The URDF as given" in printed(bad)
+    assert "61.00%" in printed(bad)
+    unknown = replace(bad, untouched=None)
+    assert diagnosis_answer(unknown, "arm.yaml", {}).data["error"]["untouched"] is None
+    assert "URDF" not in printed(unknown)

@@ -1,0 +1,112 @@
+"""What every effect is worth on data that took no part: the error there with it and without it.
+
+Without it, the model is fitted anew to the training data: so is what refines it left out, which
+would take its place. What the effect removes is the difference of the mean relative errors of the
+torque, where joints move: of one that stands the stiction may be any, and no model says it. Blocks
+of the sealed part are drawn with replacement, the same for both errors, and say whether it is above
+or below zero beyond chance. Nothing is chosen or fitted by this.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.diagnosis.before_after import FittedModel, Played, refitted
+from excite_cli.diagnosis.declared_model import Model
+from excite_cli.diagnosis.prediction import Prediction
+from excite_cli.diagnosis.records import Removed
+from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.identification.errors_of_torque import Errors, block_sums, drawn_blocks
+from excite_cli.identification.prepare import PreparedRun
+from excite_cli.robot.model import Array
+
+# Blocks are longer than what noise of the filtered torque remembers [s]; of little data, shorter.
+_SHORTEST, _LONGEST, _WANTED = 0.2, 0.5, 8
+_FEWEST = 5  # blocks: of fewer, all of them agree by chance too often
+_NIL = 1e-6  # of the torque
+
+
+@dataclass(frozen=True)
+class Worth:
+    """The verdict on an effect, and by how much it lowers the error, per joint where it does."""
+
+    verdict: SealedVerdict
+    removes: dict[str, Removed]
+
+
+def worth_on_sealed(
+    played: Played, model: Model, traced: Traced, after: FittedModel
+) -> dict[int, Worth]:
+    """Worth of every chosen candidate on the sealed runs `played`, beside all others."""
+    with_all = played.predictions(after)
+    errors = played.errors(with_all)
+    found = {}
+    for i in traced.chosen:
+        rest = traced.judge.without(i, traced.chosen)
+        without = played.predictions(refitted(model, traced, rest))
+        errors_without = played.errors(without)
+        removed = removed_in_draws(played.runs, without, with_all)
+        lower = errors_without.mean_relative - errors.mean_relative
+        found[i] = Worth(sealed_verdict(removed, lower), _removes(errors_without, errors))
+    return found
+
+
+def sealed_verdict(removed: Array, lower: float) -> SealedVerdict:
+    """Judge an effect by what it removes in many draws of blocks (draws,), none if there are few.
+
+    `lower`: by how much it lowers the mean error over all samples, also where joints stand; a
+    verdict that this contradicts is not given.
+    """
+    if not len(removed):
+        return SealedVerdict.NOT_CONFIRMED
+    low, high = np.percentile(removed, [2.5, 97.5])
+    if low > 0.0 and lower > 0.0:
+        return SealedVerdict.CONFIRMED
+    if high < 0.0 and lower < 0.0:
+        return SealedVerdict.HARMFUL
+    return SealedVerdict.NOT_CONFIRMED
+
+
+def removed_in_draws(
+    runs: Sequence[PreparedRun], without: Sequence[Prediction], with_it: Sequence[Prediction]
+) -> Array:
+    """What is removed from the mean relative error where joints move; (0,) of too few blocks."""
+    moving = sum(run.step * (run.valid & run.moving).any(axis=1).sum() for run in runs)
+    block = min(max(moving / _WANTED, _SHORTEST), _LONGEST)
+    (worse, size), (better, _) = (_moving_sums(runs, each, block) for each in (without, with_it))
+    moves = size.any(axis=1)
+    if np.count_nonzero(moves) < _FEWEST:
+        return np.zeros(0)
+    # The torque's size is not drawn anew: few blocks may hold next to none of a joint's.
+    moved = size.any(axis=0)
+    whole, draws = size.sum(axis=0)[moved], drawn_blocks(int(np.count_nonzero(moves)))
+    relative = [np.sqrt(draws @ each[moves][:, moved] / whole) for each in (worse, better)]
+    return np.asarray((relative[0] - relative[1]).mean(axis=1))
+
+
+def _moving_sums(
+    runs: Sequence[PreparedRun], predictions: Sequence[Prediction], block: float
+) -> tuple[Array, Array]:
+    """‖e‖² and ‖τ‖² of every block, where the joints move: (B, n) each."""
+    sums = [
+        block_sums(run.tau, run.averaged(each.torque), run.valid, run.moving, run.step, block)
+        for run, each in zip(runs, predictions, strict=True)
+    ]
+    _, _, wrong, size, _ = np.concatenate(sums, axis=1)
+    return wrong, size
+
+
+def _removes(without: Errors, with_it: Errors) -> dict[str, Removed]:
+    """What is removed on every joint on which it is not nil."""
+    found = {}
+    for joint, relative in with_it.relative.items():
+        less = without.relative[joint] - relative
+        if abs(less) > _NIL:
+            found[joint] = Removed(
+                less,
+                without.relative_moving[joint] - with_it.relative_moving[joint],
+                without.rms[joint] - with_it.rms[joint],
+            )
+    return found

@@ -1,0 +1,59 @@
+"""The verdict on what an effect removes from the error on sealed data."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from excite_cli.diagnosis.prediction import Prediction
+from excite_cli.diagnosis.sealed_verdict import removed_in_draws, sealed_verdict
+from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.identification.prepare import PreparedRun
+from tests.diagnosis.explicit_data import STEP, prepared
+
+SURE = np.linspace(0.01, 0.03, 1000)
+UNSURE = np.linspace(-0.002, 0.03, 1000)  # a sixteenth of the draws says the opposite
+
+
+@pytest.mark.parametrize(
+    ("sign", "verdict"), [(1.0, SealedVerdict.CONFIRMED), (-1.0, SealedVerdict.HARMFUL)]
+)
+def test_what_nearly_all_draws_say_is_the_verdict(sign: float, verdict: SealedVerdict) -> None:
+    assert sealed_verdict(sign * SURE, 0.02 * sign) is verdict
+    assert sealed_verdict(sign * UNSURE, 0.02 * sign) is SealedVerdict.NOT_CONFIRMED
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_error_where_joints_stand_must_not_contradict(sign: float) -> None:
+    assert sealed_verdict(sign * SURE, -0.02 * sign) is SealedVerdict.NOT_CONFIRMED
+
+
+def test_without_draws_nothing_is_confirmed() -> None:
+    assert sealed_verdict(np.zeros(0), 0.02) is SealedVerdict.NOT_CONFIRMED
+
+
+def recording(seconds: float, still: bool = False) -> tuple[PreparedRun, Prediction, Prediction]:
+    """A run of two joints, a prediction that is 2 % off, and one that is 1 % off."""
+    shape = (round(seconds / STEP), 2)
+    rng = np.random.default_rng(2)
+    tau = 5.0 + rng.normal(size=shape)
+    run = prepared(np.ones(shape, bool), tau=tau)
+    if still:
+        run = replace(run, moving=np.zeros(shape, bool))
+    errors = rng.normal(size=shape) * np.sqrt(np.mean(tau**2))
+    worse, better = (Prediction(tau, tau + share * errors) for share in (0.02, 0.01))
+    return run, worse, better
+
+
+def test_draws_tell_what_is_removed_from_the_mean_relative_error() -> None:
+    run, worse, better = recording(5.0)
+    assert removed_in_draws([run], [worse], [better]).mean() == pytest.approx(0.01, rel=0.1)
+    assert removed_in_draws([run], [better], [worse]).max() < 0.0
+
+
+def test_few_blocks_are_no_evidence_nor_is_a_robot_that_stands() -> None:
+    """Four blocks, of 0.2 s at least, may agree by chance."""
+    for run, worse, better in (recording(0.8), recording(5.0, still=True)):
+        assert len(removed_in_draws([run], [worse], [better])) == 0
+    run, worse, better = recording(1.0)
+    assert len(removed_in_draws([run], [worse], [better])) > 0
