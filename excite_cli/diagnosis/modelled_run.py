@@ -11,7 +11,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns
+from excite_cli.identification.regression import effect_columns, with_carried
 from excite_cli.robot.model import Array
 
 
@@ -37,6 +37,7 @@ class ModelledRun:
         signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run.run)
         if not len(values):
             return signals
+        signals = with_carried(signals, effects, values)
         # Defects of the measurement do not change the torque that they act upon.
         in_robot = np.repeat(
             [not effect.data_defect for effect in effects],
