@@ -19,6 +19,7 @@ from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
 from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.friction_line import friction_lines
+from excite_cli.diagnosis.large_rest import large_rests
 from excite_cli.diagnosis.plausibility import check_plausibility
 from excite_cli.diagnosis.records import (
     Absorbed,
@@ -131,6 +132,15 @@ def diagnose(
         ),
         sealed_traces=sealed_part.traces,
         assumed=assumed,
+        large_rests=large_rests(
+            traced.data,
+            traced.signals,
+            traced.data.residuals(traced.candidates, traced.chosen, parameters),
+            parts.training,
+            processing,
+            floor,
+            robot.joint_names,
+        ),
     )
 
 

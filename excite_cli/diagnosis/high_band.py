@@ -28,6 +28,8 @@ _HIGHEST = 0.4  # of the recorded rate
 _CORNERS = np.append(np.geomspace(1.5, 60.0, 40), 1e6)
 _MODEL_ERROR = 0.05  # relative, of a band's power, beside its statistical error
 _TWO_SD = 4.0  # of χ²
+# A second band so much weaker than the first was filtered before it was recorded.
+_FILTERED = 0.2
 _REVERSAL = 0.15  # s around a reversal, whose friction is in all bands
 _LEAST_SECONDS = 2.0
 
@@ -48,7 +50,7 @@ def band_noise(
 ) -> BandNoise:
     """Noise of the torque of `recorded` runs, of which `prepared` are the same in the same order.
 
-    Recordings below 50 Hz do not show it.
+    Recordings below 50 Hz do not show it, nor torque that somebody low-passed.
     """
     n = recorded[0].tau.shape[1]
     bands = [band for band in _BANDS if band[1] <= _HIGHEST * processing.recorded_rate]
@@ -64,6 +66,7 @@ def band_noise(
     widths = np.array([high - low for low, high in bands])
     power = energy / np.where(known, seconds, np.nan) / widths[:, None]
     white, coloured = np.full(n, np.nan), np.full(n, np.nan)
+    known &= np.nan_to_num(power[1]) > _FILTERED * np.nan_to_num(power[0])
     for j in np.flatnonzero(known & (power > 0).all(axis=0)):
         gain = _gain(prepared, processing, int(j))
         flat = float(np.average(power[:_WHITE, j], weights=widths[:_WHITE]))

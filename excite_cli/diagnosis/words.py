@@ -2,17 +2,26 @@
 
 from collections.abc import Callable
 
-from excite_cli.diagnosis.covariate import Aspect, Covariate
-from excite_cli.diagnosis.records import Approximation, Assumption, EffectRecord, NamedEffect
-from excite_cli.effects.base import Quantity, Value
+from excite_cli.diagnosis.covariate import Aspect, Covariate, Source
+from excite_cli.diagnosis.records import (
+    Approximation,
+    Assumption,
+    EffectRecord,
+    LargeRest,
+    NamedEffect,
+)
+from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
 
 # Effects that explain less of the residual, and without which runs left out are hardly worse, are
 # told with few words.
 SMALL_SHARE = 0.002
 _SMALL_GAIN = 0.3
-_QUANTITIES: dict[Quantity, str] = {
+# A smaller predictable share of what is left is not worth a word.
+_TELLING = 0.2
+_QUANTITIES: dict[Source, str] = {
     "time": "time",
+    "run": "run",
     "position": "angle",
     "speed": "speed",
     "acceleration": "acceleration",
@@ -81,6 +90,26 @@ def approximation_in_words(
     if found.covariates:
         return f"a function of {', '.join(map(say, found.covariates))}"
     return f"something that also looks like {title_of(found.kind)}"
+
+
+def rest_in_words(
+    rest: LargeRest, unit: str, say: Callable[[Covariate], str] = covariate_in_symbols
+) -> str:
+    """How much is left of a joint beside its noise, and what of it can be predicted from what."""
+    beside = "" if rest.noise is None else f" beside noise of {rest.noise:.3g} {unit}"
+    left = (
+        f"{rest.rms:.3g} {unit} of {rest.joint} are left{beside} "
+        f"({rest.share_of_torque:.1%} of its torque)"
+    )
+    if rest.depends_on:
+        of = " and ".join(map(say, rest.depends_on))
+        return f"{left}; {rest.predictable:.0%} of it can be predicted, best from {of}."
+    if not rest.certain:
+        return f"{left}; no quantity predicts it: noise with a memory could be as large."
+    share = f"{rest.predictable:.0%} of it can be predicted"
+    if rest.predictable > _TELLING:
+        return f"{left}; {share}, but from no one or two quantities."
+    return f"{left}; no quantity that was tried predicts it."
 
 
 def assumption_in_words(assumed: Assumption) -> str:

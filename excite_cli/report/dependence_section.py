@@ -9,7 +9,7 @@ import numpy as np
 from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import Diagnosis, Unexplained
 from excite_cli.diagnosis.traces import Dependence, Traces
-from excite_cli.diagnosis.words import covariate_in_words
+from excite_cli.diagnosis.words import covariate_in_words, rest_in_words
 from excite_cli.report.chart import (
     BLUE,
     INK,
@@ -41,6 +41,8 @@ _SERIES = {"position": "q", "speed": "v", "acceleration": "a", "load": "load", "
 
 def dependence_section(found: Diagnosis) -> Section:
     """Sentences, the map, and what is left over what it depends on most."""
+    known = found.traces.torque_units if found.traces else ("N·m",) * len(found.joint_names)
+    units = dict(zip(found.joint_names, known, strict=True))
     sentences: list[Block] = [
         Text(
             f"The residual of {each.joint} still depends on {_joined(each.depends_on)} "
@@ -49,7 +51,14 @@ def dependence_section(found: Diagnosis) -> Section:
         )
         for each in found.unexplained
     ]
-    if not found.unexplained:
+    sentences += [
+        Text(
+            f"More than noise: {rest_in_words(each, units[each.joint], covariate_in_words)}",
+            "bad" if each.certain else "",
+        )
+        for each in found.large_rests
+    ]
+    if not sentences:
         sentences.append(
             Text(
                 "No significant dependence on any quantity is left: what remains "

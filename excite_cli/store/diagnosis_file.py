@@ -19,6 +19,7 @@ from excite_cli.diagnosis.records import (
     Diagnosis,
     EffectRecord,
     Information,
+    LargeRest,
     NamedEffect,
     Round,
     Unexplained,
@@ -62,6 +63,7 @@ _RECORDS: dict[str, Any] = {
 _LATER: dict[str, Any] = {
     "noise_floor": dict[str, float] | None,
     "assumed": tuple[Assumption, ...],
+    "large_rests": tuple[LargeRest, ...],
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
@@ -129,8 +131,8 @@ def _read(file: Any, path: Path) -> Diagnosis:
     fields["phi"] = checked.array(file["phi"], (None,))
     fields.update({name: checked.array(file[name], base, finite=False) for name in _OF_BASE})
     for name, kind in _LATER.items():
-        stored = f"records/{name}" in file
-        fields[name] = _record(file, f"records/{name}", kind) if stored else None
+        if f"records/{name}" in file:
+            fields[name] = _record(file, f"records/{name}", kind)
     # Files of earlier versions have no traces.
     fields["traces"] = read_traces(file["traces"], joints) if "traces" in file else None
     if "sealed_traces" in file:
@@ -174,6 +176,7 @@ def _named_joints(found: Diagnosis) -> set[str]:
     return {
         *(joint for each in records for joint in each.joints),
         *(each.joint for each in found.unexplained),
+        *(each.joint for each in found.large_rests),
         *(joint for each in found.rounds for joint in each.residual),
     }
 
@@ -206,7 +209,7 @@ def _record(group: Any, name: str, kind: Any) -> Any:
 
 def _known(name: str, value: Any) -> Any:
     """What stands in the file as a text, as a record."""
-    if name == "records/unexplained":
+    if name in ("records/unexplained", "records/large_rests"):
         return [
             {**each, "depends_on": tuple(map(Covariate.of_code, each["depends_on"]))}
             for each in value

@@ -17,6 +17,7 @@ from excite_cli.diagnosis.words import (
     other_name_of,
     p_in_words,
     place_in_words,
+    rest_in_words,
     value_in_words,
 )
 from excite_cli.identification.fit_words import above_the_floor
@@ -57,8 +58,9 @@ def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
     if found.approximations:
         parts.append(_approximation_table(found))
     if not found.effects:
-        parts.append("Nothing is missing: no effect of the catalogue passes.")
-    parts += _absorbed(found) + _unexplained(found)
+        whole = "Nothing is missing: no" if found.complete else "No"
+        parts.append(f"{whole} effect of the catalogue passes.")
+    parts += _absorbed(found) + _unexplained(found) + _large_rests(found)
     parts.append(_error_table(found, verbose))
     above = above_the_floor(found.after, found.noise_floor)
     parts += [above] if above else []
@@ -203,11 +205,22 @@ def _unexplained(found: Diagnosis) -> Parts:
     ]
 
 
+def _large_rests(found: Diagnosis) -> Parts:
+    units = dict(zip(found.joint_names, _units(found), strict=True))
+    return [
+        f"More than noise: {rest_in_words(each, units[each.joint])}" for each in found.large_rests
+    ]
+
+
+def _units(found: Diagnosis) -> tuple[str, ...]:
+    """Of the torques; files of earlier versions do not say whether joints slide."""
+    return found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
+
+
 def _error_table(found: Diagnosis, verbose: bool) -> Table:
     """Errors where the joints move; with `verbose` over all samples, too."""
     errors = (found.before, found.after)
-    # Files of earlier versions do not say whether joints slide.
-    units = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
+    units = _units(found)
     rows = [
         (
             joint,
@@ -301,6 +314,10 @@ def _data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
             {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
             for each in found.unexplained
         ],
+        "large_rests": [
+            {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
+            for each in found.large_rests
+        ],
         "error": {
             "sealed_run": found.sealed_run,
             "before": found.before.as_data(),
@@ -321,7 +338,8 @@ def _in_words(found: Diagnosis) -> str:
     everything = len(found.joint_names)
     effects = ", ".join(_what(each.effect, everything) for each in found.named)
     before, after = found.before.mean_relative_moving, found.after.mean_relative_moving
-    return f"{effects or 'nothing is missing'}; mean error {before:.2%} → {after:.2%}"
+    none = "nothing is missing" if found.complete else "no name for what is left"
+    return f"{effects or none}; mean error {before:.2%} → {after:.2%}"
 
 
 def _named_in_words(named: NamedEffect) -> str:
