@@ -23,6 +23,7 @@ from excite_cli.robot.model import Array
 _TIMES = 2.5
 _PREDICTABLE = 0.3  # share; of noise with a memory hardly anything is
 _SAID = 0.2  # a quantity that predicts less is no answer
+_UNKNOWN = 0.02  # of the torque's RMS: a word where noise is not known
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no word
 
 
@@ -54,14 +55,14 @@ def large_rests(
         if repeated is not None and np.isfinite(repeated.rms[joint]):
             noise = most = float(repeated.rms[joint])
             basis = "periods"
-        above = rms > _TIMES * noise
+        known = np.isfinite(noise)
+        above = rms > _TIMES * noise if known else rms > _UNKNOWN * torque
         rest = quantities.rest(joint, residuals)
         predictable = rest is not None and rest.predictable > _PREDICTABLE
         if not above and not predictable:
             continue
         structure = Structure(0.0) if rest is None else rest.structure()
         certain = rms > _TIMES * most or structure.predictable > _PREDICTABLE
-        known = np.isfinite(noise)
         found.append(
             LargeRest(
                 joint=name,

@@ -77,9 +77,9 @@ class LargeRest:
 
     `rms` of the filtered residual and `noise` [N·m] (N), this by its `basis`: `periods` that were
     repeated, or the `band` of the torque above the motion; None and empty where it is not known.
-    If it is not `certain`, noise with a memory could be as large. `predictable`: share of the
-    residual's energy that all quantities predict on stretches left out; `depends_on`: the one or
-    two that predict most of it; empty if none does.
+    If it is not `certain`, noise (with a memory, or of unknown size) could be as large.
+    `predictable`: share of the residual's energy that is predicted on stretches left out, by all
+    quantities or by those of `depends_on`, the one or two that predict most; empty if none does.
     """
 
     joint: str

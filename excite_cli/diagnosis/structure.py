@@ -18,6 +18,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.history import histories
@@ -45,7 +46,7 @@ class Structure:
 
 @dataclass(frozen=True)
 class Rest:
-    """Residual (k,) of a joint, the second (block) of each sample, and kernels (k, k).
+    """Residual (k,) of a joint, the second (block) of each sample in order, and kernels (k, k).
 
     `direction` is ½ (1 + k_s).
     """
@@ -75,6 +76,7 @@ class Rest:
         pair = max(
             (self._predicted(one * other, _RIDGES[1:2]), (a.code, b.code), (a, b))
             for (a, one), (b, other) in combinations(self._paired(), 2)
+            if {a.quantity, b.quantity} != {"time", "run"}  # any series is a function of both
         )
         best = pair if pair[0] - single[0] > _CLEARER * (1.0 - single[0]) else single
         return Structure(max(everything, best[0], 0.0), max(best[0], 0.0), best[2])
@@ -94,12 +96,14 @@ class Rest:
         return 1.0 - min(self._left(weighted, ridge) for ridge in ridges) / whole
 
     def _left(self, kernel: Array, ridge: float) -> float:
-        inverse = np.linalg.inv(kernel + ridge * np.eye(len(kernel)))
+        factor, _ = dpotrf(kernel + ridge * np.eye(len(kernel)), lower=1)
+        half = np.tril(dpotri(factor, lower=1)[0])
+        inverse = half + np.tril(half, -1).T
         weights = inverse @ self.residual
+        edges = [0, *(np.flatnonzero(np.diff(self.block)) + 1), len(weights)]
         left = 0.0
-        for block in np.unique(self.block):
-            at = np.flatnonzero(self.block == block)
-            error = np.linalg.solve(inverse[np.ix_(at, at)], weights[at])
+        for block in map(slice, edges[:-1], edges[1:]):
+            error = np.linalg.solve(inverse[block, block], weights[block])
             left += float(error @ error)
         return left
 

@@ -6,6 +6,7 @@ from excite_cli.diagnosis.covariate import Aspect, Covariate, Source
 from excite_cli.diagnosis.records import (
     Approximation,
     Assumption,
+    Diagnosis,
     EffectRecord,
     LargeRest,
     NamedEffect,
@@ -92,24 +93,42 @@ def approximation_in_words(
     return f"something that also looks like {title_of(found.kind)}"
 
 
-def rest_in_words(
-    rest: LargeRest, unit: str, say: Callable[[Covariate], str] = covariate_in_symbols
-) -> str:
-    """How much is left of a joint beside its noise, and what of it can be predicted from what."""
-    beside = "" if rest.noise is None else f" beside noise of {rest.noise:.3g} {unit}"
-    left = (
-        f"{rest.rms:.3g} {unit} of {rest.joint} are left{beside} "
-        f"({rest.share_of_torque:.1%} of its torque)"
-    )
-    if rest.depends_on:
-        of = " and ".join(map(say, rest.depends_on))
-        return f"{left}; {rest.predictable:.0%} of it can be predicted, best from {of}."
-    if not rest.certain:
-        return f"{left}; no quantity predicts it: noise with a memory could be as large."
-    share = f"{rest.predictable:.0%} of it can be predicted"
-    if rest.predictable > _TELLING:
-        return f"{left}; {share}, but from no one or two quantities."
-    return f"{left}; no quantity that was tried predicts it."
+def rests_in_words(
+    found: Diagnosis, say: Callable[[Covariate], str] = covariate_in_symbols
+) -> tuple[list[str], list[str]]:
+    """What is left beside the noise: sentences on what surely is more, and on what may be."""
+    # Files of earlier versions do not say whether joints slide, nor what is left.
+    known = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
+    units = dict(zip(found.joint_names, known, strict=True))
+
+    def left(rest: LargeRest) -> str:
+        return f"{rest.rms:.3g} {units[rest.joint]} ({rest.share_of_torque:.1%} of its torque)"
+
+    more = []
+    for rest in (each for each in found.large_rests if each.certain):
+        beside = "" if rest.noise is None else f" beside noise of {rest.noise:.3g}"
+        text = f"More than noise: {left(rest)} of {rest.joint} are left{beside}; "
+        share = f"{rest.predictable:.0%} of its energy can be predicted"
+        if rest.depends_on:
+            text += f"{share}, best from {' and '.join(map(say, rest.depends_on))}."
+        elif rest.predictable > _TELLING:
+            text += f"{share}, but from no one or two quantities."
+        else:
+            text += "no quantity that was tried predicts it."
+        more.append(text)
+    perhaps = []
+    for unknown, why in (
+        (False, "more than white noise, but noise with a memory could be as large"),
+        (True, "the noise is not known: the torque was filtered, or recorded below 50 Hz"),
+    ):
+        open_ones = [
+            f"{left(each)} of {each.joint}"
+            for each in found.large_rests
+            if not each.certain and (each.noise is None) == unknown
+        ]
+        if open_ones:
+            perhaps.append(f"Left, and predicted by nothing: {', '.join(open_ones)}; {why}.")
+    return more, perhaps
 
 
 def assumption_in_words(assumed: Assumption) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import Diagnosis, Unexplained
 from excite_cli.diagnosis.traces import Dependence, Traces
-from excite_cli.diagnosis.words import covariate_in_words, rest_in_words
+from excite_cli.diagnosis.words import covariate_in_words, rests_in_words
 from excite_cli.report.chart import (
     BLUE,
     INK,
@@ -41,8 +41,6 @@ _SERIES = {"position": "q", "speed": "v", "acceleration": "a", "load": "load", "
 
 def dependence_section(found: Diagnosis) -> Section:
     """Sentences, the map, and what is left over what it depends on most."""
-    known = found.traces.torque_units if found.traces else ("N·m",) * len(found.joint_names)
-    units = dict(zip(found.joint_names, known, strict=True))
     sentences: list[Block] = [
         Text(
             f"The residual of {each.joint} still depends on {_joined(each.depends_on)} "
@@ -51,13 +49,8 @@ def dependence_section(found: Diagnosis) -> Section:
         )
         for each in found.unexplained
     ]
-    sentences += [
-        Text(
-            f"More than noise: {rest_in_words(each, units[each.joint], covariate_in_words)}",
-            "bad" if each.certain else "",
-        )
-        for each in found.large_rests
-    ]
+    more, perhaps = rests_in_words(found, covariate_in_words)
+    sentences += [*(Text(text, "bad") for text in more), *(Text(text) for text in perhaps)]
     if not sentences:
         sentences.append(
             Text(

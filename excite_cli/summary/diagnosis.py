@@ -17,7 +17,7 @@ from excite_cli.diagnosis.words import (
     other_name_of,
     p_in_words,
     place_in_words,
-    rest_in_words,
+    rests_in_words,
     value_in_words,
 )
 from excite_cli.identification.fit_words import above_the_floor
@@ -60,7 +60,8 @@ def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
     if not found.effects:
         whole = "Nothing is missing: no" if found.complete else "No"
         parts.append(f"{whole} effect of the catalogue passes.")
-    parts += _absorbed(found) + _unexplained(found) + _large_rests(found)
+    parts += _absorbed(found) + _unexplained(found)
+    parts += [text for texts in rests_in_words(found) for text in texts]
     parts.append(_error_table(found, verbose))
     above = above_the_floor(found.after, found.noise_floor)
     parts += [above] if above else []
@@ -205,22 +206,11 @@ def _unexplained(found: Diagnosis) -> Parts:
     ]
 
 
-def _large_rests(found: Diagnosis) -> Parts:
-    units = dict(zip(found.joint_names, _units(found), strict=True))
-    return [
-        f"More than noise: {rest_in_words(each, units[each.joint])}" for each in found.large_rests
-    ]
-
-
-def _units(found: Diagnosis) -> tuple[str, ...]:
-    """Of the torques; files of earlier versions do not say whether joints slide."""
-    return found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
-
-
 def _error_table(found: Diagnosis, verbose: bool) -> Table:
     """Errors where the joints move; with `verbose` over all samples, too."""
     errors = (found.before, found.after)
-    units = _units(found)
+    # Files of earlier versions do not say whether joints slide.
+    units = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
     rows = [
         (
             joint,
