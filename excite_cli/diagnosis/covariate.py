@@ -3,12 +3,15 @@
 import re
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Self
+from typing import Literal, Self
 
 from excite_cli.effects.base import Quantity
 
-_SYMBOLS: dict[Quantity, str] = {
+Source = Quantity | Literal["run"]
+
+_SYMBOLS: dict[Source, str] = {
     "time": "time",
+    "run": "run",
     "position": "q",
     "speed": "v",
     "acceleration": "a",
@@ -29,16 +32,16 @@ class Aspect(StrEnum):
 class Covariate:
     """`quantity` of `joint`; `own` stands for that of whichever joint is looked at.
 
-    Time belongs to no joint.
+    Time, and which run it is, belong to no joint.
     """
 
-    quantity: Quantity
+    quantity: Source
     joint: str = ""
     aspect: Aspect = Aspect.VALUE
     own: bool = False
 
     @property
-    def like(self) -> Quantity:
+    def like(self) -> Source:
         """The quantity of which an effect would be a function: hysteresis is one of motion."""
         if self.quantity == "position" and self.aspect is not Aspect.VALUE:
             return "speed"

@@ -19,6 +19,7 @@ from excite_cli.diagnosis.effect_trace import effect_traces
 from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.final_fit import final_fit
 from excite_cli.diagnosis.friction_line import friction_lines
+from excite_cli.diagnosis.large_rest import large_rests
 from excite_cli.diagnosis.plausibility import check_plausibility
 from excite_cli.diagnosis.records import (
     Absorbed,
@@ -135,6 +136,15 @@ def diagnose(
         assumed=assumed,
         parts=on_sealed_ends(model, models, parts.ends, processing),
         untouched=sealed_part.untouched,
+        large_rests=large_rests(
+            traced.data,
+            traced.signals,
+            traced.data.residuals(traced.candidates, traced.chosen, parameters),
+            parts.training,
+            processing,
+            floor,
+            robot.joint_names,
+        ),
     )
 
 

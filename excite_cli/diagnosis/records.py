@@ -90,6 +90,27 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
+class LargeRest:
+    """More than noise is left of the torque of `joint` once all effects are in (training data).
+
+    `rms` of the filtered residual and `noise` [N·m] (N), this by its `basis`: `periods` that were
+    repeated, or the `band` of the torque above the motion; None and empty where it is not known.
+    If it is not `certain`, noise (with a memory, or of unknown size) could be as large.
+    `predictable`: share of the residual's energy that is predicted on stretches left out, by all
+    quantities or by those of `depends_on`, the one or two that predict most; empty if none does.
+    """
+
+    joint: str
+    rms: float
+    share_of_torque: float
+    noise: float | None
+    basis: str
+    certain: bool
+    predictable: float
+    depends_on: tuple[Covariate, ...]
+
+
+@dataclass(frozen=True)
 class Assumption:
     """An effect of single `runs` was taken to be `present` in what is sealed, or to be absent."""
 
@@ -191,6 +212,7 @@ class Diagnosis(Shown):
     assumed: tuple[Assumption, ...] = ()
     parts: tuple[SealedEnds, ...] = ()
     untouched: Errors | None = None
+    large_rests: tuple[LargeRest, ...] = ()
 
     @property
     def good(self) -> bool:
@@ -206,6 +228,18 @@ class Diagnosis(Shown):
     def named(self) -> tuple[NamedEffect, ...]:
         """Effects that are what their names say."""
         return tuple(each for each in self.effects if not each.approximates)
+
+    @property
+    def joints_left(self) -> tuple[str, ...]:
+        """Joints of whose torque structure, or surely more than noise, is left."""
+        left = {each.joint for each in self.unexplained}
+        left |= {each.joint for each in self.large_rests if each.certain}
+        return tuple(joint for joint in self.joint_names if joint in left)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the declared model lacks nothing: no effect, and nothing is left but noise."""
+        return not self.effects and not self.joints_left
 
     @property
     def approximations(self) -> tuple[NamedEffect, ...]:

@@ -2,25 +2,29 @@
 
 from collections.abc import Callable
 
-from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.covariate import Aspect, Covariate, Source
 from excite_cli.diagnosis.records import (
     Approximation,
     Assumption,
     Diagnosis,
     EffectRecord,
+    LargeRest,
     NamedEffect,
     SealedEnds,
 )
 from excite_cli.diagnosis.verdict import SealedVerdict
-from excite_cli.effects.base import Quantity, Value
+from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
 
 # Effects that explain less of the residual, and without which runs left out are hardly worse, are
 # told with few words.
 SMALL_SHARE = 0.002
 _SMALL_GAIN = 0.3
-_QUANTITIES: dict[Quantity, str] = {
+# A smaller predictable share of what is left is not worth a word.
+_TELLING = 0.2
+_QUANTITIES: dict[Source, str] = {
     "time": "time",
+    "run": "run",
     "position": "angle",
     "speed": "speed",
     "acceleration": "acceleration",
@@ -95,6 +99,44 @@ def approximation_in_words(
     if found.covariates:
         return f"a function of {', '.join(map(say, found.covariates))}"
     return f"something that also looks like {title_of(found.kind)}"
+
+
+def rests_in_words(
+    found: Diagnosis, say: Callable[[Covariate], str] = covariate_in_symbols
+) -> tuple[list[str], list[str]]:
+    """What is left beside the noise: sentences on what surely is more, and on what may be."""
+    # Files of earlier versions do not say whether joints slide, nor what is left.
+    known = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
+    units = dict(zip(found.joint_names, known, strict=True))
+
+    def left(rest: LargeRest) -> str:
+        return f"{rest.rms:.3g} {units[rest.joint]} ({rest.share_of_torque:.1%} of its torque)"
+
+    more = []
+    for rest in (each for each in found.large_rests if each.certain):
+        beside = "" if rest.noise is None else f" beside noise of {rest.noise:.3g}"
+        text = f"More than noise: {left(rest)} of {rest.joint} are left{beside}; "
+        share = f"{rest.predictable:.0%} of its energy can be predicted"
+        if rest.depends_on:
+            text += f"{share}, best from {' and '.join(map(say, rest.depends_on))}."
+        elif rest.predictable > _TELLING:
+            text += f"{share}, but from no one or two quantities."
+        else:
+            text += "no quantity that was tried predicts it."
+        more.append(text)
+    perhaps = []
+    for unknown, why in (
+        (False, "more than white noise, but noise with a memory could be as large"),
+        (True, "the noise is not known: the torque was filtered, or recorded below 50 Hz"),
+    ):
+        open_ones = [
+            f"{left(each)} of {each.joint}"
+            for each in found.large_rests
+            if not each.certain and (each.noise is None) == unknown
+        ]
+        if open_ones:
+            perhaps.append(f"Left, and predicted by nothing: {', '.join(open_ones)}; {why}.")
+    return more, perhaps
 
 
 def assumption_in_words(assumed: Assumption) -> str:

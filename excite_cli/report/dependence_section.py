@@ -9,7 +9,7 @@ import numpy as np
 from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import Diagnosis, Unexplained
 from excite_cli.diagnosis.traces import Dependence, Traces
-from excite_cli.diagnosis.words import covariate_in_words
+from excite_cli.diagnosis.words import covariate_in_words, rests_in_words
 from excite_cli.report.chart import (
     BLUE,
     INK,
@@ -49,7 +49,9 @@ def dependence_section(found: Diagnosis) -> Section:
         )
         for each in found.unexplained
     ]
-    if not found.unexplained:
+    more, perhaps = rests_in_words(found, covariate_in_words)
+    sentences += [*(Text(text, "bad") for text in more), *(Text(text) for text in perhaps)]
+    if not sentences:
         sentences.append(
             Text(
                 "No significant dependence on any quantity is left: what remains "

@@ -90,8 +90,9 @@ def _lead(found: Diagnosis) -> str:
         or "no effect beside the rigid bodies"
     )
     if not found.effects:
+        nothing = "Nothing is missing: " if found.complete else "More is left than noise: "
         return (
-            f"Nothing is missing: with {declared} declared, no effect of the catalogue passes. The "
+            f"{nothing}with {declared} declared, no effect of the catalogue passes. The "
             f"mean error of the torque on {found.sealed_run}, which took no part, is "
             f"{found.after.mean_relative_moving:.2%} where joints move."
         )

@@ -36,7 +36,7 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
             f"{before.mean_relative_moving:.2%} → {after.mean_relative_moving:.2%}",
             f"all samples {after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}",
         ),
-        KeyFigure("effects found", str(len(diagnosis.named)), kinds or "nothing is missing"),
+        KeyFigure("effects found", str(len(diagnosis.named)), kinds or _none(diagnosis)),
         KeyFigure(
             "not told apart",
             str(open_questions),
@@ -44,10 +44,14 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
         ),
         KeyFigure(
             "unexplained",
-            counted(len(diagnosis.unexplained), "joint"),
-            ", ".join(each.joint for each in diagnosis.unexplained) or "no significant dependence",
+            counted(len(diagnosis.joints_left), "joint"),
+            ", ".join(diagnosis.joints_left) or "what is left behaves like noise",
         ),
     )
+
+
+def _none(diagnosis: Diagnosis) -> str:
+    return "nothing is missing" if diagnosis.complete else "no name for what is left"
 
 
 def diagnosis_sections(diagnosis: Diagnosis) -> tuple[Section, ...]:

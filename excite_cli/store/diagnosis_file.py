@@ -19,6 +19,7 @@ from excite_cli.diagnosis.records import (
     Diagnosis,
     EffectRecord,
     Information,
+    LargeRest,
     NamedEffect,
     Round,
     SealedEnds,
@@ -65,6 +66,7 @@ _LATER: dict[str, Any] = {
     "assumed": tuple[Assumption, ...],
     "parts": tuple[SealedEnds, ...],
     "untouched": Errors | None,
+    "large_rests": tuple[LargeRest, ...],
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
@@ -181,6 +183,7 @@ def _named_joints(found: Diagnosis) -> set[str]:
         *(joint for each in records for joint in each.joints),
         *(joint for each in found.effects for joint in each.removes),
         *(each.joint for each in found.unexplained),
+        *(each.joint for each in found.large_rests),
         *(joint for each in found.rounds for joint in each.residual),
     }
 
@@ -213,7 +216,7 @@ def _record(group: Any, name: str, kind: Any) -> Any:
 
 def _known(name: str, value: Any) -> Any:
     """What stands in the file as a text, as a record."""
-    if name == "records/unexplained":
+    if name in ("records/unexplained", "records/large_rests"):
         return [
             {**each, "depends_on": tuple(map(Covariate.of_code, each["depends_on"]))}
             for each in value

@@ -27,6 +27,7 @@ from excite_cli.diagnosis.words import (
     other_name_of,
     p_in_words,
     place_in_words,
+    rests_in_words,
     sealed_in_words,
     untouched_in_words,
     value_in_words,
@@ -70,8 +71,10 @@ def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
         parts.append(_approximation_table(found))
     parts += changes_in_words(found)
     if not found.effects:
-        parts.append("Nothing is missing: no effect of the catalogue passes.")
+        whole = "Nothing is missing: no" if found.complete else "No"
+        parts.append(f"{whole} effect of the catalogue passes.")
     parts += _absorbed(found) + _unexplained(found)
+    parts += [text for texts in rests_in_words(found) for text in texts]
     parts.append(_error_table(found, verbose))
     above = above_the_floor(found.after, found.noise_floor)
     parts += [above] if above else []
@@ -336,6 +339,10 @@ def _data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
             {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
             for each in found.unexplained
         ],
+        "large_rests": [
+            {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
+            for each in found.large_rests
+        ],
         "error": {
             "sealed_run": found.sealed_run,
             "before": found.before.as_data(),
@@ -359,7 +366,8 @@ def _in_words(found: Diagnosis) -> str:
     everything = len(found.joint_names)
     effects = ", ".join(_what(each.effect, everything) for each in found.named)
     before, after = found.before.mean_relative_moving, found.after.mean_relative_moving
-    return f"{effects or 'nothing is missing'}; mean error {before:.2%} → {after:.2%}"
+    none = "nothing is missing" if found.complete else "no name for what is left"
+    return f"{effects or none}; mean error {before:.2%} → {after:.2%}"
 
 
 def _named_in_words(named: NamedEffect) -> str:

@@ -16,6 +16,7 @@ from excite_cli.diagnosis.records import (
     Diagnosis,
     EffectRecord,
     Information,
+    LargeRest,
     NamedEffect,
     Removed,
     Round,
@@ -134,7 +135,13 @@ def make_diagnosis(
         ),
         versions={"excite-cli": "0"},
         seconds=1.5,
-    )
+        large_rests=(
+            LargeRest(
+                "elbow", 0.8, 0.04, 0.1, "band", True, 0.6,
+                (Covariate("position", "elbow"), Covariate("load", "elbow")),
+            ),
+        ),
+    )  # fmt: skip
 
 
 def make_traces(

@@ -162,7 +162,10 @@ def test_without_dependences_there_is_no_map(diagnosis: Diagnosis) -> None:
         diagnosis.traces.dependence, shares=np.zeros_like(diagnosis.traces.dependence.shares)
     )
     calm = replace(
-        diagnosis, unexplained=(), traces=replace(diagnosis.traces, dependence=dependence)
+        diagnosis,
+        unexplained=(),
+        large_rests=(),
+        traces=replace(diagnosis.traces, dependence=dependence),
     )
     section = dependence_section(calm)
     assert charts_of(section) == []
@@ -206,8 +209,10 @@ def test_a_sealed_error_that_did_not_fall_is_told_first(diagnosis: Diagnosis) ->
 
 
 def test_nothing_found(diagnosis: Diagnosis) -> None:
-    nothing = replace(diagnosis, effects=())
-    assert "Nothing is missing" in found_section(nothing).lead
+    unnamed = replace(diagnosis, effects=())
+    assert found_section(unnamed).lead.startswith("More is left than noise")
+    nothing = replace(unnamed, unexplained=(), large_rests=())
+    assert found_section(nothing).lead.startswith("Nothing is missing")
     assert effect_section(nothing) is None
 
 

@@ -75,7 +75,24 @@ def test_the_noise_floor_stands_beside_the_errors(doubted: Diagnosis) -> None:
 
 
 def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -> None:
-    assert "noise" not in printed(doubted)
+    assert "noise" not in printed(replace(doubted, large_rests=()))
+
+
+def test_nothing_is_missing_only_where_nothing_large_is_left(doubted: Diagnosis) -> None:
+    (rest,) = doubted.large_rests
+    bare = replace(doubted, effects=(), unexplained=(), large_rests=())
+    assert "Nothing is missing" in printed(bare)
+    for left, whole in ((rest, False), (replace(rest, certain=False), True)):
+        text = printed(replace(bare, large_rests=(left,)))
+        assert ("Nothing is missing" in text) == whole
+        assert "0.8" in text
+        assert "elbow" in text
+    assert "q[elbow] and load[elbow]" in printed(replace(bare, large_rests=(rest,)))
+    alone = replace(rest, depends_on=(), predictable=0.0, certain=False, noise=None)
+    assert "the noise is not known" in printed(replace(bare, large_rests=(alone,)))
+    assert "memory could be as large" in printed(
+        replace(bare, large_rests=(replace(alone, noise=0.1),))
+    )
     assert diagnosis_answer(doubted, "arm.yaml", {}).data["noise_floor"] is None
 
 

@@ -1,0 +1,137 @@
+"""The noise of the torque, from its own spectrum above the motion.
+
+Between 8 and 100 Hz hardly any torque belongs to the motion. What is there is taken for noise with
+the spectrum of an autoregression of first order,
+
+    S(f) = S₀ / (1 + (f/f₀)²),    white for f₀ → ∞,
+
+fitted to the power of a few bands; ∫ S(f) |G(f)|² df is then what the averages G of the fit leave
+of it. The corner f₀ is not known well where it lies below the bands. So there are two levels: of
+white noise as in 8–20 Hz, and of the noise with the lowest corner that the bands allow (two
+standard deviations), which is the most that noise with a memory can be.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.identification.averages import average_rows
+from excite_cli.identification.prepare import PreparedRun
+from excite_cli.identification.processing import Processing
+from excite_cli.measurement.dataset import Array, Mask, Run
+
+_BANDS = ((8.0, 14.0), (14.0, 20.0), (20.0, 35.0), (35.0, 60.0), (60.0, 100.0))  # Hz
+_WHITE = 2  # of the bands give the level of white noise
+_HIGHEST = 0.4  # of the recorded rate
+# f₀ of the spectra that are tried [Hz]: a coefficient of 0.98 at 500 Hz has 1.6 Hz.
+_CORNERS = np.append(np.geomspace(1.5, 60.0, 40), 1e6)
+_MODEL_ERROR = 0.05  # relative, of a band's power, beside its statistical error
+_TWO_SD = 4.0  # of χ²
+# A second band so much weaker than the first was filtered before it was recorded.
+_FILTERED = 0.2
+_REVERSAL = 0.15  # s around a reversal, whose friction is in all bands
+_LEAST_SECONDS = 2.0
+
+
+@dataclass(frozen=True)
+class BandNoise:
+    """RMS (n,) [N·m] (N) of noise in the averages of the fit; NaN where it is not known.
+
+    `white`: as flat as between 8 and 20 Hz. `coloured`: the most that the bands allow.
+    """
+
+    white: Array
+    coloured: Array
+
+
+def band_noise(
+    recorded: Sequence[Run], prepared: Sequence[PreparedRun], processing: Processing
+) -> BandNoise:
+    """Noise of the torque of `recorded` runs, of which `prepared` are the same in the same order.
+
+    Recordings below 50 Hz do not show it, nor torque that somebody low-passed.
+    """
+    n = recorded[0].tau.shape[1]
+    bands = [band for band in _BANDS if band[1] <= _HIGHEST * processing.recorded_rate]
+    if len(bands) < _WHITE:
+        return BandNoise(np.full(n, np.nan), np.full(n, np.nan))
+    energy, seconds = np.zeros((len(bands), n)), np.zeros(n)
+    for run, fit in zip(recorded, prepared, strict=True):
+        sliding = _sliding(run, fit, processing.moving_speed)
+        seconds += sliding.sum(axis=0) * run.step
+        for k, band in enumerate(bands):
+            energy[k] += np.where(sliding, _passed(run, band) ** 2, 0.0).sum(axis=0) * run.step
+    known = seconds > _LEAST_SECONDS
+    widths = np.array([high - low for low, high in bands])
+    power = energy / np.where(known, seconds, np.nan) / widths[:, None]
+    white, coloured = np.full(n, np.nan), np.full(n, np.nan)
+    known &= np.nan_to_num(power[1]) > _FILTERED * np.nan_to_num(power[0])
+    for j in np.flatnonzero(known & (power > 0).all(axis=0)):
+        gain = _gain(prepared, processing, int(j))
+        flat = float(np.average(power[:_WHITE, j], weights=widths[:_WHITE]))
+        level, corner = _lowest_corner(power[:, j], 2 * widths * seconds[j], bands)
+        white[j] = np.sqrt(gain * _left(flat, _CORNERS[-1], processing))
+        coloured[j] = max(white[j], np.sqrt(gain * _left(level, corner, processing)))
+    return BandNoise(white, coloured)
+
+
+def _sliding(run: Run, fit: PreparedRun, moving: float) -> Mask:
+    """Samples (T, n) in which a joint moves and is not near a reversal, nor is anything invalid."""
+    v = np.stack([np.interp(run.t, fit.t, column) for column in fit.v.T], axis=1)
+    crossing = np.zeros(v.shape)
+    crossing[1:] = np.signbit(v[1:]) != np.signbit(v[:-1])
+    crossing[[0, -1]] = 1.0
+    crossing[~run.usable()] = 1.0
+    window = np.ones(2 * round(_REVERSAL / run.step) + 1)
+    near = np.stack([np.convolve(column, window, "same") for column in crossing.T], axis=1) > 0.5
+    return np.asarray(~near & (np.abs(v) > moving))
+
+
+def _passed(run: Run, band: tuple[float, float]) -> Array:
+    from scipy.signal import butter, sosfiltfilt  # takes a second to import
+
+    sections = butter(4, band, "bandpass", fs=1.0 / run.step, output="sos")
+    tau = np.where(np.isfinite(run.tau), run.tau, 0.0)
+    return np.asarray(sosfiltfilt(sections, tau, axis=0, padlen=min(len(tau) - 2, 100)))
+
+
+def _lowest_corner(
+    power: Array, freedom: Array, bands: Sequence[tuple[float, float]]
+) -> tuple[float, float]:
+    """S₀ and f₀ of the lowest corner that explains the power of the bands."""
+    weights = 1.0 / (2.0 / freedom + _MODEL_ERROR**2)
+    found = []
+    for corner in _CORNERS:
+        shape = [
+            corner * (np.arctan(high / corner) - np.arctan(low / corner)) / (high - low)
+            for low, high in bands
+        ]
+        levels = np.log(power) - np.log(shape)
+        mean = float(np.average(levels, weights=weights))
+        found.append((float(weights @ (levels - mean) ** 2), float(np.exp(mean)), float(corner)))
+    best = min(misfit for misfit, _, _ in found)
+    return next((level, corner) for misfit, level, corner in found if misfit <= best + _TWO_SD)
+
+
+def _left(level: float, corner: float, processing: Processing) -> float:
+    """∫ S |G|² df: what the averages leave; without any, all up to half the recorded rate."""
+    cutoff = processing.parallel_cutoff
+    if cutoff is None:
+        f = np.linspace(0.0, processing.recorded_rate / 2, 2000)
+        passed = np.ones_like(f)
+    else:
+        f = np.linspace(0.0, 4.0 * cutoff, 400)
+        passed = np.exp(-np.log(2.0) * (f / cutoff) ** 2)
+    return float(np.trapezoid(level * passed / (1.0 + (f / corner) ** 2), f))
+
+
+def _gain(prepared: Sequence[PreparedRun], processing: Processing, joint: int) -> float:
+    """Σ w² of the averages of the fit over that of whole ones: samples left out mean more noise."""
+    run = prepared[0]
+    h = float(run.t[1] - run.t[0])
+    whole = average_rows(len(run.t), np.array([len(run.t) // 2]), h, processing.parallel_cutoff)
+    rows = [each.fit_averages[joint][each.usable[:, joint]] for each in prepared]
+    squares = np.concatenate([np.asarray(x.multiply(x).sum(axis=1)).ravel() for x in rows])
+    full = float(whole.multiply(whole).sum())
+    return max(1.0, float(squares.mean()) / full) if len(squares) else 1.0

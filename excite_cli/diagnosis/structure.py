@@ -1,0 +1,197 @@
+"""Structure that needs no name: how much of a residual can be predicted, and from what.
+
+Kernel ridge regression of a joint's residual r on every quantity x_i at once, with
+
+    k = ½ (1 + k_s) (mean of k_i + mean of k_i k_j),    k_i = exp(−|x_i − x_i'|² / 2ℓ²),
+
+k_s that of the direction of motion: functions of one quantity and of two, in each direction their
+own. Every second of the data is predicted from all others; with A = (K + λ)⁻¹ and B the samples of
+one second, what the prediction leaves there is (A_BB)⁻¹ (A r)_B. Noise is forgotten within a
+fraction of a second, so noise is not predicted.
+
+From what: the same with one k_i, or one product k_i k_j, in place of all.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri
+
+from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.history import histories
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.effects.base import Signals
+from excite_cli.robot.model import Array
+
+_BLOCK = 1.0  # s
+_MOST_ROWS = 300  # of a joint
+_WINDOW = 5.0  # s: long data are represented by stretches of this length
+_FEWEST_ROWS = 60
+_LENGTH = 1.5  # ℓ, in standard deviations of a quantity
+_RIDGES = (1.0, 0.1, 0.01)  # λ; k is one on its diagonal
+_CLEARER = 0.15  # of what one quantity leaves, a second one must explain
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Shares of the residual's energy: `predictable` from everything, `named` by `depends_on`."""
+
+    predictable: float
+    named: float = 0.0
+    depends_on: tuple[Covariate, ...] = ()
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Residual (k,) of a joint, the second (block) of each sample in order, and kernels (k, k).
+
+    `direction` is ½ (1 + k_s).
+    """
+
+    joint: str
+    residual: Array
+    block: NDArray[np.intp]
+    direction: Array
+    kernels: Mapping[Covariate, Array]
+
+    @property
+    def predictable(self) -> float:
+        """Share of the residual's energy that all quantities together predict."""
+        every = np.array(list(self.kernels.values()))
+        total, squares = every.sum(axis=0), np.square(every).sum(axis=0)
+        count = len(every)
+        pairs = (total**2 - squares) / (count * (count - 1))
+        return self._predicted(0.5 * (total / count + pairs), _RIDGES)
+
+    def structure(self) -> Structure:
+        """How much is predictable, and the quantity or the pair of them that predicts most."""
+        everything = self.predictable
+        single = max(
+            (self._predicted(kernel, _RIDGES[1:]), covariate.code, (covariate,))
+            for covariate, kernel in self.kernels.items()
+        )
+        pair = max(
+            (self._predicted(one * other, _RIDGES[1:2]), (a.code, b.code), (a, b))
+            for (a, one), (b, other) in combinations(self._paired(), 2)
+            if {a.quantity, b.quantity} != {"time", "run"}  # any series is a function of both
+        )
+        best = pair if pair[0] - single[0] > _CLEARER * (1.0 - single[0]) else single
+        return Structure(max(everything, best[0], 0.0), max(best[0], 0.0), best[2])
+
+    def _paired(self) -> list[tuple[Covariate, Array]]:
+        """Accelerations of other joints are left to the functions of one quantity."""
+        return [
+            (covariate, kernel)
+            for covariate, kernel in self.kernels.items()
+            if covariate.quantity != "acceleration" or covariate.joint == self.joint
+        ]
+
+    def _predicted(self, kernel: Array, ridges: Sequence[float]) -> float:
+        """The most over the `ridges`; below zero where a prediction is worse than none."""
+        weighted = self.direction * kernel
+        whole = max(float(self.residual @ self.residual), 1e-300)
+        return 1.0 - min(self._left(weighted, ridge) for ridge in ridges) / whole
+
+    def _left(self, kernel: Array, ridge: float) -> float:
+        factor, _ = dpotrf(kernel + ridge * np.eye(len(kernel)), lower=1)
+        half = np.tril(dpotri(factor, lower=1)[0])
+        inverse = half + np.tril(half, -1).T
+        weights = inverse @ self.residual
+        edges = [0, *(np.flatnonzero(np.diff(self.block)) + 1), len(weights)]
+        left = 0.0
+        for block in map(slice, edges[:-1], edges[1:]):
+            error = np.linalg.solve(inverse[block, block], weights[block])
+            left += float(error @ error)
+        return left
+
+
+class Quantities:
+    """What a residual may be a function of: series (M, n, w) per part, averaged as errors are."""
+
+    def __init__(
+        self, data: TrainingData, signals: Sequence[Signals], joint_names: Sequence[str]
+    ) -> None:
+        self._data, self._names = data, joint_names
+
+        def averaged(series: Sequence[Array]) -> list[Array]:
+            return [run.averaged(x) for run, x in zip(data.runs, series, strict=True)]
+
+        self._q, self._v, self._a, self._load = (
+            averaged([getattr(s, name) for s in signals]) for name in ("q", "v", "a", "load")
+        )
+        self._past_q = averaged(histories([s.q for s in signals]))
+        self._past_load = averaged(histories([s.load for s in signals]))
+        self._t = averaged([s.t for s in signals])
+
+    def rest(self, joint: int, residuals: Sequence[Array]) -> Rest | None:
+        """The residual of a joint and its kernels; None where too few samples are known.
+
+        residuals: (M, n) per part.
+        """
+        rows, block = self._rows(joint)
+        if sum(len(each) for each in rows) < _FEWEST_ROWS:
+            return None
+
+        def taken(series: Sequence[Array]) -> Array:
+            return np.concatenate([x[at] for x, at in zip(series, rows, strict=True)])
+
+        direction = _kernel(taken([np.sign(v[:, joint, None]) for v in self._v]))
+        return Rest(
+            self._names[joint],
+            taken([r[:, joint] for r in residuals]),
+            block,
+            0.5 * (1.0 + direction),
+            {covariate: _kernel(taken(x)) for covariate, x in self._all(joint)},
+        )
+
+    def _all(self, joint: int) -> Iterator[tuple[Covariate, list[Array]]]:
+        own = self._names[joint]
+        yield Covariate("time"), [t[:, None] for t in self._t]
+        names = list(dict.fromkeys(run.run.name for run in self._data.runs))
+        yield (
+            Covariate("run"),
+            [
+                np.full((len(t), 1), float(names.index(run.run.name)))
+                for t, run in zip(self._t, self._data.runs, strict=True)
+            ],
+        )
+        for k, name in enumerate(self._names):
+            yield Covariate("position", name), [x[:, k, None] for x in self._q]
+            yield Covariate("speed", name), [x[:, k, None] for x in self._v]
+            yield Covariate("acceleration", name), [x[:, k, None] for x in self._a]
+        yield Covariate("load", own), [x[:, joint, None] for x in self._load]
+        yield Covariate("position", own, Aspect.HISTORY), [x[:, joint] for x in self._past_q]
+        yield Covariate("load", own, Aspect.HISTORY), [x[:, joint] for x in self._past_load]
+
+    def _rows(self, joint: int) -> tuple[list[NDArray[np.intp]], NDArray[np.intp]]:
+        """Samples of every part, and the second that each of them is in (all parts in a row).
+
+        Of long data whole stretches are left out, evenly: neighbours in time must stay.
+        """
+        usable = [np.flatnonzero(run.usable[:, joint]) for run in self._data.runs]
+        seconds = sum(len(at) * run.step for at, run in zip(usable, self._data.runs, strict=True))
+        rate = max(_MOST_ROWS / max(seconds, 1e-9), 2 * _MOST_ROWS / 60.0)
+        every = max(1.0, seconds * rate / _MOST_ROWS)  # of so many windows one is taken
+        rows, blocks, first, window = [], [], 0, 0
+        for at, run in zip(usable, self._data.runs, strict=True):
+            stride = max(1, int(np.ceil(1.0 / (run.step * rate) - 1e-9)))
+            numbers = window + (at * run.step // _WINDOW).astype(int)
+            chosen = np.floor((numbers + 1) / every) > np.floor(numbers / every)
+            rows.append(at[chosen & (at % stride == 0)])
+            seconds_in = (rows[-1] * run.step // _BLOCK).astype(np.intp)
+            blocks.append(first + seconds_in)
+            first += int(seconds_in.max(initial=0)) + 1
+            window = int(numbers.max(initial=window)) + 1
+        return rows, np.concatenate(blocks)
+
+
+def _kernel(x: Array) -> Array:
+    """k (k, k) of a quantity (k, w), standardised; w series count as one quantity."""
+    spread = x.std(axis=0)
+    unit = (x - x.mean(axis=0)) / np.where(spread > 0, spread, 1.0) / np.sqrt(x.shape[1])
+    squares = np.square(unit).sum(axis=1)
+    distance = np.maximum(squares[:, None] + squares - 2.0 * unit @ unit.T, 0.0)
+    return np.asarray(np.exp(-0.5 * distance / _LENGTH**2))

@@ -1,0 +1,74 @@
+"""Noise from the torque's spectrum above the motion, white and with a memory."""
+
+import numpy as np
+import pytest
+from scipy.signal import butter, lfilter, sosfiltfilt
+
+from excite_cli.diagnosis.high_band import BandNoise, band_noise
+from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.processing import Processing
+from excite_cli.measurement.dataset import Run
+from excite_cli.robot.model import Array
+
+SECONDS = 20.0
+
+
+def processing(rate: float) -> Processing:
+    return Processing(
+        rate, 8.0, 4.8, 19.2, max(1, int(rate // 48)), 0.2, "differentiated", 0.02, 0.8
+    )
+
+
+def recorded(noise: Array, rate: float) -> Run:
+    """Two joints that sweep slowly beside noise (T,) of the first; the other's is a tenth."""
+    t = np.arange(len(noise)) / rate
+    q = np.stack([np.sin(0.7 * t), np.cos(0.5 * t)], axis=1)
+    return Run("run", t, q, 5.0 * q + np.stack([noise, 0.1 * noise], axis=1))
+
+
+def measured(noise: Array, rate: float = 500.0) -> tuple[BandNoise, Array]:
+    """What is found, and the RMS (n,) of the noise in the averages of the fit."""
+    p, run = processing(rate), recorded(noise, rate)
+    fit: PreparedRun = prepare(run, p)
+    alone = prepare(Run("run", run.t, run.q, run.tau - 5.0 * run.q), p)
+    rms = [np.sqrt(np.mean(alone.tau_fit[fit.usable[:, j], j] ** 2)) for j in range(2)]
+    return band_noise([run], [fit], p), np.array(rms)
+
+
+def coloured(memory: float, seed: int, rate: float = 500.0) -> Array:
+    e = np.random.default_rng([seed, 4]).normal(size=int(SECONDS * rate))
+    return np.asarray(lfilter([1.0], [1.0, -memory], e))
+
+
+def test_white_noise_is_measured() -> None:
+    found, rms = measured(coloured(0.0, 1))
+    np.testing.assert_allclose(found.white, rms, rtol=0.2)
+    np.testing.assert_allclose(found.coloured, rms, rtol=0.2)
+
+
+@pytest.mark.parametrize("memory", [0.8, 0.93, 0.97])
+def test_noise_with_a_memory_is_not_taken_for_more_than_noise(memory: float) -> None:
+    for seed in range(2):
+        found, rms = measured(coloured(memory, seed))
+        assert np.all(rms < 1.5 * found.coloured)
+        assert np.all(found.white <= found.coloured)
+        assert np.all(found.coloured < 6.0 * found.white)
+    assert np.all(rms > 1.2 * found.white)
+
+
+def test_structure_below_the_band_is_no_noise() -> None:
+    wave = 3.0 * np.sin(9.0 * np.arange(SECONDS * 500) / 500.0)
+    found, rms = measured(coloured(0.0, 2) + wave)
+    assert np.all(rms > 5.0 * found.coloured)
+
+
+def test_torque_that_was_filtered_says_nothing_of_its_noise() -> None:
+    sections = butter(6, 9.0, fs=500.0, output="sos")
+    found, _ = measured(sosfiltfilt(sections, coloured(0.0, 3)))
+    assert np.isnan(found.white).all()
+    assert np.isnan(found.coloured).all()
+
+
+def test_slow_recordings_say_nothing_of_their_noise() -> None:
+    found, _ = measured(coloured(0.0, 3, 40.0), 40.0)
+    assert np.isnan(found.white).all()
