@@ -86,7 +86,7 @@ def diagnose(
         return [prepare(run, processing, coupled) for run in parts.training]
 
     training = prepared(())
-    check_plausibility(robot, training)
+    suspicious = check_plausibility(robot, training, spec.measurement)
     traced = trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
     progress("naming", 8)
     parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
@@ -114,7 +114,7 @@ def diagnose(
         before=sealed_part.before,
         after=sealed_part.after,
         rounds=rounds_of(traced, robot.joint_names),
-        findings=(*dataset.findings, *_noticed(assumed, floor, robot)),
+        findings=(*dataset.findings, *suspicious, *_noticed(assumed, floor, robot)),
         processing=_choices(processing, traced, parts, training),
         phi=model.full_inertias(parameters),
         base_values=base_values,

@@ -1,13 +1,15 @@
 """Errors of a predicted torque: per joint, relative and in N·m, with an interval of their mean."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from excite_cli.errors import FileError
 from excite_cli.identification.factors import Mask
 from excite_cli.robot.model import Array
 
+FEWEST = 10  # samples that an error may rest on
 _DRAWS, _SEED = 1000, 20170529
 _BLOCK = 1.0  # s, longer than what noise of the filtered torque remembers
 
@@ -16,7 +18,8 @@ _BLOCK = 1.0  # s, longer than what noise of the filtered torque remembers
 class Errors:
     """Of the torque on the sealed data: per joint, relative (RMS/RMS) and in N·m.
 
-    `interval` is the 95 % block-bootstrap interval of the mean relative error.
+    `interval` is the 95 % block-bootstrap interval of the mean relative error. `samples` per joint
+    are the filtered ones that count; files of earlier versions do not say.
     """
 
     mean_relative: float
@@ -26,6 +29,7 @@ class Errors:
     rms: dict[str, float]
     rms_raw: dict[str, float]
     interval: tuple[float, float]
+    samples: dict[str, int] = field(default_factory=dict)
 
     def as_data(self) -> dict[str, object]:
         """Plain values for files and JSON."""
@@ -50,14 +54,26 @@ def torque_errors(
     raw, raw_predicted: per run (T, n), torque as recorded; entries that are not finite are left out
     step: between filtered samples [s]
 
-    A joint without a (moving) sample has NaN and does not enter the mean.
+    A joint with fewer than `FEWEST` (moving) samples has NaN and does not enter the mean.
+
+    Raises
+    ------
+    FileError
+        No joint has as many.
     """
     blocks = [_block_sums(*run, step) for run in zip(tau, predicted, usable, moving, strict=True)]
-    sums = np.concatenate(blocks, axis=1)  # (5, blocks, n)
-    wrong, size, wrong_moving, size_moving, count = sums.sum(axis=1)
-    relative, relative_moving = _ratio(wrong, size), _ratio(wrong_moving, size_moving)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        rms = np.sqrt(wrong / count)
+    sums = np.concatenate(blocks, axis=1)  # (6, blocks, n)
+    wrong, size, wrong_moving, size_moving, count, count_moving = sums.sum(axis=1)
+    enough = count >= FEWEST
+    if not enough.any():
+        raise FileError(
+            f"the data to judge by leave {count.max():.0f} filtered samples at most to any joint; "
+            f"{FEWEST} are needed. The others were masked (stale, saturated, missing), or the runs "
+            "are too short: record longer, or seal another run."
+        )
+    relative = np.where(enough, _ratio(wrong, size), np.nan)
+    relative_moving = np.where(count_moving >= FEWEST, _ratio(wrong_moving, size_moving), np.nan)
+    rms = np.sqrt(np.where(enough, wrong, np.nan) / np.maximum(count, 1))
     return Errors(
         mean_relative=_mean(relative),
         mean_relative_moving=_mean(relative_moving),
@@ -65,16 +81,17 @@ def torque_errors(
         relative_moving=_named(joint_names, relative_moving),
         rms=_named(joint_names, rms),
         rms_raw=_named(joint_names, _raw_rms(raw, raw_predicted, len(joint_names))),
-        interval=_interval(sums[0], sums[1]),
+        interval=_interval(sums[0] * enough, sums[1] * enough),
+        samples={name: int(k) for name, k in zip(joint_names, count, strict=True)},
     )
 
 
 def _block_sums(tau: Array, predicted: Array, usable: Mask, moving: Mask, step: float) -> Array:
-    """Per block of about 1 s: ‖e‖², ‖τ‖², the same where moving, and the count; (5, blocks, n)."""
+    """Per block of about 1 s: ‖e‖², ‖τ‖², the same where moving, and both counts; (6, blocks, n)."""
     good, slow = usable.astype(float), (usable & moving).astype(float)
     error = np.square(np.where(usable, tau - predicted, 0.0))
     size = np.square(np.where(usable, tau, 0.0))
-    rows = np.stack([error, size, error * slow, size * slow, good])
+    rows = np.stack([error, size, error * slow, size * slow, good, slow])
     length = max(1, round(_BLOCK / step))
     edges = np.arange(0, max(len(tau) - length // 2, 1), length)
     return np.add.reduceat(rows, edges, axis=1)

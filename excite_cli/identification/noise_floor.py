@@ -26,6 +26,7 @@ from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 
 _FEWEST = 8  # phases at which a joint must have been seen twice
+_FILLED = 0.1  # weight that samples filled between their neighbours may have in an average
 # Misalignment of this share of the floor must be reported.
 _UNEVEN = 0.5
 
@@ -118,7 +119,7 @@ def _whole(group: Sequence[Run]) -> _Whole:
         at = slice(first, first + len(part.t))
         q[at], known[at] = part.q, True
         valid[at] = part.usable() & np.isfinite(part.tau)
-        tau[at] = np.where(valid[at], part.tau, 0.0)
+        tau[at] = np.where(np.isfinite(part.tau), part.tau, 0.0)
     return _Whole(q, tau, known, valid, step)
 
 
@@ -137,11 +138,13 @@ def _sums(run: _Whole, period: float, processing: Processing) -> Array:
     nominal = average_rows(size, np.array([margin]), run.step, cutoff)
     gain = _squared(rows).reshape(*inside.shape, 1) / _squared(nominal)
 
-    def seen(known: Mask) -> Mask:
-        touched = np.asarray((rows != 0).astype(float) @ (~known).astype(float))
-        return inside[:, :, None] & (touched.reshape(*inside.shape, -1) == 0)
+    def seen(known: Mask, filled: float = 0.0) -> Mask:
+        lost = np.asarray(abs(rows) @ (~known).astype(float))
+        return inside[:, :, None] & (lost.reshape(*inside.shape, -1) <= filled)
 
-    torque, good = apply(rows, run.tau).reshape(*inside.shape, -1), seen(run.valid)
+    complete = seen(run.known[:, None])
+    torque = apply(rows, run.tau).reshape(*inside.shape, -1)
+    good = complete & seen(run.valid, _FILLED)
     times = good.sum(axis=0)
     twice = times > 1
     good &= twice
@@ -149,7 +152,7 @@ def _sums(run: _Whole, period: float, processing: Processing) -> Array:
     squares = np.square(np.where(good, torque - mean, 0.0)).sum(axis=(0, 1))
     freedom = (good * gain * (1.0 - 1.0 / np.maximum(times, 1))).sum(axis=(0, 1))
     position = apply(rows, run.q).reshape(*inside.shape, -1)
-    late = _late(position, seen(run.known[:, None]), stride)
+    late = _late(position, complete, stride)
     slope = np.nan_to_num(np.gradient(mean, stride, axis=0))
     steep = np.square(slope).sum(axis=0) / np.maximum(twice.sum(axis=0), 1)
     return np.stack([squares, freedom, freedom * late**2 * steep, twice.sum(axis=0)])

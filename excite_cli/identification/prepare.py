@@ -33,8 +33,10 @@ class PreparedRun:
 
     `t` (T,) from the start of the recording `run`, `q, v, a, tau_raw` (T, n) at the working rate
     with borders cut; `averages` (M, T) gives filtered and decimated values, at `step`, of any
-    column: A x; `tau` (M, n) = A tau_raw; `valid` (M, n) samples untouched by invalid ones;
-    `moving` (M, n) where the joint itself moves.
+    column: A x; `moving` (M, n) where the joint itself moves.
+
+    What torque is judged by leaves out invalid samples of its joint: `tau` (M, n) are averages of
+    the others, `valid` (M, n) where enough is left, `valid_averages` those of each joint.
 
     For fits every joint has averages of its own, which leave out invalid samples and those in
     which it stands or reverses; `tau_fit` (M, n) are those of the torque, `usable` (M, n) where
@@ -50,6 +52,7 @@ class PreparedRun:
     averages: csr_matrix
     tau: Array
     valid: NDArray[np.bool_]
+    valid_averages: tuple[csr_matrix, ...]
     moving: NDArray[np.bool_]
     fit_averages: tuple[csr_matrix, ...]
     tau_fit: Array
@@ -59,6 +62,11 @@ class PreparedRun:
     def averaged(self, columns: Array) -> Array:
         """A applied along the first axis of (T, …)."""
         return apply(self.averages, columns)
+
+    def averaged_torque(self, torque: Array) -> Array:
+        """Averages (M, n) of torques (T, n) over the very samples that `tau` is made of."""
+        columns = zip(self.valid_averages, torque.T, strict=True)
+        return np.stack([each @ column for each, column in columns], axis=1)
 
     def averaged_for_fit(self, columns: Array, rows: Sequence[int] | None = None) -> Array:
         """Averages of (T, r, …), each row with those of its joint (default: joint k for row k)."""
@@ -106,7 +114,6 @@ def prepare(
     # The torque is averaged at the full rate: picking samples first would fold its noise down.
     of_torque = average_rows(len(run.t[inside]), centers * stride, run.step, cutoff)
     recorded = run.usable()[inside]
-    valid = np.asarray((of_torque != 0).astype(float) @ (~recorded).astype(float)) == 0
     speed = np.abs(np.asarray(averages @ v[keep]))
     counted = recorded & _sliding(v, run.step, processing, coupled)[inside]
     joints = range(run.q.shape[1])
@@ -115,6 +122,10 @@ def prepare(
     # would be, and the torque would lag by milliseconds.
     to_full_rate = interpolation(len(t), stride, len(counted))
     fit_averages = tuple((each @ to_full_rate).tocsr() for each in for_fit)
+    of_valid = [without(of_torque, recorded[:, j]) for j in joints]
+    valid_averages = tuple(
+        averages if each is of_torque else (each @ to_full_rate).tocsr() for each in of_valid
+    )
     tau = run.tau[inside]
     return PreparedRun(
         run=run.id,
@@ -124,8 +135,9 @@ def prepare(
         a=a[keep],
         tau_raw=run.tau[keep],
         averages=averages,
-        tau=np.asarray(of_torque @ tau),
-        valid=valid,
+        tau=np.stack([np.asarray(of_valid[j] @ tau[:, j]) for j in joints], axis=1),
+        valid=np.stack([filled(of_valid[j]) & filled(valid_averages[j]) for j in joints], axis=1),
+        valid_averages=valid_averages,
         moving=speed > processing.moving_speed,
         fit_averages=fit_averages,
         tau_fit=np.stack([np.asarray(for_fit[j] @ tau[:, j]) for j in joints], axis=1),
