@@ -41,7 +41,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
-from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.prepare import PreparedRun, prepare, require_motion
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.split import Split, split
@@ -86,6 +86,7 @@ def diagnose(
         return [prepare(run, processing, coupled) for run in parts.training]
 
     training = prepared(())
+    require_motion(training, processing)
     suspicious = check_plausibility(robot, training, spec.measurement)
     traced = trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
     progress("naming", 8)

@@ -36,14 +36,15 @@ from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.robot.model import Array, Robot
 
 _SAMPLES = 600
-_GOOD = 0.06  # data that leave less than this on every joint are what they say they are
+_GOOD = 0.03  # data that leave less than this on every joint are what they say they are
 _WORSE = 0.3  # log of the share by which no joint may fit worse; or share of the whole gain
 _FITS = 0.6  # share that the joints concerned may have left, in the median
 # Exchanged wrists of wrong inertias may fit somewhat better: that is no evidence of an order.
 _ORDER_FITS = 0.35
 _FOREIGN = 0.85  # torques of which this is left have nothing to do with the motion
-# Shares left as the data are, from which a mistake is certain, and most that is left without it.
-_CERTAIN, _EXPLAINED = 0.5, 0.25
+# Shares left as the data are, from which a mistake is certain (inertias would have to be 5 standard
+# deviations off), and most that may be left without it.
+_CERTAIN, _EXPLAINED = 0.15, 0.1
 
 
 def check_plausibility(
@@ -62,6 +63,8 @@ def check_plausibility(
     if declared.trust:
         return ()
     names, samples, model = robot.joint_names, samples_of(runs, _SAMPLES), RoughModel(robot)
+    if not len(samples.q):
+        return ()  # nobody moves: there is nothing to judge
     table = model.shares_left(samples)
     here = np.arange(robot.n)
     straight = Verdict(Change.none(robot.n), table[here, here, 0])
@@ -158,14 +161,12 @@ def _message(names: Sequence[str], straight: Verdict, best: Verdict, rivals: lis
 
 def _settling(names: Sequence[str], change: Change) -> str:
     """The key that ends the discussion where the data are right all the same."""
-    own = zip(("sign", "position_sign"), change.signs, strict=True)
-    keys = [
-        f"measurement.{key}: {{{', '.join(f'{names[j]}: 1' for j in np.flatnonzero(wrong))}}}"
-        for key, wrong in own
-        if wrong.any()
-    ]
-    only_signs = change.signs.any(axis=0)[change.touched].all()
-    said = " and ".join(keys if only_signs else ["measurement.trust: true"])
+    keys = []
+    for key, wrong in zip(("sign", "position_sign"), change.signs, strict=True):
+        if wrong.any():
+            joints = ", ".join(f"{names[j]}: 1" for j in np.flatnonzero(wrong).tolist())
+            keys.append(f"measurement.{key}: {{{joints}}}")
+    said = "measurement.trust: true" if change.exchanges else " and ".join(keys)
     return f"If the data are right as they are, say so: {said}."
 
 

@@ -21,7 +21,7 @@ from excite_cli.robot.model import Array
 
 _SEARCH_SAMPLES = 100
 # Shares below this are the noise, the inertias' errors and effects: no difference is made there.
-FLOOR = 0.04
+FLOOR = 0.02
 # A gain in log(share before / share after) that is worth a word: one share nearly halved.
 CLEAR = 0.64
 # What every change costs, in the same measure: of explanations alike, the simpler one.

@@ -17,7 +17,7 @@ stands do not count, since what it then carries is up to its friction.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve
@@ -34,7 +34,7 @@ _SWEEPS = 80
 _PASSIVE = 7  # columns
 _UNCERTAIN, _CENTER = 0.3, 0.03  # share of masses and inertias; m by which centres of mass are off
 _DEVIATION = 0.03  # λ: inertias one standard deviation off cost as much as 3 % of the torque
-_FEWEST = 60  # instants from which a joint can be judged
+_FEWEST = 60  # instants in motion from which a joint can be judged
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,16 @@ class Samples:
 
     def thinned(self, most: int) -> "Samples":
         """At most `most` of them, evenly spread."""
-        stride = -(-len(self.q) // most)
+        stride = max(1, -(-len(self.q) // most))
         every = (self.q, self.v, self.a, self.tau, self.known, self.moves)
         return Samples(*(x[::stride] for x in every))  # type: ignore[arg-type]
 
 
 def samples_of(runs: Sequence[PreparedRun], most: int) -> Samples:
-    """At most about `most` of the filtered samples of all runs in which some joint moves."""
+    """At most about `most` of the filtered samples of all runs in which some joint moves.
+
+    A joint that hardly moves is not judged: none of its instants counts.
+    """
     parts = []
     for run in runs:
         moves = run.usable & run.moving
@@ -68,7 +71,8 @@ def samples_of(runs: Sequence[PreparedRun], most: int) -> Samples:
         motion = [np.asarray(picks @ x) for x in (run.q, run.v, run.a)]
         parts.append([*motion, run.tau[some], run.valid[some], moves[some]])
     whole = Samples(*(np.concatenate(each) for each in zip(*parts, strict=True)))
-    return whole.thinned(most)
+    judged = whole.moves.sum(axis=0) >= _FEWEST
+    return replace(whole, moves=whole.moves & judged).thinned(most)
 
 
 class RoughModel:
@@ -119,11 +123,11 @@ def _spread(robot: Robot, phi: Array) -> Array:
 def _products(samples: Samples, motion: tuple[Array, Array], j: int, k: int) -> Array:
     """Products (9, 9) of joint j's columns and torque k with z taken out; ‖τ_k‖² in the corner.
 
-    Zero where joint j moves too little.
+    Zero where joint j moves too little: anything fits then.
     """
     counted = samples.moves[:, j] & samples.known[:, k]
     found = np.zeros((_PASSIVE + 2, _PASSIVE + 2))
-    if np.count_nonzero(counted) < _FEWEST:
+    if np.count_nonzero(counted) <= 2 * len(found):
         return found
     passive, uncertain = (x[counted, j] for x in motion)
     x = np.column_stack([passive, samples.tau[counted, k]])

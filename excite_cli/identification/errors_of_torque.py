@@ -87,7 +87,7 @@ def torque_errors(
 
 
 def _block_sums(tau: Array, predicted: Array, usable: Mask, moving: Mask, step: float) -> Array:
-    """Per block of about 1 s: ‖e‖², ‖τ‖², the same where moving, and both counts; (6, blocks, n)."""
+    """Per block of about 1 s: ‖e‖², ‖τ‖², the same where moving, both counts; (6, blocks, n)."""
     good, slow = usable.astype(float), (usable & moving).astype(float)
     error = np.square(np.where(usable, tau - predicted, 0.0))
     size = np.square(np.where(usable, tau, 0.0))

@@ -20,13 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from excite_cli.identification.averages import apply, average_rows, reach
+from excite_cli.identification.averages import apply, average_rows, reach, without
 from excite_cli.identification.exact_period import exact_period
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 
 _FEWEST = 8  # phases at which a joint must have been seen twice
-_FILLED = 0.1  # weight that samples filled between their neighbours may have in an average
+_LOST = 0.1  # share of an average's weight that invalid samples may take
 # Misalignment of this share of the floor must be reported.
 _UNEVEN = 0.5
 
@@ -119,7 +119,7 @@ def _whole(group: Sequence[Run]) -> _Whole:
         at = slice(first, first + len(part.t))
         q[at], known[at] = part.q, True
         valid[at] = part.usable() & np.isfinite(part.tau)
-        tau[at] = np.where(np.isfinite(part.tau), part.tau, 0.0)
+        tau[at] = np.where(valid[at], part.tau, 0.0)
     return _Whole(q, tau, known, valid, step)
 
 
@@ -138,13 +138,15 @@ def _sums(run: _Whole, period: float, processing: Processing) -> Array:
     nominal = average_rows(size, np.array([margin]), run.step, cutoff)
     gain = _squared(rows).reshape(*inside.shape, 1) / _squared(nominal)
 
-    def seen(known: Mask, filled: float = 0.0) -> Mask:
-        lost = np.asarray(abs(rows) @ (~known).astype(float))
-        return inside[:, :, None] & (lost.reshape(*inside.shape, -1) <= filled)
+    def seen(known: Mask, lost: float = 0.0) -> Mask:
+        share = np.asarray(abs(rows) @ (~known).astype(float))
+        return inside[:, :, None] & (share.reshape(*inside.shape, -1) <= lost)
 
-    complete = seen(run.known[:, None])
-    torque = apply(rows, run.tau).reshape(*inside.shape, -1)
-    good = complete & seen(run.valid, _FILLED)
+    complete, good = seen(run.known[:, None]), seen(run.valid, _LOST)
+    counted = [without(rows, valid) for valid in run.valid.T]
+    torque = np.stack([each @ tau for each, tau in zip(counted, run.tau.T, strict=True)], axis=1)
+    torque = torque.reshape(*inside.shape, -1)
+    good &= complete
     times = good.sum(axis=0)
     twice = times > 1
     good &= twice

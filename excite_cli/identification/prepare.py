@@ -146,6 +146,19 @@ def prepare(
     )
 
 
+def require_motion(runs: Sequence[PreparedRun], processing: Processing) -> None:
+    """Raise FileError unless some joint moves in the data that are to be fitted.
+
+    Where a joint stands or reverses, its torque is up to its friction and counts in no fit.
+    """
+    if not any(run.usable.any() for run in runs):
+        raise FileError(
+            f"no joint moves faster than {processing.moving_speed:g} rad/s (m/s) with a torque "
+            "that may be used, outside of the sealed part: nothing can be fitted. Record motion, "
+            "or lower diagnosis.moving_speed."
+        )
+
+
 def _sliding(
     v: Array, h: float, processing: Processing, coupled: Sequence[tuple[int, int, float]]
 ) -> NDArray[np.bool_]:

@@ -76,5 +76,5 @@ def test_errors_rest_on_enough_samples_and_say_on_how_many() -> None:
     assert math.isnan(found.rms["a"])
     assert found.mean_relative == found.mean_relative_moving == pytest.approx(0.1)
     usable[:51, 1] = False
-    with pytest.raises(FileError, match="leave 9 filtered samples at most .* 10 are needed"):
+    with pytest.raises(FileError, match=r"leave 9 filtered samples at most .* 10 are needed"):
         errors(tau, 0.9 * tau, usable=usable)
