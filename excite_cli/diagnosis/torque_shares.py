@@ -34,6 +34,7 @@ _SWEEPS = 80
 _PASSIVE = 7  # columns
 _UNCERTAIN, _CENTER = 0.3, 0.03  # share of masses and inertias; m by which centres of mass are off
 _DEVIATION = 0.03  # λ: inertias one standard deviation off cost as much as 3 % of the torque
+_ROUNDING = 1e-12
 _FEWEST = 60  # instants in motion from which a joint can be judged
 
 
@@ -135,8 +136,11 @@ def _products(samples: Samples, motion: tuple[Array, Array], j: int, k: int) -> 
     z = uncertain[:, np.abs(uncertain).max(axis=0) > 0.0]
     z -= z.mean(axis=0)
     gram = x.T @ x
-    energy = max(float(gram[-1, -1]), 1e-300)
-    precision = _DEVIATION**2 * energy
+    energy = float(gram[-1, -1])
+    if not energy > 0.0:
+        return found
+    # Of a torque far smaller than any inertia makes it, rounding is left: anything fits.
+    precision = max(_DEVIATION**2 * energy, _ROUNDING * float(np.square(z).sum()))
     if z.shape[1] > len(z):  # the smaller of two equal ways: x' x - x' Z (Z' Z + p)^-1 Z' x
         gram = precision * (x.T @ _solved(z @ z.T, precision, x))
     elif z.shape[1]:

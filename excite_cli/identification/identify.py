@@ -192,8 +192,8 @@ def _much_left(error: Errors) -> list[Finding]:
     worst = max(much, key=lambda name: much[name])
     text = (
         f"{much[worst]:.0%} of the torque of {worst} is left on sealed data ({len(much)} "
-        f"joint{'s' * (len(much) > 1)} above {_MUCH_LEFT:.0%}): the declared model lacks something. "
-        "`excite diagnose` looks for what"
+        f"joint{'s' * (len(much) > 1)} above {_MUCH_LEFT:.0%}): the declared model lacks "
+        "something. `excite diagnose` looks for what"
     )
     return [Finding("much_left", "warning", text, "", tuple(much))]
 

@@ -24,6 +24,7 @@ from excite_cli.measurement.run_identity import RunId
 # Around a reversal a joint sticks: what its friction then is, only the torque itself knows.
 _STICKING = 0.02  # s
 _SMEARED = 0.5  # periods of the cut-off by which the filter smears a reversal
+_NOISE = 0.01  # rad (m), RMS, beyond what any encoder adds
 _FEWEST = 8  # decimated samples a run needs to say anything
 
 
@@ -90,6 +91,7 @@ def prepare(
     fs, q = 1.0 / run.step, run.q
     if processing.position_cutoff is not None:
         q = _smooth(q, processing.position_cutoff, fs, run.label)
+        _require_smooth(run, q, processing.position_cutoff)
     if processing.velocity == "measured" and run.dq is not None:
         v = run.dq
         if processing.position_cutoff is not None:
@@ -147,7 +149,7 @@ def prepare(
 
 
 def require_motion(runs: Sequence[PreparedRun], processing: Processing) -> None:
-    """Raise FileError unless some joint moves in the data that are to be fitted.
+    """Raise FileError unless some joint moves, under some torque, in what is to be fitted.
 
     Where a joint stands or reverses, its torque is up to its friction and counts in no fit.
     """
@@ -156,6 +158,11 @@ def require_motion(runs: Sequence[PreparedRun], processing: Processing) -> None:
             f"no joint moves faster than {processing.moving_speed:g} rad/s (m/s) with a torque "
             "that may be used, outside of the sealed part: nothing can be fitted. Record motion, "
             "or lower diagnosis.moving_speed."
+        )
+    if not any(run.tau_fit[run.usable].any() for run in runs):
+        raise FileError(
+            "all torques are zero wherever a joint moves: there is nothing to fit. Is this the "
+            "right channel (measurement.channels: {tau: …})?"
         )
 
 
@@ -185,6 +192,19 @@ def _centers(samples: int, h: float, processing: Processing) -> NDArray[np.intp]
     stride = max(1, round(1.0 / (h * processing.rate)))
     half = reach(h, processing.parallel_cutoff)
     return np.arange(half, samples - half, stride)
+
+
+def _require_smooth(run: Run, smoothed: Array, cutoff: float) -> None:
+    """Refuse positions that are noise: no robot moves so."""
+    noise = np.std(run.q - smoothed, axis=0)
+    wild = (noise > _NOISE) & (noise > 0.5 * np.std(run.q, axis=0))
+    if wild.any():
+        raise FileError(
+            f"run '{run.label}': positions jump by {noise.max():.3g} rad (m) from sample to sample "
+            f"(of joint {', '.join(str(j + 1) for j in np.flatnonzero(wild))} of the config, "
+            f"counted from 1); most of their change lies beyond {cutoff:.3g} Hz. Are these the "
+            "positions (measurement.channels), in the right unit (measurement.angle, time)?"
+        )
 
 
 def _smooth(x: Array, cutoff: float, fs: float, name: str) -> Array:
