@@ -149,7 +149,7 @@ def prepare(
 
 
 def require_motion(runs: Sequence[PreparedRun], processing: Processing) -> None:
-    """Raise FileError unless some joint moves, under some torque, in what is to be fitted.
+    """Raise FileError unless some joint moves, and some torque changes, in what is fitted.
 
     Where a joint stands or reverses, its torque is up to its friction and counts in no fit.
     """
@@ -159,10 +159,10 @@ def require_motion(runs: Sequence[PreparedRun], processing: Processing) -> None:
             "that may be used, outside of the sealed part: nothing can be fitted. Record motion, "
             "or lower diagnosis.moving_speed."
         )
-    if not any(run.tau_fit[run.usable].any() for run in runs):
+    if not any(np.ptp(run.tau_raw, axis=0).any() for run in runs):
         raise FileError(
-            "all torques are zero wherever a joint moves: there is nothing to fit. Is this the "
-            "right channel (measurement.channels: {tau: …})?"
+            "all torques are constant: there is nothing to fit. Is this the right channel "
+            "(measurement.channels: {tau: …})?"
         )
 
 
