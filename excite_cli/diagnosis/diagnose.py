@@ -87,6 +87,7 @@ def diagnose(
 
     training = prepared(())
     require_motion(training, processing)
+    to_judge = [prepare(run, processing) for run in parts.sealed]  # refused early where too short
     suspicious = check_plausibility(robot, training, spec.measurement)
     traced = trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
     progress("naming", 8)
@@ -98,7 +99,7 @@ def diagnose(
     doubts = approximations(traced, unexplained, robot.joint_names)
     named, rivals = _named(model, traced, parameters, covariance, doubts)
     models = both_models(model, traced, parameters)
-    sealed_part = on_sealed(robot, models, [prepare(run, processing) for run in parts.sealed])
+    sealed_part = on_sealed(robot, models, to_judge)
     base_values, base_std = _base_parameters(model, parameters, covariance)
     floor, assumed = noise_floor(parts.training, processing), _assumed(traced, parts)
     return Diagnosis(
