@@ -13,6 +13,7 @@ coulomb: 4 of 5 start so (seed 1 is named right at once); 4 of 4 settled.
 panda: 5 of 5 start so; 4 of 5 settled (seed 1: right name, a new alias, stribeck_friction).
 """
 
+import argparse
 import json
 import os
 import shutil
@@ -215,10 +216,14 @@ def report(name: str, case: Case, folder: Path) -> bool:
     return good
 
 
-def main(arguments: Sequence[str] = tuple(sys.argv[1:])) -> int:
+def main() -> int:
     """Run the cases named (default: all)."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES))
+    names = parser.parse_args().cases or list(CASES)
+    if unknown := [name for name in names if name not in CASES]:
+        parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
     good = 0
-    names = list(arguments) or list(CASES)
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
             good += report(name, CASES[name], Path(folder))

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.loading import Case, dataset_of, inputs_of, sources_of
+from excite_cli.api.loading import Case, dataset_of, inputs_of, sources_of, tell_findings
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
 from excite_cli.config.load import spec_as_yaml
@@ -75,6 +75,7 @@ def diagnose(
             config_folder=str(problem.folder),
             versions=versions(),
         )
+        tell_findings(found.findings[len(dataset.findings) :], tell)
         if output is not None:
             write_diagnosis(Path(output), found)
         if apply is not None and (found.good or apply_unconfirmed):

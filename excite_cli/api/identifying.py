@@ -1,6 +1,7 @@
 """The parameters of the declared model from measured data: `excite identify`."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
@@ -54,7 +55,9 @@ def identify(
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, **models}, overwrite, inputs):
         dataset = dataset_of(problem, data, tell)
-        check_dataset(problem.robot, dataset, problem.spec)
+        suspicious = check_dataset(problem.robot, dataset, problem.spec, sealed)
+        dataset = replace(dataset, findings=(*dataset.findings, *suspicious))
+        tell_findings(suspicious, tell)
         found = identify_dataset(
             problem.robot,
             problem.base,

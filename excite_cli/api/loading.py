@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
 from excite_cli.api.arguments import checked
 from excite_cli.api.paths import paths_in, refuse_twice
 from excite_cli.config.inputs import files_of_config
@@ -195,6 +197,14 @@ def dataset_of(
             f"the data are of other joints ({', '.join(data.joint_names)}) than the config "
             f"({', '.join(problem.robot.joint_names)}). Read them with `load_data` and this config."
         )
+    if not data.runs:
+        raise FileError("the data hold no run. Give one, or read them with `load_data`.")
+    for run in data.runs:
+        if not all(np.isfinite(values).all() for values in (run.t, run.q, run.tau)):
+            raise FileError(
+                f"run '{run.label}': time, positions or torques are NaN or infinite. `load_data` "
+                "fills and masks such samples in files; take them out of data of your own."
+            )
     return data
 
 

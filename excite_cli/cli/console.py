@@ -264,7 +264,7 @@ def run_guarded(action: Callable[[], None]) -> int:
         _tell(words)
         return status
     except MemoryError:
-        _tell("error: out of memory; take fewer samples, harmonics or joints.")
+        _tell(f"error: out of memory; {_less_memory(sys.argv[1:])}.")
         return 2
     except OSError as error:
         return _refused(error)
@@ -273,6 +273,16 @@ def run_guarded(action: Callable[[], None]) -> int:
     finally:
         leave_claims()
     return status if isinstance(status, int) else 0
+
+
+def _less_memory(arguments: Sequence[str]) -> str:
+    """What takes less memory, for the command line `arguments`."""
+    measured = {
+        "diagnose": "take fewer runs, fewer samples or fewer candidates (diagnosis.kinds)",
+        "identify": "take fewer runs or fewer samples",
+    }
+    command = next((each for each in arguments if not each.startswith("-")), "")
+    return measured.get(command, "take fewer samples, harmonics or joints")
 
 
 # Nothing that a user could fix: the program looked for a file that it should have asked for.

@@ -106,6 +106,9 @@ class MeasurementSpec(Section):
     names: dict[str, str] = Field(
         default_factory=dict, description="name in the file -> joint of the robot"
     )
+    trust: bool = Field(
+        False, description="take order and signs of the columns as they are, whatever the URDF says"
+    )
     topic: str | None = Field(None, description="topic of a bag; default: the only JointState")
     filter: FilterSpec = FilterSpec()
 

@@ -24,5 +24,8 @@ def confirmed_shares(plain: Evidence, chosen: Sequence[int], joint: int) -> Arra
     fitted = np.array(
         [plain.energy_on([*chosen, i], [joint]) for i in range(len(chosen), len(plain.blocks))]
     )
-    shares = 1.0 - np.maximum(after / max(before, 1e-300), fitted / max(rest, 1e-300))
-    return np.clip(shares, 0.0, 1.0)
+    # What grows explains nothing, by however much: of nearly nothing, by more than numbers hold.
+    left = [
+        np.minimum(now, once) / max(once, 1e-300) for now, once in ((after, before), (fitted, rest))
+    ]
+    return np.clip(1.0 - np.maximum(*left), 0.0, 1.0)

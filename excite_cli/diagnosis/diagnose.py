@@ -44,7 +44,7 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.effects.placing import told_on
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
-from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.prepare import PreparedRun, prepare, require_motion
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
@@ -82,19 +82,25 @@ def diagnose(
     parts = split(dataset, sealed, spec.diagnosis.block)
     check_left_to_fit(spec.effects, parts)
     refuse_sealed_copies(parts)
-    training, processing, traced = _searched(model, spec, parts, progress)
+    processing, training = _prepared(spec, parts)
+    require_motion(training, processing)
+    kept = [prepare(run, processing) for run in parts.sealed]  # refused early where too short
+    suspicious = check_plausibility(robot, training, spec.measurement)
+    traced = _traced(model, spec, parts, processing, progress)
     with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
     if with_ends.ends:
         parts = with_ends
-        del training, traced  # gigabytes, of large data: not beside the next ones
-        training, processing, traced = _searched(model, spec, parts, progress)
+        del traced  # gigabytes, of large data: not beside the next one
+        processing, training = _prepared(spec, parts)
+        traced = _traced(model, spec, parts, processing, progress)
+        kept = [prepare(run, processing) for run in parts.sealed]
     progress("naming", 8)
     final = final_fit(traced)
     traced, parameters, covariance = final.traced, final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
     doubts = approximations(traced, unexplained, robot.joint_names)
     models = both_models(model, traced, parameters)
-    kept, ends = ([prepare(run, processing) for run in runs] for runs in (parts.sealed, parts.ends))
+    ends = [prepare(run, processing) for run in parts.ends]
     sealed_part = on_sealed(Played(robot, kept), models)
     worth = worth_on_sealed(Played(robot, [*kept, *ends]), model, traced, models[1])
     named, rivals = _named(
@@ -117,7 +123,7 @@ def diagnose(
         before=sealed_part.before,
         after=sealed_part.after,
         rounds=rounds_of(traced, robot.joint_names),
-        findings=(*dataset.findings, *_noticed(assumed, floor, robot)),
+        findings=(*dataset.findings, *suspicious, *_noticed(assumed, floor, robot)),
         processing=_choices(processing, traced, parts, training),
         phi=model.full_inertias(parameters),
         base_values=base_values,
@@ -148,22 +154,24 @@ def diagnose(
     )
 
 
-def _searched(
-    model: Model, spec: Spec, parts: Split, progress: Progress
-) -> tuple[list[PreparedRun], Processing, Traced]:
-    """Training parts as they are filtered, how, and what was found in them."""
+def _prepared(spec: Spec, parts: Split) -> tuple[Processing, list[PreparedRun]]:
+    """How the training parts are filtered, and what that gives."""
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )
+    return processing, [prepare(run, processing) for run in parts.training]
+
+
+def _traced(
+    model: Model, spec: Spec, parts: Split, processing: Processing, progress: Progress
+) -> Traced:
+    """What is found in the training parts."""
     progress("filtering", 0)
 
     def prepared(coupled: Sequence[tuple[int, int, float]]) -> list[PreparedRun]:
         return [prepare(run, processing, coupled) for run in parts.training]
 
-    training = prepared(())
-    check_plausibility(model.robot, training)
-    traced = trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
-    return training, processing, traced
+    return trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
 
 
 def _noticed(

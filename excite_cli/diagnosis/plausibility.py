@@ -2,14 +2,18 @@
 
 A mistake in the file is not an effect of the robot, and a diagnosis of such data would be wrong
 from the start. So mistakes are tried out (`rearranged`): one is reported if, undone, it leaves
-clearly less of the torques (`torque_shares`) than the data as they are, and no joint fits clearly
-worse. Whatever no such mistake explains is left to the diagnosis.
+clearly less of the torques (`torque_shares`, which allow for wrong inertias) than the data as they
+are, and no joint fits clearly worse. It is an error where hardly anything of the torques concerned
+fits as they are, whatever the inertias, and nearly all of it the other way round; else a warning,
+and the person decides. Whatever no such mistake explains is left to the diagnosis.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.rearranged import (
     CLEAR,
@@ -23,112 +27,119 @@ from excite_cli.diagnosis.rearranged import (
     positions_changed,
     torques_changed,
 )
-from excite_cli.diagnosis.torque_shares import Samples, columns_of, samples_of, shares_left
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.regressor import standard_parameters
-from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.diagnosis.torque_shares import RoughModel, samples_of
 from excite_cli.errors import FileError
 from excite_cli.identification.prepare import PreparedRun, prepare
-from excite_cli.identification.prior import inertial_prior
 from excite_cli.identification.processing import choose_processing
-from excite_cli.measurement.dataset import Dataset
+from excite_cli.identification.split import split
+from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.robot.model import Array, Robot
 
 _SAMPLES = 600
-_GOOD = 0.1  # data that leave less than this on every joint are what they say they are
+_GOOD = 0.03  # data that leave less than this on every joint are what they say they are
 _WORSE = 0.3  # log of the share by which no joint may fit worse; or share of the whole gain
 _FITS = 0.6  # share that the joints concerned may have left, in the median
 # Exchanged wrists of wrong inertias may fit somewhat better: that is no evidence of an order.
 _ORDER_FITS = 0.35
-# How wrong inertias may be [share], how far beyond that torques must be for an exchange or for
-# another sign to be judged, and from how many joints on most of them suffice.
-_UNCERTAIN, _BEYOND, _BEYOND_SIGN, _MANY = 0.3, 2.0, 2.3, 3
 _FOREIGN = 0.85  # torques of which this is left have nothing to do with the motion
+# Shares left as the data are, from which a mistake is certain (inertias would have to be 5 standard
+# deviations off), and most that may be left without it.
+_CERTAIN, _EXPLAINED = 0.15, 0.1
 
 
-def check_plausibility(robot: Robot, runs: Sequence[PreparedRun]) -> None:
-    """Refuse data whose order of columns or whose signs contradict the robot.
+def check_plausibility(
+    robot: Robot, runs: Sequence[PreparedRun], declared: MeasurementSpec
+) -> tuple[Finding, ...]:
+    """What order of columns or signs seem to contradict the robot: findings of severity `warning`.
+
+    Signs that are `declared` for a joint, as they are or not, are taken as they are.
 
     Raises
     ------
     FileError
-        Columns are in another order, or torques or positions of joints have the opposite sign.
+        Columns are in another order, or torques or positions of joints have the opposite sign,
+        whatever the inertias.
     """
-    samples, dynamics = samples_of(runs, _SAMPLES), InverseDynamics(robot)
-    table = shares_left(
-        columns_of(dynamics, samples.q, samples.v, samples.a), samples.tau, samples.usable
-    )
+    if declared.trust:
+        return ()
+    names, samples, model = robot.joint_names, samples_of(runs, _SAMPLES), RoughModel(robot)
+    if not len(samples.q):
+        return ()  # nobody moves: there is nothing to judge
+    table = model.shares_left(samples)
     here = np.arange(robot.n)
     straight = Verdict(Change.none(robot.n), table[here, here, 0])
     if straight.left.max() < _GOOD:
-        return
-    tried = [*torques_changed(table), *positions_changed(dynamics, samples)]
-    excess = _excess(robot, samples)
-    found = [verdict for verdict in tried if _clearly_better(verdict, straight, excess)]
-    if not found:
-        if np.mean((straight.left > _FOREIGN) & (excess > _BEYOND)) >= 0.5:
-            raise FileError(_foreign(robot.joint_names, straight))
-        return
-    best = min(found, key=lambda verdict: verdict.cost)
-    if np.median(best.left) > _FITS:
-        raise FileError(_foreign(robot.joint_names, straight))
-    found += mirrored(dynamics, samples, best.change) if best.change.mistakes == 1 else []
+        return ()
+    settled = _settled(names, declared)
+    tried = [*torques_changed(table), *positions_changed(model, samples)]
+    found = [
+        v for v in tried if _clearly_better(v, straight) and not (v.change.signs & settled).any()
+    ]
+    best = min(found, key=lambda verdict: verdict.cost, default=None)
+    if best is None or np.median(best.left[best.change.touched]) > _FITS:
+        if np.mean(straight.left > _FOREIGN) >= 0.5:
+            raise FileError(_foreign(names, straight))
+        return ()
+    found += mirrored(model, samples, best.change) if best.change.mistakes == 1 else []
     rivals = [v for v in found if v.cost < best.cost + PRICE and v is not best]
-    raise FileError(_message(robot.joint_names, straight, best, rivals))
+    text = _message(names, straight, best, rivals)
+    if _certain(best, straight):
+        raise FileError(f"the measured data contradict the robot: {text}")
+    joints = tuple(names[j] for j in np.flatnonzero(best.change.touched))
+    text = f"the measured data may contradict the robot: {text}"
+    return (Finding("implausible", "warning", text.removesuffix("."), "", joints),)
 
 
-def check_dataset(robot: Robot, dataset: Dataset, spec: Spec) -> None:
-    """As `check_plausibility`, for all runs as they were read, filtered as `spec` says.
+def check_dataset(
+    robot: Robot, dataset: Dataset, spec: Spec, sealed: str | None = None
+) -> tuple[Finding, ...]:
+    """As `check_plausibility`, for all runs but the sealed part, filtered as `spec` says.
 
     Raises
     ------
     FileError
         As `check_plausibility`; or a run is too short for the filters.
     """
-    processing = choose_processing(
-        dataset.runs, spec.measurement.filter, spec.diagnosis.moving_speed
-    )
-    check_plausibility(robot, [prepare(run, processing) for run in dataset.runs])
+    runs = split(dataset, sealed, spec.diagnosis.block).training
+    processing = choose_processing(runs, spec.measurement.filter, spec.diagnosis.moving_speed)
+    return check_plausibility(robot, [prepare(run, processing) for run in runs], spec.measurement)
 
 
-def _excess(robot: Robot, samples: Samples) -> Array:
-    """How much more torque (n,) varies than inertias that are somewhat wrong could make it vary.
-
-    A wrist that carries next to nothing may have its small torque turned round by a centre of mass
-    a few millimetres off; its sign says nothing.
-    """
-    cad = standard_parameters(robot)
-    std = inertial_prior(robot, cad, _UNCERTAIN).std
-    body = RigidBody(robot, cad, samples.q, samples.v, samples.a)
-    made_up = np.sqrt(np.var(body.regressor, axis=0) @ np.square(std))
-    measured = np.std(samples.tau, axis=0)  # a constant is an offset, whatever its sign
-    return np.asarray(measured / np.maximum(made_up, 1e-300))
+def _settled(names: Sequence[str], declared: MeasurementSpec) -> NDArray[np.bool_]:
+    """Whose sign of torque, and of position, is declared: (2, n)."""
+    signs = (declared.sign, declared.position_sign)
+    return np.array([[name in given for name in names] for given in signs])
 
 
-def _clearly_better(verdict: Verdict, straight: Verdict, excess: Array) -> bool:
+def _clearly_better(verdict: Verdict, straight: Verdict) -> bool:
     """Whether a change gains enough on the joints it is about, and costs none of the others."""
-    if not verdict.change.mistakes:
+    change = verdict.change
+    if not change.mistakes:
         return False
-    here = np.arange(len(excess))
-    ordered = (verdict.change.q_order == here).all() and (verdict.change.tau_order == here).all()
-    sure = excess[verdict.change.touched] > (_BEYOND_SIGN if ordered else _BEYOND)
-    if not (sure.all() if len(sure) < _MANY else sure.mean() >= 0.5):
-        return False
+    here = np.arange(len(change.q_sign))
+    ordered = (change.q_order == here).all() and (change.tau_order == here).all()
     gain = logs(straight.left) - logs(verdict.left)
-    touched = verdict.change.touched
+    touched = change.touched
     left = verdict.left[touched]
     fits = bool(np.median(left) < _FITS)
     if not ordered:
         foreign = np.median(straight.left[touched]) > _FOREIGN
         fits = bool(left.max() < _ORDER_FITS or (foreign and np.median(left) < 1.4 * _ORDER_FITS))
-    turned = (verdict.change.tau_sign < 0) & (verdict.change.q_sign > 0)
+    turned = (change.tau_sign < 0) & (change.q_sign > 0)
     return bool(
-        gain.sum() > CLEAR * verdict.change.mistakes
+        gain.sum() > CLEAR * change.exchanges + SIGN * (change.mistakes - change.exchanges)
         and gain.min() > -max(_WORSE, _WORSE * gain.sum())
         and (turned.all() or (gain[turned] > SIGN).all())
-        and gain[touched].mean() > 0.5 * CLEAR
+        and gain[touched].mean() > 0.5 * SIGN
         and fits
     )
+
+
+def _certain(best: Verdict, straight: Verdict) -> bool:
+    """Whether no inertias could make the torques concerned what they are recorded as."""
+    touched = best.change.touched
+    before, after = np.median(straight.left[touched]), np.median(best.left[touched])
+    return bool(before > _CERTAIN and after < _EXPLAINED)
 
 
 def _message(names: Sequence[str], straight: Verdict, best: Verdict, rivals: list[Verdict]) -> str:
@@ -138,15 +149,25 @@ def _message(names: Sequence[str], straight: Verdict, best: Verdict, rivals: lis
     shown = gain if gain.any() else best.change.touched
     before, after = _rms(straight.left[shown]), _rms(best.left[shown])
     text = (
-        f"the measured data contradict the robot: {'; and '.join(parts)}. As they are, "
-        f"{before:.0%} of these torques do not fit the URDF with any friction or stiffness; that "
-        f"way {after:.0%}."
+        f"{'; and '.join(parts)}. As they are, {before:.0%} of these torques do not fit the URDF "
+        f"with any friction or stiffness; that way {after:.0%}."
     )
     others = dict.fromkeys("; and ".join(_sentences(names, rival.change)) for rival in rivals)
     others.pop("; and ".join(parts), None)
     if others:
         text += f" As likely: {'. Or: '.join(others)}."
-    return text
+    return f"{text} {_settling(names, best.change)}"
+
+
+def _settling(names: Sequence[str], change: Change) -> str:
+    """The key that ends the discussion where the data are right all the same."""
+    keys = []
+    for key, wrong in zip(("sign", "position_sign"), change.signs, strict=True):
+        if wrong.any():
+            joints = ", ".join(f"{names[j]}: 1" for j in np.flatnonzero(wrong).tolist())
+            keys.append(f"measurement.{key}: {{{joints}}}")
+    said = "measurement.trust: true" if change.exchanges else " and ".join(keys)
+    return f"If the data are right as they are, say so: {said}."
 
 
 def _foreign(names: Sequence[str], straight: Verdict) -> str:
@@ -156,7 +177,8 @@ def _foreign(names: Sequence[str], straight: Verdict) -> str:
         f"the measured data contradict the robot: the torques of {wrong} do not fit their motion "
         "with any friction or stiffness, and no single exchange or sign explains it. Check the "
         "order and the signs of all columns (measurement.names, sign, position_sign), what the "
-        "torque is (measurement.torque), and whether this is the robot's URDF."
+        "torque is (measurement.torque), and whether this is the robot's URDF. If the data are "
+        "right as they are, say so: measurement.trust: true."
     )
 
 

@@ -56,7 +56,7 @@ def errors_on(
     return torque_errors(
         robot.joint_names,
         [run.tau for run in runs],
-        [run.averaged(each) for run, each in zip(runs, raw, strict=True)],
+        [run.averaged_torque(each) for run, each in zip(runs, raw, strict=True)],
         [run.valid for run in runs],
         [run.moving & run.valid for run in runs],
         [run.tau_raw for run in runs],

@@ -16,19 +16,18 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from excite_cli.diagnosis.torque_shares import Samples, columns_of, own_shares_left
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.diagnosis.torque_shares import RoughModel, Samples
 from excite_cli.robot.model import Array
 
 _SEARCH_SAMPLES = 100
 # Shares below this are the noise, the inertias' errors and effects: no difference is made there.
-FLOOR = 0.05
+FLOOR = 0.02
 # A gain in log(share before / share after) that is worth a word: one share nearly halved.
 CLEAR = 0.64
 # What every change costs, in the same measure: of explanations alike, the simpler one.
 PRICE = 0.35
 # The gain that makes another sign of a torque worth a try.
-SIGN = 0.5
+SIGN = 0.4
 
 Order = NDArray[np.intp]
 
@@ -54,17 +53,25 @@ class Change:
         """The data with the change made."""
         q, v, a = (x[:, self.q_order] * self.q_sign for x in (samples.q, samples.v, samples.a))
         tau = samples.tau[:, self.tau_order] * self.tau_sign
-        return Samples(q, v, a, tau, samples.usable[:, self.tau_order])
+        known, moves = samples.known[:, self.tau_order], samples.moves[:, self.q_order]
+        return Samples(q, v, a, tau, known, moves)
+
+    @property
+    def exchanges(self) -> int:
+        """How many columns were exchanged; a whole turn or shift counts once."""
+        again = not (self.tau_order == self.q_order).all()
+        return exchanges(self.q_order) + (exchanges(self.tau_order) if again else 0)
 
     @property
     def mistakes(self) -> int:
-        """How many things went wrong: exchanges and signs; a whole turn or sign counts once."""
-        here = np.arange(len(self.q_sign))
-        orders = exchanges(self.q_order)
-        if not (self.tau_order == self.q_order).all():
-            orders += exchanges(self.tau_order)
-        signs = [int((sign < 0).sum()) for sign in (self.q_sign, self.tau_sign)]
-        return orders + sum(1 if count == len(here) else count for count in signs)
+        """How many things went wrong: exchanges and signs; all signs turned count once."""
+        turned = self.signs.sum(axis=1)
+        return self.exchanges + int(np.where(turned == len(self.q_sign), 1, turned).sum())
+
+    @property
+    def signs(self) -> NDArray[np.bool_]:
+        """Joints whose torque, and whose position, has the other sign: (2, n)."""
+        return np.array([self.tau_sign < 0, self.q_sign < 0])
 
     @property
     def touched(self) -> NDArray[np.bool_]:
@@ -121,24 +128,24 @@ def torques_changed(table: Array) -> Iterator[Verdict]:
         yield Verdict(Change(here, ones, order, sign), left)
 
 
-def positions_changed(dynamics: InverseDynamics, samples: Samples) -> list[Verdict]:
+def positions_changed(model: RoughModel, samples: Samples) -> list[Verdict]:
     """The best changes of positions, with or without their torques, found step by step."""
     few = samples.thinned(_SEARCH_SAMPLES)
     n = samples.q.shape[1]
-    current = _judged(dynamics, few, [Change.none(n)])[0]
+    current = _judged(model, few, [Change.none(n)])[0]
     for step in range(n + 1):
         tried = list(_neighbours(current.change, far=step == 0))
-        found = _judged(dynamics, few, tried)
+        found = _judged(model, few, tried)
         best = min(found, key=lambda verdict: verdict.cost)
         if best.cost > current.cost - 1e-6:
             break
         current = best
     if not current.change.mistakes:
         return []
-    return _judged(dynamics, samples, [current.change], signs=False)
+    return _judged(model, samples, [current.change], signs=False)
 
 
-def mirrored(dynamics: InverseDynamics, samples: Samples, change: Change) -> list[Verdict]:
+def mirrored(model: RoughModel, samples: Samples, change: Change) -> list[Verdict]:
     """What torques of another sign may be as well: the joint's positions have the opposite sign."""
     turned = np.flatnonzero((change.tau_sign < 0) & (change.q_sign > 0))
     if not len(turned):
@@ -148,7 +155,7 @@ def mirrored(dynamics: InverseDynamics, samples: Samples, change: Change) -> lis
     for j in turned:
         sign = np.where(here == j, -1.0, 1.0)
         found.append(replace(change, q_sign=change.q_sign * sign, tau_sign=change.tau_sign * sign))
-    return _judged(dynamics, samples, found, signs=False)
+    return _judged(model, samples, found, signs=False)
 
 
 def _neighbours(change: Change, far: bool) -> Iterator[Change]:
@@ -179,17 +186,12 @@ def _neighbours(change: Change, far: bool) -> Iterator[Change]:
 
 
 def _judged(
-    dynamics: InverseDynamics, samples: Samples, changes: Sequence[Change], signs: bool = True
+    model: RoughModel, samples: Samples, changes: Sequence[Change], signs: bool = True
 ) -> list[Verdict]:
     """Shares left by every change; with `signs`, the signs of the torques are chosen anew."""
     if signs:
         changes = [replace(change, tau_sign=np.abs(change.tau_sign)) for change in changes]
-    moved = [change.applied(samples) for change in changes]
-    count, (size, n) = len(moved), samples.q.shape
-    q, v, a = (np.concatenate([getattr(each, name) for each in moved]) for name in ("q", "v", "a"))
-    columns = columns_of(dynamics, q, v, a).reshape(count, size, n, -1)
-    tau = np.stack([each.tau for each in moved])
-    left = own_shares_left(columns, tau, np.stack([each.usable for each in moved]))
+    left = model.own_shares_left([change.applied(samples) for change in changes])
     if not signs:
         return [Verdict(c, each[:, 0]) for c, each in zip(changes, left, strict=True)]
     chosen, shares = _signed(left)

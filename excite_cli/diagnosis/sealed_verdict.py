@@ -91,10 +91,12 @@ def _moving_sums(
 ) -> tuple[Array, Array]:
     """‖e‖² and ‖τ‖² of every block, where the joints move: (B, n) each."""
     sums = [
-        block_sums(run.tau, run.averaged(each.torque), run.valid, run.moving, run.step, block)
+        block_sums(
+            run.tau, run.averaged_torque(each.torque), run.valid, run.moving, run.step, block
+        )
         for run, each in zip(runs, predictions, strict=True)
     ]
-    _, _, wrong, size, _ = np.concatenate(sums, axis=1)
+    _, _, wrong, size, *_ = np.concatenate(sums, axis=1)
     return wrong, size
 
 

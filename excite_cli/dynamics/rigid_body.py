@@ -128,9 +128,8 @@ class RigidBody:
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         jacobians = np.empty((len(self.q), 6, robot.n))
         for t, q in enumerate(robot.configurations(self.q)):
-            jacobians[t] = pin.computeFrameJacobian(
-                model, data, q, _frame_of(model, last), aligned
-            )[:, robot.moved]
+            jacobian = pin.computeFrameJacobian(model, data, q, _frame_of(model, last), aligned)
+            jacobians[t] = jacobian.reshape(6, -1)[:, robot.moved]  # of one column: 1-D
         return jacobians
 
 

@@ -38,6 +38,7 @@ _FINER = (1.15, 1.06, 1.02, 1.007)
 _WIDTH = 0.01  # s, of a blow in the search, about that of a filter of 20 Hz
 _FINE = 2e-3  # s, the step in which flights are followed
 _CHUNK = 256  # samples that are looked at first for the end of a flight
+_NOTHING = 1e-12  # of the residual energy
 _PORTION = 2**17  # values of columns that are searched at once
 
 
@@ -72,7 +73,9 @@ class Backlash(Effect):
         """The gap whose flights and blows, smoothed a little, explain most of the residuals."""
         if not any(len(s.t) > 2 for s in signals):
             return []
-        weights = 1.0 / np.maximum(np.mean(np.concatenate(residuals) ** 2, axis=0), 1e-300)
+        energy = np.mean(np.concatenate(residuals) ** 2, axis=0)
+        # Of joints with nothing left, rounding is no evidence of a gap.
+        weights = 1.0 / np.maximum(energy, _NOTHING * energy.max() + 1e-100)
         motions = [_Motion.of(s, joints[0]) for s in signals]
 
         def best(gaps: Array) -> float:

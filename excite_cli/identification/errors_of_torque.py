@@ -6,9 +6,11 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.errors import FileError
 from excite_cli.identification.factors import Mask
 from excite_cli.robot.model import Array
 
+FEWEST = 10  # samples that an error may rest on
 _DRAWS, _SEED = 1000, 20170529
 _BLOCK = 1.0  # s, longer than what noise of the filtered torque remembers
 
@@ -17,8 +19,8 @@ _BLOCK = 1.0  # s, longer than what noise of the filtered torque remembers
 class Errors:
     """Of the torque on the sealed data: per joint, relative (RMS/RMS) and in N·m.
 
-    `interval` is the 95 % block-bootstrap interval of the mean relative error; `samples` says how
-    many filtered ones count, for files of earlier versions it is empty.
+    `interval` is the 95 % block-bootstrap interval of the mean relative error. `samples` per joint
+    are the filtered ones that count; files of earlier versions do not say.
     """
 
     mean_relative: float
@@ -53,14 +55,26 @@ def torque_errors(
     raw, raw_predicted: per run (T, n), torque as recorded; entries that are not finite are left out
     step: between filtered samples [s]
 
-    A joint without a (moving) sample has NaN and does not enter the mean.
+    A joint with fewer than `FEWEST` (moving) samples has NaN and does not enter the mean.
+
+    Raises
+    ------
+    FileError
+        No joint has as many.
     """
     blocks = [block_sums(*run, step) for run in zip(tau, predicted, usable, moving, strict=True)]
-    sums = np.concatenate(blocks, axis=1)  # (5, blocks, n)
-    wrong, size, wrong_moving, size_moving, count = sums.sum(axis=1)
-    relative, relative_moving = _ratio(wrong, size), _ratio(wrong_moving, size_moving)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        rms = np.sqrt(wrong / count)
+    sums = np.concatenate(blocks, axis=1)  # (6, blocks, n)
+    wrong, size, wrong_moving, size_moving, count, count_moving = sums.sum(axis=1)
+    enough = count >= FEWEST
+    if not enough.any():
+        raise FileError(
+            f"the data to judge by leave {count.max():.0f} filtered samples at most to any joint; "
+            f"{FEWEST} are needed. The others were masked (stale, saturated, missing), or the runs "
+            "are too short: record longer, or seal another run."
+        )
+    relative = np.where(enough, _ratio(wrong, size), np.nan)
+    relative_moving = np.where(count_moving >= FEWEST, _ratio(wrong_moving, size_moving), np.nan)
+    rms = np.sqrt(np.where(enough, wrong, np.nan) / np.maximum(count, 1))
     return Errors(
         mean_relative=_mean(relative),
         mean_relative_moving=_mean(relative_moving),
@@ -68,7 +82,7 @@ def torque_errors(
         relative_moving=_named(joint_names, relative_moving),
         rms=_named(joint_names, rms),
         rms_raw=_named(joint_names, _raw_rms(raw, raw_predicted, len(joint_names))),
-        interval=_interval(sums[0], sums[1]),
+        interval=_interval(sums[0] * enough, sums[1] * enough),
         samples={name: int(each) for name, each in zip(joint_names, count, strict=True)},
     )
 
@@ -76,14 +90,14 @@ def torque_errors(
 def block_sums(
     tau: Array, predicted: Array, usable: Mask, moving: Mask, step: float, seconds: float = _BLOCK
 ) -> Array:
-    """Per block of about so many seconds, of the samples (M, n) of a run: (5, blocks, n).
+    """Per block of about so many seconds, of the samples (M, n) of a run: (6, blocks, n).
 
-    ‖e‖², ‖τ‖², the same where moving, and the count. The last block has at least half the length.
+    ‖e‖², ‖τ‖², the same where moving, both counts. The last block has at least half the length.
     """
     good, slow = usable.astype(float), (usable & moving).astype(float)
     error = np.square(np.where(usable, tau - predicted, 0.0))
     size = np.square(np.where(usable, tau, 0.0))
-    rows = np.stack([error, size, error * slow, size * slow, good])
+    rows = np.stack([error, size, error * slow, size * slow, good, slow])
     length = max(1, round(seconds / step))
     edges = np.arange(0, max(len(tau) - length // 2, 1), length)
     return np.add.reduceat(rows, edges, axis=1)

@@ -29,7 +29,7 @@ from excite_cli.identification.hausman import (
     not_testable,
 )
 from excite_cli.identification.noise_floor import noise_floor
-from excite_cli.identification.prepare import prepare
+from excite_cli.identification.prepare import prepare, require_motion
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import Regression, build_regression
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
@@ -42,6 +42,8 @@ from excite_cli.shown.record import Shown
 Tell = Callable[[str], None]
 # Parameters this many standard deviations below zero that cannot be negative are reported.
 _SURELY = 3.0
+# Share of a joint's torque on sealed data from which the declared model is doubted.
+_MUCH_LEFT = 0.1
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,6 +93,7 @@ def identify(
     )
     tell("columns of the regression")
     training = _regression(robot, base, effects, parts.training, processing)
+    require_motion([run.prepared for run in training.runs], processing)
     tell("fit")
     found = fit(training, spec.identification)
     tell("errors on the sealed part")
@@ -113,6 +116,7 @@ def identify(
         findings=(
             *dataset.findings,
             *_noticed(found, hausman),
+            *_much_left(error),
             *(floor.noticed(robot.joint_names) if floor else ()),
         ),
         noise_floor=floor.named(robot.joint_names) if floor else None,
@@ -141,7 +145,7 @@ def judged(
     errors = torque_errors(
         regression.robot.joint_names,
         [run.tau for run in runs],
-        [run.averaged(each) for run, each in zip(runs, raw, strict=True)],
+        [run.averaged_torque(each) for run, each in zip(runs, raw, strict=True)],
         [run.valid for run in runs],
         [run.moving & run.valid for run in runs],
         [run.tau_raw for run in runs],
@@ -183,6 +187,20 @@ def _hausman(
     )
 
 
+def _much_left(error: Errors) -> list[Finding]:
+    """That the declared model lacks something, where joints move."""
+    much = {name: x for name, x in error.relative_moving.items() if x > _MUCH_LEFT}
+    if not much:
+        return []
+    worst = max(much, key=lambda name: much[name])
+    text = (
+        f"{much[worst]:.0%} of the torque of {worst} is left on sealed data ({len(much)} "
+        f"joint{'s' * (len(much) > 1)} above {_MUCH_LEFT:.0%}): the declared model lacks "
+        "something. `excite diagnose` looks for what"
+    )
+    return [Finding("much_left", "warning", text, "", tuple(much))]
+
+
 def _noticed(found: Fit, hausman: Hausman) -> list[Finding]:
     """What a person must know about the fit."""
     findings = []
@@ -196,7 +214,7 @@ def _noticed(found: Fit, hausman: Hausman) -> list[Finding]:
         if len(negative) == signed.sum() > 1:
             text += " The sign of the torque may be flipped (measurement.sign)."
         else:
-            text += " The declared model lacks something: try `excite diagnose`."
+            text += " The declared model lacks something."
         findings.append(Finding("negative", "warning", text))
     loose = [name for name, ok in zip(found.names, found.identifiable, strict=True) if not ok]
     if loose:

@@ -20,12 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from excite_cli.identification.averages import apply, average_rows, reach
+from excite_cli.identification.averages import apply, average_rows, reach, without
 from excite_cli.identification.exact_period import exact_period
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 
 _FEWEST = 8  # phases at which a joint must have been seen twice
+_LOST = 0.1  # share of an average's weight that invalid samples may take
 # Misalignment of this share of the floor must be reported.
 _UNEVEN = 0.5
 
@@ -137,11 +138,15 @@ def _sums(run: _Whole, period: float, processing: Processing) -> Array:
     nominal = average_rows(size, np.array([margin]), run.step, cutoff)
     gain = _squared(rows).reshape(*inside.shape, 1) / _squared(nominal)
 
-    def seen(known: Mask) -> Mask:
-        touched = np.asarray((rows != 0).astype(float) @ (~known).astype(float))
-        return inside[:, :, None] & (touched.reshape(*inside.shape, -1) == 0)
+    def seen(known: Mask, lost: float = 0.0) -> Mask:
+        share = np.asarray(abs(rows) @ (~known).astype(float))
+        return inside[:, :, None] & (share.reshape(*inside.shape, -1) <= lost)
 
-    torque, good = apply(rows, run.tau).reshape(*inside.shape, -1), seen(run.valid)
+    complete, good = seen(run.known[:, None]), seen(run.valid, _LOST)
+    counted = [without(rows, valid) for valid in run.valid.T]
+    torque = np.stack([each @ tau for each, tau in zip(counted, run.tau.T, strict=True)], axis=1)
+    torque = torque.reshape(*inside.shape, -1)
+    good &= complete
     times = good.sum(axis=0)
     twice = times > 1
     good &= twice
@@ -149,7 +154,7 @@ def _sums(run: _Whole, period: float, processing: Processing) -> Array:
     squares = np.square(np.where(good, torque - mean, 0.0)).sum(axis=(0, 1))
     freedom = (good * gain * (1.0 - 1.0 / np.maximum(times, 1))).sum(axis=(0, 1))
     position = apply(rows, run.q).reshape(*inside.shape, -1)
-    late = _late(position, seen(run.known[:, None]), stride)
+    late = _late(position, complete, stride)
     slope = np.nan_to_num(np.gradient(mean, stride, axis=0))
     steep = np.square(slope).sum(axis=0) / np.maximum(twice.sum(axis=0), 1)
     return np.stack([squares, freedom, freedom * late**2 * steep, twice.sum(axis=0)])

@@ -24,6 +24,7 @@ from excite_cli.measurement.run_identity import RunId
 # Around a reversal a joint sticks: what its friction then is, only the torque itself knows.
 _STICKING = 0.02  # s
 _SMEARED = 0.5  # periods of the cut-off by which the filter smears a reversal
+_NOISE = 0.01  # rad (m), RMS, beyond what any encoder adds
 _FEWEST = 8  # decimated samples a run needs to say anything
 
 
@@ -33,8 +34,10 @@ class PreparedRun:
 
     `t` (T,) from the start of the recording `run` (at `start` [s] on the campaign's clock), `q, v,
     a, tau_raw` (T, n) at the working rate with borders cut; `averages` (M, T) gives filtered and
-    decimated values, at `step`, of any column: A x; `tau` (M, n) = A tau_raw; `valid` (M, n)
-    samples untouched by invalid ones; `moving` (M, n) where the joint itself moves.
+    decimated values, at `step`, of any column: A x; `moving` (M, n) where the joint itself moves.
+
+    What torque is judged by leaves out invalid samples of its joint: `tau` (M, n) are averages of
+    the others, `valid` (M, n) where enough is left, `valid_averages` those of each joint.
 
     For fits every joint has averages of its own, which leave out invalid samples and those in
     which it stands or reverses; `tau_fit` (M, n) are those of the torque, `usable` (M, n) where
@@ -50,6 +53,7 @@ class PreparedRun:
     averages: csr_matrix
     tau: Array
     valid: NDArray[np.bool_]
+    valid_averages: tuple[csr_matrix, ...]
     moving: NDArray[np.bool_]
     fit_averages: tuple[csr_matrix, ...]
     tau_fit: Array
@@ -60,6 +64,11 @@ class PreparedRun:
     def averaged(self, columns: Array) -> Array:
         """A applied along the first axis of (T, …)."""
         return apply(self.averages, columns)
+
+    def averaged_torque(self, torque: Array) -> Array:
+        """Averages (M, n) of torques (T, n) over the very samples that `tau` is made of."""
+        columns = zip(self.valid_averages, torque.T, strict=True)
+        return np.stack([each @ column for each, column in columns], axis=1)
 
     def averaged_for_fit(self, columns: Array, rows: Sequence[int] | None = None) -> Array:
         """Averages of (T, r, …), each row with those of its joint (default: joint k for row k)."""
@@ -83,6 +92,7 @@ def prepare(
     fs, q = 1.0 / run.step, run.q
     if processing.position_cutoff is not None:
         q = _smooth(q, processing.position_cutoff, fs, run.label)
+        _require_smooth(run, q, processing.position_cutoff)
     if processing.velocity == "measured" and run.dq is not None:
         v = run.dq
         if processing.position_cutoff is not None:
@@ -107,7 +117,6 @@ def prepare(
     # The torque is averaged at the full rate: picking samples first would fold its noise down.
     of_torque = average_rows(len(run.t[inside]), centers * stride, run.step, cutoff)
     recorded = run.usable()[inside]
-    valid = np.asarray((of_torque != 0).astype(float) @ (~recorded).astype(float)) == 0
     speed = np.abs(np.asarray(averages @ v[keep]))
     counted = recorded & _sliding(v, run.step, processing, coupled)[inside]
     joints = range(run.q.shape[1])
@@ -116,6 +125,10 @@ def prepare(
     # would be, and the torque would lag by milliseconds.
     to_full_rate = interpolation(len(t), stride, len(counted))
     fit_averages = tuple((each @ to_full_rate).tocsr() for each in for_fit)
+    of_valid = [without(of_torque, recorded[:, j]) for j in joints]
+    valid_averages = tuple(
+        averages if each is of_torque else (each @ to_full_rate).tocsr() for each in of_valid
+    )
     tau = run.tau[inside]
     return PreparedRun(
         run=run.id,
@@ -125,8 +138,9 @@ def prepare(
         a=a[keep],
         tau_raw=run.tau[keep],
         averages=averages,
-        tau=np.asarray(of_torque @ tau),
-        valid=valid,
+        tau=np.stack([np.asarray(of_valid[j] @ tau[:, j]) for j in joints], axis=1),
+        valid=np.stack([filled(of_valid[j]) & filled(valid_averages[j]) for j in joints], axis=1),
+        valid_averages=valid_averages,
         moving=speed > processing.moving_speed,
         fit_averages=fit_averages,
         tau_fit=np.stack([np.asarray(for_fit[j] @ tau[:, j]) for j in joints], axis=1),
@@ -134,6 +148,24 @@ def prepare(
         step=float((centers[1] - centers[0]) * h),
         start=run.start,
     )
+
+
+def require_motion(runs: Sequence[PreparedRun], processing: Processing) -> None:
+    """Raise FileError unless some joint moves, and some torque changes, in what is fitted.
+
+    Where a joint stands or reverses, its torque is up to its friction and counts in no fit.
+    """
+    if not any(run.usable.any() for run in runs):
+        raise FileError(
+            f"no joint moves faster than {processing.moving_speed:g} rad/s (m/s) with a torque "
+            "that may be used, outside of the sealed part: nothing can be fitted. Record motion, "
+            "or lower diagnosis.moving_speed."
+        )
+    if not any(np.ptp(run.tau_raw, axis=0).any() for run in runs):
+        raise FileError(
+            "all torques are constant: there is nothing to fit. Is this the right channel "
+            "(measurement.channels: {tau: …})?"
+        )
 
 
 def _sliding(
@@ -162,6 +194,19 @@ def _centers(samples: int, h: float, processing: Processing) -> NDArray[np.intp]
     stride = max(1, round(1.0 / (h * processing.rate)))
     half = reach(h, processing.parallel_cutoff)
     return np.arange(half, samples - half, stride)
+
+
+def _require_smooth(run: Run, smoothed: Array, cutoff: float) -> None:
+    """Refuse positions that are noise: no robot moves so."""
+    noise = np.std(run.q - smoothed, axis=0)
+    wild = (noise > _NOISE) & (noise > 0.5 * np.std(run.q, axis=0))
+    if wild.any():
+        raise FileError(
+            f"run '{run.label}': positions jump by {noise.max():.3g} rad (m) from sample to sample "
+            f"(of joint {', '.join(str(j + 1) for j in np.flatnonzero(wild))} of the config, "
+            f"counted from 1); most of their change lies beyond {cutoff:.3g} Hz. Are these the "
+            "positions (measurement.channels), in the right unit (measurement.angle, time)?"
+        )
 
 
 def _smooth(x: Array, cutoff: float, fs: float, name: str) -> Array:

@@ -20,6 +20,7 @@ from excite_cli.measurement.run_identity import Part, RunId
 # A single run is cut into about this many blocks of one to two seconds; every third is sealed.
 _BLOCKS, _SHORTEST, _LONGEST = 9, 1.0, 2.0
 _EVERY = 3
+_FEWEST = 10  # samples of a block
 _MOST_FOLDS = 8
 
 
@@ -128,6 +129,12 @@ def _blocks(run: Run, block: float | None) -> Split:
         raise ConfigError(
             f"run '{run.label}' lasts {run.duration:.3g} s: too short to seal a part of it. Give "
             "at least two runs, or one of at least 3 s (diagnosis.block sets the blocks' length)."
+        )
+    if count * _FEWEST > len(run.t):
+        raise ConfigError(
+            f"diagnosis.block: blocks of {length:g} s of run '{run.label}' hold "
+            f"{len(run.t) / count:.3g} samples each; {_FEWEST} are needed at least. Give longer "
+            "blocks, or leave this key out."
         )
     edges = [round(i * (len(run.t)) / count) for i in range(count + 1)]
     training, sealed = [], []

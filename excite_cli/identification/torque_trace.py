@@ -47,24 +47,20 @@ def torque_trace(
     sealed: bool = False,
 ) -> TorqueTrace:
     """The trace of a prepared run; `load`, `predicted`, `before` (T, n) at the working rate."""
-    signals = [run.t[:, None], run.q, run.v, run.a, load, predicted]
-    if before is not None:
-        signals.append(before)
-    stacked = run.averaged(np.concatenate(signals, axis=1))
-    n = run.q.shape[1]
-    t, rest = stacked[:, 0], np.split(stacked[:, 1:], np.arange(n, stacked.shape[1] - 1, n), axis=1)
+    stacked = run.averaged(np.concatenate([run.t[:, None], run.q, run.v, run.a], axis=1))
+    motion = np.split(stacked[:, 1:], 3, axis=1)
     whole = TorqueTrace(
         run=run.run.key,
         sealed=sealed,
-        t=t,
-        q=rest[0],
-        v=rest[1],
-        a=rest[2],
-        load=rest[3],
+        t=stacked[:, 0],
+        q=motion[0],
+        v=motion[1],
+        a=motion[2],
+        load=run.averaged_torque(load),
         measured=np.where(run.valid, run.tau, np.nan),
         counted=run.usable & run.valid,
-        predicted=rest[4],
-        before=rest[5] if before is not None else None,
+        predicted=run.averaged_torque(predicted),
+        before=None if before is None else run.averaged_torque(before),
     )
     return thinned(whole)
 

@@ -1,15 +1,22 @@
-"""Samples that repeat while the robot moves: masked, and reported."""
+"""Samples that repeat while the robot moves: masked, and reported.
+
+A stale message repeats all channels for an instant or a few. Its positions would lead the filters
+astray (its torque is masked), so they are filled between those of the messages around it.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.measurement.dataset import Finding, Mask, Run
+from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.stretches import stretches
 
 _SHORTEST = 0.1  # s, of a single channel
 _FEWEST = 20  # samples, of a single channel
 _FROZEN_END = 10  # samples
+_SHORT = 5  # samples of stale messages that need no jump to be known
+# Torques that repeat in less than this share of samples do not all repeat at once by chance.
+_HARDLY, _ENOUGH = 1e-3, 200
 
 
 def mask_stuck(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]:
@@ -24,10 +31,11 @@ def mask_stuck(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]:
     if stale.any():
         text = (
             f"{np.count_nonzero(stale)} of {len(run.t)} samples repeat the one before in every "
-            "position and torque while the robot moves: stale messages; masked"
+            "position and torque while the robot moves: stale messages; filled and masked"
         )
         findings.append(Finding("stuck", "warning", text, run.name))
         valid[stale] = False
+        run = _filled(run, stale)
     same = np.vstack([np.zeros((1, len(joints)), bool), run.tau[1:] == run.tau[:-1]])
     for j, joint in enumerate(joints):
         if same[1:, j].all():
@@ -48,10 +56,13 @@ def _stale(run: Run) -> Mask:
     """Rows equal to the one before, where the positions then catch up with a jump.
 
     At rest, a noiseless robot repeats its rows too, and in slow motion a coarse encoder; there is
-    no jump of more than a step of the encoder when it goes on.
+    no jump of more than a step of the encoder when it goes on. A few equal rows are stale without
+    a jump where no torque ever repeats by itself.
     """
     moved = np.abs(np.diff(run.q, axis=0)).max(axis=1)
-    repeated = (np.diff(run.tau, axis=0) == 0).all(axis=1) & (moved == 0)
+    same = np.diff(run.tau, axis=0) == 0
+    repeated = same.all(axis=1) & (moved == 0)
+    noisy = len(run.t) > _ENOUGH and same[~repeated].mean() < _HARDLY
     # Repeats of a time stamp are duplicates, and told as such.
     repeated = np.concatenate([[False], repeated & (np.diff(run.t) > 0)])
     stale = np.zeros(len(run.t), bool)
@@ -60,10 +71,22 @@ def _stale(run: Run) -> Mask:
         end = start + length
         if end + 1 < len(run.t):
             late = moved[end - 1] > max((1 + 0.5 * length) * moved[end], 2.5 * encoder)
+            late |= noisy and length <= _SHORT
         else:
             late = length >= _FROZEN_END
         stale[start:end] = late
     return stale
+
+
+def _filled(run: Run, stale: Mask) -> Run:
+    """Positions, speeds and torques of stale rows, linear between fresh ones."""
+
+    def between(values: Array) -> Array:
+        columns = (np.interp(run.t, run.t[~stale], column[~stale]) for column in values.T)
+        return np.column_stack(list(columns))
+
+    dq = None if run.dq is None else between(run.dq)
+    return replace(run, q=between(run.q), tau=between(run.tau), dq=dq)
 
 
 def _standing(run: Run, repeats: Mask, j: int) -> list[tuple[int, int]]:

@@ -9,12 +9,12 @@ def require_joints(
     joints: Sequence[str], errors: Sequence[Errors], noise_floor: Mapping[str, float] | None
 ) -> None:
     """Raise ValueError where they are of other joints."""
-    found = [
+    found: list[Mapping[str, float]] = [
         mapping
         for each in errors
         for mapping in (each.relative, each.relative_moving, each.rms, each.rms_raw)
     ]
-    others = {*(noise_floor or ()), *(joint for each in errors for joint in each.samples)}
-    others -= set(joints)
+    found += [each.samples for each in errors if each.samples]
+    others = set(noise_floor or ()) - set(joints)
     if others or any(set(mapping) != set(joints) for mapping in found):
         raise ValueError("its errors are those of other joints")

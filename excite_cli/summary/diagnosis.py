@@ -37,6 +37,7 @@ from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.noise_floor import floor_cells, floor_columns
+from excite_cli.summary.written import files_in_words
 
 
 def diagnosis_answer(
@@ -55,7 +56,7 @@ def diagnosis_answer(
     if not verbose:
         rounds = counted(len(found.rounds), "round")
         parts.append(f"({rounds} of tests; --verbose shows the suspects of each, and why not.)")
-    parts.append(_next(experiment))
+    parts += [_next(experiment), *files_in_words(files)]
     return Answer(tuple(parts), {**_data(found, experiment), "output": files}, found.good)
 
 

@@ -18,6 +18,7 @@ from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.noise_floor import floor_cells, floor_columns
+from excite_cli.summary.written import files_in_words
 
 
 def identification_answer(
@@ -25,7 +26,8 @@ def identification_answer(
 ) -> Answer:
     """What `excite identify` answers; `written` are the files that were requested, by kind."""
     files = {kind: str(path) for kind, path in written.items() if path is not None}
-    return Answer(tuple(identification_parts(found)), {**_data(found), "output": files})
+    parts = (*identification_parts(found), *files_in_words(files))
+    return Answer(parts, {**_data(found), "output": files})
 
 
 def identification_parts(found: Identification) -> Parts:

@@ -127,6 +127,10 @@ CASES: dict[str, tuple[Damage, tuple[str, ...]]] = {
 }
 
 
+# Other inertias would explain these as well: signs of what is light and has no friction.
+DOUBTED = {"all torque signs", *(f"torque sign of {NAMES[j]}" for j in (1, 3, 4))}
+
+
 def one_clear_message(program: Program, words: tuple[str, ...], *arguments: str | Path) -> None:
     run = program(*arguments)
     assert run.returncode == 2, run.stdout + run.stderr
@@ -136,7 +140,7 @@ def one_clear_message(program: Program, words: tuple[str, ...], *arguments: str 
     assert run.stdout.strip() == ""
 
 
-@pytest.mark.parametrize("case", ["milliseconds", "dead torque", "torque sign of slide"])
+@pytest.mark.parametrize("case", ["milliseconds", "dead torque", "torque sign of elbow"])
 def test_the_program_ends_with_the_message(
     case: str, recorded: Dataset, config: Path, excite: Program
 ) -> None:
@@ -153,6 +157,12 @@ def test_every_mistake_has_its_message(
     damage, words = CASES[case]
     write_dataset(tmp_path / "data.h5", damaged(recorded, damage), {})
     spec = load_spec(config)
+    if case in DOUBTED:
+        data = load_data(Case(spec, config.parent, robot), tmp_path / "data.h5")
+        (found,) = check_dataset(robot, data, spec)
+        assert found.severity == "warning"
+        assert all(word in found.text for word in words), found.text
+        return
     with pytest.raises(FileError) as told:  # noqa: PT012 - either may be the one that tells
         data = load_data(Case(spec, config.parent, robot), tmp_path / "data.h5")
         check_dataset(robot, data, spec)
@@ -167,9 +177,12 @@ def test_names_in_another_order_are_told_by_diagnose_and_identify(
     names = tuple(recorded.joint_names[j] for j in order)
     write_dataset(excite.folder / "data.h5", replace(recorded, joint_names=names), {})
     write_csv(excite.folder / "data.csv", recorded.runs[0], names)
-    words = ("columns of shoulder_pitch and elbow are swapped", "measurement.names")
-    one_clear_message(excite, words, "diagnose", config, "data.csv")
-    one_clear_message(excite, words, "identify", config, "data.h5")
+    for command, file in (("diagnose", "data.csv"), ("identify", "data.h5")):
+        run = excite(command, config, file)
+        said = " ".join(run.stderr.split())
+        assert "columns of shoulder_pitch and elbow are swapped" in said
+        assert "measurement.names: {" in said
+        assert "measurement.trust: true" in said
 
 
 def write_csv(path: Path, run: Run, names: tuple[str, ...], keep: np.ndarray | None = None) -> None:

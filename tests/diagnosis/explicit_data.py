@@ -53,6 +53,7 @@ def prepared(
         averages=as_it_is,
         tau=zero if tau is None else tau,
         valid=usable,
+        valid_averages=(as_it_is,) * shape[1],
         moving=np.ones(shape, bool),
         fit_averages=(as_it_is,) * shape[1],
         tau_fit=zero if tau is None else tau,

@@ -13,10 +13,12 @@ from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.plausibility import check_dataset
 from excite_cli.diagnosis.rearranged import exchanges
 from excite_cli.diagnosis.torque_shares import nonnegative
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import robot_with
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import FileError
 from excite_cli.measurement.catalogue import read_dataset
-from excite_cli.measurement.dataset import Dataset
+from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.simulation.planted import Planted, plant
 from tests.simulation.arms import arm, played
@@ -47,12 +49,12 @@ def frictionless(robot: Robot) -> Dataset:
     return played(robot, torque_noise=0.01, inertia_error=0.1).dataset
 
 
-def told(robot: Robot, data: Dataset) -> str:
+def told(robot: Robot, data: Dataset, spec: Spec = SPEC) -> str:
+    """What is said, be it certain or not."""
     try:
-        check_dataset(robot, data, SPEC)
+        return "".join(found.text for found in check_dataset(robot, data, spec))
     except FileError as error:
         return str(error)
-    return ""
 
 
 def changed(data: Dataset, order: Array | None = None, tau: Array | None = None,
@@ -86,7 +88,50 @@ def test_a_torque_or_a_position_of_other_sign(robot: Robot, rubbing: Dataset, j:
     message = told(robot, changed(rubbing, q=negative(j)))
     # Of light wrists, torque and position cannot be told apart, and both are named.
     assert f"measurement.position_sign: {{{name}: -1}}" in message
-    assert j > 2 or "measurement.sign" not in message
+    assert j > 2 or "set measurement.sign" not in message
+
+
+def test_what_is_declared_is_not_judged(robot: Robot, rubbing: Dataset) -> None:
+    """A sign given for a joint settles that joint alone, `trust` everything."""
+    name, other = robot.joint_names[1], robot.joint_names[2]
+
+    def with_(**declared: object) -> Spec:
+        measured = SPEC.measurement.model_copy(update=declared)
+        return SPEC.model_copy(update={"measurement": measured})
+
+    wrong = changed(rubbing, tau=negative(1))
+    message = told(robot, wrong)
+    assert f"measurement.sign: {{{name}: -1}}" in message
+    assert f"If the data are right as they are, say so: measurement.sign: {{{name}: 1}}." in message
+    assert told(robot, wrong, with_(sign={name: 1})) == ""
+    assert name in told(robot, wrong, with_(sign={other: 1}))
+    reversed_ = changed(rubbing, order=np.arange(6)[::-1])
+    assert "measurement.trust: true" in told(robot, reversed_)
+    assert told(robot, reversed_, with_(trust=True)) == ""
+
+
+def test_inertias_of_a_wrist_may_be_anything(robot: Robot) -> None:
+    """Centres of mass 3 cm off turn a light wrist's torque round; nobody is refused for it."""
+    phi = standard_parameters(robot).reshape(-1, 10).copy()
+    for body in phi:
+        body[1:4] -= 0.03 * body[0] * np.sign(body[1:4] + 1e-12)
+    true = replace(robot, model=robot_with(robot, phi.ravel()))
+    data = played(true, torque_noise=0.01, inertia_error=0.1).dataset
+    assert check_dataset(robot, data, SPEC) == ()
+
+
+def test_torques_of_joints_that_stand_are_not_judged(robot: Robot, rubbing: Dataset) -> None:
+    """What they carry is up to their friction: anything."""
+    rng = np.random.default_rng(0)
+
+    def with_rest(run: Run) -> Run:
+        still = np.arange(len(run.t)) % 700 < 500
+        q, tau = run.q.copy(), run.tau.copy()
+        q[:, 3:] = q[0, 3:]
+        tau[:, 3:] = np.cumsum(rng.normal(size=(len(tau), 3)), axis=0) * still[:, None]
+        return replace(run, q=q, tau=tau, dq=None)
+
+    assert told(robot, replace(rubbing, runs=tuple(map(with_rest, rubbing.runs)))) == ""
 
 
 def test_all_torques_of_other_sign(robot: Robot, rubbing: Dataset) -> None:

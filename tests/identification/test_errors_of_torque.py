@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from excite_cli.errors import FileError
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 
 NAMES = ("a", "b")
@@ -62,3 +63,18 @@ def test_the_interval_has_the_right_width() -> None:
         means.append(found.mean_relative)
         widths.append(found.interval[1] - found.interval[0])
     assert np.mean(widths) == pytest.approx(2 * 1.96 * np.std(means), rel=0.3)
+
+
+def test_errors_rest_on_enough_samples_and_say_on_how_many() -> None:
+    """Of a joint with a handful nothing is said, and with no other joint all is refused."""
+    tau = np.random.default_rng(0).normal(size=(60, 2))
+    usable = np.ones(tau.shape, bool)
+    usable[:51, 0] = False
+    found = errors(tau, 0.9 * tau, usable=usable)
+    assert found.samples == {"a": 9, "b": 60}
+    assert math.isnan(found.relative["a"])
+    assert math.isnan(found.rms["a"])
+    assert found.mean_relative == found.mean_relative_moving == pytest.approx(0.1)
+    usable[:51, 1] = False
+    with pytest.raises(FileError, match=r"leave 9 filtered samples at most .* 10 are needed"):
+        errors(tau, 0.9 * tau, usable=usable)

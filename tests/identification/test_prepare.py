@@ -138,18 +138,23 @@ def test_the_linear_model_holds_for_averages_of_fits() -> None:
     assert np.array_equal(second, found.averaged_for_fit(columns)[:, 1:])
 
 
-def test_an_invalid_sample_touches_no_row_that_is_used() -> None:
+def test_an_invalid_sample_costs_its_weight_and_touches_nothing() -> None:
+    """Every window that holds one goes on with the rest, torque and prediction alike."""
     run = recorded()
     bad = np.zeros(run.tau.shape, bool)
-    bad[[700, 2600], 0] = bad[3300:3350, 1] = True
+    bad[::60, 0] = bad[3300:3350, 1] = True
     clean = ready(run)
-    spoilt = ready(replace(run, tau=np.where(bad, 1e9, run.tau), valid=~bad))
-    assert np.array_equal(spoilt.tau[spoilt.valid], clean.tau[spoilt.valid])
-    touched = np.abs(spoilt.tau - clean.tau) > 0
-    assert np.array_equal(touched, ~spoilt.valid)  # and none is given away
-    assert np.abs(spoilt.tau_fit).max() < 1e3
+    spoilt, worse = (
+        ready(replace(run, tau=np.where(bad, size, run.tau), valid=~bad)) for size in (1e3, -1e9)
+    )
+    assert spoilt.valid[:, 0].all()
+    assert 0 < np.count_nonzero(~spoilt.valid[:, 1]) < 20
+    assert np.array_equal(spoilt.tau, worse.tau)
+    assert np.array_equal(spoilt.tau_fit, worse.tau_fit)
     assert not (spoilt.usable & ~clean.usable).any()
     assert np.count_nonzero(~spoilt.usable) < 1.3 * np.count_nonzero(~clean.usable) + 20
+    right = spoilt.averaged_torque(run.tau[np.searchsorted(run.t, clean.t)])
+    assert np.abs(right - spoilt.tau)[spoilt.valid].max() < 1e-3 * np.abs(clean.tau).max()
 
 
 def test_what_sticks_around_a_reversal_counts_in_no_fit() -> None:

@@ -283,3 +283,20 @@ def test_stamps_in_another_unit_are_not_lost_as_missing() -> None:
     t[7] = np.finfo(np.float32).max  # as recorders write where they have none
     _, findings = check(replace(run, t=t))
     assert "1 rows without a time stamp" in findings[0].text
+
+
+@pytest.mark.parametrize("rate", [500.0, 1000.0])
+def test_stale_messages_are_filled_and_masked_be_they_slow_or_close(rate: float) -> None:
+    """One to three repeats of all channels, 3 % of the samples, at any speed of the robot."""
+    run = recorded(rate=rate)
+    rng = np.random.default_rng(1)
+    first = np.flatnonzero(rng.uniform(size=len(run.t)) < 0.015)
+    stale = np.zeros(len(run.t), bool)
+    for at, length in zip(first, rng.integers(1, 4, len(first)), strict=True):
+        stale[at + 1 : at + 1 + length] = True
+    held = np.maximum.accumulate(np.where(stale, 0, np.arange(len(run.t))))
+    runs, findings = check(replace(run, q=run.q[held], tau=run.tau[held], dq=None))
+    assert only(findings, "stuck").severity == "warning"
+    assert np.array_equal(runs[0].usable(), np.tile(~stale[:, None], run.tau.shape[1]))
+    step = np.abs(np.diff(run.q, axis=0)).max()
+    assert np.abs(runs[0].q - run.q).max() < 0.5 * step
