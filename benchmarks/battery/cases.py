@@ -204,7 +204,9 @@ def _two(
         second = size(second_kind, places[at], ground, rng)
         if second is None or left_over(beside_first, second, ground) < _SEPARATE:
             continue
-        beside_second = orthonormal(np.hstack([model, weighted_columns(second.planted.effect, ground)]))
+        beside_second = orthonormal(
+            np.hstack([model, weighted_columns(second.planted.effect, ground)])
+        )
         if left_over(beside_second, first, ground) >= _SEPARATE:
             return first, second
     return None
@@ -217,7 +219,9 @@ def model_columns(of: Arm, declared: Sequence[Effect], ground: Ground) -> Array:
     """
     inertial = np.concatenate([s.body.regressor[:, :, of.base.selection] for s in ground.signals])
     flat = (inertial * _weights(ground)[:, None]).reshape(-1, of.base.rank)
-    return orthonormal(np.hstack([flat, *(weighted_columns(effect, ground) for effect in declared)]))
+    return orthonormal(
+        np.hstack([flat, *(weighted_columns(effect, ground) for effect in declared)])
+    )
 
 
 def orthonormal(columns: Array) -> Array:

@@ -1,1 +1,1 @@
-"""Parts of the battery of campaigns: robots, motions, instruments, what changes, judging, tables."""
+"""Parts of the battery of campaigns: robots, motions, instruments, changes, judging, tables."""

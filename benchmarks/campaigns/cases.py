@@ -17,7 +17,7 @@ from benchmarks.campaigns.instruments import Instruments
 from benchmarks.campaigns.mechanisms import MovedCenters
 from benchmarks.campaigns.motions import series, short_moves
 from benchmarks.campaigns.planting import Draw, Scene
-from benchmarks.campaigns.plants import Plant
+from benchmarks.campaigns.plants import FIRST_ORDER, Plant
 from benchmarks.campaigns.robots import drawn_robot, robot_of
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
@@ -44,10 +44,18 @@ _CHANGES: dict[str, Draw] = {
 GROUPS = (*_CHANGES, "short_moves", "stale_packets", "one_training_run", "several", *CLEAN)
 
 # What short moves, faulty packets and single training runs are asked about.
-_SIMPLE = ("spring", "load_dependent_friction", "torque_offset", "armature", "cable_force",
-           "asymmetric_friction", "nonlinear_viscous_friction", "ripple", "torque_gain")  # fmt: skip
-_ALL_RUNS = (*_SIMPLE, "stribeck_friction", "base_tilt", "encoder_offset", "elasticity",
-             "backlash", "torque_delay")  # fmt: skip
+_SIMPLE = (
+    "spring",
+    "load_dependent_friction",
+    "torque_offset",
+    "armature",
+    "cable_force",
+    "asymmetric_friction",
+    "nonlinear_viscous_friction",
+    "ripple",
+    "torque_gain",
+)
+_ALL_RUNS = (*_SIMPLE, "stribeck_friction", *FIRST_ORDER)
 _IN_RUNS: tuple[Draw, ...] = (
     planting.payload,
     planting.offset_change,
@@ -159,7 +167,7 @@ def _settings(group: str, rng: np.random.Generator) -> SimulationSettings:
     rates = (500.0, 1000.0) if group == "stale_packets" else (200.0, 250.0, 500.0)
     return SimulationSettings(
         seed=int(rng.integers(2**31)),
-        rate=float(rng.choice(rates)),
+        rate=float(rng.choice(rates[: 2 if rng.uniform() < 0.7 else None])),
         torque_noise=0.0,
         encoder=float(2 * np.pi / 2 ** rng.integers(17, 22)),
     )
@@ -239,9 +247,7 @@ def _plants(
     return None if found is None else (found,)
 
 
-def _several(
-    scene: Scene, friction: str, rng: np.random.Generator
-) -> tuple[Plant, ...] | None:
+def _several(scene: Scene, friction: str, rng: np.random.Generator) -> tuple[Plant, ...] | None:
     """Two to four effects of different kinds that can be told apart."""
     in_runs = [draw for draw in _IN_RUNS if friction != "none" or draw != planting.friction_step]
     pool: list[Draw] = [partial(planting.of_catalogue, kind) for kind in _SIMPLE]

@@ -3,10 +3,10 @@
 The robot is simulated without noise; here it is added, so that the noise of every sample is known.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from excite_cli.measurement.dataset import Dataset, Run
@@ -85,6 +85,6 @@ def _lost(run: Run, share: float, rng: np.random.Generator) -> Run:
     return replace(_taken(run, kept), t=run.t[kept])
 
 
-def _taken(run: Run, rows: Array | Sequence[int]) -> Run:
+def _taken(run: Run, rows: NDArray[np.intp]) -> Run:
     dq = None if run.dq is None else run.dq[rows]
     return replace(run, q=run.q[rows], tau=run.tau[rows], dq=dq)

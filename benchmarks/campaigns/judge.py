@@ -29,6 +29,7 @@ from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.simulation.simulate import simulate
 
 LARGE = 2.5  # times the noise floor
+ROSE = 1.25  # times the error before, of a joint
 
 
 @dataclass
@@ -37,8 +38,8 @@ class Outcome:
 
     `rest`: residual over noise floor by joint. `silent`: joints of which a large rest is not said.
     `refused`: the data, sound as they are, were not taken. `worse`: the sealed error did not fall,
-    `admitted`: and the
-    program says so. `seconds` are of the processor.
+    `admitted`: and the program says so. `worse_joints`: where it rose, and no effect there is
+    doubted. `seconds` are of the processor.
     """
 
     index: int
@@ -61,6 +62,7 @@ class Outcome:
     refused: bool = False
     worse: bool = False
     admitted: bool = False
+    worse_joints: list[str] = field(default_factory=list)
     before: float = float("nan")
     after: float = float("nan")
     seconds: dict[str, float] = field(default_factory=dict)
@@ -68,8 +70,9 @@ class Outcome:
 
     @property
     def alarm(self) -> bool:
-        """Anything said of a robot that lacks nothing."""
-        return bool(self.named or self.unexplained)
+        """Anything said that is not so, for a robot that lacks nothing."""
+        false = any(each["judged"] not in ("true", "companion") for each in self.named)
+        return false or bool(self.unexplained)
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,9 @@ def _judged(outcome: Outcome, case: Case) -> Judged:
     _fill(outcome, found, answer, score(truth_of(case), answer))
     outcome.rest = rests(case, data, found)
     outcome.silent = [
-        joint for joint, ratio in outcome.rest.items() if ratio > LARGE and joint not in _told(found)
+        joint
+        for joint, ratio in outcome.rest.items()
+        if ratio > LARGE and joint not in _told(found)
     ]
     return Judged(outcome, case, found)
 
@@ -251,4 +256,13 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score) -> 
     ]
     outcome.before, outcome.after = found.before.mean_relative, found.after.mean_relative
     outcome.worse = bool(found.effects) and not outcome.after < outcome.before
-    outcome.admitted = any(each["verdict"] in ("harmful", "not confirmed") for each in outcome.named)
+    outcome.admitted = not getattr(found, "good", True)
+    outcome.worse_joints = [joint for joint in found.joint_names if _unsaid_worse(found, joint)]
+
+
+def _unsaid_worse(found: Diagnosis, joint: str) -> bool:
+    """Whether a joint's sealed error rose clearly, and all effects on it pass for confirmed."""
+    rose = found.after.rms[joint] > ROSE * found.before.rms[joint]
+    on_it = [each for each in found.effects if joint in each.effect.joints]
+    verdicts = {str(getattr(each, "verdict", None) or "confirmed") for each in on_it}
+    return rose and verdicts == {"confirmed"} and getattr(found, "good", True)

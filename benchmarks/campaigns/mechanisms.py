@@ -3,6 +3,7 @@
 They are planted only; a diagnosis does not know them.
 """
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -15,9 +16,7 @@ from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.true_robot import pseudo_inertia, ten_parameters
 
 
-def solid(
-    mass: float, center: Array, rng: np.random.Generator, density: float = 1500.0
-) -> Array:
+def solid(mass: float, center: Array, rng: np.random.Generator, density: float = 1500.0) -> Array:
     """Ten parameters of a solid sphere or box of `mass` [kg] with its centre there [m]."""
     volume = mass / (density * rng.uniform(0.3, 2.0))
     if rng.uniform() < 0.5:
@@ -54,9 +53,7 @@ class Carried(Effect):
                                                               "Izz")),
     )  # fmt: skip
 
-    def build_into(
-        self, robot: SimulatedRobot, values: Array, numbers: dict[str, float]
-    ) -> None:
+    def build_into(self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]) -> None:
         """The body has more inertia."""
         robot.phi[slice_of(robot.robot, self.joints[0])] += values
 
@@ -78,9 +75,7 @@ class MovedCenters(Effect):
     signature: ClassVar = ""
     parameters: ClassVar = (Parameter("shift", "m", 0.0, 0.1),)
 
-    def build_into(
-        self, robot: SimulatedRobot, values: Array, numbers: dict[str, float]
-    ) -> None:
+    def build_into(self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]) -> None:
         """Each body's mass is moved as a whole."""
         for joint, shift in zip(self.joints, values.reshape(-1, 3), strict=True):
             part = slice_of(robot.robot, joint)

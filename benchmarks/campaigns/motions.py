@@ -1,4 +1,4 @@
-"""Motions of a campaign: Fourier series of 4–12 s, or short moves with rests between them.
+"""Motions of a campaign: Fourier series of 4–10 s, or short moves with rests between them.
 
 Several series are drawn for a run and the best conditioned one is taken, so that parameters are
 known about as well as from planned motions. Short moves are those that people record: from point to
@@ -29,7 +29,7 @@ _PEAK_SPEED, _PEAK_PUSH = 1.875, 5.774
 def series(of: Arm, names: tuple[str, ...], rng: np.random.Generator) -> tuple[Planned, ...]:
     """A well conditioned Fourier motion for every run; some runs repeat one."""
     found: list[PlannedMotion] = []
-    seconds = float(rng.uniform(4.0, 10.0))
+    seconds = float(rng.uniform(4.0, 8.0))
     for name in names:
         if len(found) > 1 and rng.uniform() < _AGAIN:
             again = found[rng.integers(len(found))]
@@ -43,7 +43,7 @@ def series(of: Arm, names: tuple[str, ...], rng: np.random.Generator) -> tuple[P
 
 
 def short_moves(of: Arm, names: tuple[str, ...], rng: np.random.Generator) -> tuple[Planned, ...]:
-    """A program of moves and rests, 6–12 s long, for every run."""
+    """A program of moves and rests, 5–10 s long, for every run."""
     return tuple(PlannedProgram(name, _moves(of, rng)) for name in names)
 
 
@@ -76,7 +76,7 @@ def _moves(of: Arm, rng: np.random.Generator) -> Chain:
     lower, upper, fastest = joint_limits(of.robot)
     middle, half = (upper + lower) / 2, 0.45 * (upper - lower)
     at = middle + half * rng.uniform(-1.0, 1.0, of.robot.n)
-    wanted, spent = float(rng.uniform(6.0, 12.0)), 0.0
+    wanted, spent = float(rng.uniform(5.0, 10.0)), 0.0
     segments: list[Segment] = []
     while spent < wanted:
         seconds, rest = float(rng.uniform(0.5, 2.0)), float(rng.uniform(0.2, 1.0))

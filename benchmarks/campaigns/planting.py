@@ -233,9 +233,7 @@ def separate(scene: Scene, plant: Plant) -> bool:
 _PLAIN = ("coulomb_friction", "viscous_friction")
 
 
-def _other_friction(
-    scene: Scene, runs: frozenset[str], rng: np.random.Generator
-) -> Plant | None:
+def _other_friction(scene: Scene, runs: frozenset[str], rng: np.random.Generator) -> Plant | None:
     j, which = int(rng.integers(scene.of.robot.n)), int(rng.uniform() < 0.35)
     change = float(rng.choice([-1.0, 1.0]) * rng.uniform(*_STRONGER))
     values = np.array([change * scene.friction[which, j]])

@@ -6,7 +6,7 @@ model with the opposite sign. Several names of one kind and place, each of some 
 as one. A trend over the runs may also go by two levels if those are the trend, to 98 %.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +21,7 @@ from benchmarks.battery.scoring import (
     same,
 )
 from benchmarks.campaigns.plants import FIRST_ORDER, TRENDS, Plant
+from excite_cli.effects.base import Effect
 
 _AS_TWO_LEVELS = 0.98
 # The same motor or sensor in all runs, of which some runs may differ.
@@ -161,9 +162,8 @@ def _level_of_all(called: Called, truth: Truth) -> bool:
     )
 
 
-def _effect_name(effect: object, truth: Truth) -> Name:
-    joints: Sequence[int] = effect.joints  # type: ignore[attr-defined]
-    return Name(effect.kind, tuple(truth.joints[j] for j in joints))  # type: ignore[attr-defined]
+def _effect_name(effect: Effect, truth: Truth) -> Name:
+    return Name(effect.kind, tuple(truth.joints[j] for j in effect.joints))
 
 
 def _means(named: Named, plant: Plant, truth: Truth, answer: Answer) -> bool:
@@ -181,9 +181,12 @@ def _is(called: Called, plant: Plant, truth: Truth, answer: Answer) -> bool:
     if not _kind_and_place(plant, called.name, truth):
         return False
     told, true = _trained(called.runs, truth), _trained(plant.runs, truth)
-    if told == true:
-        return True
+    of_sealed = called.runs - truth.training
     if told == truth.training - true and _opposite(called, truth, answer):
+        return not of_sealed & plant.runs
+    if plant.runs and not of_sealed <= plant.runs:
+        return False  # it is said of a sealed run that does not have it
+    if told == true:
         return True
     return told < true and true == frozenset().union(*_alike(called, true, truth, answer))
 
@@ -221,9 +224,7 @@ def _opposite(called: Called, truth: Truth, answer: Answer) -> bool:
     name = called.name
     if name.kind not in _TWO_SIDED:
         return False
-    everywhere = any(
-        other.called.name == name and not other.called.runs for other in answer.named
-    )
+    everywhere = any(other.called.name == name and not other.called.runs for other in answer.named)
     return everywhere or name.kind in truth.declared
 
 

@@ -39,8 +39,8 @@ def verdict(o: Outcome) -> str:
         words.append("WRONG")
     if o.silent:
         words.append("SILENT")
-    if o.worse:
-        words.append("worse" if o.admitted else "WORSE")
+    if o.worse or o.worse_joints:
+        words.append("WORSE" if unsaid(o) else "worse")
     return "+".join(words) or "ok"
 
 
@@ -64,6 +64,11 @@ def where(joints: Sequence[str]) -> str:
     return "+".join(joints) if len(joints) < 4 else "all"
 
 
+def unsaid(o: Outcome) -> bool:
+    """Whether the sealed error rose, as a whole or on a joint, and nothing says so."""
+    return (o.worse and not o.admitted) or bool(o.worse_joints)
+
+
 def rates(outcomes: Sequence[Outcome]) -> list[Rate]:
     """The criteria of acceptance. What failed with an error counts against every one."""
     planted = [o for o in outcomes if o.planted]
@@ -83,9 +88,8 @@ def rates(outcomes: Sequence[Outcome]) -> list[Rate]:
              len(outcomes), 0.0, False),
         Rate("false alarms on clean", of(clean, (o.alarm for o in clean)), len(clean), 0.05, False),
         Rate("false refusals", len(broken), len(outcomes), 0.0, False),
-        Rate("sealed error not lowered, and not said",
-             of(outcomes, (o.worse and not o.admitted for o in outcomes)), len(outcomes), 0.0,
-             False),
+        Rate("harmful, or error not lowered, and unsaid",
+             of(outcomes, (unsaid(o) for o in outcomes)), len(outcomes), 0.0, False),
         Rate("sizes within 2 sd", sum(s["within"] for s in sizes), len(sizes), 0.93, True),
         Rate("of first-order effects", sum(s["within"] for s in first), len(first), 0.93, True),
     ]  # fmt: skip
@@ -114,7 +118,7 @@ def _row(name: str, part: Sequence[Outcome]) -> str:
     return (
         f"{name:18} {len(part):5} {right:>7} {sum(o.wrong for o in part):5} "
         f"{sum(bool(o.silent) for o in part):6} {alarm:>5} {sum(bool(o.error) for o in part):7} "
-        f"{sum(o.worse and not o.admitted for o in part):12} {within:>13} {seconds:6.1f}"
+        f"{sum(unsaid(o) for o in part):12} {within:>13} {seconds:6.1f}"
     )
 
 
