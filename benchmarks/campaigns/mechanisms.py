@@ -53,7 +53,9 @@ class Carried(Effect):
                                                               "Izz")),
     )  # fmt: skip
 
-    def build_into(self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]) -> None:
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
         """The body has more inertia."""
         robot.phi[slice_of(robot.robot, self.joints[0])] += values
 
@@ -75,7 +77,9 @@ class MovedCenters(Effect):
     signature: ClassVar = ""
     parameters: ClassVar = (Parameter("shift", "m", 0.0, 0.1),)
 
-    def build_into(self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]) -> None:
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
         """Each body's mass is moved as a whole."""
         for joint, shift in zip(self.joints, values.reshape(-1, 3), strict=True):
             part = slice_of(robot.robot, joint)
