@@ -28,6 +28,7 @@ from excite_cli.api.loading import Case
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.catalogue import declared_effects
+from excite_cli.errors import ExciteError
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.simulation.planted import Planted, parse_planted
 from excite_cli.simulation.settings import SimulationSettings
@@ -39,11 +40,12 @@ _FRICTION = (EffectSpec(kind="viscous_friction"), EffectSpec(kind="coulomb_frict
 _PLANTED = ("load_dependent_friction@elbow_joint=0.06",)
 _GAIN, _INERTIA = 0.08, 0.2
 _SEED = 24
+_NAN = float("nan")
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Names of one order; of payloads the runs, and mass ± 1 sd of the first."""
+    """Names of one order, or why it was refused; of payloads the runs, and the first one's mass."""
 
     order: tuple[str, ...]
     names: tuple[str, ...]
@@ -95,7 +97,10 @@ def answer(case: Case, data: Dataset, order: tuple[str, ...], sealed: str | None
     """Of the runs in this order."""
     by_name = {run.name: run for run in data.runs}
     ordered = replace(data, runs=tuple(by_name[name] for name in order))
-    found = diagnose(case, ordered, sealed, tell=lambda note: None)
+    try:
+        found = diagnose(case, ordered, sealed, tell=lambda note: None)
+    except ExciteError as error:
+        return Answer(order, (f"refused: {error}",), (), (_NAN, _NAN), _NAN, _NAN, (_NAN, _NAN))
     payloads = [each for each in found.effects if each.effect.kind == "payload"]
     mass = payloads[0].parameters["mass"] if payloads else None
     return Answer(
@@ -103,7 +108,7 @@ def answer(case: Case, data: Dataset, order: tuple[str, ...], sealed: str | None
         tuple(f"{e.effect.kind}@{'+'.join(e.effect.joints) if len(e.effect.joints) < 4 else 'all'}"
               for e in found.effects),
         tuple(each.effect.runs for each in payloads),
-        (mass.value, mass.std) if mass else (float("nan"), float("nan")),
+        (mass.value, mass.std) if mass else (_NAN, _NAN),
         found.before.mean_relative,
         found.after.mean_relative,
         _loaded(found),
@@ -115,7 +120,7 @@ def _loaded(found: Diagnosis) -> tuple[float, float]:
     for part in getattr(found, "parts", ()):
         if "loaded" in part.runs:
             return part.before.mean_relative, part.after.mean_relative
-    return float("nan"), float("nan")
+    return _NAN, _NAN
 
 
 def line(a: Answer) -> str:
