@@ -19,10 +19,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from benchmarks.battery.motions import CONFIGS
 from benchmarks.campaigns.instruments import Instruments, recorded
 from benchmarks.campaigns.mechanisms import Carried, solid
 from benchmarks.campaigns.motions import series
-from benchmarks.campaigns.robots import folder_of, robot_of
+from benchmarks.campaigns.robots import robot_of
 from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.loading import Case
 from excite_cli.config.data_spec import EffectSpec
@@ -90,7 +91,7 @@ def made() -> tuple[Case, Dataset]:
     )
     data = recorded(played.dataset, Instruments(_SEED, 0.01)).dataset
     runs = tuple(replace(run, tau=(1.0 + _GAIN) * run.tau) for run in data.runs)
-    return Case(spec, folder_of("ur10"), of.robot), replace(data, runs=runs)
+    return Case(spec, CONFIGS, of.robot), replace(data, runs=runs)
 
 
 def answer(case: Case, data: Dataset, order: tuple[str, ...], sealed: str | None) -> Answer:

@@ -14,9 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.battery.motions import CONFIGS
 from benchmarks.campaigns.cases import Case, group_of, make_case
 from benchmarks.campaigns.instruments import Recorded, recorded
-from benchmarks.campaigns.robots import folder_of, leaves
+from benchmarks.campaigns.robots import leaves
 from benchmarks.campaigns.scoring import Answer, Called, Name, Named, Score, Truth, score
 from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.loading import Case as RobotCase
@@ -132,7 +133,7 @@ def _judged(outcome: Outcome, case: Case) -> Judged:
 
 
 def _diagnosed(case: Case, data: Recorded) -> Diagnosis:
-    robot = RobotCase(case.spec, folder_of(case.robot.name), case.robot.robot)
+    robot = RobotCase(case.spec, CONFIGS, case.robot.robot)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "campaign.h5"
         write_dataset(path, data.dataset, {})

@@ -1,7 +1,6 @@
 """Robots of the campaigns: arms of some makers, our own small one, and a torso with two arms."""
 
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -55,13 +54,8 @@ def robot_of(name: str) -> Arm:
         spec = load_spec(CONFIGS / f"{name}.yaml", [])
     else:
         spec = Spec.model_validate({"robot": _OF_EXAMPLES[name]})
-    robot = build_robot(spec.robot, folder_of(name))
+    robot = build_robot(spec.robot, CONFIGS)
     return Arm(name, robot, find_base_parameters(robot), spec)
-
-
-def folder_of(name: str) -> Path:
-    """Where relative paths of the robot's configuration start."""
-    return CONFIGS
 
 
 def leaves(robot: Robot) -> tuple[int, ...]:

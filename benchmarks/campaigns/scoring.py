@@ -237,8 +237,20 @@ def _alike(
             yield runs
 
 
+def _disturbed(plant: Plant, truth: Truth, answer: Answer) -> bool:
+    """Whether its joint has no one value of it, or lacks what was not found and counts as that."""
+    return any(
+        set(plant.joints) & set(other.joints)
+        and (other.kinds[0] == plant.kinds[0] or not _found(other, truth, answer))
+        for other in truth.plants
+        if other.required
+    )
+
+
 def _sizes(truth: Truth, answer: Answer) -> Iterable[Size]:
     for plant in truth.plants:
+        if not plant.required and _disturbed(plant, truth, answer):
+            continue
         for named in answer.named:
             if named.approximation or not _is(named.called, plant, truth, answer):
                 continue

@@ -111,3 +111,16 @@ def test_sizes_are_of_the_same_runs_only() -> None:
         assert size.within is within
     part = Called(Name("torque_offset", ("j1",)), frozenset("a"))
     assert not judged(there, Named(part, sizes=far)).sizes
+
+
+@pytest.mark.parametrize(("joint", "found", "counts"), [("j1", False, 0), ("j1", True, 1),
+                                                        ("j2", False, 1)])  # fmt: skip
+def test_sizes_of_friction_beside_what_was_missed_do_not_count(
+    joint: str, found: bool, counts: int
+) -> None:
+    friction = Plant(("coulomb_friction",), ("j1",), (), sizes={"coulomb": 1.0}, required=False)
+    spring = plant("spring", joint)
+    truth = Truth((friction, spring), frozenset(TRAINING), JOINTS, "j3", "undeclared")
+    coulomb = Named(Called(Name("coulomb_friction", ("j1",))), sizes={"coulomb": (1.5, 0.1)})
+    names = (coulomb, named("spring", joint)) if found else (coulomb,)
+    assert len(score(truth, Answer(names)).sizes) == counts
