@@ -30,12 +30,16 @@ def test_an_order_is_right_with_payload_and_friction() -> None:
     def of(order: str, *runs: str, friction: bool = True) -> Answer:
         names = ("payload@all", *(["load_dependent_friction@elbow_joint"] if friction else []))
         nan = float("nan")
-        return Answer(tuple(order.split()), names, (runs,), (2.6, 0.1), 0.1, 0.02, (nan, nan))
+        words = tuple(order.split())
+        payloads = (runs,) if runs else ()
+        return Answer(words, words[-1], names, payloads, (2.6, 0.1), 0.1, 0.02, (nan, nan))
 
     good = of("loaded a b c", "loaded")
     assert good.right
     assert not of("loaded a b c", "loaded", "c").right
     assert not of("loaded a b c", "loaded", friction=False).right
-    told = summary([good, of("a b c loaded", "c")], None)
+    assert of("a b c loaded").right
+    told = summary([good, of("a b c loaded", "c")])
     assert told[0].startswith("1 of 1 orders")
-    assert told[1].startswith("2 of 2")
+    assert told[1].startswith("0 of 1 with it sealed")
+    assert told[2].startswith("2 of 2")
