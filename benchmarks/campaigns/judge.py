@@ -8,7 +8,6 @@ through the filters of that diagnosis.
 import tempfile
 import time
 import traceback
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
@@ -37,10 +36,11 @@ ROSE = 1.25  # times the error before, of a joint
 class Outcome:
     """A case in plain words and numbers, for tables and files.
 
-    `rest`: residual over noise floor by joint. `silent`: joints of which a large rest is not said.
-    `refused`: the data, sound as they are, were not taken. `worse`: the sealed error did not fall,
-    `admitted`: and the program says so. `worse_joints`: where it rose, and no effect there is
-    doubted. `seconds` are of the processor.
+    `left`: joints of which it is said that more than noise is left. `rest`: residual over noise
+    floor by joint. `silent`: joints of which a large rest is not said. `refused`: the data, sound
+    as they are, were not taken. `worse`: the sealed error did not fall, `admitted`: and the program
+    says so. `worse_joints`: where it rose, and no effect there is doubted. `seconds` are of the
+    processor.
     """
 
     index: int
@@ -56,6 +56,7 @@ class Outcome:
     found: list[bool] = field(default_factory=list)
     sizes: list[dict] = field(default_factory=list)
     unexplained: list[dict] = field(default_factory=list)
+    left: list[str] = field(default_factory=list)
     rest: dict[str, float] = field(default_factory=dict)
     silent: list[str] = field(default_factory=list)
     right: bool = False
@@ -73,7 +74,7 @@ class Outcome:
     def alarm(self) -> bool:
         """Anything said that is not so, for a robot that lacks nothing."""
         false = any(each["judged"] not in ("true", "companion") for each in self.named)
-        return false or bool(self.unexplained)
+        return false or bool(self.unexplained or self.left)
 
 
 @dataclass(frozen=True)
@@ -162,7 +163,7 @@ def answer_of(found: Diagnosis) -> Answer:
     return Answer(
         tuple(_named(each, refined) for each in found.effects),
         tuple(Name(each.kind, each.joints) for each in found.absorbed),
-        frozenset(_unexplained(found)),
+        frozenset((*(each.joint for each in found.unexplained), *_left(found))),
     )
 
 
@@ -183,15 +184,16 @@ def _called(record: EffectRecord) -> Called:
     return Called(Name(record.kind, record.joints), runs)
 
 
-def _unexplained(found: Diagnosis) -> Iterable[str]:
-    yield from (each.joint for each in found.unexplained)
-    yield from (each.joint for each in getattr(found, "large_rests", ()))
+def _left(found: Diagnosis) -> list[str]:
+    """Joints of which it is certain that more than noise is left."""
+    return [each.joint for each in getattr(found, "large_rests", ()) if each.certain]
 
 
 def _told(found: Diagnosis) -> set[str]:
     """Joints of which anything is said that is left."""
     near = {joint for each in found.approximations for joint in each.effect.joints}
-    return near | set(_unexplained(found))
+    rests = (*found.unexplained, *getattr(found, "large_rests", ()))
+    return near | {each.joint for each in rests}
 
 
 def rests(case: Case, data: Recorded, found: Diagnosis) -> dict[str, float]:
@@ -250,6 +252,7 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score) -> 
         }
         for each in found.unexplained
     ]
+    outcome.left = _left(found)
     outcome.found, outcome.right, outcome.wrong = list(result.found), result.right, result.wrong
     outcome.sizes = [
         {**asdict(size), "within": size.within, "first_order": size.first_order}

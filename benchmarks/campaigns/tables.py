@@ -54,6 +54,8 @@ def _named(o: Outcome) -> str:
         words.append(f"{each['kind']}@{where(each['joints'])}{runs}{mark}")
     if o.unexplained:
         words.append("unexplained@" + "+".join(each["joint"] for each in o.unexplained))
+    if o.left:
+        words.append("left@" + "+".join(o.left))
     if o.silent:
         words.append("silent on " + ", ".join(f"{j} ({o.rest[j]:.1f})" for j in o.silent))
     return "; ".join(words) or "nothing"

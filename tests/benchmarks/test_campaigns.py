@@ -168,22 +168,23 @@ def test_rates_count_what_went_wrong() -> None:
         outcome(4, "contact", worse=True, admitted=True),
         outcome(5, "clean_white", planted=[], named=[false_name], wrong=True),
         outcome(6, "clean_white", planted=[]),
+        outcome(8, "clean_white", planted=[], left=["j1"]),
         outcome(7, "short_moves", refused=True, error="FileError: no"),
     ]
     counts = {rate.name: (rate.count, rate.out_of) for rate in rates(outcomes)}
     assert counts == {
         "right name or alias set": (4, 6),
-        "wrong names": (3, 8),
-        "large rest without a word": (2, 8),
-        "false alarms on clean": (1, 2),
-        "false refusals": (1, 8),
-        "harmful, or error not lowered, and unsaid": (2, 8),
+        "wrong names": (3, 9),
+        "large rest without a word": (2, 9),
+        "false alarms on clean": (2, 3),
+        "false refusals": (1, 9),
+        "harmful, or error not lowered, and unsaid": (2, 9),
         "sizes within 2 sd": (0, 1),
         "of first-order effects": (0, 0),
     }
     words = [verdict(each) for each in outcomes]
     assert words == ["ok", "missed+WRONG", "ok+SILENT", "ok+WORSE", "ok+worse", "ALARM+WRONG", "ok",
-                     "REFUSED"]  # fmt: skip
+                     "ALARM", "REFUSED"]  # fmt: skip
     told = "\n".join(failures(outcomes))
     assert "z 10.0" in told
     assert "no" in told
