@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
 .PHONY: install run plan loop test sanitize lint lock floors audit docs bench peers trust battery
-.PHONY: robots real clean
+.PHONY: campaigns robots real clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
 
@@ -68,6 +68,12 @@ real: $(STAMP)           ## logs of four real robots, into the table of the READ
 
 battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about 20 minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.diagnosis_battery --cases 130 --seed 11001
+
+campaigns: $(STAMP)      ## runs that differ, short moves, faulty packets; many runs, orders, noises
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.campaign_battery --cases 208 --seed 5001
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.runs
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.orders
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.noises
 
 # Development and CI use the pinned versions of requirements/ci.txt, checked by their hashes; the
 # program alone takes what pyproject.toml allows, as it does in an environment of a user's own.

@@ -17,13 +17,8 @@ another seed from 5000 on.
 """
 
 import argparse
-import json
 import os
 import time
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict
-from multiprocessing import get_context
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -33,6 +28,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.battery import tables
 from benchmarks.battery.cases import label
 from benchmarks.battery.judge import Outcome, judge
+from benchmarks.battery.processes import outcomes_of, write
 
 
 def main() -> None:
@@ -53,11 +49,11 @@ def main() -> None:
     began = time.perf_counter()
     print(tables.HEADER, flush=True)
     outcomes = []
-    for outcome in outcomes_of(arguments.seed, chosen, arguments.workers):
+    for outcome in outcomes_of(_outcome, arguments.seed, chosen, arguments.workers):
         outcomes.append(outcome)
         print(tables.line(outcome), flush=True)
         if arguments.json is not None:
-            write(arguments.json, arguments.seed, outcomes)
+            write(arguments.json, arguments.seed, tables.rates(outcomes), outcomes)
     summary = [
         "",
         "true kind -> named",
@@ -75,33 +71,8 @@ def _asked(kind: str | None, seed: int, index: int) -> bool:
     return kind is None or kind in label(seed, index)
 
 
-def outcomes_of(seed: int, indices: list[int], workers: int) -> Iterator[Outcome]:
-    """Outcomes as they come."""
-    if workers < 2:
-        with threadpool_limits(1):
-            for index in indices:
-                yield judge(seed, index).outcome
-        return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as processes:
-        for done in as_completed([processes.submit(_one, seed, index) for index in indices]):
-            yield done.result()
-
-
-def _one(seed: int, index: int) -> Outcome:
-    with threadpool_limits(1):
-        return judge(seed, index).outcome
-
-
-def write(path: Path, seed: int, outcomes: list[Outcome]) -> None:
-    """Everything as JSON, whole after each case."""
-    content = {
-        "seed": seed,
-        "rates": {rate.name: [rate.count, rate.out_of] for rate in tables.rates(outcomes)},
-        "cases": [asdict(o) for o in sorted(outcomes, key=lambda o: o.index)],
-    }
-    partial = path.with_suffix(".partial")
-    partial.write_text(json.dumps(content, indent=1, ensure_ascii=False))
-    partial.replace(path)
+def _outcome(seed: int, index: int) -> Outcome:
+    return judge(seed, index).outcome
 
 
 if __name__ == "__main__":

@@ -140,23 +140,23 @@ def _planted(
     if group == "clean":
         return ()
     if group == "one":
-        found = _one(kind_named(kind), of, ground, model, (_SHOWS, np.inf), rng)
+        found = one_effect(kind_named(kind), of, ground, model, (_SHOWS, np.inf), rng)
         return None if found is None else (found,)
     if group == "outside":
         kinds = {each.kind: each for each in OUTSIDE}
-        found = _one(kinds[kind], of, ground, model, (0.05, np.inf), rng)
+        found = one_effect(kinds[kind], of, ground, model, (0.05, np.inf), rng)
         return None if found is None else (found,)
     if group == "absorbed":
         hidden = list(rng.permutation(_HIDDEN))
         for name in hidden:
-            found = _one(kind_named(str(name)), of, ground, model, (-1.0, _ABSORBED), rng)
+            found = one_effect(kind_named(str(name)), of, ground, model, (-1.0, _ABSORBED), rng)
             if found is not None:
                 return (found,)
         return None
     return _two(of, ground, model, with_friction, rng)
 
 
-def _one(
+def one_effect(
     kind: type[Effect],
     of: Arm,
     ground: Ground,
@@ -192,19 +192,21 @@ def _two(
         excluded |= {"viscous_friction", "coulomb_friction"}
     names = [name for name in catalogue() if name not in excluded]
     first_name, second_name = rng.choice(names, 2, replace=False)
-    first = _one(kind_named(str(first_name)), of, ground, model, (_SEPARATE, np.inf), rng)
+    first = one_effect(kind_named(str(first_name)), of, ground, model, (_SEPARATE, np.inf), rng)
     if first is None:
         return None
     second_kind = kind_named(str(second_name))
     places = second_kind.places(of.robot)
     if rng.uniform() < 0.5:
         places = [place for place in places if set(place) & set(first.touched)]
-    beside_first = orthonormal(np.hstack([model, _columns(first.planted.effect, ground)]))
+    beside_first = orthonormal(np.hstack([model, weighted_columns(first.planted.effect, ground)]))
     for at in rng.permutation(len(places)):
         second = size(second_kind, places[at], ground, rng)
         if second is None or left_over(beside_first, second, ground) < _SEPARATE:
             continue
-        beside_second = orthonormal(np.hstack([model, _columns(second.planted.effect, ground)]))
+        beside_second = orthonormal(
+            np.hstack([model, weighted_columns(second.planted.effect, ground)])
+        )
         if left_over(beside_second, first, ground) >= _SEPARATE:
             return first, second
     return None
@@ -217,7 +219,9 @@ def model_columns(of: Arm, declared: Sequence[Effect], ground: Ground) -> Array:
     """
     inertial = np.concatenate([s.body.regressor[:, :, of.base.selection] for s in ground.signals])
     flat = (inertial * _weights(ground)[:, None]).reshape(-1, of.base.rank)
-    return orthonormal(np.hstack([flat, *(_columns(effect, ground) for effect in declared)]))
+    return orthonormal(
+        np.hstack([flat, *(weighted_columns(effect, ground) for effect in declared)])
+    )
 
 
 def orthonormal(columns: Array) -> Array:
@@ -228,7 +232,8 @@ def orthonormal(columns: Array) -> Array:
     return basis[:, sizes > 1e-9 * sizes[0]]
 
 
-def _columns(effect: Effect, ground: Ground) -> Array:
+def weighted_columns(effect: Effect, ground: Ground) -> Array:
+    """Torque per parameter over all motions, (T·n, P), in units of each joint's torque."""
     n = ground.robot.n
     rows, count = list(effect.rows(n)), len(effect.parameters)
     found = []

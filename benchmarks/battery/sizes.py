@@ -14,7 +14,7 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.planned_motion import PlannedMotion
+from excite_cli.simulation.planned_motion import Planned
 from excite_cli.simulation.planted import Planted
 
 RATIOS = (0.03, 0.30)
@@ -55,14 +55,14 @@ class Ground:
 def ground_of(
     robot: Robot,
     phi: Array,
-    motions: Sequence[PlannedMotion],
+    motions: Sequence[Planned],
     declared: Sequence[Planted],
     noise: float,
 ) -> Ground:
     """Signals of the motions with the torque of what is declared."""
     found, friction = [], np.zeros(robot.n)
     for motion in motions:
-        t = np.linspace(0.0, motion.trajectory.duration, _SAMPLES)
+        t = np.linspace(0.0, motion.duration, _SAMPLES)
         q, v, a = motion.states(t)
         body = RigidBody(robot, phi, q, v, a)
         bare = Signals(t, q, v, a, body.load, body.load, body, RunId(motion.name))
@@ -104,20 +104,20 @@ def size(
     elif kind.kind in ("torque_saturation", "backlash"):
         values = np.array([1.0])
     else:
-        unit = float(_ratios(effect, direction, ground).max())
+        unit = float(ratios(effect, direction, ground).max())
         if not unit > 0.0:
             return None
         values = _within(kind, direction * wanted / unit, ground, joints)
     if kind.kind == "friction_drift":
         values = _warming(values, effect, ground)
-    ratios = _ratios(effect, values, ground)
-    if not np.isfinite(ratios).all() or not _sensible(kind, float(ratios.max()), ground):
+    shares = ratios(effect, values, ground)
+    if not np.isfinite(shares).all() or not _sensible(kind, float(shares.max()), ground):
         return None
-    touched = tuple(int(j) for j in np.flatnonzero(ratios >= 0.1 * ratios.max()))
+    touched = tuple(int(j) for j in np.flatnonzero(shares >= 0.1 * shares.max()))
     return Sized(
         Planted(effect, values),
-        float(ratios.max()),
-        int(np.argmax(ratios)),
+        float(shares.max()),
+        int(np.argmax(shares)),
         touched,
         _companions(effect, values),
     )
@@ -228,7 +228,7 @@ def _companions(effect: Effect, values: Array) -> tuple[Planted, ...]:
     return tuple(Planted(viscous((j,)), np.array([abs(values[0])])) for j in effect.joints)
 
 
-def _ratios(effect: Effect, values: Array, ground: Ground) -> Array:
+def ratios(effect: Effect, values: Array, ground: Ground) -> Array:
     """RMS of the effect over that of the torque (n,)."""
     parts = [effect.torque(s, values) for s in ground.signals]
     tau = np.concatenate(parts)

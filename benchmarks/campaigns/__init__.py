@@ -1,0 +1,1 @@
+"""Parts of the battery of campaigns: robots, motions, instruments, changes, judging, tables."""
