@@ -10,7 +10,7 @@ looked at: single runs, all runs from one on, and the clusters of what each run 
 number, and that of the candidates, grows linearly with the runs, or not at all.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,25 +44,36 @@ class RunEvidence:
 
     def values(self, chosen: Sequence[int]) -> Array:
         """Values (p,) fitted to some runs."""
-        return np.asarray(np.linalg.solve(*self._sums(chosen)))
-
-    def explained(self, chosen: Sequence[int]) -> float:
-        """E(S), for all columns."""
-        rest = [r for r in range(self.runs) if r not in set(chosen)]
-        whole = range(self.runs)
-        return self.energy(chosen) + self.energy(rest) - self.energy(whole)
-
-    def _sums(self, chosen: Sequence[int]) -> tuple[Array, Array]:
-        at = list(chosen)
-        gram = self.grams[at].sum(axis=0)
-        scale = np.diag(self.grams.sum(axis=0))
-        gram[np.diag_indices(len(gram))] += _RIDGE * scale + 1e-300
-        return gram, self.cross[at].sum(axis=0)
+        gram, cross = self._sums(self._inside([chosen]))
+        return np.asarray(np.linalg.solve(gram[0], cross[0]))
 
     def energy(self, chosen: Sequence[int]) -> float:
         """What values fitted to some runs explain in them."""
-        gram, cross = self._sums(chosen)
-        return float(cross @ np.linalg.solve(gram, cross))
+        return float(self._energies(self._inside([chosen]))[0])
+
+    def explained(self, sets: Sequence[Collection[int]]) -> Array:
+        """E(S) of every set, for all columns."""
+        inside = self._inside(sets)
+        whole = self._energies(np.ones((1, self.runs)))
+        return self._energies(inside) + self._energies(1.0 - inside) - whole
+
+    def _inside(self, sets: Sequence[Collection[int]]) -> Array:
+        """One row of zeros and ones for every set."""
+        inside = np.zeros((len(sets), self.runs))
+        for row, chosen in zip(inside, sets, strict=True):
+            row[list(chosen)] = 1.0
+        return inside
+
+    def _sums(self, inside: Array) -> tuple[Array, Array]:
+        gram = np.tensordot(inside, self.grams, 1)
+        at = np.arange(gram.shape[1])
+        gram[:, at, at] += _RIDGE * np.diag(self.grams.sum(axis=0)) + 1e-300
+        return gram, inside @ self.cross
+
+    def _energies(self, inside: Array) -> Array:
+        gram, cross = self._sums(inside)
+        solved = np.linalg.solve(gram, cross[:, :, None])[:, :, 0]
+        return np.asarray(np.einsum("sp,sp->s", cross, solved))
 
 
 def evidence_by_run(
@@ -120,28 +131,30 @@ def _clusters(found: RunEvidence) -> Iterator[RunSet]:
             yield members[-1]
 
 
-def _ranked(found: RunEvidence, sets: Sequence[RunSet] | Iterator[RunSet]) -> list[RunSet]:
+def _ranked(found: RunEvidence, sets: Iterable[RunSet]) -> list[RunSet]:
     """Best first, without empty ones; a set and all other runs are one and the same."""
     everything = frozenset(range(found.runs))
-    scores: dict[RunSet, float] = {}
+    kept: dict[RunSet, None] = {}
     for chosen in sets:
-        if not chosen or chosen == everything or everything - chosen in scores:
-            continue
-        scores.setdefault(chosen, found.explained(sorted(chosen)))
-    return sorted(scores, key=lambda chosen: -scores[chosen])
+        if chosen and chosen != everything and everything - chosen not in kept:
+            kept[chosen] = None
+    scores = found.explained(list(kept))
+    return [chosen for _, chosen in sorted(zip(-scores, kept, strict=True), key=lambda x: x[0])]
 
 
 def _improved(found: RunEvidence, chosen: RunSet) -> RunSet:
     """Runs are taken in or out, one at a time, while that explains more."""
-    best = found.explained(sorted(chosen))
+    best = float(found.explained([chosen])[0])
     for _ in range(found.runs):
         moves = [chosen ^ {r} for r in range(found.runs)]
         moves = [move for move in moves if move and len(move) < found.runs]
-        scores = [found.explained(sorted(move)) for move in moves]
-        at = int(np.argmax(scores)) if scores else -1
-        if at < 0 or scores[at] <= best * (1.0 + 1e-9):
+        if not moves:
             return chosen
-        best, chosen = scores[at], moves[at]
+        scores = found.explained(moves)
+        at = int(np.argmax(scores))
+        if scores[at] <= best * (1.0 + 1e-9):
+            return chosen
+        best, chosen = float(scores[at]), moves[at]
     return chosen
 
 
