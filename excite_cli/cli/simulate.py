@@ -58,6 +58,14 @@ def simulate(
             help="Periods of a motion in each recording.",
         ),
     ] = 1,
+    pause: Annotated[
+        float,
+        typer.Option(
+            "--pause",
+            rich_help_panel=_PLAYED,
+            help="Seconds between recordings, which then have absolute stamps.",
+        ),
+    ] = 0.0,
     entry: Annotated[
         bool,
         typer.Option(
@@ -164,6 +172,7 @@ def simulate(
             inertia_error=inertia_error,
             repeat=repeat,
             periods=periods,
+            pause=pause,
             torque_limits=torque_limits,
         )
         with terminal.live("simulating") as line:

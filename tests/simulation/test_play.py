@@ -187,3 +187,28 @@ def test_a_robot_that_runs_away_is_told(robot: Robot) -> None:
 def test_settings_that_cannot_be(wrong: dict[str, float], words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         SimulationSettings(**wrong)  # type: ignore[arg-type]
+
+
+def test_friction_goes_on_changing_from_one_recording_to_the_next(robot: Robot) -> None:
+    """By the campaign's clock: the same motion meets more friction after a pause."""
+    shape = {"time_constant": 2e4, "span": 1000.0}
+    growing = plant(kind_named("friction_change"), (ELBOW,), 30.0, shape)
+    settings = replace(IDEAL, repeat=2, pause=500.0)
+    first, second = simulate(robot, [motion(robot)], settings, [growing]).dataset.runs
+    length = first.duration
+    assert (first.start, second.start) == pytest.approx((0.0, length + 500.0))
+    assert second.epoch is not None
+    assert first.epoch is not None
+    assert second.epoch - first.epoch == pytest.approx(length + 500.0)
+    more = (second.tau - first.tau)[:, ELBOW]
+    moving = np.abs(first.dq[:, ELBOW]) > 0.1  # type: ignore[index]
+    expected = 30.0 * second.start / 1000.0
+    assert np.median(more[moving] * np.sign(first.dq[moving, ELBOW])) == pytest.approx(  # type: ignore[index]
+        expected, rel=0.1
+    )
+
+
+def test_recordings_without_pauses_have_no_stamps(robot: Robot) -> None:
+    runs = simulate(robot, [motion(robot)], replace(IDEAL, repeat=2)).dataset.runs
+    assert [run.epoch for run in runs] == [None, None]
+    assert runs[1].start == pytest.approx(runs[0].duration)
