@@ -12,7 +12,6 @@ model has taken its part, z = G_cy − G_cS N⁻¹ G_Sy its product with the res
 energy that it explains: χ² distributed for unit noise if the candidate is not there.
 """
 
-import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -74,7 +73,7 @@ class Evidence:
         self._without: dict[tuple[int, ...], Array] = {}
         self._solved: dict[tuple[int, ...], Array] = {}
         self._schurs: dict[tuple[int, ...], Schur] = {}
-        self._bases: dict[int, Array] = {}
+        self._candidates = _Candidates(self.total, fixed, self.blocks)
         self._seen = grams.seen()[:, :-1] > 0.0
 
     @property
@@ -141,7 +140,7 @@ class Evidence:
         rest = slice(self.fixed, self.torque)
         left = self.total[rest, rest] - shared.T @ solved
         cross = self.total[rest, self.torque] - solved.T @ self.total[at, self.torque]
-        return Schur(self, left, cross)
+        return Schur(self._candidates, left, cross)
 
     @cached_property
     def _folds(self) -> Array:
@@ -232,64 +231,58 @@ class Evidence:
         part = self._part(range(self.grams.folds), joints, at)
         return max(_energy(part, self.solve(chosen) * self.norms[at]), 0.0)
 
-    def basis(self, candidate: int) -> Array:
-        """Orthonormal directions (p, d) of a candidate's columns, without collinear ones."""
-        if candidate not in self._bases:
-            self._bases[candidate] = self.basis_of(self.blocks[candidate])
-        return self._bases[candidate]
-
-    def basis_of(self, at: NDArray[np.intp]) -> Array:
-        """Orthonormal directions (k, d) of the columns `at`, without collinear ones."""
-        values, vectors = np.linalg.eigh(self.total[np.ix_(at, at)])
-        kept = values > _COLLINEAR * values[-1]
-        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
-
 
 def _energy(gram: Array, x: Array) -> float:
     """‖y − C x‖² from the Gram matrix of [C y]."""
     return float(gram[-1, -1] - 2 * x @ gram[:-1, -1] + x @ gram[:-1, :-1] @ x)
 
 
-class Schur:
-    """Candidates after projection off a model."""
+class _Candidates:
+    """Columns of candidates in the normalised Gram matrix of all."""
 
-    def __init__(self, evidence: Evidence, left: Array, cross: Array) -> None:
-        # The evidence keeps this: in a circle, both would outlive a pass, and so would all it has.
-        self.evidence: Evidence = weakref.proxy(evidence)
-        self.matrix, self.cross = left, cross
+    def __init__(self, total: Array, fixed: int, blocks: list[NDArray[np.intp]]) -> None:
+        self.total, self.fixed, self.blocks = total, fixed, blocks
+        self._bases: dict[int, Array] = {}
+
+    def basis(self, candidates: Sequence[int]) -> Array:
+        """Orthonormal directions (p, d) of candidates' columns, without collinear ones."""
+        if len(candidates) > 1:
+            return self._basis(np.concatenate([self.blocks[i] for i in candidates]))
+        if candidates[0] not in self._bases:
+            self._bases[candidates[0]] = self._basis(self.blocks[candidates[0]])
+        return self._bases[candidates[0]]
+
+    def _basis(self, at: NDArray[np.intp]) -> Array:
+        values, vectors = np.linalg.eigh(self.total[np.ix_(at, at)])
+        kept = values > _COLLINEAR * values[-1]
+        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
+
+
+class Schur:
+    """Candidates after projection off a model.
+
+    It knows the candidates and not the evidence, which keeps it: in a circle, all the matrices of a
+    pass would outlive it.
+    """
+
+    def __init__(self, candidates: _Candidates, left: Array, cross: Array) -> None:
+        self._candidates, self.matrix, self.cross = candidates, left, cross
 
     def gain(self, *candidates: int, absorbed: float = ABSORBED) -> Gain:
         """χ², degrees of freedom and the largest share left of candidates taken together.
 
         Directions of which less than `absorbed` is left do not count.
         """
-        e = self.evidence
-        columns = np.concatenate([e.blocks[i] for i in candidates])
-        at = columns - e.fixed
-        if len(at) == 1:
-            k = int(at[0])
-            left, cross = float(self.matrix[k, k]), float(self.cross[k])
-            share = left / max(float(e.total[columns[0], columns[0]]), 1e-300)
-            if share < absorbed:
-                return Gain(0.0, 0, share)
-            return Gain(cross * cross / left, 1, share)
-        basis = e.basis(candidates[0]) if len(candidates) == 1 else e.basis_of(columns)
-        left = basis.T @ self.matrix[at[:, None], at] @ basis
-        shares, turned = np.linalg.eigh(left)
-        alive = shares > absorbed
-        if not alive.any():
-            return Gain(0.0, 0, float(shares.max(initial=0.0)))
-        z = turned[:, alive].T @ (basis.T @ self.cross[at])
-        return Gain(float(np.sum(z**2 / shares[alive])), int(alive.sum()), float(shares[-1]))
+        return _gain(self._candidates, self.matrix, self.cross, candidates, absorbed)
 
     @cached_property
     def singles(self) -> "Singles":
         """Gain of every candidate alone."""
-        return Singles(self)
+        return Singles(self._candidates, self.matrix, self.cross)
 
     def pair_chi2(self, first: Array, second: Array) -> Array:
         """χ² of pairs of candidates of one column each, without those that are collinear."""
-        e = self.evidence
+        e = self._candidates
         i = np.array([e.blocks[k][0] for k in first]) - e.fixed
         j = np.array([e.blocks[k][0] for k in second]) - e.fixed
         ii, jj, ij = self.matrix[i, i], self.matrix[j, j], self.matrix[i, j]
@@ -299,20 +292,41 @@ class Schur:
         return np.where(determinant > 1e-3 * ii * jj, found, 0.0)
 
 
+def _gain(
+    e: _Candidates, matrix: Array, cross: Array, candidates: Sequence[int], absorbed: float
+) -> Gain:
+    columns = np.concatenate([e.blocks[i] for i in candidates])
+    at = columns - e.fixed
+    if len(at) == 1:
+        k = int(at[0])
+        left, product = float(matrix[k, k]), float(cross[k])
+        share = left / max(float(e.total[columns[0], columns[0]]), 1e-300)
+        if share < absorbed:
+            return Gain(0.0, 0, share)
+        return Gain(product * product / left, 1, share)
+    basis = e.basis(candidates)
+    shares, turned = np.linalg.eigh(basis.T @ matrix[at[:, None], at] @ basis)
+    alive = shares > absorbed
+    if not alive.any():
+        return Gain(0.0, 0, float(shares.max(initial=0.0)))
+    z = turned[:, alive].T @ (basis.T @ cross[at])
+    return Gain(float(np.sum(z**2 / shares[alive])), int(alive.sum()), float(shares[-1]))
+
+
 class Singles:
     """Gains of single candidates: those with one column all at once, the others when asked for."""
 
-    def __init__(self, schur: Schur) -> None:
-        e = schur.evidence
-        self._schur: Schur = weakref.proxy(schur)
+    def __init__(self, candidates: _Candidates, matrix: Array, cross: Array) -> None:
+        e = candidates
+        self._given = candidates, matrix, cross
         self._first = np.array([b[0] for b in e.blocks], dtype=int) - e.fixed
         self._single = np.array([len(b) == 1 for b in e.blocks])
-        own = np.diag(e.total)[e.fixed : e.torque][self._first]
-        left = np.diag(schur.matrix)[self._first]
+        own = np.diag(e.total)[e.fixed : -1][self._first]
+        left = np.diag(matrix)[self._first]
         self._share = left / np.maximum(own, 1e-300)
         alive = self._share > ABSORBED
-        cross = schur.cross[self._first]
-        self._chi2 = np.where(alive, cross**2 / np.where(alive, left, 1.0), 0.0)
+        products = cross[self._first]
+        self._chi2 = np.where(alive, products**2 / np.where(alive, left, 1.0), 0.0)
         self._others: dict[int, Gain] = {}
 
     def __getitem__(self, i: int) -> Gain:
@@ -320,5 +334,5 @@ class Singles:
             share = float(self._share[i])
             return Gain(float(self._chi2[i]), int(share > ABSORBED), share)
         if i not in self._others:
-            self._others[i] = self._schur.gain(i)
+            self._others[i] = _gain(*self._given, (i,), ABSORBED)
         return self._others[i]

@@ -1,0 +1,97 @@
+"""What is left beside the noise is said: never of noise alone, always of more."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+from excite_cli.diagnosis.large_rest import large_rests
+from excite_cli.diagnosis.records import LargeRest
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.effects.base import Signals
+from excite_cli.identification.noise_floor import NoiseFloor
+from excite_cli.identification.prepare import prepare
+from excite_cli.identification.processing import Processing
+from excite_cli.measurement.dataset import Run
+from excite_cli.robot.model import Array
+
+RATE, SECONDS = 200.0, 12.0
+PROCESSING = Processing(RATE, 8.0, 4.8, 19.2, 4, 0.2, "differentiated", 0.02, 0.8)
+NOISE = 0.5
+
+
+def motion(number: int) -> tuple[Array, Array]:
+    rng = np.random.default_rng([number, 6])
+    t = np.arange(SECONDS * RATE) / RATE
+    rate, phase = rng.uniform(0.8, 3.0, (3, 2)), rng.uniform(0.0, 6.0, (3, 2))
+    return t, np.sin(rate * t[:, None, None] + phase).sum(1)
+
+
+def left(
+    size: float,
+    filtered: bool = False,
+    floor: NoiseFloor | None = None,
+    slow: float = 0.0,
+    single: float = 0.0,
+) -> tuple[LargeRest, ...]:
+    """Noise; on joint a a map of both angles, or of a `single` one; on b a wave of its own."""
+    recorded, signals, prepared, residuals = [], [], [], []
+    rng = np.random.default_rng(3)
+    for number in range(3):
+        t, q = motion(number)
+        more = NOISE * rng.normal(size=q.shape)
+        if filtered:
+            more = 5 * sosfiltfilt(butter(6, 9.0, fs=RATE, output="sos"), more, axis=0)
+        more[:, 0] += size * np.sin(1.5 * q[:, 0]) * np.cos(1.5 * q[:, 1])
+        more[:, 0] += single * np.sin(2.0 * q[:, 1])
+        more[:, 1] += slow * np.sin(14.0 * t + 3.0 * rng.normal(size=len(t)).cumsum() / RATE)
+        run = Run(f"run_{number}", t, q, 5.0 * q + more)
+        fit = prepare(run, PROCESSING)
+        alone = prepare(replace(run, tau=more), PROCESSING)
+        recorded.append(run)
+        prepared.append(fit)
+        residuals.append(alone.tau_fit)
+        signals.append(
+            Signals(fit.t, fit.q, fit.v, fit.a, 5 * fit.q, 5 * fit.q, None, fit.run)  # type: ignore[arg-type]
+        )
+    nothing = tuple(np.zeros((*r.shape, 1)) for r in residuals)
+    data = TrainingData(tuple(prepared), (0, 1, 2), nothing, tuple(r.tau_fit for r in prepared))
+    return large_rests(data, signals, residuals, recorded, PROCESSING, floor, ("a", "b"))
+
+
+def test_nothing_is_said_of_noise() -> None:
+    assert left(0.0) == ()
+
+
+def test_an_unknown_map_is_said_with_its_two_quantities() -> None:
+    (rest,) = left(2.0)
+    assert (rest.joint, rest.certain, rest.basis) == ("a", True, "band")
+    assert {each.code for each in rest.depends_on} == {"q[a]", "q[b]"}
+    assert rest.noise is not None
+    assert rest.rms > 2.5 * rest.noise
+    assert rest.predictable > 0.6
+
+
+def test_what_no_quantity_predicts_is_said_all_the_same() -> None:
+    (rest,) = left(0.0, slow=2.0)
+    assert (rest.joint, rest.certain, rest.depends_on) == ("b", True, ())
+
+
+def test_repeated_periods_know_the_noise_best() -> None:
+    known = NoiseFloor(np.array([10.0, 0.01]), np.zeros(2))
+    (rest,) = left(0.0, floor=known)
+    assert (rest.joint, rest.basis, rest.noise) == ("b", "periods", 0.01)
+    assert rest.certain
+
+
+def test_noise_of_unknown_size_is_no_certainty() -> None:
+    found = left(0.0, filtered=True)
+    assert [each.joint for each in found] == ["a", "b"]
+    assert all(each.noise is None and not each.certain for each in found)
+
+
+@pytest.mark.parametrize("single", [0.0, 4.0])
+def test_less_than_the_noise_is_said_if_it_is_predicted(single: float) -> None:
+    loud = NoiseFloor(np.array([10.0, 10.0]), np.zeros(2))
+    assert [each.joint for each in left(0.0, floor=loud, single=single)] == ["a"] * bool(single)
