@@ -30,17 +30,23 @@ class FittedModel:
 
 @dataclass(frozen=True)
 class Played:
-    """Runs that models are tried on, with their regressors: these do not depend on the model."""
+    """Runs that models are tried on."""
 
     robot: Robot
     runs: Sequence[PreparedRun]
-    regressors: Sequence[Array]
 
     def predictions(self, fitted: FittedModel) -> list[Prediction]:
         """What a model says of every run."""
+        values = fitted.values if len(fitted.effects) else np.zeros(0)
         return [
-            _predicted(self.robot, fitted, *pair)
-            for pair in zip(self.runs, self.regressors, strict=True)
+            predicted(
+                RigidBody(self.robot, fitted.phi, run.q, run.v, run.a),
+                fitted.effects,
+                values,
+                run.t,
+                run.run,
+            )
+            for run in self.runs
         ]
 
     def errors(self, predictions: Sequence[Prediction]) -> Errors:
@@ -88,17 +94,9 @@ def training_traces(
     robot: Robot, models: tuple[FittedModel, FittedModel], traced: Traced
 ) -> tuple[TorqueTrace, ...]:
     """Torque over time of the training parts."""
-    regressors = [signals.body.regressor for signals in traced.signals]
-    played = Played(robot, traced.data.runs, regressors)
+    played = Played(robot, traced.data.runs)
     before, after = map(played.predictions, models)
     return played.traces(before, after, sealed=False)
-
-
-def sealed_runs(robot: Robot, runs: Sequence[PreparedRun]) -> Played:
-    """The sealed part, for the models to be tried on."""
-    cad = standard_parameters(robot)
-    regressors = [RigidBody(robot, cad, run.q, run.v, run.a).regressor for run in runs]
-    return Played(robot, runs, regressors)
 
 
 def on_sealed(played: Played, models: tuple[FittedModel, FittedModel]) -> BeforeAfter:
@@ -118,10 +116,3 @@ def _untouched(played: Played) -> Errors | None:
     if not phi.any():
         return None
     return played.errors(played.predictions(FittedModel(phi, *urdf_friction(played.robot))))
-
-
-def _predicted(robot: Robot, fitted: FittedModel, run: PreparedRun, regressor: Array) -> Prediction:
-    body = RigidBody(robot, fitted.phi, run.q, run.v, run.a)
-    body.__dict__["regressor"] = regressor  # it does not depend on φ, and takes a while
-    values = fitted.values if len(fitted.effects) else np.zeros(0)
-    return predicted(body, fitted.effects, values, run.t, run.run)

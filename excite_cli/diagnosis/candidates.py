@@ -8,6 +8,7 @@ import numpy as np
 
 from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis.records import EffectRecord
+from excite_cli.diagnosis.run_sets import MOST, evidence_by_run, run_sets, sets_looked_at
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named
 from excite_cli.errors import ConfigError, ExciteWarning
@@ -16,6 +17,7 @@ from excite_cli.identification.processing import DEFAULT_MOVING
 from excite_cli.robot.model import Array, Robot
 
 _TOGETHER = 16  # effects that are filtered at once
+_LOOKED_AT = 1000  # samples of a part, at most, from which the runs of an effect are told
 
 
 # Kind, joints and runs: candidates that differ in shape only share it.
@@ -26,7 +28,8 @@ Place = tuple[str, tuple[int, ...], tuple[str, ...]]
 class Candidate:
     """An effect that may be missing, with its columns in every training part.
 
-    `columns[i]` (M_i, len(rows), p) filtered and decimated; zeros where it is not present.
+    `columns[i]` (M_i, len(rows), p) filtered and decimated; zeros, which take no room, where it is
+    not present.
     `tests`: how many tests its kind stands for, times the number of kinds (Bonferroni with equal
     shares of α for all kinds).
     """
@@ -119,7 +122,7 @@ def _of_kind(
             continue
         if kind.per_run:
             effects += _in_runs(kind, robot, place, signals, residuals, runs)
-            tests += len(runs) * kind.tests_of_grid(robot, place, signals[:1])
+            tests += sets_looked_at(len(runs)) * kind.tests_of_grid(robot, place, signals[:1])
         else:
             shapes = kind.tuned(robot, place, signals, residuals)
             effects += [kind(place, shape) for shape in shapes]
@@ -147,29 +150,49 @@ def _in_runs(
     residuals: Sequence[Array],
     runs: Sequence[str],
 ) -> list[Effect]:
-    """A kind that is present in some runs only, looked for in each on its own.
-
-    One without a shape of its own also in all runs from some run on; in all of them it
-    would be part of the robot.
-    """
-    found: list[Effect] = []
+    """A kind that is present in some training runs only; in all it would be part of the robot."""
     trained = [run for run in runs if any(s.run.is_among((run,)) for s in signals)]
-    for run in trained:
-        own = [i for i, s in enumerate(signals) if s.run.is_among((run,))]
-        shapes = kind.tuned(robot, place, [signals[i] for i in own], [residuals[i] for i in own])
-        if kind.shapes or len(runs) > 1:
-            found += [kind(place, shape, (run,)) for shape in shapes]
-    if not kind.shapes:
-        later = [tuple(runs[i:]) for i in range(1, len(runs) - 1)]
-        some = [
-            tuple(trained[i:k])
-            for i in range(len(trained))
-            for k in range(i + 2, len(trained) + 1)
-            if k - i < len(trained)
-        ]
-        together = [*later, *(each for each in some if each not in later)]
-        found += [kind(place, {}, chosen) for chosen in together if set(chosen) & set(trained)]
-    return found
+    unit_of = [next(k for k, u in enumerate(trained) if s.run.is_among((u,))) for s in signals]
+    if kind.shapes:
+        return _shaped_in_runs(kind, robot, place, (signals, residuals), (trained, unit_of))
+    if len(trained) < 2:
+        return []
+    effect = kind(place, {})
+    rows = list(effect.rows(robot.n))
+    steps = [max(1, len(s.t) // _LOOKED_AT) for s in signals]
+    found = evidence_by_run(
+        [effect.columns(s.every(step)) for s, step in zip(signals, steps, strict=True)],
+        [r[::step, rows] for r, step in zip(residuals, steps, strict=True)],
+        unit_of,
+        kind.parameters[0].nonnegative,
+    )
+    return [kind(place, {}, tuple(trained[k] for k in chosen)) for chosen in run_sets(found)]
+
+
+def _shaped_in_runs(
+    kind: type[Effect],
+    robot: Robot,
+    place: tuple[int, ...],
+    motion: tuple[Sequence[Signals], Sequence[Array]],
+    units: tuple[Sequence[str], Sequence[int]],
+) -> list[Effect]:
+    """The runs and shapes that explain most of the residual, a few of all."""
+    found: list[tuple[float, Effect]] = []
+    for number, run in enumerate(units[0]):
+        own = [i for i, unit in enumerate(units[1]) if unit == number]
+        signals, residuals = [motion[0][i] for i in own], [motion[1][i] for i in own]
+        for shape in kind.tuned(robot, place, signals, residuals):
+            effect = kind(place, shape, (run,))
+            rows = list(effect.rows(robot.n))
+            evidence = evidence_by_run(
+                [effect.columns(s) for s in signals],
+                [r[:, rows] for r in residuals],
+                [0] * len(own),
+                False,
+            )
+            found.append((evidence.energy([0]), effect))
+    found.sort(key=lambda each: -each[0])
+    return [effect for _, effect in found[:MOST]]
 
 
 def with_columns(
@@ -182,17 +205,19 @@ def with_columns(
     alike: dict[tuple[int, ...], list[int]] = {}
     for i, (effect, _) in enumerate(effects):
         alike.setdefault(effect.rows(n), []).append(i)
-    found: dict[int, Candidate] = {}
-    for rows, members in alike.items():
-        own = [effects[i][0] for i in members]
-        parts = [_filtered(own, rows, *pair) for pair in zip(signals, runs, strict=True)]
-        for i, *blocks in zip(members, *parts, strict=True):
-            if any(np.abs(block).max(initial=0.0) > 0 for block in blocks) and all(
-                np.isfinite(block).all() for block in blocks
-            ):
-                effect, tests = effects[i]
-                found[i] = Candidate(effect, rows, tuple(blocks), tests)
-    return [found[i] for i in sorted(found)]
+    columns: list[list[Array]] = [[] for _ in effects]
+    for signal, run in zip(signals, runs, strict=True):
+        for rows, members in alike.items():
+            blocks = _filtered([effects[i][0] for i in members], rows, signal, run)
+            for i, block in zip(members, blocks, strict=True):
+                columns[i].append(block)
+        signal.body.forget()
+    return [
+        Candidate(effect, effect.rows(n), tuple(blocks), tests)
+        for (effect, tests), blocks in zip(effects, columns, strict=True)
+        if any(np.abs(block).max(initial=0.0) > 0 for block in blocks)
+        and all(np.isfinite(block).all() for block in blocks)
+    ]
 
 
 def _filtered(
@@ -201,7 +226,7 @@ def _filtered(
     """Columns (M, len(rows), p) in one run of effects on the same rows, filtered together."""
     present = [i for i, effect in enumerate(effects) if effect.active(signals.run)]
     size = run.averages.shape[0], len(rows)
-    found = [np.zeros((*size, len(effect.parameters))) for effect in effects]
+    found = [np.broadcast_to(0.0, (*size, len(effect.parameters))) for effect in effects]
     for some in _portions(present):
         columns = [effects[i].columns(signals) for i in some]
         ends = np.cumsum([block.shape[2] for block in columns])

@@ -11,12 +11,7 @@ from scipy.linalg import cholesky
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import Alias, aliases_of
-from excite_cli.diagnosis.before_after import (
-    both_models,
-    on_sealed,
-    sealed_runs,
-    training_traces,
-)
+from excite_cli.diagnosis.before_after import Played, both_models, on_sealed, training_traces
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.correlated_covariance import covariance_of
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
@@ -104,7 +99,7 @@ def diagnose(
     unexplained, dependence = _unexplained(traced, robot)
     doubts = approximations(traced, unexplained, robot.joint_names)
     models = both_models(model, traced, parameters)
-    sealed_data = sealed_runs(robot, [prepare(run, processing) for run in parts.sealed])
+    sealed_data = Played(robot, [prepare(run, processing) for run in parts.sealed])
     sealed_part = on_sealed(sealed_data, models)
     worth = worth_on_sealed(sealed_data, model, traced, models[1])
     named, rivals = _named(model, traced, parameters, covariance, doubts, worth)

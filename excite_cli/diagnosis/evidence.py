@@ -2,7 +2,9 @@
 
 Columns are [inertial | declared effects | candidates | torque], rows whitened. A Gram matrix is
 kept per fold and joint; their sums give the residual energy, the gain of any candidate, and the
-error on any fold left out, each by solves of the size of the model.
+error on any fold left out, each by solves of the size of the model. What is there in one fold only
+(a payload of one run) cannot be known from the others: it is fitted on one side of that fold, the
+rest of the model held, and judged on the other.
 
 With N = G_SS + Λ (Λ the precision of a prior on the inertial columns, if there is one) and a
 candidate c, the Schur complement Z = G_cc − G_cS N⁻¹ G_Sc is what is left of the candidate once the
@@ -27,6 +29,9 @@ ABSORBED = 1e-3
 SHARED = 1e-7
 _COLLINEAR = 1e-9
 _RIDGE = 1e-11
+_RIDGE_ALONE = 1e-6  # of its own energy: half a run may not determine all that a run does
+# Where the other side of a fold has less of such a column than this share, both sides fit it.
+_LEAST_SIDE = 0.1
 _KEPT = 6  # projections that are kept: a step of a search asks for the same few again
 
 
@@ -69,6 +74,7 @@ class Evidence:
         self._solved: dict[tuple[int, ...], Array] = {}
         self._schurs: dict[tuple[int, ...], Schur] = {}
         self._bases: dict[int, Array] = {}
+        self._seen = grams.seen()[:, :-1] > 0.0
 
     @property
     def torque(self) -> int:
@@ -142,26 +148,71 @@ class Evidence:
         return self.grams.by_fold() / np.outer(self.norms, self.norms)
 
     def _part(
-        self, folds: Sequence[int], joints: Sequence[int] | None, at: NDArray[np.intp]
+        self,
+        folds: Sequence[int],
+        joints: Sequence[int] | None,
+        at: NDArray[np.intp],
+        sides: slice = slice(None),
     ) -> Array:
         """Gram matrix (k + 1, k + 1) of some folds' rows of some joints, the torque last."""
         both = np.append(at, self.torque)
         everywhere = joints is None or len(joints) == len(self.grams.joints)
-        if everywhere and len(folds) == 1:
+        if everywhere and len(folds) == 1 and sides == slice(None):
             return np.asarray(self._folds[folds[0]][both[:, None], both])
         rows = range(len(self.grams.joints)) if joints is None else joints
         norms = self.norms[both]
-        return self.grams.on(folds, rows, both) / (norms[:, None] * norms)
+        return self.grams.on(folds, rows, both, sides) / (norms[:, None] * norms)
+
+    def folds_of(self, candidates: Sequence[int]) -> NDArray[np.bool_]:
+        """Folds (F,) in which one of some candidates is there."""
+        columns = np.concatenate([self.blocks[i] for i in candidates])
+        return np.asarray(self._seen[:, columns].any(axis=1))
 
     def left_out(self, chosen: Sequence[int], joints: Sequence[int] | None) -> Array:
-        """Energy (F,) on the rows of `joints` of each fold, fitted to all other folds."""
+        """Energy (F,) on the rows of `joints` of each fold, fitted to all other folds.
+
+        What is there in no other fold is fitted to the other side of the fold.
+        """
         key = (tuple(sorted(chosen)), None if joints is None else tuple(joints))
         if key not in self._left_out:
             at = self.columns(key[0])
             fitted = self._without_folds(at, key[0])
-            found = [_energy(self._part([fold], joints, at), x) for fold, x in enumerate(fitted)]
+            seen = self._seen[:, at]
+            alone = seen & (seen.sum(axis=0) == 1)
+            alone[:, : self.fixed] = False
+            found = []
+            for fold, x in enumerate(fitted):
+                if alone[fold].any():
+                    found.append(self._crosswise(fold, joints, at, (x, alone[fold])))
+                else:
+                    found.append(_energy(self._part([fold], joints, at), x))
             self._left_out[key] = np.maximum(found, 0.0)
         return self._left_out[key]
+
+    def _crosswise(
+        self,
+        fold: int,
+        joints: Sequence[int] | None,
+        at: NDArray[np.intp],
+        fitted: tuple[Array, NDArray[np.bool_]],
+    ) -> float:
+        """Energy of a fold's two sides, with what is there alone fitted to the other side."""
+        common, alone = fitted
+        parts = [self._part([fold], None, at, slice(side, side + 1)) for side in (0, 1)]
+        own = np.flatnonzero(alone)
+        energies = np.array([np.diag(part)[own].sum() for part in parts])
+        energy = 0.0
+        for side in (0, 1):
+            x, other = common.copy(), parts[1 - side]
+            if energies[1 - side] < _LEAST_SIDE * energies.sum():
+                other = parts[0] + parts[1]
+            x[own] = 0.0
+            rhs = other[own, -1] - other[own, :-1] @ x
+            normal = other[np.ix_(own, own)]
+            normal[np.diag_indices(len(own))] += _RIDGE_ALONE * np.diag(normal) + _RIDGE
+            x[own] = np.linalg.solve(normal, rhs)
+            energy += _energy(self._part([fold], joints, at, slice(side, side + 1)), x)
+        return energy
 
     def _without_folds(self, at: NDArray[np.intp], chosen: tuple[int, ...]) -> Array:
         """Parameters (F, k) fitted to all folds but one."""

@@ -1,7 +1,8 @@
 """Gram matrices per joint and fold, of those columns only that show in the joint's rows.
 
 Most candidates act on one joint: of all columns, a joint's rows hold a third or less, and what is
-zero is neither stored nor added.
+zero is neither stored nor added. Every fold has two sides, blocks of time in turn: what belongs to
+a run alone is fitted on one side of it and judged on the other.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from excite_cli.robot.model import Array
 
 @dataclass(frozen=True)
 class JointGram:
-    """Of the rows of one joint: `active` (A,) its columns in all, `own` (F, A + 1, A + 1).
+    """Of the rows of one joint: `active` (A,) its columns in all, `own` (F, 2, A + 1, A + 1).
 
     The torque is the last column of `own`, and not among the `active`.
     """
@@ -55,10 +56,23 @@ class Grams:
 
     def _add(self, to: Array, fold: int) -> None:
         for joint, active in zip(self.joints, self._active, strict=True):
-            to[np.ix_(active, active)] += joint.own[fold]
+            to[np.ix_(active, active)] += joint.own[fold].sum(axis=0)
 
-    def on(self, folds: Sequence[int], joints: Sequence[int], at: NDArray[np.intp]) -> Array:
-        """Sum (k, k) over some folds and the rows of `joints`, of the columns `at` (k,)."""
+    def seen(self) -> Array:
+        """Energy (F, K) of every column in every fold."""
+        found = np.zeros((self.folds, self.size))
+        for joint, active in zip(self.joints, self._active, strict=True):
+            found[:, active] += np.einsum("fskk->fk", joint.own)
+        return found
+
+    def on(
+        self,
+        folds: Sequence[int],
+        joints: Sequence[int],
+        at: NDArray[np.intp],
+        sides: slice = slice(None),
+    ) -> Array:
+        """Sum (k, k) over some folds' `sides` and rows of `joints`, of the columns `at` (k,)."""
         places = []
         for j in joints:
             position = self._position[j, at]
@@ -68,7 +82,7 @@ class Grams:
         found = np.zeros((len(at), len(at)))
         for fold in folds:
             for j, own, to in places:
-                part = self.joints[j].own[fold][own]
+                part = self.joints[j].own[fold, sides][:, *own].sum(axis=0)
                 if len(part) == len(at):
                     found += part
                 else:
@@ -77,4 +91,4 @@ class Grams:
 
     def torque_energy(self, joint: int) -> float:
         """Energy of the torque itself on a joint's rows."""
-        return float(self.joints[joint].own[:, -1, -1].sum())
+        return float(self.joints[joint].own[:, :, -1, -1].sum())

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate, Place
@@ -136,12 +137,11 @@ class Judgement:
         joints = sorted({j for i in added for j in self.white.rows_of[i]})
         best = -np.inf
         for evidence in (self.plain, self.white):
-            if any(self.candidates[i].effect.runs for i in added):
-                before = evidence.energy_on(chosen, joints)
-                after = evidence.energy_on([*chosen, *added], joints)
-            else:
-                before = evidence.left_out(chosen, joints).sum()
-                after = evidence.left_out([*chosen, *added], joints).sum()
+            there: NDArray[np.bool_] | slice = slice(None)
+            if all(self.candidates[i].effect.runs for i in added):
+                there = evidence.folds_of(added)
+            before = evidence.left_out(chosen, joints)[there].sum()
+            after = evidence.left_out([*chosen, *added], joints)[there].sum()
             best = max(best, 1.0 - float(np.sqrt(after / max(before, 1e-300))))
         return best
 

@@ -1,7 +1,7 @@
 """Torque that a fitted model predicts for a prepared run, and its errors."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns
+from excite_cli.identification.regression import effect_columns, with_carried
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 
@@ -40,6 +40,7 @@ def predicted(
     total = load
     for _ in range(_SETTLED):
         signals = Signals(t, body.q, body.v, body.a, load, torque, body, run)
+        signals = replace(with_carried(signals, effects, values), torque=torque)
         columns = effect_columns(effects, signals)
         total = load + columns @ values
         if not len(effects):

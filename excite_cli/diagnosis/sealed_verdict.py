@@ -81,7 +81,7 @@ def removed_in_draws(
         return np.zeros(0)
     # The torque's size is not drawn anew: few blocks may hold next to none of a joint's.
     moved = size.any(axis=0)
-    whole, draws = size.sum(axis=0)[moved], drawn_blocks(np.count_nonzero(moves))
+    whole, draws = size.sum(axis=0)[moved], drawn_blocks(int(np.count_nonzero(moves)))
     relative = [np.sqrt(draws @ each[moves][:, moved] / whole) for each in (worse, better)]
     return np.asarray((relative[0] - relative[1]).mean(axis=1))
 

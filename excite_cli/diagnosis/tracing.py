@@ -161,15 +161,18 @@ def _one_pass(
     candidates: list[Candidate] = []
     if spec.rounds:
         # Kinds that are searched on the residual must see what the last search gave to one of them.
+        # Likewise the runs of what is in some of them only.
         plain_kinds = np.repeat(
-            [effect.tier != Tier.LAST for effect in effects],
+            [effect.tier != Tier.LAST and not effect.runs for effect in effects],
             [len(effect.parameters) for effect in effects],
         )
         steady = [body.signals(fit.phi, effects, fit.values * plain_kinds) for body in bodies]
         raw = [body.run.tau_raw - s.torque for body, s in zip(bodies, steady, strict=True)]
         found = {(e.kind, e.joints, e.runs): e for e in fit.effects}
         shapes = {
-            place: shapes_around(effect, signals) for place, effect in found.items() if effect.shape
+            place: shapes_around(effect, signals) if effect.shape else [{}]
+            for place, effect in found.items()
+            if effect.shape or effect.runs
         }
         possible = possible_effects(
             spec, model.robot, model.declared, signals, raw, run_names, shapes

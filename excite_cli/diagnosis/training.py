@@ -2,16 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.grams import Grams, JointGram
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
+
+# Blocks of a run whose samples are fitted and judged in turn; short runs have four at least.
+_BLOCK = 1.0  # s
+_FEWEST_BLOCKS = 4
 
 
 class Columns(Protocol):
@@ -48,6 +54,11 @@ class TrainingData:
     def n(self) -> int:
         """Number of joints."""
         return int(self.tau[0].shape[1])
+
+    @cached_property
+    def sides(self) -> tuple[NDArray[np.bool_], ...]:
+        """Which side (M,) of its fold every sample is on: blocks of time in turn."""
+        return tuple(_sides(run.averaged(run.t)) for run in self.runs)
 
     def columns(
         self, candidates: Sequence[Columns], chosen: Sequence[int], part: int, joint: int
@@ -96,13 +107,16 @@ class TrainingData:
         active = np.concatenate(
             [np.arange(fixed), *(np.arange(starts[i], starts[i + 1]) for i in touching)]
         ).astype(np.intp)
-        own = np.zeros((max(self.folds) + 1, len(active) + 1, len(active) + 1))
+        own = np.zeros((max(self.folds) + 1, 2, len(active) + 1, len(active) + 1))
         for part, fold in enumerate(self.folds):
             columns = self.columns(candidates, touching, part, joint)
             x = np.hstack([columns, self.tau[part][:, joint, None]])
             clean = noise.clean(self.runs[part].usable[:, joint])
-            white = noise.whitened(x, joint)[clean]
-            own[fold] += white.T @ white
+            white = noise.whitened(x, joint)
+            second = self.sides[part][noise.order :]
+            for side, there in enumerate((clean & ~second, clean & second)):
+                rows = white[there]
+                own[fold, side] += rows.T @ rows
         return JointGram(active, own)
 
     def residuals(
@@ -121,3 +135,9 @@ class TrainingData:
                 at += candidate.width
             found.append(residual)
         return found
+
+
+def _sides(t: Array) -> NDArray[np.bool_]:
+    span = float(t[-1] - t[0])
+    block = max(min(_BLOCK, span / _FEWEST_BLOCKS), 1e-12)
+    return np.asarray(np.floor((t - t[0]) / block) % 2 > 0.5)

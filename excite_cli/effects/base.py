@@ -88,6 +88,7 @@ class Effect(ABC):
     defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
+    carried: ClassVar[bool] = False  # a body: its torque is part of the load of the joints
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
     why_not_excitable: ClassVar[str] = ""
 

@@ -42,6 +42,7 @@ class Payload(Effect):
     )
     defaults: ClassVar[Mapping[str, float]] = {"cx": 0.0, "cy": 0.0, "cz": 0.05, "radius": _RADIUS}
     per_run: ClassVar = True
+    carried: ClassVar = True
     usual: ClassVar = True
 
     def build_into(

@@ -27,6 +27,7 @@ from excite_cli.identification.regression import (
     RunColumns,
     effect_columns,
     signals_of,
+    with_carried,
 )
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.record import Shown
@@ -98,9 +99,10 @@ class Fit(Shown):
 
     def predict_raw(self, run: RunColumns, robot: Robot) -> tuple[Array, Array]:
         """Rigid-body torque and τ̂ (T, n) at the working rate, not averaged."""
-        signals = signals_of(run.prepared, robot, self.phi)
         values = self.values[self.rank :]
-        return signals.load, signals.load + effect_columns(self.effects, signals) @ values
+        signals = signals_of(run.prepared, robot, self.phi)
+        columns = effect_columns(self.effects, with_carried(signals, self.effects, values))
+        return signals.load, signals.load + columns @ values
 
     def _part(self, index: int) -> slice:
         first = self.rank + sum(len(e.parameters) for e in self.effects[:index])
@@ -161,7 +163,7 @@ def _settled(
             break
         before = [run.effects @ linear.x[base.rank :] for run in regression.runs]
         phi = completion.completed(base, linear.x[: base.rank])
-        regression = rebuilt(regression, phi)
+        regression = rebuilt(regression, phi, linear.x[base.rank :])
         after = [run.effects @ linear.x[base.rank :] for run in regression.runs]
         change = float(np.linalg.norm(np.concatenate(after) - np.concatenate(before)))
         if change <= _SETTLED * max(float(np.linalg.norm(np.concatenate(before))), 1e-12):
@@ -186,11 +188,12 @@ def follows_model(regression: Regression) -> bool:
     return not np.allclose(one, other, rtol=1e-9, atol=1e-12)
 
 
-def rebuilt(regression: Regression, phi: Array) -> Regression:
-    """The effects' columns again, with the rigid body at `phi`."""
+def rebuilt(regression: Regression, phi: Array, values: Array) -> Regression:
+    """The effects' columns again, with the rigid body at `phi` and effects of `values`."""
     runs = []
     for run in regression.runs:
         signals: Signals = signals_of(run.prepared, regression.robot, phi)
+        signals = with_carried(signals, regression.effects, values)
         columns = effect_columns(regression.effects, signals)
         runs.append(replace(run, effects=run.prepared.averaged_for_fit(columns)))
     return replace(regression, runs=tuple(runs))

@@ -96,7 +96,8 @@ def identify(
     tell("errors on the sealed part")
     held_out = _regression(robot, base, effects, parts.sealed, processing)
     if follows_model(training):
-        training, held_out = rebuilt(training, found.phi), rebuilt(held_out, found.phi)
+        values = found.values[found.rank :]
+        training, held_out = (rebuilt(r, found.phi, values) for r in (training, held_out))
     tell("closed-loop bias")
     hausman = _hausman(training, dataset, parts, processing, found, (sealed, spec.diagnosis.block))
     floor = noise_floor(parts.training, processing)

@@ -1,7 +1,7 @@
 """The regression: torque and the columns that explain it, filtered and decimated alike."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,19 @@ def signals_of(prepared: PreparedRun, robot: Robot, phi: Array | None = None) ->
         prepared.t, prepared.q, prepared.v, prepared.a, body.load, body.load, body,
         prepared.run,
     )  # fmt: skip
+
+
+def with_carried(signals: Signals, effects: Sequence[Effect], values: Array) -> Signals:
+    """The same, with the bodies among `effects` in load and torque: gears carry them, too."""
+    if not any(effect.carried for effect in effects):
+        return signals
+    carried, at = np.zeros_like(signals.load), 0
+    for effect in effects:
+        width = len(effect.parameters)
+        if effect.carried:
+            carried += effect.torque(signals, values[at : at + width])
+        at += width
+    return replace(signals, load=signals.load + carried, torque=signals.torque + carried)
 
 
 def effect_columns(effects: Sequence[Effect], signals: Signals) -> Array:

@@ -14,6 +14,7 @@ from excite_cli.measurement.run_identity import Part, RunId
 # A single run is cut into about this many blocks of one to two seconds; every third is sealed.
 _BLOCKS, _SHORTEST, _LONGEST = 9, 1.0, 2.0
 _EVERY = 3
+_MOST_FOLDS = 8
 
 
 @dataclass(frozen=True)
@@ -81,11 +82,14 @@ def _from_start(run: Run) -> Run:
 
 
 def _folds(training: list[Run]) -> tuple[int, ...]:
-    """A fold for each recording; of a single one, for each of its parts."""
+    """A fold for each recording, of a single one for each of its parts; in turn, if they are many.
+
+    Time and memory of a diagnosis grow with the folds.
+    """
     names = list(dict.fromkeys(run.name for run in training))
     if len(names) == 1:
-        return tuple(range(len(training)))
-    return tuple(names.index(run.name) for run in training)
+        return tuple(i % _MOST_FOLDS for i in range(len(training)))
+    return tuple(names.index(run.name) % _MOST_FOLDS for run in training)
 
 
 def _blocks(run: Run, block: float | None) -> Split:

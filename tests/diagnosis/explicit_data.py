@@ -101,7 +101,7 @@ def autoregression() -> NoiseModel:
 
 @dataclass(frozen=True)
 class Rows:
-    """All whitened rows: x (N, columns), y (N,), fold and joint (N,) of each; blocks of columns."""
+    """All whitened rows: x (N, columns), y (N,), fold, joint and side (N,); blocks of columns."""
 
     x: Array
     y: Array
@@ -109,6 +109,7 @@ class Rows:
     joint: np.ndarray
     blocks: list[np.ndarray]
     prior: Array
+    side: np.ndarray
 
     def fitted(self, chosen: Sequence[int], kept: np.ndarray | None = None) -> Array:
         """Least squares (with the prior as rows of their own) of the model on the rows kept."""
@@ -139,15 +140,35 @@ class Rows:
         found = []
         for fold in range(max(FOLDS) + 1):
             theta = self.fitted(chosen, self.fold != fold)
-            rows = (self.fold == fold) & np.isin(self.joint, joints)
-            rest = self.y[rows] - self.x[rows][:, self.columns(chosen)] @ theta
-            found.append(float(rest @ rest))
+            energy = 0.0
+            for side in (False, True):
+                here = (self.fold == fold) & (self.side == side)
+                own = self._refitted(chosen, theta, fold, self.side != side)
+                rows = here & np.isin(self.joint, joints)
+                rest = self.y[rows] - self.x[rows][:, self.columns(chosen)] @ own
+                energy += float(rest @ rest)
+            found.append(energy)
         return found
+
+    def _refitted(
+        self, chosen: Sequence[int], theta: np.ndarray, fold: int, side: np.ndarray
+    ) -> np.ndarray:
+        """What is there in this fold alone, fitted to one side of it, all else held."""
+        at = self.columns(chosen)
+        there = np.array([np.any(self.x[self.fold != fold][:, k] != 0) for k in at])
+        alone = ~there & (np.arange(len(at)) >= FIXED)
+        if not alone.any():
+            return theta
+        rows = (self.fold == fold) & side
+        kept = np.where(alone, 0.0, theta)
+        rest = self.y[rows] - self.x[rows][:, at] @ kept
+        kept[alone] = np.linalg.lstsq(self.x[rows][:, at[alone]], rest, rcond=None)[0]
+        return kept
 
     def projected(self, column: int, chosen: Sequence[int]) -> float:
         """Energy of a column that the model cannot imitate, as a share of all of it."""
         changed = Rows(
-            self.x, self.x[:, column], self.fold, self.joint, self.blocks, self.prior
+            self.x, self.x[:, column], self.fold, self.joint, self.blocks, self.prior, self.side
         )  # fmt: skip
         whole = float(self.x[:, column] @ self.x[:, column])
         return changed.energy(chosen, with_prior=True) / whole
@@ -158,7 +179,7 @@ def rows_of(data: TrainingData, candidates: Sequence[Candidate], noise: NoiseMod
     order = max(len(c) for c in noise.coefficients)
     starts = FIXED + np.cumsum([0, *(c.width for c in candidates)])
     blocks = [np.arange(starts[i], starts[i + 1]) for i in range(len(candidates))]
-    x, y, folds, joints = [], [], [], []
+    x, y, folds, joints, sides = [], [], [], [], []
     for part, fold in enumerate(data.folds):
         samples = len(data.tau[part])
         full = np.zeros((samples, data.n, int(starts[-1])))
@@ -179,5 +200,8 @@ def rows_of(data: TrainingData, candidates: Sequence[Candidate], noise: NoiseMod
                 y.append(torque / noise.sigma[joint])
                 folds.append(fold)
                 joints.append(joint)
+                sides.append(data.sides[part][t])
     prior = np.zeros(FIXED) if data.prior_precision is None else data.prior_precision
-    return Rows(np.array(x), np.array(y), np.array(folds), np.array(joints), blocks, prior)
+    return Rows(
+        np.array(x), np.array(y), np.array(folds), np.array(joints), blocks, prior, np.array(sides)
+    )  # fmt: skip

@@ -53,15 +53,16 @@ def test_errors_on_folds_left_out(
     )
 
 
-def test_an_effect_of_one_fold_predicts_nothing_where_that_fold_is_left_out(
-    both: tuple[Evidence, Rows],
+@pytest.mark.parametrize("chosen", [(4,), (0, 4), (1, 3, 4)])
+def test_an_effect_of_one_fold_is_fitted_on_one_side_of_it_and_judged_on_the_other(
+    both: tuple[Evidence, Rows], chosen: tuple[int, ...]
 ) -> None:
-    """Its parameter cannot be known there: it is zero, and no rounding of the sums is taken."""
     evidence, rows = both
-    found, expected = evidence.left_out((4,), [0]), rows.left_out((4,), [0])
-    without = rows.left_out((), [0])
-    assert found == pytest.approx(expected, rel=1e-3)
-    assert found[1] == pytest.approx(without[1], rel=1e-3)
+    for joints in ([0], [0, 1]):
+        found, expected = evidence.left_out(chosen, joints), rows.left_out(chosen, joints)
+        assert found == pytest.approx(expected, rel=1e-4)
+    assert evidence.folds_of([4]).tolist() == [False, True, False]
+    assert evidence.folds_of([0, 4]).all()
 
 
 @pytest.mark.parametrize("chosen", [(), (0,), (1, 2)])

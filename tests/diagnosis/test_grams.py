@@ -12,23 +12,24 @@ FOLDS, SIZE = 3, 7
 
 @pytest.fixture
 def both() -> tuple[Grams, np.ndarray]:
-    """And in full, (F, n, K, K)."""
+    """And in full, (F, 2, n, K, K)."""
     rng = np.random.default_rng(4)
-    full = np.zeros((FOLDS, 3, SIZE, SIZE))
+    full = np.zeros((FOLDS, 2, 3, SIZE, SIZE))
     joints = []
     for j, active in enumerate(([0, 1, 2], [0, 1, 4, 5], [0, 1])):
-        own = rng.normal(size=(FOLDS, len(active) + 1, len(active) + 1))
+        own = rng.normal(size=(FOLDS, 2, len(active) + 1, len(active) + 1))
         at = np.array([*active, SIZE - 1])
-        full[:, j, at[:, None], at] = own
+        full[:, :, j, at[:, None], at] = own
         joints.append(JointGram(np.array(active), own))
     return Grams(joints, SIZE), full
 
 
 def test_sums_over_folds_and_joints(both: tuple[Grams, np.ndarray]) -> None:
     grams, full = both
-    assert grams.total() == pytest.approx(full.sum(axis=(0, 1)))
-    assert grams.by_fold() == pytest.approx(full.sum(axis=1))
-    assert grams.torque_energy(1) == pytest.approx(full[:, 1, -1, -1].sum())
+    assert grams.total() == pytest.approx(full.sum(axis=(0, 1, 2)))
+    assert grams.by_fold() == pytest.approx(full.sum(axis=(1, 2)))
+    assert grams.seen() == pytest.approx(np.einsum("fsjkk->fk", full))
+    assert grams.torque_energy(1) == pytest.approx(full[:, :, 1, -1, -1].sum())
 
 
 @pytest.mark.parametrize("at", [[0, 1, 6], [0, 1, 4, 6], [2, 3, 5, 6]])
@@ -38,8 +39,9 @@ def test_columns_on_some_rows(
 ) -> None:
     grams, full = both
     for folds in ([1], [0, 2]):
-        wanted = full[np.ix_(folds, joints, at, at)].sum(axis=(0, 1))
-        assert grams.on(folds, joints, np.array(at)) == pytest.approx(wanted)
+        for sides in (slice(None), slice(0, 1), slice(1, 2)):
+            wanted = full[:, sides].sum(axis=1)[np.ix_(folds, joints, at, at)].sum(axis=(0, 1))
+            assert grams.on(folds, joints, np.array(at), sides) == pytest.approx(wanted)
 
 
 def test_joints_that_are_known_need_not_be_summed_again() -> None:

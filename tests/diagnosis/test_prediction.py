@@ -15,8 +15,10 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.load_dependent_friction import LoadDependentFriction
 from excite_cli.effects.payload import Payload
+from excite_cli.effects.sign import smooth_sign
 from excite_cli.effects.torque_delay import TorqueDelay
 from excite_cli.effects.viscous_friction import ViscousFriction
+from excite_cli.identification.fit import rebuilt
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.regression import build_regression
@@ -69,11 +71,27 @@ def test_prediction_is_columns_times_parameters(robot: Robot, runs: list[Prepare
     kinds = effects()
     values = rng.uniform(0.1, 0.5, sum(len(e.parameters) for e in kinds))
     regression = build_regression(robot, find_base_parameters(robot), kinds, runs, phi)
+    regression = rebuilt(regression, phi, values)  # the payload is part of the load
     for run, columns in zip(runs, regression.runs, strict=True):
         tau = torque(robot, phi, kinds, values, run, run.run)
         assert tau.shape == run.q.shape
         modelled = columns.inertial @ phi + columns.effects @ values
         assert run.averaged_for_fit(tau) == pytest.approx(modelled, rel=1e-9, abs=1e-9)
+
+
+def test_gears_carry_the_payload_too(robot: Robot, runs: list[PreparedRun]) -> None:
+    phi = standard_parameters(robot)
+    run, (payload, friction) = runs[0], (Payload((0, 1, 2)), LoadDependentFriction((1,)))
+    mass, ratio = np.array([2.0, 0.0, 0.0, 0.1, 0.01, 0.0, 0.01, 0.0, 0.0, 0.01]), np.array([0.2])
+    alone, carrying = (
+        torque(robot, phi, kinds, values, run, run.run)
+        for kinds, values in (
+            ((payload,), mass),
+            ((payload, friction), np.append(mass, ratio)),
+        )
+    )
+    sign = smooth_sign(run.v[:, 1])
+    assert carrying[:, 1] - alone[:, 1] == pytest.approx(0.2 * np.abs(alone[:, 1]) * sign)
 
 
 def test_an_effect_acts_in_its_runs_by_the_name_that_is_given(
