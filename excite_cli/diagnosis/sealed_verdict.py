@@ -94,7 +94,7 @@ def _moving_sums(
         block_sums(run.tau, run.averaged(each.torque), run.valid, run.moving, run.step, block)
         for run, each in zip(runs, predictions, strict=True)
     ]
-    _, _, wrong, size, _ = np.concatenate(sums, axis=1)
+    wrong, size = np.concatenate(sums, axis=1)[2:4]
     return wrong, size
 
 
