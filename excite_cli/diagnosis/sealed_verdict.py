@@ -96,7 +96,7 @@ def _moving_sums(
         )
         for run, each in zip(runs, predictions, strict=True)
     ]
-    _, _, wrong, size, *_ = np.concatenate(sums, axis=1)
+    wrong, size = np.concatenate(sums, axis=1)[2:4]
     return wrong, size
 
 
