@@ -224,18 +224,23 @@ class Effect(ABC):
         low = np.where(signs, 0.0, -np.inf)
         return np.asarray(lsq_linear(whiten, whiten @ values, (low, np.inf), method="bvls").x)
 
-    def may_be(self, values: Array, covariance: Array, early: bool) -> bool:
-        """Whether values that physics allows are as near as the error of the fit makes likely.
+    def why_impossible(self, values: Array, covariance: Array, early: bool) -> str:
+        """Why values that are not `possible` cannot be the error of the fit; empty if they can.
 
-        Refused where the χ² distance is one that chance exceeds in 1 % of all cases, if it is
-        also more than the share `forgiven` of all that the effect explains.
+        They cannot where the χ² distance to possible ones is one that chance exceeds in 1 % of all
+        cases, if it is also more than the share `forgiven` of all that the effect explains; and
+        what is then left of the effect must be more than its error.
         """
         near = self.nearest(values, covariance)
         if not self.possible(near, early):
-            return False
+            return self.why_not(values)
         whiten = np.linalg.inv(half_of(covariance))
         far, whole = (float(np.square(whiten @ x).sum()) for x in (values - near, values))
-        return far <= max(_unlikely(len(values)), self.forgiven * whole)
+        if far > max(_unlikely(len(values)), self.forgiven * whole):
+            return self.why_not(values)
+        if self.over_error(near, covariance) <= 1.0:
+            return f"{self.why_not(values)}, and with another sign it is nothing"
+        return ""
 
     def absurd(self, values: Array, seen: Seen) -> str:
         """Why values that could be are absurd on the robot that was `seen`; empty if they are not.

@@ -59,10 +59,18 @@ def test_friction_and_inertia_are_never_negative(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", NONNEGATIVE)
-def test_a_sign_that_may_be_the_error_of_the_fit_is_no_reason(kind: str) -> None:
-    assert possible(kind, -0.1, error=1.0)
-    assert possible(kind, -2.3, error=1.0)
-    assert not possible(kind, -2.4, error=1.0)
+def test_a_wrong_sign_within_the_error_is_nothing(kind: str) -> None:
+    spread = np.eye(1)
+    judge = PossibleSizes([candidate(kind)], False, lambda _: spread, LARGE)
+    assert "it is nothing" in judge.why_not(np.array([-0.1]), [0], [0])
+    assert "it is nothing" in judge.why_not(np.array([-2.3]), [0], [0])
+    assert judge.why_not(np.array([-2.4]), [0], [0]).endswith("cannot be negative")
+
+
+def test_one_of_several_parameters_may_have_the_wrong_sign_by_the_error_of_the_fit() -> None:
+    assert possible("coupled_friction", -1.0, 20.0, joints=(0, 1), error=1.0)
+    assert not possible("coupled_friction", -4.0, 20.0, joints=(0, 1), error=1.0)
+    assert not possible("coupled_friction", -1.0, 1.0, joints=(0, 1), error=1.0)
 
 
 def test_a_payload_is_refused_where_no_body_is_near() -> None:
@@ -76,7 +84,7 @@ def test_a_payload_is_refused_where_no_body_is_near() -> None:
     assert not possible("payload", -2.7, *sphere[1:], error=0.1)
     plate = [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 5.0]  # no sign is wrong
     assert not possible("payload", *plate, error=0.01)
-    assert possible("payload", *plate, error=2.0)
+    assert not possible("payload", *plate, error=2.0)  # and within the error, it is nothing
 
 
 @pytest.mark.parametrize(
