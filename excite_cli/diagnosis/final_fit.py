@@ -3,8 +3,8 @@
 What a search has named is fitted once more (`robust_solve`), with standard deviations that respect
 serial correlation and what the columns of first-order effects leave. Sizes that no effect can have
 are moved to the nearest possible ones, all other parameters with them as the covariance says. A
-name whose size is within two standard deviations of zero goes, the weakest first, and the others
-are judged anew.
+name whose size is within two standard deviations of zero goes, the weakest first, and the search
+goes on from the others without it.
 """
 
 from collections.abc import Iterator
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from excite_cli.diagnosis.candidates import Place
 from excite_cli.diagnosis.correlated_covariance import covariance_of
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.robust_fit import robust_solve
@@ -32,6 +33,7 @@ class FinalFit:
 
 def final_fit(traced: Traced) -> FinalFit:
     """Fit what was found, without what turns out to be insignificant."""
+    closed: set[Place] = set()
     while True:
         found = _fitted(traced)
         sizes = _over_error(found)
@@ -39,7 +41,9 @@ def final_fit(traced: Traced) -> FinalFit:
         if weakest is None or sizes[weakest] > 1.0:
             return found
         rest = [i for i in traced.chosen if i != weakest]
-        traced = replace(traced, chosen=tuple(Search(traced.judge).pruned(rest)))
+        closed.add(traced.candidates[weakest].place)
+        again = Search(traced.judge, len(traced.chosen), closed).run(rest)
+        traced = replace(traced, chosen=tuple(again))
 
 
 def _fitted(traced: Traced) -> FinalFit:
