@@ -54,9 +54,11 @@ def _fitted(traced: Traced) -> FinalFit:
     for i, own in _places(traced, len(parameters)):
         error = traced.candidates[i].effect.model_error(parameters[own])
         covariance[own, own] += np.diag(error**2)
+    lines = _lines(traced, len(parameters))
     for i, own in _places(traced, len(parameters)):
         effect, values = traced.candidates[i].effect, parameters[own]
-        if not effect.possible(values, early=False):
+        beside = np.delete(lines[own], own, axis=1).any()  # it is told with what refines it
+        if not beside and not effect.possible(values, early=False):
             whiten = np.linalg.inv(half_of(covariance[own, own]))
             shift = whiten.T @ (whiten @ (effect.nearest(values, covariance[own, own]) - values))
             parameters = parameters + covariance[:, own] @ shift
@@ -66,13 +68,17 @@ def _fitted(traced: Traced) -> FinalFit:
 def _over_error(found: FinalFit) -> dict[int, float]:
     """Size over error of every effect that was found, as it is told."""
     traced, count = found.traced, len(found.parameters)
-    start = count - sum(traced.candidates[i].width for i in traced.chosen)
-    lines = friction_lines(traced, start)
+    lines = _lines(traced, count)
     shown, spread = lines @ found.parameters, lines @ found.covariance @ lines.T
     return {
         i: traced.candidates[i].effect.over_error(shown[own], spread[own, own])
         for i, own in _places(traced, count)
     }
+
+
+def _lines(traced: Traced, count: int) -> Array:
+    """Parameters as they are told, times all `count` of them."""
+    return friction_lines(traced, count - sum(traced.candidates[i].width for i in traced.chosen))
 
 
 def _places(traced: Traced, count: int) -> Iterator[tuple[int, slice]]:
