@@ -9,7 +9,6 @@ from excite_cli.diagnosis.declared_model import Model, width_of
 from excite_cli.diagnosis.prediction import Prediction, errors_on, predicted
 from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.tracing import Traced
-from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect
 from excite_cli.identification.errors_of_torque import Errors
@@ -54,17 +53,14 @@ def training_traces(
     robot: Robot, models: tuple[FittedModel, FittedModel], traced: Traced
 ) -> tuple[TorqueTrace, ...]:
     """Torque over time of the training parts."""
-    regressors = [signals.body.regressor for signals in traced.signals]
-    return _compared(robot, models, traced.data.runs, regressors, sealed=False)[2]
+    return _compared(robot, models, traced.data.runs, sealed=False)[2]
 
 
 def on_sealed(
     robot: Robot, models: tuple[FittedModel, FittedModel], runs: Sequence[PreparedRun]
 ) -> BeforeAfter:
     """Errors and torque over time of the sealed part, used once."""
-    cad = standard_parameters(robot)
-    regressors = [RigidBody(robot, cad, run.q, run.v, run.a).regressor for run in runs]
-    before, after, traces = _compared(robot, models, runs, regressors, sealed=True)
+    before, after, traces = _compared(robot, models, runs, sealed=True)
     return BeforeAfter(errors_on(robot, runs, before), errors_on(robot, runs, after), traces)
 
 
@@ -72,13 +68,9 @@ def _compared(
     robot: Robot,
     models: tuple[FittedModel, FittedModel],
     runs: Sequence[PreparedRun],
-    regressors: Sequence[Array],
     sealed: bool,
 ) -> tuple[list[Prediction], list[Prediction], tuple[TorqueTrace, ...]]:
-    before, after = (
-        [_predicted(robot, fitted, *pair) for pair in zip(runs, regressors, strict=True)]
-        for fitted in models
-    )
+    before, after = ([_predicted(robot, fitted, run) for run in runs] for fitted in models)
     traces = tuple(
         torque_trace(run, new.load, new.torque, old.torque, sealed)
         for run, old, new in zip(runs, before, after, strict=True)
@@ -86,8 +78,7 @@ def _compared(
     return before, after, traces
 
 
-def _predicted(robot: Robot, fitted: FittedModel, run: PreparedRun, regressor: Array) -> Prediction:
+def _predicted(robot: Robot, fitted: FittedModel, run: PreparedRun) -> Prediction:
     body = RigidBody(robot, fitted.phi, run.q, run.v, run.a)
-    body.__dict__["regressor"] = regressor  # it does not depend on φ, and takes a while
     values = fitted.values if len(fitted.effects) else np.zeros(0)
     return predicted(body, fitted.effects, values, run.t, run.run)

@@ -168,10 +168,10 @@ def _in_runs(
         return []
     effect = kind(place, {})
     rows = list(effect.rows(robot.n))
-    thin = [slice(None, None, max(1, len(s.t) // _LOOKED_AT)) for s in signals]
+    steps = [max(1, len(s.t) // _LOOKED_AT) for s in signals]
     found = evidence_by_run(
-        [effect.columns(s)[cut] for s, cut in zip(signals, thin, strict=True)],
-        [r[cut][:, rows] for r, cut in zip(residuals, thin, strict=True)],
+        [effect.columns(s.every(step)) for s, step in zip(signals, steps, strict=True)],
+        [r[::step, rows] for r, step in zip(residuals, steps, strict=True)],
         unit_of,
         kind.parameters[0].nonnegative,
     )
@@ -214,17 +214,19 @@ def with_columns(
     alike: dict[tuple[int, ...], list[int]] = {}
     for i, (effect, _) in enumerate(effects):
         alike.setdefault(effect.rows(n), []).append(i)
-    found: dict[int, Candidate] = {}
-    for rows, members in alike.items():
-        own = [effects[i][0] for i in members]
-        parts = [_filtered(own, rows, *pair) for pair in zip(signals, runs, strict=True)]
-        for i, *blocks in zip(members, *parts, strict=True):
-            if any(np.abs(block).max(initial=0.0) > 0 for block in blocks) and all(
-                np.isfinite(block).all() for block in blocks
-            ):
-                effect, tests = effects[i]
-                found[i] = Candidate(effect, rows, tuple(blocks), tests)
-    return [found[i] for i in sorted(found)]
+    columns: list[list[Array]] = [[] for _ in effects]
+    for signal, run in zip(signals, runs, strict=True):
+        for rows, members in alike.items():
+            blocks = _filtered([effects[i][0] for i in members], rows, signal, run)
+            for i, block in zip(members, blocks, strict=True):
+                columns[i].append(block)
+        signal.body.forget()
+    return [
+        Candidate(effect, effect.rows(n), tuple(blocks), tests)
+        for (effect, tests), blocks in zip(effects, columns, strict=True)
+        if any(np.abs(block).max(initial=0.0) > 0 for block in blocks)
+        and all(np.isfinite(block).all() for block in blocks)
+    ]
 
 
 def _filtered(

@@ -16,19 +16,24 @@ from excite_cli.robot.model import Array
 
 
 class ModelledRun:
-    """A run's rigid-body quantities; the regressor is computed once."""
+    """A run's rigid-body quantities; `inertial` (M, n, k): averages of the columns that are fitted.
+
+    These are all standard parameters beside a prior, and the base parameters' columns without.
+    """
 
     def __init__(self, model: Model, run: PreparedRun) -> None:
-        self.model, self.run = model, run
-        body = RigidBody(model.robot, standard_parameters(model.robot), run.q, run.v, run.a)
-        self.regressor = body.regressor
-        self._body = body
+        self.model = model
+        self._body = RigidBody(model.robot, standard_parameters(model.robot), run.q, run.v, run.a)
         self.take(run)
 
     def take(self, run: PreparedRun) -> None:
         """The same motion with other averages."""
         self.run = run
-        self.inertial = run.averaged_for_fit(self.regressor)
+        columns = self._body.regressor
+        if self.model.prior is None:
+            columns = columns[:, :, self.model.base.selection]
+        self.inertial = run.averaged_for_fit(columns)
+        self._body.forget()
 
     def signals(self, phi: Array, effects: Sequence[Effect], values: Array) -> Signals:
         """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
@@ -51,7 +56,6 @@ class ModelledRun:
         if not np.array_equal(phi, self._body.phi):
             run = self.run
             self._body = RigidBody(self.model.robot, phi, run.q, run.v, run.a)
-            self._body.__dict__["regressor"] = self.regressor
         return self._body
 
 
@@ -66,9 +70,7 @@ def training_data(
     for body, signal in zip(modelled, signals, strict=True):
         run = body.run
         inertial, tau = body.inertial, run.tau_fit
-        if model.prior is None:
-            inertial = inertial[:, :, model.base.selection]
-        else:
+        if model.prior is not None:
             tau = tau - inertial @ model.prior.mean
         effects = run.averaged_for_fit(effect_columns(model.declared, signal))
         declared.append(np.concatenate([inertial, effects], axis=2))

@@ -75,8 +75,8 @@ class RigidBody:
 
     @cached_property
     def load(self) -> Array:
-        """τ (T, n) = Y φ [N·m]."""
-        return self.regressor @ self.phi
+        """τ (T, n) = Y φ [N·m], without Y, which takes more room than all the rest."""
+        return InverseDynamics(self.robot, self._model).torques(self.q, self.v, self.a)
 
     @cached_property
     def _derivatives(self) -> tuple[Array, Array, Array]:
@@ -96,6 +96,11 @@ class RigidBody:
     def mass(self) -> Array:
         """∂τ/∂a, the joint-space inertia matrix (T, n, n)."""
         return self._derivatives[2]
+
+    def forget(self) -> None:
+        """Let go of what can be computed again: it is many times as large as the motion."""
+        for name in ("regressor", "_derivatives", "gravity_axes"):
+            self.__dict__.pop(name, None)
 
     def pull_back(self, weights: Array) -> tuple[Array, Array, Array]:
         """Derivatives by q, v, a, each (T, n), of Σ weights ∘ τ for weights (T, n)."""

@@ -1,6 +1,6 @@
 """What an effect sees of a motion, and how its derivative is handed back."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -26,6 +26,13 @@ class Signals:
     torque: Array
     body: RigidBody
     run: RunId = field(default_factory=RunId)
+
+    def every(self, step: int) -> "Signals":
+        """Every `step`-th instant."""
+        at, body = slice(None, None, step), self.body
+        thin = RigidBody(body.robot, body.phi, body.q[at], body.v[at], body.a[at])
+        series = {name: getattr(self, name)[at] for name in ("t", "q", "v", "a", "load", "torque")}
+        return replace(self, **series, body=thin)
 
     def rate(self, x: Array) -> Array:
         """dx/dt by central differences along the first axis."""
