@@ -148,8 +148,8 @@ def _noticed(
         yield Finding(
             "one run",
             "warning",
-            f"All names rest on one recording, {training[0].name}: what is left out to test them is "
-            "a part of the same motion. Record a second motion, and names that do not hold go.",
+            f"All names rest on one recording, {training[0].name}: what is left out to test them "
+            "is a part of the same motion. Record a second motion, and names that do not hold go.",
             training[0].name,
         )
 
