@@ -39,13 +39,22 @@ def test_deviations_hold_what_the_columns_of_an_effect_miss() -> None:
     assert found.covariance[-1, -1] == pytest.approx(noise + missed**2)
 
 
-def test_a_negative_size_is_moved_with_all_that_depends_on_it() -> None:
-    """Two columns that are nearly one: of one in excess and a negative other, the sum remains."""
-    effects = [one("armature"), one("coupled_friction", 0, 1)]
-    mix = np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.3]])
-    torque = np.array([[2.0, 0.0], [4.0, 4.0], [-0.01, 0.0]])
-    data, candidates = planted(effects, torque, mix)
-    found = final_fit(traced(data, candidates, (0, 1)))
-    values = found.parameters[-3:]
-    assert values.min() >= 0.0
-    assert values[0] + values[2] == pytest.approx(2.0, abs=0.1)
+def test_a_payload_is_moved_to_a_body_and_all_that_depends_on_it_too() -> None:
+    """Its Ixx is negative by the noise; the friction shares a column with it."""
+    width = 11
+    mix = np.eye(width)
+    mix[0, 5] = 1.0
+    _, body = catalogue()["payload"].planted(40.0, {"radius": 1.0, "cz": 0.0})
+    body[4] = -0.01  # as fitted, with an error of 0.05
+    torque = mix @ np.array([2.0, *body])
+    data, candidates = planted(
+        [one("viscous_friction"), one("payload")], np.outer(torque, [1.0, 0.0]), mix
+    )
+    given = traced(data, candidates, (0, 1))
+    fitted = given.judge.plain.solve((0, 1))[-width:]
+    found = final_fit(given).parameters[-width:]
+    assert fitted[5] < 0.0
+    assert candidates[1].effect.possible(found[1:], early=False)
+    # What the body has gained of the shared column, the friction has lost.
+    assert found[0] + found[5] == pytest.approx(fitted[0] + fitted[5], abs=0.05)
+    assert found[0] < fitted[0] - 0.01
