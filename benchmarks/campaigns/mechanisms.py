@@ -8,12 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from excite_cli.dynamics.pseudo_inertia import pseudo_inertias, ten_parameters
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.effects.base import Effect, Parameter, Signals
 from excite_cli.effects.sign import smooth_sign
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.true_robot import pseudo_inertia, ten_parameters
 
 
 def solid(mass: float, center: Array, rng: np.random.Generator, density: float = 1500.0) -> Array:
@@ -85,7 +85,9 @@ class MovedCenters(Effect):
             part = slice_of(robot.robot, joint)
             change = np.eye(4)
             change[:3, 3] = shift
-            robot.phi[part] = ten_parameters(change @ pseudo_inertia(robot.phi[part]) @ change.T)
+            robot.phi[part] = ten_parameters(
+                change @ pseudo_inertias(robot.phi[part])[0] @ change.T
+            )
 
     def columns(self, signals: Signals) -> Array:
         """None: it is absorbed by the inertial parameters."""

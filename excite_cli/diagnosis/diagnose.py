@@ -50,7 +50,7 @@ from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split, with_ends_sealed
 from excite_cli.identification.torque_trace import torque_units
-from excite_cli.measurement.dataset import Dataset, Finding
+from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Array, Robot
 
 Progress = Callable[[str, int], None]
@@ -123,7 +123,11 @@ def diagnose(
         before=sealed_part.before,
         after=sealed_part.after,
         rounds=rounds_of(traced, robot.joint_names),
-        findings=(*dataset.findings, *suspicious, *_noticed(assumed, floor, robot)),
+        findings=(
+            *dataset.findings,
+            *suspicious,
+            *_noticed(assumed, floor, robot, parts.training),
+        ),
         processing=_choices(processing, traced, parts, training),
         phi=model.full_inertias(parameters),
         base_values=base_values,
@@ -175,12 +179,23 @@ def _traced(
 
 
 def _noticed(
-    assumed: Sequence[Assumption], floor: NoiseFloor | None, robot: Robot
+    assumed: Sequence[Assumption],
+    floor: NoiseFloor | None,
+    robot: Robot,
+    training: Sequence[Run],
 ) -> Iterator[Finding]:
     for each in assumed:
         yield Finding("assumed", "warning", assumption_in_words(each))
     if floor is not None:
         yield from floor.noticed(robot.joint_names)
+    if len({run.name for run in training}) == 1:
+        yield Finding(
+            "one run",
+            "warning",
+            f"All names rest on one recording, {training[0].name}: what is left out to test them "
+            "is a part of the same motion. Record a second motion, and names that do not hold go.",
+            training[0].name,
+        )
 
 
 def _unexplained(traced: Traced, robot: Robot) -> tuple[list[Unexplained], Dependence]:

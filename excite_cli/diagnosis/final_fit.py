@@ -3,8 +3,8 @@
 What a search has named is fitted once more (`robust_solve`), with standard deviations that respect
 serial correlation and what the columns of first-order effects leave. Sizes that no effect can have
 are moved to the nearest possible ones, all other parameters with them as the covariance says. A
-name whose size is within two standard deviations of zero goes, the weakest first, and the others
-are judged anew.
+name whose size is within two standard deviations of zero goes, the weakest first, and the search
+goes on from the others without it.
 """
 
 from collections.abc import Iterator
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from excite_cli.diagnosis.candidates import Place
 from excite_cli.diagnosis.correlated_covariance import covariance_of
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.robust_fit import robust_solve
@@ -32,6 +33,7 @@ class FinalFit:
 
 def final_fit(traced: Traced) -> FinalFit:
     """Fit what was found, without what turns out to be insignificant."""
+    closed: set[Place] = set()
     while True:
         found = _fitted(traced)
         sizes = _over_error(found)
@@ -39,7 +41,9 @@ def final_fit(traced: Traced) -> FinalFit:
         if weakest is None or sizes[weakest] > 1.0:
             return found
         rest = [i for i in traced.chosen if i != weakest]
-        traced = replace(traced, chosen=tuple(Search(traced.judge).pruned(rest)))
+        closed.add(traced.candidates[weakest].place)
+        again = Search(traced.judge, len(traced.chosen), closed).run(rest)
+        traced = replace(traced, chosen=tuple(again))
 
 
 def _fitted(traced: Traced) -> FinalFit:
@@ -50,9 +54,11 @@ def _fitted(traced: Traced) -> FinalFit:
     for i, own in _places(traced, len(parameters)):
         error = traced.candidates[i].effect.model_error(parameters[own])
         covariance[own, own] += np.diag(error**2)
+    lines = _lines(traced, len(parameters))
     for i, own in _places(traced, len(parameters)):
         effect, values = traced.candidates[i].effect, parameters[own]
-        if not effect.possible(values, early=False):
+        beside = np.delete(lines[own], own, axis=1).any()  # it is told with what refines it
+        if not beside and not effect.possible(values, early=False):
             whiten = np.linalg.inv(half_of(covariance[own, own]))
             shift = whiten.T @ (whiten @ (effect.nearest(values, covariance[own, own]) - values))
             parameters = parameters + covariance[:, own] @ shift
@@ -62,13 +68,17 @@ def _fitted(traced: Traced) -> FinalFit:
 def _over_error(found: FinalFit) -> dict[int, float]:
     """Size over error of every effect that was found, as it is told."""
     traced, count = found.traced, len(found.parameters)
-    start = count - sum(traced.candidates[i].width for i in traced.chosen)
-    lines = friction_lines(traced, start)
+    lines = _lines(traced, count)
     shown, spread = lines @ found.parameters, lines @ found.covariance @ lines.T
     return {
         i: traced.candidates[i].effect.over_error(shown[own], spread[own, own])
         for i, own in _places(traced, count)
     }
+
+
+def _lines(traced: Traced, count: int) -> Array:
+    """Parameters as they are told, times all `count` of them."""
+    return friction_lines(traced, count - sum(traced.candidates[i].width for i in traced.chosen))
 
 
 def _places(traced: Traced, count: int) -> Iterator[tuple[int, slice]]:

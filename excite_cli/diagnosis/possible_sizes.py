@@ -13,8 +13,8 @@ class PossibleSizes:
     """Judges fitted sizes of effects.
 
     `spread(chosen)` is the covariance of the parameters of a model with these candidates; it is
-    asked for only where a value is impossible: what cannot be so, but for the error of the fit, is
-    allowed. It is not significant either. `early_pass`: of a diagnosis, which does not know the
+    asked for only where a value is impossible: what is so by the error of the fit only is allowed
+    (`Effect.why_impossible`). `early_pass`: of a diagnosis, which does not know the
     torque well yet.
     """
 
@@ -37,11 +37,11 @@ class PossibleSizes:
             if i not in added:
                 continue
             effect, values = self._candidates[i].effect, parameters[own]
-            if not effect.possible(values, self._early) and not effect.may_be(
-                values, self._spread(chosen)[own, own], self._early
-            ):
-                return effect.why_not(values)
-            if reason := effect.absurd(values, self._seen):
+            reason = effect.absurd(values, self._seen)
+            if not reason and not effect.possible(values, self._early):
+                covariance = self._spread(chosen)[own, own]
+                reason = effect.why_impossible(values, covariance, self._early)
+            if reason:
                 return reason
         return ""
 

@@ -6,10 +6,11 @@ with local ones on all rows at once: one parameter that explains many joints win
 explain one each.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from excite_cli.diagnosis.candidates import Place
 from excite_cli.diagnosis.evidence import SHARED, Schur
 from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.diagnosis.verdict import Verdict
@@ -23,14 +24,16 @@ _PAIRED = 14  # candidates of one joint that are tried in pairs
 class Search:
     """A search from the declared model for the set that is judged best."""
 
-    def __init__(self, judge: Judgement, most: int = _MOST_STEPS) -> None:
-        """`most` effects at most."""
-        self.judge, self._most = judge, most
+    def __init__(
+        self, judge: Judgement, most: int = _MOST_STEPS, closed: Collection[Place] = ()
+    ) -> None:
+        """`most` effects at most, and none at the `closed` places."""
+        self.judge, self._most, self._closed = judge, most, closed
         self.white, self.plain, self.candidates = judge.white, judge.plain, judge.candidates
 
-    def run(self) -> list[int]:
-        """Search from the declared model until no step lowers J."""
-        chosen: list[int] = []
+    def run(self, start: Sequence[int] = ()) -> list[int]:
+        """Search from the declared model, or from those of `start`, until no step lowers J."""
+        chosen = list(start)
         for _ in range(_MOST_STEPS):
             before = set(chosen)
             for latest in Tier:
@@ -38,7 +41,7 @@ class Search:
             chosen = self._polish(chosen)
             if set(chosen) == before:
                 break
-        return self._completed(self.pruned(chosen))
+        return self._completed(self._pruned(chosen))
 
     def _completed(self, chosen: list[int]) -> list[int]:
         """With all that an effect refines on a joint, where some is in and it completes the rest.
@@ -75,11 +78,14 @@ class Search:
     def _free(self, chosen: Sequence[int], latest: Tier = Tier.LAST) -> list[int]:
         """Candidates up to tier `latest` whose place is free, and so is that of what excludes."""
         taken = {self.candidates[i].place for i in chosen}
-        shut = {place for i in chosen for place in self.judge.excluded(i)}
+        shut = {*self._closed, *(place for i in chosen for place in self.judge.excluded(i))}
         return [
             i
             for i, c in enumerate(self.candidates)
-            if c.place not in taken and c.place not in shut and c.effect.asked_for <= latest
+            if c.place not in taken
+            and c.place not in shut
+            and c.place not in self._closed
+            and c.effect.asked_for <= latest
         ]
 
     def _best_one(self, chosen: list[int], latest: Tier) -> tuple[int, ...]:
@@ -190,7 +196,7 @@ class Search:
                     best, found = cost, trial
         return found
 
-    def pruned(self, chosen: list[int]) -> list[int]:
+    def _pruned(self, chosen: list[int]) -> list[int]:
         """Without those that, with all others in, are not significant or bring nothing."""
         while True:
             weakest: tuple[float, list[int]] | None = None

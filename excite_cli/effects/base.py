@@ -237,28 +237,28 @@ class Effect(ABC):
         return all(parameter.allows(float(value), early) for parameter, value in given)
 
     def nearest(self, values: Array, covariance: Array) -> Array:
-        """Of the values with signs that physics allows, those at the least χ² distance."""
-        signs = np.array([parameter.nonnegative for parameter in self.parameters])
-        if not (values[signs] < 0.0).any():
-            return values
-        from scipy.optimize import lsq_linear  # slow to import
+        """The nearest possible values, in units of their error; themselves where no way is known.
 
-        whiten = np.linalg.inv(half_of(covariance))
-        low = np.where(signs, 0.0, -np.inf)
-        return np.asarray(lsq_linear(whiten, whiten @ values, (low, np.inf), method="bvls").x)
+        Without a way an impossible sign is a refusal: within its error a single parameter is
+        nothing anyway.
+        """
+        return values
 
-    def may_be(self, values: Array, covariance: Array, early: bool) -> bool:
-        """Whether values that physics allows are as near as the error of the fit makes likely.
+    def why_impossible(self, values: Array, covariance: Array, early: bool) -> str:
+        """Why values that are not `possible` cannot be the error of the fit; empty if they can.
 
-        Refused where the χ² distance is one that chance exceeds in 1 % of all cases, if it is
-        also more than the share `forgiven` of all that the effect explains.
+        They cannot where the χ² distance to the `nearest` ones is one that chance exceeds in 1 % of
+        all cases, if it is also more than the share `forgiven` of all that the effect explains; and
+        what is then left of the effect must be more than its error.
         """
         near = self.nearest(values, covariance)
         if not self.possible(near, early):
-            return False
+            return self.why_not(values)
         whiten = np.linalg.inv(half_of(covariance))
         far, whole = (float(np.square(whiten @ x).sum()) for x in (values - near, values))
-        return far <= max(_unlikely(len(values)), self.forgiven * whole)
+        if far > max(_unlikely(len(values)), self.forgiven * whole):
+            return self.why_not(values)
+        return "" if self.over_error(near, covariance) > 1.0 else self.why_not(values)
 
     def absurd(self, values: Array, seen: Seen) -> str:
         """Why values that could be are absurd on the robot that was `seen`; empty if they are not.
@@ -397,10 +397,10 @@ def _two_deviations(count: int) -> float:
 
 @cache
 def _unlikely(count: int) -> float:
-    """χ² distance of `count` parameters from a bound; of a single one 2.3 standard deviations."""
+    """χ² distance that `count` parameters of a possible effect seldom have from possible ones."""
     from scipy.stats import chi2  # slow to import
 
-    return float(chi2.isf(2 * _CHANCE, count))
+    return float(chi2.isf(_CHANCE, count))
 
 
 def steps_by_ratio(value: float, ratios: Sequence[float]) -> list[float]:

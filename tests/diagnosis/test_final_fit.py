@@ -1,0 +1,60 @@
+"""The fit that is told: nothing insignificant, nothing impossible, errors of inexact columns."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from excite_cli.diagnosis.final_fit import final_fit
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import catalogue
+from tests.diagnosis.test_doubt import planted, traced
+
+
+def one(kind: str, *joints: int) -> Effect:
+    effect = catalogue()[kind]
+    return effect(joints or (0,), {p.name: p.low for p in effect.shapes})
+
+
+def test_what_is_no_more_than_its_error_goes_and_the_rest_stays() -> None:
+    """The second is beyond its noise of 0.05, the third is not."""
+    effects = [one("viscous_friction"), one("armature"), one("torque_offset")]
+    torque = np.array([[3.0, 0.0], [1.0, 0.0], [0.01, 0.0]])
+    data, candidates = planted(effects, torque)
+    found = final_fit(traced(data, candidates, (0, 1, 2)))
+    assert set(found.traced.chosen) == {0, 1}
+    assert found.parameters[-2:] == pytest.approx([3.0, 1.0], abs=0.1)
+    assert found.covariance.shape == (len(found.parameters),) * 2
+
+
+def test_deviations_hold_what_the_columns_of_an_effect_miss() -> None:
+    data, candidates = planted([one("elasticity")], np.array([[2.0, 0.0]]))
+    given = traced(data, candidates, (0,))
+    effect = candidates[0].effect
+    found = final_fit(given)
+    missed = effect.model_error(found.parameters[-1:])[0]
+    assert missed > 0.1
+    exact = replace(given, candidates=(replace(candidates[0], effect=one("armature")),))
+    noise = final_fit(exact).covariance[-1, -1]
+    assert found.covariance[-1, -1] == pytest.approx(noise + missed**2)
+
+
+def test_a_payload_is_moved_to_a_body_and_all_that_depends_on_it_too() -> None:
+    """Its Ixx is negative by the noise; the friction shares a column with it."""
+    width = 11
+    mix = np.eye(width)
+    mix[0, 5] = 1.0
+    _, body = catalogue()["payload"].planted(40.0, {"radius": 1.0, "cz": 0.0})
+    body[4] = -0.01  # as fitted, with an error of 0.05
+    torque = mix @ np.array([2.0, *body])
+    data, candidates = planted(
+        [one("viscous_friction"), one("payload")], np.outer(torque, [1.0, 0.0]), mix
+    )
+    given = traced(data, candidates, (0, 1))
+    fitted = given.judge.plain.solve((0, 1))[-width:]
+    found = final_fit(given).parameters[-width:]
+    assert fitted[5] < 0.0
+    assert candidates[1].effect.possible(found[1:], early=False)
+    # What the body has gained of the shared column, the friction has lost.
+    assert found[0] + found[5] == pytest.approx(fitted[0] + fitted[5], abs=0.05)
+    assert found[0] < fitted[0] - 0.01
