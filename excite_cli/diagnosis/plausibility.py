@@ -138,8 +138,9 @@ def _clearly_better(verdict: Verdict, straight: Verdict) -> bool:
 def _certain(best: Verdict, straight: Verdict) -> bool:
     """Whether no inertias could make the torques concerned what they are recorded as."""
     touched = best.change.touched
-    before, after = np.median(straight.left[touched]), np.median(best.left[touched])
-    return bool(before > _CERTAIN and after < _EXPLAINED)
+    before, after = straight.left[touched], best.left[touched]
+    judged = (before > 0.0).all()  # nothing at all is left of joints that hardly move
+    return bool(judged and np.median(before) > _CERTAIN and np.median(after) < _EXPLAINED)
 
 
 def _message(names: Sequence[str], straight: Verdict, best: Verdict, rivals: list[Verdict]) -> str:

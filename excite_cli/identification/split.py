@@ -76,6 +76,11 @@ def split(dataset: Dataset, sealed: str | None = None, block: float | None = Non
         sealed = units[-1]
     training = [run for run in runs if not run.id.is_among((sealed,))]
     kept = tuple(run for run in runs if run.id.is_among((sealed,)))
+    if not training:
+        raise ConfigError(
+            f"all {len(runs)} runs are called '{sealed}': none is left to fit. Give each recording "
+            "a name of its own."
+        )
     if len(training) == 1:  # folds are still needed: halves of the only run
         run = training[0]
         middle = len(run.t) // 2
