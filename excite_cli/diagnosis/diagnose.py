@@ -104,7 +104,7 @@ def diagnose(
     sealed_part = on_sealed(Played(robot, kept), models)
     worth = worth_on_sealed(Played(robot, [*kept, *ends]), model, traced, models[1])
     named, rivals = _named(
-        model, traced, (parameters, covariance), doubts, worth, spec.diagnosis.payload_links
+        model, traced, (parameters, covariance), doubts, worth, spec.diagnosis.carrying_links
     )
     base_values, base_std = _base_parameters(model, parameters, covariance)
     floor = noise_floor(parts.training, processing)

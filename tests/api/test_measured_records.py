@@ -49,7 +49,7 @@ def test_a_diagnosis_is_told_as_by_the_program() -> None:
     assert "viscous_friction on " in repr(found)
     assert "mean error" in repr(found)
     answer = diagnosis_answer(found, "arm.yaml", {"diagnosis": "d.h5", "config": None})
-    for part in answer.parts[:-2]:  # but for what the program says of itself
+    for part in answer.parts[:-3]:  # but for what the program says of itself
         assert escape(part if isinstance(part, str) else part.title) in html_of(found)
-    assert "--after d.h5" in str(answer.parts[-1])
+    assert "--after d.h5" in str(answer.parts[-2])
     assert answer.data["output"] == {"diagnosis": "d.h5"}

@@ -212,7 +212,7 @@ def test_what_is_assumed_of_the_sealed_run_is_told(baseline: Diagnosis) -> None:
     assert baseline.assumed == (assumed,)
     told = [each.text for each in baseline.findings if each.kind == "assumed"]
     assert told == [assumption_in_words(assumed)]
-    assert "payload in motion_2: taken to be absent in the sealed motion_3." in told[0]
+    assert "payload of slide in motion_2: taken to be absent in the sealed motion_3." in told[0]
     assert "runs: {motion_2: {payload: a}, motion_3: {payload: a}}" in told[0]
     (friction,) = (replace(assumed, kind="coulomb_friction", joints=("elbow",)),)
     assert "coulomb_friction of elbow in motion_2:" in assumption_in_words(friction)
