@@ -86,7 +86,7 @@ def diagnose(
         return [prepare(run, processing, coupled) for run in parts.training]
 
     training = prepared(())
-    require_motion(training, processing)
+    require_motion(training, processing, robot.joint_names)
     to_judge = [prepare(run, processing) for run in parts.sealed]  # refused early where too short
     suspicious = check_plausibility(robot, training, spec.measurement)
     traced = trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
