@@ -83,7 +83,7 @@ def diagnose(
     check_left_to_fit(spec.effects, parts)
     refuse_sealed_copies(parts)
     processing, training = _prepared(spec, parts)
-    require_motion(training, processing)
+    require_motion(training, processing, robot.joint_names)
     kept = [prepare(run, processing) for run in parts.sealed]  # refused early where too short
     suspicious = check_plausibility(robot, training, spec.measurement)
     traced = _traced(model, spec, parts, processing, progress)

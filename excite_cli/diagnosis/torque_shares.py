@@ -35,7 +35,7 @@ _PASSIVE = 7  # columns
 _UNCERTAIN, _CENTER = 0.3, 0.03  # share of masses and inertias; m by which centres of mass are off
 _DEVIATION = 0.03  # λ: inertias one standard deviation off cost as much as 3 % of the torque
 _ROUNDING = 1e-12
-_FEWEST = 60  # instants in motion from which a joint can be judged
+_FEWEST = 50  # instants in motion from which a joint can be judged
 
 
 @dataclass(frozen=True)

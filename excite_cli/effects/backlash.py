@@ -86,7 +86,7 @@ class Backlash(Effect):
                     product[some] += np.einsum("gtr,tr->g", columns, left * weights)
                     square[some] += np.einsum("gtr,gtr->gr", columns, columns) @ weights
             fitted = np.maximum(product, 0.0)  # a negative share is no backlash
-            return float(gaps[int(np.argmax(fitted**2 / (square + 1e-300)))])
+            return float(gaps[int(np.argmax(fitted / np.sqrt(square + 1e-300)))])
 
         return [{"gap": best(best(np.geomspace(*_GAPS, 48)) * np.geomspace(0.93, 1.07, 21))}]
 

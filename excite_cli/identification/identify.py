@@ -93,7 +93,7 @@ def identify(
     )
     tell("columns of the regression")
     training = _regression(robot, base, effects, parts.training, processing)
-    require_motion([run.prepared for run in training.runs], processing)
+    require_motion([run.prepared for run in training.runs], processing, robot.joint_names)
     tell("fit")
     found = fit(training, spec.identification)
     tell("errors on the sealed part")

@@ -150,7 +150,9 @@ def prepare(
     )
 
 
-def require_motion(runs: Sequence[PreparedRun], processing: Processing) -> None:
+def require_motion(
+    runs: Sequence[PreparedRun], processing: Processing, joint_names: Sequence[str]
+) -> None:
     """Raise FileError unless some joint moves, and some torque changes, in what is fitted.
 
     Where a joint stands or reverses, its torque is up to its friction and counts in no fit.
@@ -160,6 +162,13 @@ def require_motion(runs: Sequence[PreparedRun], processing: Processing) -> None:
             f"no joint moves faster than {processing.moving_speed:g} rad/s (m/s) with a torque "
             "that may be used, outside of the sealed part: nothing can be fitted. Record motion, "
             "or lower diagnosis.moving_speed."
+        )
+    unknown = ~np.any([run.valid.any(axis=0) for run in runs], axis=0)
+    if unknown.any():
+        names = ", ".join(name for name, none in zip(joint_names, unknown, strict=True) if none)
+        raise FileError(
+            f"torque of {names}: no sample may be used outside of the sealed part, all are masked. "
+            "Leave the joint out of robot.joints, or seal another run."
         )
     if not any(np.ptp(run.tau_raw, axis=0).any() for run in runs):
         raise FileError(
