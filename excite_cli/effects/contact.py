@@ -27,7 +27,7 @@ from excite_cli.robot.model import Array, Robot
 _CELLS = 96  # per run, for the search of the window
 _SHORTEST = 0.1  # s: what is shorter is a blow or a fault of the record
 _FINER = (1.35, 1.15, 1.06, 1.02)
-_LEAST = 1.0  # N: the weight of a cup; friction of a gear is a hundred times that at the tip
+_LEAST = 0.1  # N
 _LONGEST = 0.5  # of the run; what lasts longer is no touch
 
 
