@@ -173,6 +173,13 @@ class Information:
     noise: Array
 
 
+_UNCHANGED = 0.02  # of an error that no effect concerns
+
+
+def _lower(before: Errors, after: Errors, least: float = 1.0) -> bool:
+    return not after.mean_relative >= least * before.mean_relative
+
+
 @dataclass(frozen=True, repr=False)
 class Diagnosis(Shown):
     """All that `excite diagnose` learned. `phi`: full standard parameters that fit the data.
@@ -216,8 +223,16 @@ class Diagnosis(Shown):
 
     @property
     def good(self) -> bool:
-        """Whether what was found, if anything, lowers the mean error on the sealed data."""
-        return not self.effects or not self.after.mean_relative >= self.before.mean_relative
+        """Whether what was found, if anything, lowers the mean error on the sealed data.
+
+        Where nothing of it is in the sealed run, that error need not fall, but must not rise; it is
+        on the sealed ends of the runs that carry it that the error falls.
+        """
+        absent = {(each.kind, each.runs) for each in self.assumed if not each.present}
+        if self.effects and all((e.effect.kind, e.effect.runs) in absent for e in self.effects):
+            ends = all(_lower(part.before, part.after) for part in self.parts)
+            return ends and _lower(self.before, self.after, 1.0 + _UNCHANGED)
+        return not self.effects or _lower(self.before, self.after)
 
     @property
     def harmful(self) -> tuple[NamedEffect, ...]:

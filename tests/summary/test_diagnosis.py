@@ -6,7 +6,13 @@ from typing import Any
 import pytest
 
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.records import Approximation, Diagnosis, Removed
+from excite_cli.diagnosis.records import (
+    Approximation,
+    Assumption,
+    Diagnosis,
+    Removed,
+    SealedEnds,
+)
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.shown.table import Table
 from excite_cli.summary.diagnosis import diagnosis_answer
@@ -174,3 +180,35 @@ def test_scripts_see_verdicts_and_the_untouched_urdf(bad: Diagnosis) -> None:
     unknown = replace(bad, untouched=None)
     assert diagnosis_answer(unknown, "arm.yaml", {}).data["error"]["untouched"] is None
     assert "URDF" not in printed(unknown)
+
+
+def of_single_runs(found: Diagnosis, after: float, end: float) -> Diagnosis:
+    """A payload of run_1 alone: sealed error 20 % → `after`, that of its sealed end 50 % → `end`."""
+    effect = replace(found.effects[0].effect, kind="payload", runs=("run_1",))
+    named = replace(found.effects[0], effect=effect, removes={})
+    part = SealedEnds(
+        ("run_1",),
+        (effect,),
+        replace(found.before, mean_relative=0.5),
+        replace(found.after, mean_relative=end),
+    )
+    return replace(
+        found,
+        effects=(named,),
+        assumed=(Assumption("payload", ("run_1",), ("run_3",), False, effect.joints),),
+        parts=(part,),
+        after=replace(found.after, mean_relative=after),
+    )
+
+
+@pytest.mark.parametrize(
+    ("after", "end", "good"),
+    [(0.2, 0.1, True), (0.203, 0.1, True), (0.25, 0.1, False), (0.2, 0.6, False)],
+)
+def test_what_is_not_in_the_sealed_run_is_judged_where_it_is(
+    after: float, end: float, good: bool
+) -> None:
+    found = make_diagnosis()
+    assert of_single_runs(found, after, end).good is good
+    there = replace(of_single_runs(found, after, end), assumed=())
+    assert not there.good
