@@ -183,7 +183,7 @@ def test_scripts_see_verdicts_and_the_untouched_urdf(bad: Diagnosis) -> None:
 
 
 def of_single_runs(found: Diagnosis, after: float, end: float) -> Diagnosis:
-    """A payload of run_1 alone: sealed error 20 % → `after`, that of its sealed end 50 % → `end`."""
+    """A payload of run_1 alone: sealed error 20 % → `after`, of its sealed end 50 % → `end`."""
     effect = replace(found.effects[0].effect, kind="payload", runs=("run_1",))
     named = replace(found.effects[0], effect=effect, removes={})
     part = SealedEnds(
