@@ -136,7 +136,7 @@ class DiagnosisSpec(Section):
         "all", description="kinds of effects that are looked for"
     )
     exclude: tuple[EffectKind, ...] = Field((), description="kinds that are not looked for")
-    payload_links: tuple[str, ...] = Field(
+    carrying_links: tuple[str, ...] = Field(
         (), description="links that may carry a payload; default: the last of every moved branch"
     )
     moving_speed: Positive | None = Field(

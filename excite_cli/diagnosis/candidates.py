@@ -109,8 +109,8 @@ def possible_effects(
 
 
 def _places(kind: type[Effect], robot: Robot, spec: DiagnosisSpec) -> list[tuple[int, ...]]:
-    if kind.carried and spec.payload_links:
-        return places_named(kind, spec.payload_links, robot, "diagnosis.payload_links")
+    if kind.carried and spec.carrying_links:
+        return places_named(kind, spec.carrying_links, robot, "diagnosis.carrying_links")
     return kind.places(robot)
 
 

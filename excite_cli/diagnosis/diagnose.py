@@ -94,7 +94,7 @@ def diagnose(
     unexplained, dependence = _unexplained(traced, robot)
     doubts = approximations(traced, unexplained, robot.joint_names)
     named, rivals = _named(
-        model, traced, parameters, covariance, doubts, spec.diagnosis.payload_links
+        model, traced, parameters, covariance, doubts, spec.diagnosis.carrying_links
     )
     models = both_models(model, traced, parameters)
     sealed_part = on_sealed(robot, models, [prepare(run, processing) for run in parts.sealed])

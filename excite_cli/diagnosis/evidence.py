@@ -3,8 +3,8 @@
 Columns are [inertial | declared effects | candidates | torque], rows whitened. A Gram matrix is
 kept per fold and joint; their sums give the residual energy, the gain of any candidate, and the
 error on any fold left out, each by solves of the size of the model. What is there in one fold only
-(a payload of one run) cannot be known from the others: it is fitted on one side of that fold, the
-rest of the model held, and judged on the other.
+(a body carried in one run) cannot be known from the others: it is fitted on one side of that fold,
+the rest of the model held, and judged on the other.
 
 With N = G_SS + Λ (Λ the precision of a prior on the inertial columns, if there is one) and a
 candidate c, the Schur complement Z = G_cc − G_cS N⁻¹ G_Sc is what is left of the candidate once the

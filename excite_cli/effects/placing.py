@@ -55,6 +55,6 @@ def told_on(effect: Effect, robot: Robot, links: Sequence[str]) -> LinkFrame | N
     """
     if not effect.carried:
         return None
-    named = [link_frame(robot, link, "diagnosis.payload_links") for link in links]
+    named = [link_frame(robot, link, "diagnosis.carrying_links") for link in links]
     there = [each for each in named if each.joint == effect.joints[-1]]
     return there[0] if there else own_link(robot, effect.joints[-1])
