@@ -139,8 +139,16 @@ def _imports(tree: ast.AST) -> list[str]:
 def test_packages_above_know_no_kind_by_name(package: str) -> None:
     """A kind of a package is judged, simulated and drawn as one of ours is."""
     own = {f"excite_cli.effects.{path.stem}" for path in (PACKAGE / "effects").glob("*.py")}
-    shared = {"base", "catalogue", "placing", "seen"}
-    shared |= {"simulated_robot", "parameter", "signals", "sign"}
+    shared = {
+        "base",
+        "catalogue",
+        "placing",
+        "simulated_robot",
+        "parameter",
+        "seen",
+        "signals",
+        "sign",
+    }
     of_kinds = own - {f"excite_cli.effects.{name}" for name in shared}
     names = NAMES if package == "diagnosis" else []
     files = sorted((PACKAGE / package).rglob("*.py"))
