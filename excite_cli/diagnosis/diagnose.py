@@ -98,7 +98,17 @@ def diagnose(
     final = final_fit(traced)
     traced, parameters, covariance = final.traced, final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
-    doubts = approximations(traced, unexplained, robot.joint_names)
+    floor = noise_floor(parts.training, processing)
+    rests = large_rests(
+        traced.data,
+        traced.signals,
+        traced.data.residuals(traced.candidates, traced.chosen, parameters),
+        parts.training,
+        processing,
+        floor,
+        robot.joint_names,
+    )
+    doubts = approximations(traced, unexplained, robot.joint_names, rests)
     models = both_models(model, traced, parameters)
     ends = [prepare(run, processing) for run in parts.ends]
     sealed_part = on_sealed(Played(robot, kept), models)
@@ -107,7 +117,6 @@ def diagnose(
         model, traced, (parameters, covariance), doubts, worth, spec.diagnosis.carrying_links
     )
     base_values, base_std = _base_parameters(model, parameters, covariance)
-    floor = noise_floor(parts.training, processing)
     assumed = assumptions(traced.effects, parts, model)
     return Diagnosis(
         config="",
@@ -146,15 +155,7 @@ def diagnose(
         assumed=assumed,
         parts=on_sealed_ends(model, models, parts.ends, processing),
         untouched=sealed_part.untouched,
-        large_rests=large_rests(
-            traced.data,
-            traced.signals,
-            traced.data.residuals(traced.candidates, traced.chosen, parameters),
-            parts.training,
-            processing,
-            floor,
-            robot.joint_names,
-        ),
+        large_rests=rests,
     )
 
 

@@ -2,8 +2,8 @@
 
 A line through a curve explains most of it, not its form. So for each effect that was found, E is
 the energy it explains on the joint where it matters most, and U what is left there with structure:
-the part that depends on some quantity (`unexplained`), or what an effect of an impossible sign or
-size would explain. The effect is an approximation
+the part that depends on some quantity (`unexplained`), what is surely more than noise (`rests`), or
+what an effect of an impossible sign or size would explain. The effect is an approximation
 
 * if what is left is a function of the same quantity as the effect (friction: speed), and U > 0.1 E,
 * or if U > E, whatever it depends on.
@@ -12,7 +12,7 @@ size would explain. The effect is an approximation
 from collections.abc import Sequence
 
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.records import Approximation, Unexplained
+from excite_cli.diagnosis.records import Approximation, LargeRest, Unexplained
 from excite_cli.diagnosis.tracing import Traced
 
 _SAME_QUANTITY = 0.1
@@ -20,10 +20,14 @@ _TRIED = 12  # of the strongest candidates of a joint
 
 
 def approximations(
-    traced: Traced, unexplained: Sequence[Unexplained], joint_names: Sequence[str]
+    traced: Traced,
+    unexplained: Sequence[Unexplained],
+    joint_names: Sequence[str],
+    rests: Sequence[LargeRest] = (),
 ) -> dict[int, Approximation]:
     """Which chosen candidates are approximations, and of what."""
     left = {each.joint: each for each in unexplained}
+    more = {each.joint: each for each in rests if each.certain}
     impossible: dict[int, tuple[float, str]] = {}
     found: dict[int, Approximation] = {}
     plain = traced.judge.plain
@@ -38,12 +42,21 @@ def approximations(
             if structure > (_SAME_QUANTITY if same else 1.0) * explained:
                 found[i] = Approximation(covariates=each.depends_on)
                 continue
+        if name in more and _beyond_noise(more[name]) * rest > explained:
+            found[i] = Approximation(covariates=more[name].depends_on)
+            continue
         if joint not in impossible:
             impossible[joint] = _impossible(traced, joint, rest)
         energy, what = impossible[joint]
         if energy > explained:
             found[i] = Approximation(kind=what)
     return found
+
+
+def _beyond_noise(rest: LargeRest) -> float:
+    """Share of the residual's energy that is no noise."""
+    beyond = 0.0 if rest.noise is None else 1.0 - (rest.noise / rest.rms) ** 2
+    return max(beyond, rest.predictable)
 
 
 def _strongest(traced: Traced, i: int) -> tuple[int, float]:

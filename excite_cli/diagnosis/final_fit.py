@@ -48,7 +48,8 @@ def final_fit(traced: Traced) -> FinalFit:
 
 def _fitted(traced: Traced) -> FinalFit:
     parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
-    covariance = covariance_of(
+    # Placebos say by how much more than the noise model says.
+    covariance = traced.inflation * covariance_of(
         traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
     )
     for i, own in _places(traced, len(parameters)):

@@ -143,12 +143,18 @@ class Judgement:
         The better of filtered torque and whitened torque: an effect near the noise shows in the
         second only. An effect of single runs is not there in others: it is judged where it is.
         """
+        there: NDArray[np.bool_] | slice = slice(None)
+        if all(self.candidates[i].effect.runs for i in added):
+            there = self.white.folds_of(added)
+        return self._left_out_gain(chosen, added, there)
+
+    def _left_out_gain(
+        self, chosen: Sequence[int], added: Sequence[int], there: NDArray[np.bool_] | slice
+    ) -> float:
+        """As `left_out_gain`, in some folds."""
         joints = sorted({j for i in added for j in self.white.rows_of[i]})
         best = -np.inf
         for evidence in (self.plain, self.white):
-            there: NDArray[np.bool_] | slice = slice(None)
-            if all(self.candidates[i].effect.runs for i in added):
-                there = evidence.folds_of(added)
             before = evidence.left_out(chosen, joints)[there].sum()
             after = evidence.left_out([*chosen, *added], joints)[there].sum()
             best = max(best, 1.0 - float(np.sqrt(after / max(before, 1e-300))))
@@ -219,16 +225,20 @@ class Judgement:
         return found
 
     def carries_more(self, chosen: Sequence[int], one: int, other: int) -> bool:
-        """Whether `one` says far more than `other` about the same joints on runs left out."""
+        """Whether `one` says far more than `other` about the same joints on runs left out.
+
+        On all of them: what changed in one run may explain all that is there, and next to nothing
+        beside what changes from run to run.
+        """
         if not set(self.white.rows_of[one]) & set(self.white.rows_of[other]):
             return False
-        gains = [self.left_out_gain(chosen, [i]) for i in (one, other)]
+        gains = [self._left_out_gain(chosen, [i], slice(None)) for i in (one, other)]
         return gains[0] > gains[1] + _FAR_MORE
 
     def loses(self, rest: Sequence[int], member: int, move: Sequence[int]) -> bool:
         """Whether runs left out would lose by the replacement what they gained by the member."""
-        before = self.left_out_gain(rest, [member])
-        return self.left_out_gain(rest, move) < before - _FAR_MORE
+        before = self._left_out_gain(rest, [member], slice(None))
+        return self._left_out_gain(rest, move, slice(None)) < before - _FAR_MORE
 
     def verdict(self, chosen: Sequence[int], added: Sequence[int]) -> Verdict:
         """Accepted, or why `added` may not join the chosen ones."""

@@ -98,6 +98,8 @@ def approximation_in_words(
     """What an effect only comes near; covariates as `say` puts them."""
     if found.covariates:
         return f"a function of {', '.join(map(say, found.covariates))}"
+    if not found.kind:
+        return "something else, of which more is left than this explains"
     return f"something that also looks like {title_of(found.kind)}"
 
 
