@@ -1,6 +1,7 @@
 """Effects that only come near something else, by what is left beside them."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import PossibleSizes
-from excite_cli.diagnosis.records import Approximation, Unexplained
+from excite_cli.diagnosis.records import Approximation, LargeRest, Unexplained
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
@@ -243,3 +244,21 @@ def test_without_effects_there_is_nothing_to_doubt() -> None:
     data, candidates = planted([effect("viscous_friction")], np.array([[3.0, 0.0]]))
     left = [unexplained("a", "v[a]", share=0.9)]
     assert approximations(traced(data, candidates, [], all_but(0)), left, NAMES) == {}
+
+
+@pytest.mark.parametrize(
+    ("size", "certain", "expected"),
+    [(0.5, True, {0}), (0.5, False, set()), (2.0, True, set())],
+)
+def test_what_is_left_beyond_noise_and_is_more_makes_a_name_doubtful(
+    size: float, certain: bool, expected: set[int]
+) -> None:
+    """The residual has the energy one; of that, 1 − 0.4² is no noise."""
+    data, candidates = planted([effect("viscous_friction")], np.array([[size, 0.0]]))
+    depends = (Covariate("position", "a"), Covariate("load", "a"))
+    rest = LargeRest("a", 1.0, 0.1, 0.4, "band", certain, 0.1, depends)
+    found = approximations(traced(data, candidates, [0]), [], NAMES, [rest])
+    assert set(found) == expected
+    assert all(each == Approximation(covariates=depends) for each in found.values())
+    elsewhere = replace(rest, joint="b")
+    assert approximations(traced(data, candidates, [0]), [], NAMES, [elsewhere]) == {}
