@@ -1,13 +1,14 @@
 """Friction that changes over a campaign, as a robot warms up: τ_j = φ(t) (Δc sgn v_j + Δb v_j).
 
-t is the campaign's time, from the start of its first recording, and φ grows from 0 to 1 within the
-campaign's span S, towards an end with time constant T:
+t is the campaign's time at the start of a recording, from the start of the first one, and φ grows
+from 0 to 1 within the campaign's span S, towards an end with time constant T:
 
     φ(t) = (1 − e^(−t/T)) / (1 − e^(−S/T)),   for T ≫ S   φ(t) = t/S.
 
 So Δc and Δb are by how much friction is larger at the end than at the start, and Coulomb and
 viscous friction beside it are those of the start. A recording that took no part in the fit has its
-own place on the clock.
+own place on the clock. Within a recording it stays: what warms up there is `friction_drift`, and
+where files have no stamps, the pauses between them are not known.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +20,9 @@ from excite_cli.effects.base import Abscissa, Effect, Parameter, Signals
 from excite_cli.effects.sign import smooth_sign
 from excite_cli.robot.model import Array, Robot
 
-_TIME_CONSTANTS = (0.1, 0.3, 1.0, 20.0)  # of the span; the last is a straight line
+# Of the span; the last is a straight line. Steps of single runs explain what a coarse grid leaves.
+_TIME_CONSTANTS = (0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 1.0, 20.0)
+_LEFT = 0.03  # of its energy: no warming up is an exponential
 _FEWEST = 3  # recordings: two differ by a step as well as by a trend
 
 
@@ -49,23 +52,26 @@ class FrictionChange(Effect):
         """From a quick start to a straight line; nothing where recordings are too few."""
         if len({seen.run.name for seen in signals}) < _FEWEST:
             return []
-        span = max(float(seen.clock[-1]) for seen in signals)
+        span = max(seen.start for seen in signals)
         return [{"time_constant": share * span, "span": span} for share in _TIME_CONSTANTS]
 
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """The span is no choice."""
         return () if name == "span" else super().finer_steps(name, signals)
 
-    def progress(self, clock: Array) -> Array:
-        """φ at times on the campaign's clock [s]."""
+    def leftover(self, values: Array) -> float:
+        """What another curve from its start to its end would leave of it."""
+        return _LEFT
+
+    def progress(self, start: float) -> float:
+        """φ at a time on the campaign's clock [s]."""
         constant, span = self.shape["time_constant"], self.shape["span"]
-        return np.asarray(np.expm1(-clock / constant) / np.expm1(-span / constant))
+        return float(np.expm1(-start / constant) / np.expm1(-span / constant))
 
     def columns(self, signals: Signals) -> Array:
         """φ sgn v_j and φ v_j, (T, 1, 2)."""
         v = signals.v[:, self.joints[0]]
-        progress = self.progress(signals.clock)
-        return (progress[:, None] * np.stack([smooth_sign(v), v], axis=-1))[:, None]
+        return (self.progress(signals.start) * np.stack([smooth_sign(v), v], axis=-1))[:, None]
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """The campaign's time with the sign of the speed."""
