@@ -55,7 +55,8 @@ class Search:
                 continue
             for joint in effect.joints:
                 own = [p for p in self.judge.parents[i] if self.candidates[p].rows == (joint,)]
-                missing = [p for p in own if p not in chosen]
+                open_ = [p for p in own if self.candidates[p].place not in self._closed]
+                missing = [p for p in open_ if p not in chosen]
                 more = [*chosen, *missing]
                 if len(missing) == len(own) or not missing or len(more) > self._most:
                     continue

@@ -332,3 +332,17 @@ def test_weak_first_order_friction_is_cheap_beside_what_refines_it() -> None:
     """No step that adds a parent of a chosen effect and passes may be left undone."""
     data, candidates = random_case(FRICTION, 28, 0.1)
     assert search(data, candidates) == {0, 1, 4}
+
+
+def test_what_is_closed_is_not_put_in_to_complete_either() -> None:
+    """√|v| friction brings Coulomb friction of its joint with it, however small, if it may."""
+    effects = [
+        effect("viscous_friction"),
+        effect("coulomb_friction"),
+        effect("nonlinear_viscous_friction", power=0.5),
+    ]
+    data, candidates = planted(effects, [2.0, 0.0, 2.0], np.eye(3))
+    evidence = data.evidence(candidates, ONE)
+    judge = Judgement(evidence, evidence, candidates, NO_VETO, anything)
+    assert set(Search(judge).run()) == {0, 1, 2}
+    assert set(Search(judge, closed={candidates[1].place}).run((2, 0))) == {0, 2}
