@@ -32,13 +32,18 @@ LARGE = 2.5  # times the noise floor
 ROSE = 1.25  # times the error before, of a joint
 
 
+# An error that no effect concerns need not fall: it changes with the parameters of all runs.
+_UNCHANGED = 1.02
+
+
 @dataclass
 class Outcome:
     """A case in plain words and numbers, for tables and files.
 
     `left`: joints of which it is said that more than noise is left. `rest`: residual over noise
     floor by joint. `silent`: joints of which a large rest is not said. `refused`: the data, sound
-    as they are, were not taken. `worse`: the sealed error did not fall, `admitted`: and the program
+    as they are, were not taken. `worse`: the sealed error did not fall (of effects in other runs
+    alone: it rose), `admitted`: and the program
     says so. `worse_joints`: where it rose, and no effect there is doubted. `seconds` are of the
     processor.
     """
@@ -259,7 +264,10 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score) -> 
         for size in result.sizes
     ]
     outcome.before, outcome.after = found.before.mean_relative, found.after.mean_relative
-    outcome.worse = bool(found.effects) and not outcome.after < outcome.before
+    elsewhere = all(each.effect.runs for each in found.effects)  # and not in the sealed run
+    outcome.worse = bool(found.effects) and not outcome.after < outcome.before * (
+        _UNCHANGED if elsewhere else 1.0
+    )
     outcome.admitted = not getattr(found, "good", True)
     outcome.worse_joints = [joint for joint in found.joint_names if _unsaid_worse(found, joint)]
 
