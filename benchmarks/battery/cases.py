@@ -60,9 +60,15 @@ class Case:
 
 
 @cache
+def _kinds() -> tuple[str, ...]:
+    """Kinds that four recordings of one robot show; those of campaigns have their own battery."""
+    return tuple(name for name, kind in catalogue().items() if not kind.of_campaign)
+
+
+@cache
 def _deck(seed: int, number: int) -> tuple[tuple[Group, str], ...]:
     """Group and kind of 36 cases; kinds of several effects are drawn with the case."""
-    cards: list[tuple[Group, str]] = [("one", kind) for kind in catalogue()]
+    cards: list[tuple[Group, str]] = [("one", kind) for kind in _kinds()]
     for k in range(number, number + 7):
         cards.append(("clean", ("any", "correlated")[k % 2]))
     for k in range(2):
@@ -75,7 +81,7 @@ def _deck(seed: int, number: int) -> tuple[tuple[Group, str], ...]:
 
 def label(seed: int, index: int) -> tuple[Group, str]:
     """Group and kind of a case, without making it."""
-    length = len(catalogue()) + 14
+    length = len(_kinds()) + 14
     return _deck(seed, index // length)[index % length]
 
 
@@ -190,7 +196,7 @@ def _two(
     excluded = set(_ALONE)
     if with_friction:
         excluded |= {"viscous_friction", "coulomb_friction"}
-    names = [name for name in catalogue() if name not in excluded]
+    names = [name for name in _kinds() if name not in excluded]
     first_name, second_name = rng.choice(names, 2, replace=False)
     first = one_effect(kind_named(str(first_name)), of, ground, model, (_SEPARATE, np.inf), rng)
     if first is None:

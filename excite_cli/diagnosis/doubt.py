@@ -2,7 +2,7 @@
 
 A line through a curve explains most of it, not its form. So for each effect that was found, E is
 the energy it explains on the joint where it matters most, and U what is left there with structure:
-the part that depends on some quantity (`unexplained`), what is surely more than noise (`rests`), or
+the part that depends on some quantity (`unexplained`) or can be predicted from all (`rests`), or
 what an effect of an impossible sign or size would explain. The effect is an approximation
 
 * if what is left is a function of the same quantity as the effect (friction: speed), and U > 0.1 E,
@@ -42,7 +42,7 @@ def approximations(
             if structure > (_SAME_QUANTITY if same else 1.0) * explained:
                 found[i] = Approximation(covariates=each.depends_on)
                 continue
-        if name in more and _beyond_noise(more[name]) * rest > explained:
+        if name in more and more[name].predictable * rest > explained:
             found[i] = Approximation(covariates=more[name].depends_on)
             continue
         if joint not in impossible:
@@ -51,12 +51,6 @@ def approximations(
         if energy > explained:
             found[i] = Approximation(kind=what)
     return found
-
-
-def _beyond_noise(rest: LargeRest) -> float:
-    """Share of the residual's energy that is no noise."""
-    beyond = 0.0 if rest.noise is None else 1.0 - (rest.noise / rest.rms) ** 2
-    return max(beyond, rest.predictable)
 
 
 def _strongest(traced: Traced, i: int) -> tuple[int, float]:

@@ -99,7 +99,7 @@ def approximation_in_words(
     if found.covariates:
         return f"a function of {', '.join(map(say, found.covariates))}"
     if not found.kind:
-        return "something else, of which more is left than this explains"
+        return "a function of several quantities, of which more is left than this explains"
     return f"something that also looks like {title_of(found.kind)}"
 
 

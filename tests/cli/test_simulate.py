@@ -32,7 +32,7 @@ def test_the_answer_names_runs_effects_and_file(simulated: tuple[Any, Path]) -> 
     planted = [effect for effect in answer["effects"] if not effect["declared"]]
     assert [(e["kind"], e["joints"]) for e in planted] == [
         ("coulomb_friction", ["elbow"]),
-        ("payload", ["shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide"]),
+        ("payload", ["slide"]),
     ]
     assert planted[0]["parameters"]["coulomb"] == {"value": 1.5, "unit": "N·m"}
     assert planted[1]["runs"] == ["motion_2"]

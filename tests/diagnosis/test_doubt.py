@@ -250,13 +250,13 @@ def test_without_effects_there_is_nothing_to_doubt() -> None:
     ("size", "certain", "expected"),
     [(0.5, True, {0}), (0.5, False, set()), (2.0, True, set())],
 )
-def test_what_is_left_beyond_noise_and_is_more_makes_a_name_doubtful(
+def test_what_can_be_predicted_and_is_more_makes_a_name_doubtful(
     size: float, certain: bool, expected: set[int]
 ) -> None:
-    """The residual has the energy one; of that, 1 − 0.4² is no noise."""
+    """The residual has the energy one; of that, 0.8 can be predicted."""
     data, candidates = planted([effect("viscous_friction")], np.array([[size, 0.0]]))
     depends = (Covariate("position", "a"), Covariate("load", "a"))
-    rest = LargeRest("a", 1.0, 0.1, 0.4, "band", certain, 0.1, depends)
+    rest = LargeRest("a", 1.0, 0.1, 0.4, "band", certain, 0.8, depends)
     found = approximations(traced(data, candidates, [0]), [], NAMES, [rest])
     assert set(found) == expected
     assert all(each == Approximation(covariates=depends) for each in found.values())

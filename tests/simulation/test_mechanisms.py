@@ -357,7 +357,10 @@ def test_effects_of_others_act_through_their_own_formula(robot: Robot, clean: Si
 
 
 def test_every_kind_of_the_catalogue_can_be_planted(robot: Robot, clean: Simulation) -> None:
-    """With its defaults: it runs, and something recorded differs from the bare robot."""
+    """With its defaults: it runs, and something recorded differs from the bare robot.
+
+    What comes over a campaign is nothing in its first recording.
+    """
     tested = {
         "viscous_friction", "coulomb_friction", "armature", "spring", "asymmetric_friction",
         "stribeck_friction", "load_dependent_friction", "friction_drift", "ripple", "cable_force",
@@ -367,6 +370,8 @@ def test_every_kind_of_the_catalogue_can_be_planted(robot: Robot, clean: Simulat
     }  # fmt: skip
     for name in sorted(set(catalogue()) - tested):
         kind = catalogue()[name]
+        if kind.of_campaign:
+            continue
         joints = tuple(range(robot.n)) if kind.scope == "robot" else kind.places(robot)[0]
         run = played(robot, plant(kind, joints, kind.parameters[0].high / 10)).dataset.runs[0]
         assert not np.array_equal(run.tau, clean.dataset.runs[0].tau), name
