@@ -6,7 +6,8 @@ the part that depends on some quantity (`unexplained`) or can be predicted from 
 what an effect of an impossible sign or size would explain. The effect is an approximation
 
 * if what is left is a function of the same quantity as the effect (friction: speed), and U > 0.1 E,
-* or if U > E, whatever it depends on.
+* or if U > E, whatever it depends on; of what can be predicted, only if the effect is a refinement
+  or is there in some runs alone: of a spring that gravity nearly takes up, E is next to nothing.
 """
 
 from collections.abc import Sequence
@@ -42,7 +43,9 @@ def approximations(
             if structure > (_SAME_QUANTITY if same else 1.0) * explained:
                 found[i] = Approximation(covariates=each.depends_on)
                 continue
-        if name in more and more[name].predictable * rest > explained:
+        effect = traced.candidates[i].effect
+        bends = bool(effect.refines or effect.runs)  # what lacks a name is most easily called so
+        if name in more and bends and more[name].predictable * rest > explained:
             found[i] = Approximation(covariates=more[name].depends_on)
             continue
         if joint not in impossible:

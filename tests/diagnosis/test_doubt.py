@@ -254,7 +254,7 @@ def test_what_can_be_predicted_and_is_more_makes_a_name_doubtful(
     size: float, certain: bool, expected: set[int]
 ) -> None:
     """The residual has the energy one; of that, 0.8 can be predicted."""
-    data, candidates = planted([effect("viscous_friction")], np.array([[size, 0.0]]))
+    data, candidates = planted([effect("load_dependent_friction")], np.array([[size, 0.0]]))
     depends = (Covariate("position", "a"), Covariate("load", "a"))
     rest = LargeRest("a", 1.0, 0.1, 0.4, "band", certain, 0.8, depends)
     found = approximations(traced(data, candidates, [0]), [], NAMES, [rest])
@@ -262,3 +262,5 @@ def test_what_can_be_predicted_and_is_more_makes_a_name_doubtful(
     assert all(each == Approximation(covariates=depends) for each in found.values())
     elsewhere = replace(rest, joint="b")
     assert approximations(traced(data, candidates, [0]), [], NAMES, [elsewhere]) == {}
+    data, candidates = planted([effect("armature")], np.array([[0.5, 0.0]]))
+    assert approximations(traced(data, candidates, [0]), [], NAMES, [rest]) == {}
