@@ -7,7 +7,7 @@ what an effect of an impossible sign or size would explain. The effect is an app
 
 * if what is left is a function of the same quantity as the effect (friction: speed), and U > 0.1 E,
 * or if U > E, whatever it depends on; of what can be predicted, only if the effect is a refinement
-  or is there in some runs alone: of a spring that gravity nearly takes up, E is next to nothing.
+  or is there in some runs alone: of what inertias nearly take up, E is next to nothing.
 """
 
 from collections.abc import Sequence
