@@ -30,8 +30,6 @@ from excite_cli.simulation.simulate import simulate
 
 LARGE = 2.5  # times the noise floor
 ROSE = 1.25  # times the error before, of a joint
-
-
 # An error that no effect concerns need not fall: it changes with the parameters of all runs.
 _UNCHANGED = 1.02
 
@@ -43,9 +41,8 @@ class Outcome:
     `left`: joints of which it is said that more than noise is left. `rest`: residual over noise
     floor by joint. `silent`: joints of which a large rest is not said. `refused`: the data, sound
     as they are, were not taken. `worse`: the sealed error did not fall (of effects in other runs
-    alone: it rose), `admitted`: and the program
-    says so. `worse_joints`: where it rose, and no effect there is doubted. `seconds` are of the
-    processor.
+    alone: it rose), `admitted`: and the program says so. `worse_joints`: where it rose, and no
+    effect there is doubted. `seconds` are of the processor.
     """
 
     index: int

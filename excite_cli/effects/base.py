@@ -17,13 +17,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import cache
 from typing import ClassVar, Literal
 
 import numpy as np
 
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.effects.parameter import Parameter, Value, deviation
+from excite_cli.effects.rare_sizes import two_deviations, unlikely_distance
 from excite_cli.effects.seen import Seen
 from excite_cli.effects.signals import Cotangents, Signals
 from excite_cli.effects.simulated_robot import JOINT_PARTS, SimulatedRobot
@@ -37,8 +37,6 @@ Picture = Literal["cloud", "window"]
 
 # By how much a shape parameter is changed, up and down, once its effect is found.
 _FINER = (1.35, 1.15, 1.06, 1.02)
-# Chance of a true effect to look impossible by the error of the fit, and be refused.
-_CHANCE = 0.01
 
 
 class Tier(IntEnum):
@@ -256,7 +254,7 @@ class Effect(ABC):
             return self.why_not(values)
         whiten = np.linalg.inv(half_of(covariance))
         far, whole = (float(np.square(whiten @ x).sum()) for x in (values - near, values))
-        if far > max(_unlikely(len(values)), self.forgiven * whole):
+        if far > max(unlikely_distance(len(values)), self.forgiven * whole):
             return self.why_not(values)
         return "" if self.over_error(near, covariance) > 1.0 else self.why_not(values)
 
@@ -282,7 +280,7 @@ class Effect(ABC):
         names = [parameter.name for parameter in self.parameters]
         at = [names.index(name) for name in self.size or names]
         whiten = np.linalg.inv(half_of(covariance[np.ix_(at, at)]))
-        return float(np.linalg.norm(whiten @ values[at])) / _two_deviations(len(at))
+        return float(np.linalg.norm(whiten @ values[at])) / two_deviations(len(at))
 
     def model_error(self, values: Array) -> Array:
         """Standard deviations (p,) that the inexactness of its columns gives to its parameters."""
@@ -385,22 +383,6 @@ def neighbours(robot: Robot) -> list[tuple[int, ...]]:
     first = int(robot.model.njoints) - robot.n
     parents = [int(robot.model.parents[first + k]) - first for k in range(robot.n)]
     return [(parent, k) for k, parent in enumerate(parents) if parent >= 0]
-
-
-@cache
-def _two_deviations(count: int) -> float:
-    """Length that `count` unit normals exceed as rarely as one exceeds two deviations."""
-    from scipy.stats import chi2  # slow to import
-
-    return float(np.sqrt(chi2.isf(chi2.sf(4.0, 1), count)))
-
-
-@cache
-def _unlikely(count: int) -> float:
-    """χ² distance that `count` parameters of a possible effect seldom have from possible ones."""
-    from scipy.stats import chi2  # slow to import
-
-    return float(chi2.isf(_CHANCE, count))
 
 
 def steps_by_ratio(value: float, ratios: Sequence[float]) -> list[float]:
