@@ -80,15 +80,6 @@ def _fitted(model: Model, traced: Traced, chosen: Sequence[int], parameters: Arr
     return FittedModel(model.full_inertias(parameters), effects, values)
 
 
-def training_traces(
-    robot: Robot, models: tuple[FittedModel, FittedModel], traced: Traced
-) -> tuple[TorqueTrace, ...]:
-    """Torque over time of the training parts."""
-    played = Played(robot, traced.data.runs)
-    before, after = map(played.predictions, models)
-    return played.traces(before, after, sealed=False)
-
-
 def on_sealed(played: Played, models: tuple[FittedModel, FittedModel]) -> BeforeAfter:
     """Errors and torque over time of the sealed part, used once."""
     before, after = map(played.predictions, models)

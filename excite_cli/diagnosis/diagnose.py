@@ -11,7 +11,7 @@ from scipy.linalg import cholesky
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import Alias, aliases_of
-from excite_cli.diagnosis.before_after import Played, both_models, on_sealed, training_traces
+from excite_cli.diagnosis.before_after import Played, both_models, on_sealed
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
 from excite_cli.diagnosis.doubt import approximations
@@ -99,9 +99,13 @@ def diagnose(
     traced, parameters, covariance = final.traced, final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
     floor = noise_floor(parts.training, processing)
+    models = both_models(model, traced, parameters)
+    trained = Played(robot, traced.data.runs)
+    before, after = map(trained.predictions, models)
     rests = large_rests(
         traced.data,
         traced.signals,
+        [each.torque for each in after],
         traced.data.residuals(traced.candidates, traced.chosen, parameters),
         parts.training,
         processing,
@@ -109,7 +113,6 @@ def diagnose(
         robot.joint_names,
     )
     doubts = approximations(traced, unexplained, robot.joint_names, rests)
-    models = both_models(model, traced, parameters)
     ends = [prepare(run, processing) for run in parts.ends]
     sealed_part = on_sealed(Played(robot, kept), models)
     worth = worth_on_sealed(Played(robot, [*kept, *ends]), model, traced, models[1])
@@ -147,7 +150,7 @@ def diagnose(
         noise_floor=floor.named(robot.joint_names) if floor else None,
         traces=Traces(
             torque_units(robot),
-            training_traces(robot, models, traced),
+            trained.traces(before, after, sealed=False),
             effect_traces(traced, parameters, robot.joint_names),
             dependence,
         ),

@@ -1,7 +1,8 @@
 """The noise of the torque, from its own spectrum above the motion.
 
-Between 8 and 100 Hz hardly any torque belongs to the motion. What is there is taken for noise with
-the spectrum of an autoregression of first order,
+Between 8 and 100 Hz hardly any torque belongs to the motion, and of what does a model predicts the
+most: in every band the lesser power counts, of the torque or of what a model leaves of it. That is
+taken for noise with the spectrum of an autoregression of first order,
 
     S(f) = S₀ / (1 + (f/f₀)²),    white for f₀ → ∞,
 
@@ -46,22 +47,30 @@ class BandNoise:
 
 
 def band_noise(
-    recorded: Sequence[Run], prepared: Sequence[PreparedRun], processing: Processing
+    recorded: Sequence[Run],
+    prepared: Sequence[PreparedRun],
+    predicted: Sequence[Array],
+    processing: Processing,
 ) -> BandNoise:
     """Noise of the torque of `recorded` runs, of which `prepared` are the same in the same order.
 
-    Recordings below 50 Hz do not show it, nor torque that somebody low-passed.
+    predicted: torque (T, n) of a model at the working rate of each run. Recordings below 50 Hz do not show it, nor torque that somebody low-passed.
     """
     n = recorded[0].tau.shape[1]
     bands = [band for band in _BANDS if band[1] <= _HIGHEST * processing.recorded_rate]
     if len(bands) < _WHITE:
         return BandNoise(np.full(n, np.nan), np.full(n, np.nan))
-    energy, seconds = np.zeros((len(bands), n)), np.zeros(n)
-    for run, fit in zip(recorded, prepared, strict=True):
+    energies, seconds = np.zeros((2, len(bands), n)), np.zeros(n)
+    for run, fit, torque in zip(recorded, prepared, predicted, strict=True):
         sliding = _sliding(run, fit, processing.moving_speed)
         seconds += sliding.sum(axis=0) * run.step
+        measured = np.where(np.isfinite(run.tau), run.tau, 0.0)
+        series = (measured, measured - _at_recorded_rate(torque, run, fit))
         for k, band in enumerate(bands):
-            energy[k] += np.where(sliding, _passed(run, band) ** 2, 0.0).sum(axis=0) * run.step
+            for energy, x in zip(energies, series, strict=True):
+                square = np.square(_passed(x, run.step, band))
+                energy[k] += np.where(sliding, square, 0.0).sum(axis=0) * run.step
+    energy = energies.min(axis=0)
     known = seconds > _LEAST_SECONDS
     widths = np.array([high - low for low, high in bands])
     power = energy / np.where(known, seconds, np.nan) / widths[:, None]
@@ -88,12 +97,19 @@ def _sliding(run: Run, fit: PreparedRun, moving: float) -> Mask:
     return np.asarray(~near & (np.abs(v) > moving))
 
 
-def _passed(run: Run, band: tuple[float, float]) -> Array:
+def _at_recorded_rate(predicted: Array, run: Run, fit: PreparedRun) -> Array:
+    """Torque (T, n) between samples of the working rate; at the borders, that of the nearest."""
+    from scipy.interpolate import CubicSpline  # takes a second to import
+
+    between = CubicSpline(fit.t, predicted, axis=0)
+    return np.asarray(between(np.clip(run.t, fit.t[0], fit.t[-1])))
+
+
+def _passed(x: Array, step: float, band: tuple[float, float]) -> Array:
     from scipy.signal import butter, sosfiltfilt  # takes a second to import
 
-    sections = butter(4, band, "bandpass", fs=1.0 / run.step, output="sos")
-    tau = np.where(np.isfinite(run.tau), run.tau, 0.0)
-    return np.asarray(sosfiltfilt(sections, tau, axis=0, padlen=min(len(tau) - 2, 100)))
+    sections = butter(4, band, "bandpass", fs=1.0 / step, output="sos")
+    return np.asarray(sosfiltfilt(sections, x, axis=0, padlen=min(len(x) - 2, 100)))
 
 
 def _lowest_corner(

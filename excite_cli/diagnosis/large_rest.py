@@ -2,7 +2,8 @@
 
 More than noise is left where the residual exceeds `_TIMES` the noise, or where a good part of it
 can be predicted. Noise is what changes between repeated periods, if there are any, or what the
-torque's own spectrum above the motion says.
+torque's own spectrum above the motion says. What is left in samples that no fit counts, around
+reversals, is told apart: friction there is what the torque says, and no name is at fault.
 """
 
 from collections.abc import Sequence
@@ -21,34 +22,43 @@ from excite_cli.robot.model import Array
 
 # 42 simulated robots without any defect stay below 1.42, and none of those above 2.5 is without.
 _TIMES = 2.5
+_PERHAPS = 1.8  # a word, that noise with a memory may be as large
 _PREDICTABLE = 0.3  # share; of noise with a memory hardly anything is
 _SAID = 0.2  # a quantity that predicts less is no answer
-_UNKNOWN = 0.02  # of the torque's RMS: a word where noise is not known
+_UNKNOWN = 0.005  # of the torque's RMS: a word where noise is not known
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no word
 
 
 def large_rests(
     data: TrainingData,
     signals: Sequence[Signals],
+    predicted: Sequence[Array],
     residuals: Sequence[Array],
     recorded: Sequence[Run],
     processing: Processing,
     repeated: NoiseFloor | None,
     joint_names: Sequence[str],
 ) -> tuple[LargeRest, ...]:
-    """Joints of whose torque more is left than noise, by `residuals` (M, n) of the training parts.
+    """Joints of whose torque more is left than noise, in the training parts.
 
-    recorded: the training parts as they were read; repeated: the floor from repeated periods.
+    predicted: torque (T, n) of the model at the working rate; residuals: (M, n) of the samples that
+    the fit counts; recorded: the parts as they were read; repeated: the floor from repeated periods.
     """
     quantities = Quantities(data, signals, joint_names)
-    band = band_noise(recorded, data.runs, processing)
+    band = band_noise(recorded, data.runs, predicted, processing)
+    shown = [
+        run.tau - run.averaged_torque(torque)
+        for run, torque in zip(data.runs, predicted, strict=True)
+    ]
     found = []
     for joint, name in enumerate(joint_names):
         rms, torque = (
             _rms([x[run.usable[:, joint], joint] for x, run in zip(series, data.runs, strict=True)])
             for series in (residuals, [run.tau_fit for run in data.runs])
         )
-        if not rms > _SMALLEST * torque:
+        counted = [run.usable[:, joint] & run.valid[:, joint] for run in data.runs]
+        around = _rms([x[at, joint] for x, at in zip(shown, counted, strict=True)])
+        if not max(rms, around) > _SMALLEST * torque:
             continue
         noise, most = float(band.white[joint]), float(band.coloured[joint])
         basis = "band"
@@ -56,23 +66,25 @@ def large_rests(
             noise = most = float(repeated.rms[joint])
             basis = "periods"
         known = np.isfinite(noise)
-        above = rms > _TIMES * noise if known else rms > _UNKNOWN * torque
+        enough = _PERHAPS * noise if known else _UNKNOWN * torque
         rest = quantities.rest(joint, residuals)
         predictable = rest is not None and rest.predictable > _PREDICTABLE
-        if not above and not predictable:
+        if not max(rms, around) > enough and not predictable:
             continue
-        structure = Structure(0.0) if rest is None else rest.structure()
+        at_reversals = not rms > enough and not predictable
+        structure = Structure(0.0) if rest is None or at_reversals else rest.structure()
         certain = rms > _TIMES * most or structure.predictable > _PREDICTABLE
         found.append(
             LargeRest(
                 joint=name,
-                rms=rms,
-                share_of_torque=rms / torque,
+                rms=around if at_reversals else rms,
+                share_of_torque=(around if at_reversals else rms) / torque,
                 noise=noise if known else None,
                 basis=basis if known else "",
                 certain=certain,
                 predictable=structure.predictable,
                 depends_on=structure.depends_on if structure.named > _SAID else (),
+                at_reversals=at_reversals,
             )
         )
     return tuple(found)

@@ -98,6 +98,7 @@ class LargeRest:
     If it is not `certain`, noise (with a memory, or of unknown size) could be as large.
     `predictable`: share of the residual's energy that is predicted on stretches left out, by all
     quantities or by those of `depends_on`, the one or two that predict most; empty if none does.
+    `at_reversals`: the samples that fits count are at the noise; `rms` is of all in motion.
     """
 
     joint: str
@@ -108,6 +109,7 @@ class LargeRest:
     certain: bool
     predictable: float
     depends_on: tuple[Covariate, ...]
+    at_reversals: bool = False
 
 
 @dataclass(frozen=True)

@@ -127,17 +127,27 @@ def rests_in_words(
             text += "no quantity that was tried predicts it."
         more.append(text)
     perhaps = []
-    for unknown, why in (
-        (False, "more than white noise, but noise with a memory could be as large"),
-        (True, "the noise is not known: the torque was filtered, or recorded below 50 Hz"),
+    inside = [each for each in found.large_rests if not each.certain and not each.at_reversals]
+    for rests, what, why in (
+        (
+            [each for each in inside if each.noise is not None],
+            "Left, and predicted by nothing",
+            "more than white noise, but noise with a memory could be as large",
+        ),
+        (
+            [each for each in inside if each.noise is None],
+            "Left, and predicted by nothing",
+            "the noise is not known: the torque was filtered, or recorded below 50 Hz",
+        ),
+        (
+            [each for each in found.large_rests if each.at_reversals],
+            "Left around reversals",
+            "there joints stick, and no fit counts it",
+        ),
     ):
-        open_ones = [
-            f"{left(each)} of {each.joint}"
-            for each in found.large_rests
-            if not each.certain and (each.noise is None) == unknown
-        ]
-        if open_ones:
-            perhaps.append(f"Left, and predicted by nothing: {', '.join(open_ones)}; {why}.")
+        if rests:
+            told = ", ".join(f"{left(each)} of {each.joint}" for each in rests)
+            perhaps.append(f"{what}: {told}; {why}.")
     return more, perhaps
 
 
