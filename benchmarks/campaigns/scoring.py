@@ -238,13 +238,29 @@ def _alike(
 
 
 def _disturbed(plant: Plant, truth: Truth, answer: Answer) -> bool:
-    """Whether its joint has no one value of it, or lacks what was not found and counts as that."""
+    """Whether its joint has no one value of it, or what else is there goes by another name.
+
+    Friction counts as part of what was not found, or of what may be called so, too.
+    """
     return any(
         set(plant.joints) & set(other.joints)
-        and (other.kinds[0] == plant.kinds[0] or not _found(other, truth, answer))
+        and (
+            other.kinds[0] == plant.kinds[0]
+            or not any(_is(named.called, other, truth, answer) for named in answer.named)
+        )
         for other in truth.plants
         if other.required
     )
+
+
+def _amplified(plant: Plant, truth: Truth) -> float:
+    """By how much a gain of the joint's torque in all runs makes its friction look larger."""
+    gains = [
+        other.sizes["gain"]
+        for other in truth.plants
+        if "gain" in other.sizes and other.joints == plant.joints and not other.runs
+    ]
+    return 1.0 + sum(gains) if plant.kinds[0] in PLAIN else 1.0
 
 
 def _sizes(truth: Truth, answer: Answer) -> Iterable[Size]:
@@ -256,7 +272,8 @@ def _sizes(truth: Truth, answer: Answer) -> Iterable[Size]:
                 continue
             if _trained(named.called.runs, truth) != _trained(plant.runs, truth):
                 continue  # of another set of runs: another number
-            for name, true in plant.sizes.items():
+            for name, size in plant.sizes.items():
                 value, std = named.sizes.get(name, (np.nan, np.nan))
                 if np.isfinite(value) and np.isfinite(std) and std > 0:
+                    true = size * _amplified(plant, truth)
                     yield Size(plant.kinds[0], name, true, value, std)

@@ -6,8 +6,10 @@ the part that depends on some quantity (`unexplained`) or can be predicted from 
 what an effect of an impossible sign or size would explain. The effect is an approximation
 
 * if what is left is a function of the same quantity as the effect (friction: speed), and U > 0.1 E,
-* or if U > E, whatever it depends on; of what can be predicted, only if the effect is a refinement
-  or is there in some runs alone: of what inertias nearly take up, E is next to nothing.
+* or if U > E, whatever it depends on.
+
+Of `rests`, U is what can be predicted, or if that is little, what exceeds the noise; they depend on
+two quantities mostly, so that U > 0.5 E is asked for where one of them is the effect's own.
 """
 
 from collections.abc import Sequence
@@ -16,7 +18,8 @@ from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import Approximation, LargeRest, Unexplained
 from excite_cli.diagnosis.tracing import Traced
 
-_SAME_QUANTITY = 0.1
+_SAME_QUANTITY, _ONE_OF_TWO = 0.1, 0.5
+_PREDICTABLE = 0.3  # share: less may be all that exceeds the noise, or not
 _TRIED = 12  # of the strongest candidates of a joint
 
 
@@ -43,17 +46,24 @@ def approximations(
             if structure > (_SAME_QUANTITY if same else 1.0) * explained:
                 found[i] = Approximation(covariates=each.depends_on)
                 continue
-        effect = traced.candidates[i].effect
-        bends = bool(effect.refines or effect.runs)  # what lacks a name is most easily called so
-        if name in more and bends and more[name].predictable * rest > explained:
-            found[i] = Approximation(covariates=more[name].depends_on)
-            continue
+        if name in more:
+            same = _same_quantity(traced, i, more[name].depends_on, joint_names)
+            if _surely_left(more[name]) * rest > (_ONE_OF_TWO if same else 1.0) * explained:
+                found[i] = Approximation(covariates=more[name].depends_on)
+                continue
         if joint not in impossible:
             impossible[joint] = _impossible(traced, joint, rest)
         energy, what = impossible[joint]
         if energy > explained:
             found[i] = Approximation(kind=what)
     return found
+
+
+def _surely_left(rest: LargeRest) -> float:
+    """Share of a residual's energy that is predictable, or else exceeds the noise."""
+    if rest.predictable > _PREDICTABLE or rest.noise is None:
+        return rest.predictable
+    return 1.0 - (rest.noise / rest.rms) ** 2
 
 
 def _strongest(traced: Traced, i: int) -> tuple[int, float]:

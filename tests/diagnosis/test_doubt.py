@@ -262,5 +262,8 @@ def test_what_can_be_predicted_and_is_more_makes_a_name_doubtful(
     assert all(each == Approximation(covariates=depends) for each in found.values())
     elsewhere = replace(rest, joint="b")
     assert approximations(traced(data, candidates, [0]), [], NAMES, [elsewhere]) == {}
-    data, candidates = planted([effect("armature")], np.array([[0.5, 0.0]]))
+    data, candidates = planted([effect("armature")], np.array([[0.95, 0.0]]))
     assert approximations(traced(data, candidates, [0]), [], NAMES, [rest]) == {}
+    unforeseen = replace(rest, noise=0.1, predictable=0.0, depends_on=())  # 0.99 exceed the noise
+    found = approximations(traced(data, candidates, [0]), [], NAMES, [unforeseen])
+    assert found == ({0: Approximation()} if certain else {})

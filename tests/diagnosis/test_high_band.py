@@ -32,7 +32,7 @@ def measured(noise: Array, rate: float = 500.0) -> tuple[BandNoise, Array]:
     fit: PreparedRun = prepare(run, p)
     alone = prepare(Run("run", run.t, run.q, run.tau - 5.0 * run.q), p)
     rms = [np.sqrt(np.mean(alone.tau_fit[fit.usable[:, j], j] ** 2)) for j in range(2)]
-    return band_noise([run], [fit], p), np.array(rms)
+    return band_noise([run], [fit], [5.0 * fit.q], p), np.array(rms)
 
 
 def coloured(memory: float, seed: int, rate: float = 500.0) -> Array:
