@@ -8,8 +8,9 @@ taken for noise with the spectrum of an autoregression of first order,
 
 fitted to the power of a few bands; ∫ S(f) |G(f)|² df is then what the averages G of the fit leave
 of it. The corner f₀ is not known well where it lies below the bands. So there are two levels: of
-white noise as in 8–20 Hz, and of the noise with the lowest corner that the bands allow (two
-standard deviations), which is the most that noise with a memory can be.
+white noise as in 8–20 Hz in most stretches of time (the median; bursts at reversals and starts are
+none), and of the noise with the lowest corner that the bands allow (two standard deviations), which
+is the most that noise with a memory can be.
 """
 
 from collections.abc import Sequence
@@ -33,6 +34,7 @@ _TWO_SD = 4.0  # of χ²
 _FILTERED = 0.2
 _REVERSAL = 0.15  # s around a reversal, whose friction is in all bands
 _LEAST_SECONDS = 2.0
+_STRETCH, _FEWEST_STRETCHES = 0.5, 6  # s
 
 
 @dataclass(frozen=True)
@@ -61,16 +63,20 @@ def band_noise(
     if len(bands) < _WHITE:
         return BandNoise(np.full(n, np.nan), np.full(n, np.nan))
     energies, seconds = np.zeros((2, len(bands), n)), np.zeros(n)
+    stretches: list[list[Array]] = [[] for _ in bands[:_WHITE]]
     for run, fit, torque in zip(recorded, prepared, predicted, strict=True):
         sliding = _sliding(run, fit, processing.moving_speed)
         seconds += sliding.sum(axis=0) * run.step
         measured = np.where(np.isfinite(run.tau), run.tau, 0.0)
         series = (measured, measured - _at_recorded_rate(torque, run, fit))
         for k, band in enumerate(bands):
-            for energy, x in zip(energies, series, strict=True):
-                square = np.square(_passed(x, run.step, band))
+            squares = [np.square(_passed(x, run.step, band)) for x in series]
+            for energy, square in zip(energies, squares, strict=True):
                 energy[k] += np.where(sliding, square, 0.0).sum(axis=0) * run.step
+            if k < _WHITE:
+                stretches[k].append(_stretches(np.minimum(*squares), sliding, run.step))
     energy = energies.min(axis=0)
+    usual = np.stack([_usual(np.concatenate(own)) for own in stretches])
     known = seconds > _LEAST_SECONDS
     widths = np.array([high - low for low, high in bands])
     power = energy / np.where(known, seconds, np.nan) / widths[:, None]
@@ -78,7 +84,14 @@ def band_noise(
     known &= np.nan_to_num(power[1]) > _FILTERED * np.nan_to_num(power[0])
     for j in np.flatnonzero(known & (power > 0).all(axis=0)):
         gain = _gain(prepared, processing, int(j))
-        flat = float(np.average(power[:_WHITE, j], weights=widths[:_WHITE]))
+        flat = float(
+            np.nanmin(
+                [
+                    np.average(x[:_WHITE, j], weights=widths[:_WHITE])
+                    for x in (power, usual / widths[:_WHITE, None])
+                ]
+            )
+        )
         level, corner = _lowest_corner(power[:, j], 2 * widths * seconds[j], bands)
         white[j] = np.sqrt(gain * _left(flat, _CORNERS[-1], processing))
         coloured[j] = max(white[j], np.sqrt(gain * _left(level, corner, processing)))
@@ -95,6 +108,25 @@ def _sliding(run: Run, fit: PreparedRun, moving: float) -> Mask:
     window = np.ones(2 * round(_REVERSAL / run.step) + 1)
     near = np.stack([np.convolve(column, window, "same") for column in crossing.T], axis=1) > 0.5
     return np.asarray(~near & (np.abs(v) > moving))
+
+
+def _stretches(square: Array, sliding: Mask, step: float) -> Array:
+    """Mean power (S, n) of stretches of `_STRETCH` in which a joint slides for the most, or NaN."""
+    length = max(1, round(_STRETCH / step))
+    edges = np.arange(0, max(len(square) - length + 1, 1), length)
+    count = np.add.reduceat(sliding.astype(float), edges, axis=0)
+    power = np.add.reduceat(np.where(sliding, square, 0.0), edges, axis=0)
+    return np.asarray(np.where(count > 0.5 * length, power / np.maximum(count, 1.0), np.nan))
+
+
+def _usual(power: Array) -> Array:
+    """The median (n,) of stretches (S, n) of noise, as the mean that it has with this median."""
+    from scipy.stats import chi2  # takes a second to import
+
+    freedom = 2.0 * (_BANDS[0][1] - _BANDS[0][0]) * _STRETCH
+    known = np.isfinite(power).sum(axis=0) >= _FEWEST_STRETCHES
+    median = np.nanmedian(np.where(known, power, 0.0), axis=0)
+    return np.where(known, median * freedom / chi2.median(freedom), np.nan)
 
 
 def _at_recorded_rate(predicted: Array, run: Run, fit: PreparedRun) -> Array:
