@@ -67,7 +67,7 @@ def band_noise(
     for run, fit, torque in zip(recorded, prepared, predicted, strict=True):
         sliding = _sliding(run, fit, processing.moving_speed)
         seconds += sliding.sum(axis=0) * run.step
-        measured = np.where(np.isfinite(run.tau), run.tau, 0.0)
+        measured = _bridged(run)
         series = (measured, measured - _at_recorded_rate(torque, run, fit))
         for k, band in enumerate(bands):
             squares = [np.square(_passed(x, run.step, band)) for x in series]
@@ -104,10 +104,17 @@ def _sliding(run: Run, fit: PreparedRun, moving: float) -> Mask:
     crossing = np.zeros(v.shape)
     crossing[1:] = np.signbit(v[1:]) != np.signbit(v[:-1])
     crossing[[0, -1]] = 1.0
-    crossing[~run.usable()] = 1.0
     window = np.ones(2 * round(_REVERSAL / run.step) + 1)
     near = np.stack([np.convolve(column, window, "same") for column in crossing.T], axis=1) > 0.5
-    return np.asarray(~near & (np.abs(v) > moving))
+    return np.asarray(~near & (np.abs(v) > moving) & run.usable())
+
+
+def _bridged(run: Run) -> Array:
+    """Torque (T, n) with straight lines over samples that must not be used."""
+    tau, good = run.tau.copy(), run.usable() & np.isfinite(run.tau)
+    for j in np.flatnonzero(~good.all(axis=0) & good.any(axis=0)):
+        tau[:, j] = np.interp(run.t, run.t[good[:, j]], tau[good[:, j], j])
+    return np.where(np.isfinite(tau), tau, 0.0)
 
 
 def _stretches(square: Array, sliding: Mask, step: float) -> Array:

@@ -25,7 +25,7 @@ _TIMES = 2.5
 _PERHAPS = 1.8  # a word, that noise with a memory may be as large
 _PREDICTABLE = 0.3  # share; of noise with a memory hardly anything is
 _SAID = 0.2  # a quantity that predicts less is no answer
-_UNKNOWN = 0.005  # of the torque's RMS: a word where noise is not known
+_UNKNOWN = 0.003  # of the torque's RMS: a word where noise is not known
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no word
 
 
