@@ -4,7 +4,8 @@ Columns are [inertial | declared effects | candidates | torque], rows whitened. 
 kept per fold and joint; their sums give the residual energy, the gain of any candidate, and the
 error on any fold left out, each by solves of the size of the model. What is there in one fold only
 (what one run carries) cannot be known from the others: it is fitted on one side of that fold, the
-rest of the model held, and judged on the other.
+rest of the model held, and judged on the other. So are the directions that no other fold knows if
+an effect is in all folds but that one.
 
 With N = G_SS + Λ (Λ the precision of a prior on the inertial columns, if there is one) and a
 candidate c, the Schur complement Z = G_cc − G_cS N⁻¹ G_Sc is what is left of the candidate once the
@@ -18,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, eigh
 
 from excite_cli.diagnosis.grams import Grams
 from excite_cli.robot.model import Array
@@ -29,6 +30,7 @@ ABSORBED = 1e-3
 SHARED = 1e-7
 _COLLINEAR = 1e-9
 _RIDGE = 1e-11
+_UNKNOWN = 1e-4  # of what all folds know
 _RIDGE_ALONE = 1e-6  # of its own energy: half a run may not determine all that a run does
 # Where the other side of a fold has less of such a column than this share, both sides fit it.
 _LEAST_SIDE = 0.1
@@ -171,46 +173,72 @@ class Evidence:
     def left_out(self, chosen: Sequence[int], joints: Sequence[int] | None) -> Array:
         """Energy (F,) on the rows of `joints` of each fold, fitted to all other folds.
 
-        What is there in no other fold is fitted to the other side of the fold.
+        What other folds do not know is fitted to the other side of the fold: effects that are there
+        in no other fold, and what would tell apart from the robot those that all others have.
         """
         key = (tuple(sorted(chosen)), None if joints is None else tuple(joints))
         if key not in self._left_out:
             at = self.columns(key[0])
             fitted = self._without_folds(at, key[0])
             seen = self._seen[:, at]
+            seen[:, : self.fixed] = True
             alone = seen & (seen.sum(axis=0) == 1)
-            alone[:, : self.fixed] = False
+            lacking = ~seen & (seen.sum(axis=0) == len(seen) - 1)
             found = []
             for fold, x in enumerate(fitted):
-                if alone[fold].any():
-                    found.append(self._crosswise(fold, joints, at, (x, alone[fold])))
+                open_ = self._unknown_without(fold, at, alone[fold], lacking[fold])
+                if open_.shape[1]:
+                    found.append(self._crosswise(fold, joints, at, (x, open_)))
                 else:
                     found.append(_energy(self._part([fold], joints, at), x))
             self._left_out[key] = np.maximum(found, 0.0)
         return self._left_out[key]
+
+    def _unknown_without(
+        self,
+        fold: int,
+        at: NDArray[np.intp],
+        alone: NDArray[np.bool_],
+        lacking: NDArray[np.bool_],
+    ) -> Array:
+        """Directions (k, d) of the parameters of which all other folds know next to nothing.
+
+        Columns that are there in this fold `alone`, and of those that it is `lacking`, alone of
+        all, what the rest of the model could be taken for in the others.
+        """
+        open_ = np.eye(len(at))[:, alone]
+        if not lacking.any():
+            return open_
+        others = self._normal(self.total - self._folds[fold], at)
+        own, rest = np.flatnonzero(lacking), np.flatnonzero(~(lacking | alone))
+        taken = cho_solve(cho_factor(others[np.ix_(rest, rest)]), others[np.ix_(rest, own)])
+        left = others[np.ix_(own, own)] - others[np.ix_(own, rest)] @ taken
+        shares, directions = eigh(left, others[np.ix_(own, own)])
+        unknown = directions[:, shares < _UNKNOWN]
+        more = np.zeros((len(at), unknown.shape[1]))
+        more[own], more[rest] = unknown, -taken @ unknown
+        return np.concatenate([open_, more], axis=1)
 
     def _crosswise(
         self,
         fold: int,
         joints: Sequence[int] | None,
         at: NDArray[np.intp],
-        fitted: tuple[Array, NDArray[np.bool_]],
+        fitted: tuple[Array, Array],
     ) -> float:
-        """Energy of a fold's two sides, with what is there alone fitted to the other side."""
-        common, alone = fitted
+        """Energy of a fold's two sides, with some directions fitted to the other side."""
+        common, open_ = fitted
         parts = [self._part([fold], None, at, slice(side, side + 1)) for side in (0, 1)]
-        own = np.flatnonzero(alone)
-        energies = np.array([np.diag(part)[own].sum() for part in parts])
+        energies = np.array([np.sum((part[:-1, :-1] @ open_) * open_) for part in parts])
         energy = 0.0
         for side in (0, 1):
-            x, other = common.copy(), parts[1 - side]
+            other = parts[1 - side]
             if energies[1 - side] < _LEAST_SIDE * energies.sum():
                 other = parts[0] + parts[1]
-            x[own] = 0.0
-            rhs = other[own, -1] - other[own, :-1] @ x
-            normal = other[np.ix_(own, own)]
-            normal[np.diag_indices(len(own))] += _RIDGE_ALONE * np.diag(normal) + _RIDGE
-            x[own] = np.linalg.solve(normal, rhs)
+            rhs = open_.T @ (other[:-1, -1] - other[:-1, :-1] @ common)
+            normal = open_.T @ other[:-1, :-1] @ open_
+            normal[np.diag_indices(len(normal))] += _RIDGE_ALONE * np.diag(normal) + _RIDGE
+            x = common + open_ @ np.linalg.solve(normal, rhs)
             energy += _energy(self._part([fold], joints, at, slice(side, side + 1)), x)
         return energy
 
