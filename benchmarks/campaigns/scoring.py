@@ -245,7 +245,7 @@ def _disturbed(plant: Plant, truth: Truth, answer: Answer) -> bool:
     return any(
         set(plant.joints) & set(other.joints)
         and (
-            other.kinds[0] == plant.kinds[0]
+            plant.kinds[0] in other.kinds
             or not any(_is(named.called, other, truth, answer) for named in answer.named)
         )
         for other in truth.plants
@@ -254,13 +254,21 @@ def _disturbed(plant: Plant, truth: Truth, answer: Answer) -> bool:
 
 
 def _amplified(plant: Plant, truth: Truth) -> float:
-    """By how much a gain of the joint's torque in all runs makes its friction look larger."""
+    """By how much a gain of the joint's torque in all runs makes its effects look larger.
+
+    NaN of effects on several joints, of which one has a gain.
+    """
     gains = [
         other.sizes["gain"]
         for other in truth.plants
-        if "gain" in other.sizes and other.joints == plant.joints and not other.runs
+        if "gain" in other.sizes
+        and other is not plant
+        and set(other.joints) & set(plant.joints)
+        and not other.runs
     ]
-    return 1.0 + sum(gains) if plant.kinds[0] in PLAIN else 1.0
+    if plant.kinds[0] == "torque_offset" or not gains:
+        return 1.0
+    return 1.0 + sum(gains) if len(plant.joints) == 1 else float("nan")
 
 
 def _sizes(truth: Truth, answer: Answer) -> Iterable[Size]:
@@ -274,6 +282,6 @@ def _sizes(truth: Truth, answer: Answer) -> Iterable[Size]:
                 continue  # of another set of runs: another number
             for name, size in plant.sizes.items():
                 value, std = named.sizes.get(name, (np.nan, np.nan))
-                if np.isfinite(value) and np.isfinite(std) and std > 0:
-                    true = size * _amplified(plant, truth)
+                true = size * _amplified(plant, truth)
+                if np.isfinite([value, std, true]).all() and std > 0:
                     yield Size(plant.kinds[0], name, true, value, std)

@@ -1,7 +1,7 @@
 """The fit that is told: robust, of possible sizes, and without names that mean nothing.
 
 What a search has named is fitted once more (`robust_solve`), with standard deviations that respect
-serial correlation and what the columns of first-order effects leave. Sizes that no effect can have
+serial correlation, what the columns of first-order effects leave, and shapes that fit as well. Sizes that no effect can have
 are moved to the nearest possible ones, all other parameters with them as the covariance says. A
 name whose size is within two standard deviations of zero goes, the weakest first, and the search
 goes on from the others without it.
@@ -60,7 +60,8 @@ def _fitted(traced: Traced) -> FinalFit:
     )
     for i, own in _places(traced, len(parameters)):
         error = traced.candidates[i].effect.model_error(parameters[own])
-        covariance[own, own] += np.diag(error**2 + (_SYSTEMATIC * parameters[own]) ** 2)
+        error = np.hypot(error, _SYSTEMATIC * parameters[own])
+        covariance[own, own] += np.diag(error**2 + _by_shape(traced, i) ** 2)
     lines = _lines(traced, len(parameters))
     for i, own in _places(traced, len(parameters)):
         effect, values = traced.candidates[i].effect, parameters[own]
@@ -70,6 +71,29 @@ def _fitted(traced: Traced) -> FinalFit:
             shift = whiten.T @ (whiten @ (effect.nearest(values, covariance[own, own]) - values))
             parameters = parameters + covariance[:, own] @ shift
     return FinalFit(traced, parameters, covariance)
+
+
+def _by_shape(traced: Traced, i: int) -> Array:
+    """Standard deviation (w,) of the sizes of candidate i that its uncertain shape brings.
+
+    The sizes that it has in other shapes, weighted by exp(−Δχ²/2): so likely are these shapes.
+    """
+    judge, own = traced.judge, traced.candidates[i]
+    others = [
+        k for k, c in enumerate(traced.candidates) if c.place == own.place and c.width == own.width
+    ]
+    if len(others) < 2:
+        return np.zeros(own.width)
+    sets = [[k if c == i else c for c in traced.chosen] for k in others]
+    energies = np.array([judge.white.energy(each) for each in sets]) / traced.inflation
+    weights = np.exp(-0.5 * (energies - energies.min()))
+    sizes = []
+    for k, each in zip(others, sets, strict=True):
+        parameters = judge.plain.solve(each)
+        at = dict(_places(replace(traced, chosen=tuple(each)), len(parameters)))[k]
+        sizes.append(parameters[at])
+    from_own = np.square(np.array(sizes) - sizes[others.index(i)])
+    return np.sqrt(weights @ from_own / weights.sum())
 
 
 def _over_error(found: FinalFit) -> dict[int, float]:

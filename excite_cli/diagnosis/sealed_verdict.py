@@ -4,7 +4,8 @@ Without it, the model is fitted anew to the training data: so is what refines it
 would take its place. What the effect removes is the difference of the mean relative errors of the
 torque, where joints move: of one that stands the stiction may be any, and no model says it. Blocks
 of the sealed part are drawn with replacement, the same for both errors, and say whether it is above
-or below zero beyond chance. Nothing is chosen or fitted by this.
+or below zero beyond chance. An effect of several joints that removes error on one and adds it on
+another is not confirmed. Nothing is chosen or fitted by this.
 """
 
 from collections.abc import Sequence
@@ -26,6 +27,7 @@ from excite_cli.robot.model import Array
 _SHORTEST, _LONGEST, _WANTED = 0.2, 0.5, 8
 _FEWEST = 5  # blocks: of fewer, all of them agree by chance too often
 _NIL = 1e-6  # of the torque
+_HIGHER = 1.1  # times the error without it, of one joint
 
 
 @dataclass(frozen=True)
@@ -49,8 +51,17 @@ def worth_on_sealed(
         errors_without = played.errors(without)
         removed = removed_in_draws(played.runs, without, with_all)
         lower = errors_without.mean_relative - errors.mean_relative
-        found[i] = Worth(sealed_verdict(removed, lower), _removes(errors_without, errors))
+        verdict = sealed_verdict(removed, lower)
+        if verdict is SealedVerdict.CONFIRMED and _rises(model, traced, i, errors_without, errors):
+            verdict = SealedVerdict.NOT_CONFIRMED
+        found[i] = Worth(verdict, _removes(errors_without, errors))
     return found
+
+
+def _rises(model: Model, traced: Traced, i: int, without: Errors, with_it: Errors) -> bool:
+    """Whether the error of a joint that the effect acts on is clearly higher with it."""
+    names = [model.robot.joint_names[j] for j in traced.candidates[i].effect.joints]
+    return any(with_it.relative[name] > _HIGHER * without.relative[name] for name in names)
 
 
 def sealed_verdict(removed: Array, lower: float) -> SealedVerdict:
