@@ -56,7 +56,8 @@ def band_noise(
 ) -> BandNoise:
     """Noise of the torque of `recorded` runs, of which `prepared` are the same in the same order.
 
-    predicted: torque (T, n) of a model at the working rate of each run. Recordings below 50 Hz do not show it, nor torque that somebody low-passed.
+    predicted: torque (T, n) of a model at the working rate of each run. Recordings below 50 Hz do
+    not show the noise, nor does torque that somebody low-passed.
     """
     n = recorded[0].tau.shape[1]
     bands = [band for band in _BANDS if band[1] <= _HIGHEST * processing.recorded_rate]

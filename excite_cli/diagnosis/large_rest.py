@@ -41,8 +41,8 @@ def large_rests(
 ) -> tuple[LargeRest, ...]:
     """Joints of whose torque more is left than noise, in the training parts.
 
-    predicted: torque (T, n) of the model at the working rate; residuals: (M, n) of the samples that
-    the fit counts; recorded: the parts as they were read; repeated: the floor from repeated periods.
+    predicted: torque (T, n) of the model at the working rate; residuals: (M, n) of what fits count;
+    recorded: the parts as they were read; repeated: the floor from repeated periods.
     """
     quantities = Quantities(data, signals, joint_names)
     band = band_noise(recorded, data.runs, predicted, processing)

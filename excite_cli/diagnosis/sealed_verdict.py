@@ -52,16 +52,16 @@ def worth_on_sealed(
         removed = removed_in_draws(played.runs, without, with_all)
         lower = errors_without.mean_relative - errors.mean_relative
         verdict = sealed_verdict(removed, lower)
-        if verdict is SealedVerdict.CONFIRMED and _rises(model, traced, i, errors_without, errors):
+        on = [model.robot.joint_names[j] for j in traced.candidates[i].effect.joints]
+        if verdict is SealedVerdict.CONFIRMED and rises_on_one(on, errors_without, errors):
             verdict = SealedVerdict.NOT_CONFIRMED
         found[i] = Worth(verdict, _removes(errors_without, errors))
     return found
 
 
-def _rises(model: Model, traced: Traced, i: int, without: Errors, with_it: Errors) -> bool:
-    """Whether the error of a joint that the effect acts on is clearly higher with it."""
-    names = [model.robot.joint_names[j] for j in traced.candidates[i].effect.joints]
-    return any(with_it.relative[name] > _HIGHER * without.relative[name] for name in names)
+def rises_on_one(joints: Sequence[str], without: Errors, with_it: Errors) -> bool:
+    """Whether the error of one of the joints that an effect acts on is clearly higher with it."""
+    return any(with_it.relative[name] > _HIGHER * without.relative[name] for name in joints)
 
 
 def sealed_verdict(removed: Array, lower: float) -> SealedVerdict:

@@ -164,9 +164,12 @@ def _one_pass(
     candidates: list[Candidate] = []
     if spec.rounds:
         # Kinds that are searched on the residual must see what the last search gave to one of them.
-        # Likewise the runs of what is in some of them only.
+        # Likewise the runs of what is in some of them only, or changes from run to run.
         plain_kinds = np.repeat(
-            [effect.tier != Tier.LAST and not effect.runs for effect in effects],
+            [
+                effect.tier != Tier.LAST and not effect.runs and not effect.of_campaign
+                for effect in effects
+            ],
             [len(effect.parameters) for effect in effects],
         )
         steady = [body.signals(fit.phi, effects, fit.values * plain_kinds) for body in bodies]

@@ -22,6 +22,7 @@ from excite_cli.robot.model import Array, Robot
 
 # Of the span; the last is a straight line. Steps of single runs explain what a coarse grid leaves.
 _TIME_CONSTANTS = (0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 1.0, 20.0)
+_OVER = 0.9
 _LEFT = 0.03  # of its energy: no warming up is an exponential
 _FEWEST = 3  # recordings: two differ by a step as well as by a trend
 
@@ -49,15 +50,33 @@ class FrictionChange(Effect):
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
-        """From a quick start to a straight line; nothing where recordings are too few."""
+        """From a quick start to a straight line; nothing where recordings are too few.
+
+        What is over before the second recording is a step of the first one's friction.
+        """
         if len({seen.run.name for seen in signals}) < _FEWEST:
             return []
-        span = max(seen.start for seen in signals)
-        return [{"time_constant": share * span, "span": span} for share in _TIME_CONSTANTS]
+        starts = sorted({seen.start for seen in signals})
+        span = starts[-1]
+        shapes = [{"time_constant": share * span, "span": span} for share in _TIME_CONSTANTS]
+        second = [cls(joints, shape).progress(starts[1]) for shape in shapes]
+        return [shape for shape, there in zip(shapes, second, strict=True) if there < _OVER]
 
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
-        """The span is no choice."""
-        return () if name == "span" else super().finer_steps(name, signals)
+        """The span is no choice; no step becomes a step of the first recording's friction."""
+        if name == "span":
+            return ()
+        second = sorted({seen.start for seen in signals})[1:2]
+        return [
+            step
+            for step in super().finer_steps(name, signals)
+            if not second or self._quicker(step).progress(second[0]) < _OVER
+        ]
+
+    def _quicker(self, step: float) -> "FrictionChange":
+        """The same with a time constant that is smaller by `step`."""
+        constant = self.shape["time_constant"] - step
+        return FrictionChange(self.joints, {**self.shape, "time_constant": constant}, self.runs)
 
     def leftover(self, values: Array) -> float:
         """What another curve from its start to its end would leave of it."""

@@ -65,6 +65,19 @@ def test_an_effect_of_one_fold_is_fitted_on_one_side_of_it_and_judged_on_the_oth
     assert evidence.folds_of([0, 4]).all()
 
 
+def test_what_all_folds_but_one_have_is_told_from_the_robot_on_one_side_of_that_fold() -> None:
+    """As a load in all runs but one: without that one, it is as well a part of the last link."""
+    data = random_data(5)
+    loaded = [part for part, fold in enumerate(data.folds) if fold != 1]
+    columns = tuple(d[:, :, :1] * (k in loaded) for k, d in enumerate(data.declared))
+    load = Candidate(Armature((0, 1)), (0, 1), columns)
+    torque = tuple(t + 40.0 * c[:, :, 0] for t, c in zip(data.tau, columns, strict=True))
+    evidence = replace(data, tau=torque).evidence([load], WHITE)
+    noise = data.evidence([], WHITE).left_out((), [0, 1])
+    assert evidence.left_out((0,), [0, 1]) == pytest.approx(noise, rel=0.4)
+    assert evidence.left_out((), [0, 1])[1] > 30.0 * noise[1]
+
+
 @pytest.mark.parametrize("chosen", [(), (0,), (1, 2)])
 def test_gains_are_what_the_residual_loses(
     both: tuple[Evidence, Rows], chosen: tuple[int, ...]

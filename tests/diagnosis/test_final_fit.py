@@ -58,3 +58,15 @@ def test_a_payload_is_moved_to_a_body_and_all_that_depends_on_it_too() -> None:
     # What the body has gained of the shared column, the friction has lost.
     assert found[0] + found[5] == pytest.approx(fitted[0] + fitted[5], abs=0.05)
     assert found[0] < fitted[0] - 0.01
+
+
+def test_deviations_hold_shapes_that_fit_as_well() -> None:
+    """In the second shape columns are twice as large: the size is 3 or 1.5, nobody knows which."""
+    kind = catalogue()["stribeck_friction"]
+    shapes = [kind((0,), {"stribeck_speed": speed}) for speed in (0.1, 0.11)]
+    torque = np.array([[3.0, 0.0], [0.0, 0.0]])
+    data, candidates = planted(shapes, torque, np.array([[1.0, 2.0], [0.0, 1e-6]]))
+    found = final_fit(traced(data, candidates, (0,)))
+    assert np.sqrt(found.covariance[-1, -1]) == pytest.approx(1.5 / np.sqrt(2.0), rel=0.05)
+    alone = final_fit(traced(data, candidates[:1], (0,)))
+    assert np.sqrt(alone.covariance[-1, -1]) < 0.1

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.prediction import Prediction
-from excite_cli.diagnosis.sealed_verdict import removed_in_draws, sealed_verdict
+from excite_cli.diagnosis.sealed_verdict import (
+    removed_in_draws,
+    rises_on_one,
+    sealed_verdict,
+)
 from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.prepare import PreparedRun
 from tests.diagnosis.explicit_data import STEP, prepared
 
@@ -57,3 +62,13 @@ def test_few_blocks_are_no_evidence_nor_is_a_robot_that_stands() -> None:
         assert len(removed_in_draws([run], [worse], [better])) == 0
     run, worse, better = recording(1.0)
     assert len(removed_in_draws([run], [worse], [better])) > 0
+
+
+def test_an_effect_must_not_raise_the_error_of_one_of_its_joints() -> None:
+    def errors(a: float, b: float) -> Errors:
+        relative = {"a": a, "b": b}
+        return Errors(0.5 * (a + b), 0.5 * (a + b), relative, relative, relative, relative, (0, 1))
+
+    assert rises_on_one(["a", "b"], errors(0.1, 0.1), errors(0.01, 0.12))
+    assert not rises_on_one(["a"], errors(0.1, 0.1), errors(0.01, 0.12))
+    assert not rises_on_one(["a", "b"], errors(0.1, 0.1), errors(0.01, 0.105))
