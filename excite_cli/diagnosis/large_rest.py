@@ -22,7 +22,7 @@ from excite_cli.robot.model import Array
 
 # 42 simulated robots without any defect stay below 1.42, and none of those above 2.5 is without.
 _TIMES = 2.5
-_PERHAPS = 1.8  # a word, that noise with a memory may be as large
+_PERHAPS = 1.6  # a word, that noise with a memory may be as large
 _PREDICTABLE = 0.3  # share; of noise with a memory hardly anything is
 _SAID = 0.2  # a quantity that predicts less is no answer
 _UNKNOWN = 0.003  # of the torque's RMS: a word where noise is not known

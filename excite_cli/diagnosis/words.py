@@ -142,7 +142,7 @@ def rests_in_words(
         (
             [each for each in found.large_rests if each.at_reversals],
             "Left around reversals",
-            "there joints stick, and no fit counts it",
+            "there joints stick, and fits leave it out",
         ),
     ):
         if rests:
