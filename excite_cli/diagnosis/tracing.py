@@ -75,6 +75,7 @@ def trace(
     fit = _first_fit(model, folds, bodies)
     traced: Traced | None = None
     for attempt in range(_PASSES):
+        traced = None  # its columns are gigabytes, of large data: not beside the next ones
         traced = _one_pass(model, spec, folds, run_names, bodies, fit, attempt)
         now = _fit_of(model, traced)
         count = len(traced.chosen)
