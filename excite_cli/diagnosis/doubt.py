@@ -9,17 +9,20 @@ what an effect of an impossible sign or size would explain. The effect is an app
 * or if U > E, whatever it depends on.
 
 Of `rests`, U is what can be predicted, or if that is little, what exceeds the noise; they depend on
-two quantities mostly, so that U > 0.5 E is asked for where one of them is the effect's own.
+two quantities mostly, so that U > 0.5 E is asked for where one of them is the effect's own. They
+say nothing of effects that inertias nearly take up, of which E is next to nothing.
 """
 
 from collections.abc import Sequence
 
 from excite_cli.diagnosis.covariate import Covariate
+from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.records import Approximation, LargeRest, Unexplained
 from excite_cli.diagnosis.tracing import Traced
 
 _SAME_QUANTITY, _ONE_OF_TWO = 0.1, 0.5
 _PREDICTABLE = 0.3  # share: less may be all that exceeds the noise, or not
+_OF_ITS_OWN = 0.1  # of an effect's columns
 _TRIED = 12  # of the strongest candidates of a joint
 
 
@@ -46,7 +49,7 @@ def approximations(
             if structure > (_SAME_QUANTITY if same else 1.0) * explained:
                 found[i] = Approximation(covariates=each.depends_on)
                 continue
-        if name in more:
+        if name in more and _of_its_own(traced, i):
             same = _same_quantity(traced, i, more[name].depends_on, joint_names)
             if _surely_left(more[name]) * rest > (_ONE_OF_TWO if same else 1.0) * explained:
                 found[i] = Approximation(covariates=more[name].depends_on)
@@ -57,6 +60,18 @@ def approximations(
         if energy > explained:
             found[i] = Approximation(kind=what)
     return found
+
+
+def _of_its_own(traced: Traced, i: int) -> bool:
+    """Whether E says how much candidate i explains: the rest of the model takes little of it up.
+
+    A spring beside inertias that are nearly free has next to no E, however large it is.
+    """
+    effect, judge = traced.candidates[i].effect, traced.judge
+    if effect.refines or effect.runs:
+        return True  # what lacks a name is most easily called so
+    rest = judge.without(i, traced.chosen)
+    return judge.white.schur(rest).gain(i, absorbed=SHARED).left > _OF_ITS_OWN
 
 
 def _surely_left(rest: LargeRest) -> float:

@@ -20,7 +20,6 @@ from excite_cli.robot.model import Array
 
 # It stays in beside its refinement unless it is useless there (χ² units).
 _PARENT_PRICE = 4.5
-_CLEARLY = 10.0  # χ² units
 _FAR_MORE = 0.15  # of the error on runs left out: more than noise makes of it
 _TRANSFER = 0.06  # least share of the gain on fitted runs that runs left out must have
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
@@ -105,11 +104,6 @@ class Judgement:
         return any(
             candidate in self.parents[k] and self.candidates[k].effect.imitates for k in chosen
         )
-
-    @property
-    def clear(self) -> float:
-        """By how much J of another set must be lower to be preferred to a plainer one."""
-        return self.rules.inflation * _CLEARLY
 
     def cost(self, chosen: Sequence[int]) -> float:
         """J(S)."""

@@ -4,10 +4,6 @@ J(S) = residual energy (whitened) + Σ price(c), see `judgement`. Steps: add a c
 one joint at once (two effects may hide each other), replace one, drop one. Coherent effects compete
 with local ones on all rows at once: one parameter that explains many joints wins over many that
 explain one each.
-
-Two searches compete: one adds tier by tier, plain kinds first; the other whatever saves most. Where
-its J is clearly lower the second is right: a load in one run explains at once what gains and
-offsets of many joints explain in part, and these then leave it nothing to do.
 """
 
 from collections.abc import Collection, Sequence
@@ -36,36 +32,27 @@ class Search:
         self.white, self.plain, self.candidates = judge.white, judge.plain, judge.candidates
 
     def run(self, start: Sequence[int] = ()) -> list[int]:
-        """Search from the declared model, or from those of `start`, until no step lowers J."""
-        found = self._one_way(start, tuple(Tier))
-        if start:
-            return found
-        other = self._one_way(start, (Tier.LAST,))
-        clearly = self.judge.cost(other) < self.judge.cost(found) - self.judge.clear
-        return other if clearly else found
+        """Search from the declared model, or from those of `start`, until no step lowers J.
 
-    def _one_way(self, start: Sequence[int], tiers: Sequence[Tier]) -> list[int]:
-        """As `run`, with candidates of one tier after the other.
-
-        What does not hold in the end leaves a place to others, but none to itself.
+        What does not hold in the end leaves its place to others, but not to itself.
         """
-        closed, chosen = self._closed, self._settled(start, tiers)
+        closed, chosen = self._closed, self._settled(start)
         kept = self._pruned(chosen)
         while len(kept) < len(chosen):
             lost = {self.candidates[i].place for i in chosen if i not in kept}
             self._closed = {*self._closed, *lost}
-            chosen = self._settled(kept, tiers)
+            chosen = self._settled(kept)
             if not self.judge.cost(chosen) < self.judge.cost(kept) - 1e-6:
                 break
             kept = self._pruned(chosen)
         self._closed = closed
         return self._completed(kept)
 
-    def _settled(self, start: Sequence[int], tiers: Sequence[Tier]) -> list[int]:
+    def _settled(self, start: Sequence[int]) -> list[int]:
         chosen = list(start)
         for _ in range(_MOST_STEPS):
             before = set(chosen)
-            for latest in tiers:
+            for latest in Tier:
                 chosen = self._forward(chosen, latest)
             chosen = self._polish(chosen)
             if set(chosen) == before:
