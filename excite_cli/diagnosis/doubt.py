@@ -22,7 +22,7 @@ from excite_cli.diagnosis.tracing import Traced
 
 _SAME_QUANTITY, _ONE_OF_TWO = 0.1, 0.5
 _PREDICTABLE = 0.3  # share: less may be all that exceeds the noise, or not
-_OF_ITS_OWN = 0.1  # of an effect's columns
+_OF_ITS_OWN = 0.5  # of an effect's columns
 _TRIED = 12  # of the strongest candidates of a joint
 
 
@@ -65,7 +65,7 @@ def approximations(
 def _of_its_own(traced: Traced, i: int) -> bool:
     """Whether E says how much candidate i explains: the rest of the model takes little of it up.
 
-    A spring beside inertias that are nearly free has next to no E, however large it is.
+    What inertias nearly take up has next to no E, however large it is.
     """
     effect, judge = traced.candidates[i].effect, traced.judge
     if effect.refines or effect.runs:
