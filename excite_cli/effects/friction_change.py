@@ -22,7 +22,7 @@ from excite_cli.robot.model import Array, Robot
 
 # Of the span; the last is a straight line. Steps of single runs explain what a coarse grid leaves.
 _TIME_CONSTANTS = (0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 1.0, 20.0)
-_OVER = 0.9
+_OVER = 0.9  # of the change, by the second recording: a step
 _LEFT = 0.03  # of its energy: no warming up is an exponential
 _FEWEST = 3  # recordings: two differ by a step as well as by a trend
 

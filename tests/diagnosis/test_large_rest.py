@@ -34,8 +34,12 @@ def left(
     floor: NoiseFloor | None = None,
     slow: float = 0.0,
     single: float = 0.0,
+    reversal: float = 0.0,
 ) -> tuple[LargeRest, ...]:
-    """Noise; on joint a a map of both angles, or of a `single` one; on b a wave of its own."""
+    """Noise; on joint a a map of both angles, or of a `single` one; on b a wave of its own.
+
+    `reversal`: on joint a, within 0.055 s of every change of its direction.
+    """
     recorded, signals, prepared, residuals = [], [], [], []
     rng = np.random.default_rng(3)
     for number in range(3):
@@ -46,6 +50,9 @@ def left(
         more[:, 0] += size * np.sin(1.5 * q[:, 0]) * np.cos(1.5 * q[:, 1])
         more[:, 0] += single * np.sin(2.0 * q[:, 1])
         more[:, 1] += slow * np.sin(14.0 * t + 3.0 * rng.normal(size=len(t)).cumsum() / RATE)
+        turned = np.flatnonzero(np.diff(np.sign(np.gradient(q[:, 0]))))
+        for k in range(-11, 12):
+            more[np.clip(turned + k, 0, len(t) - 1), 0] += reversal
         run = Run(f"run_{number}", t, q, 5.0 * q + more)
         fit = prepare(run, PROCESSING)
         alone = prepare(replace(run, tau=more), PROCESSING)
@@ -96,3 +103,11 @@ def test_noise_of_unknown_size_is_no_certainty() -> None:
 def test_less_than_the_noise_is_said_if_it_is_predicted(single: float) -> None:
     loud = NoiseFloor(np.array([10.0, 10.0]), np.zeros(2))
     assert [each.joint for each in left(0.0, floor=loud, single=single)] == ["a"] * bool(single)
+
+
+def test_what_is_left_around_reversals_alone_is_told_apart() -> None:
+    (rest,) = left(0.0, reversal=10.0)
+    assert (rest.joint, rest.at_reversals, rest.certain) == ("a", True, False)
+    assert rest.noise is not None
+    assert rest.rms > 1.6 * rest.noise
+    assert not any(each.at_reversals for each in left(2.0))

@@ -346,3 +346,21 @@ def test_what_is_closed_is_not_put_in_to_complete_either() -> None:
     judge = Judgement(evidence, evidence, candidates, NO_VETO, anything)
     assert set(Search(judge).run()) == {0, 1, 2}
     assert set(Search(judge, closed={candidates[1].place}).run((2, 0))) == {0, 2}
+
+
+def test_what_does_not_hold_in_the_end_leaves_its_place_to_another() -> None:
+    """The second explains most of what the first does; the first is dropped when all is chosen."""
+
+    class Dropping(Search):
+        def _pruned(self, chosen: list[int]) -> list[int]:
+            return [i for i in chosen if i != 0]
+
+    mix = np.array([[1.0, 0.9], [0.0, 0.3]])
+    data, candidates = planted([effect("viscous_friction"), effect("armature")], [3.0, 0.0], mix)
+    assert search(data, candidates) == {0}
+    evidence = data.evidence(candidates, ONE)
+    sizes = PossibleSizes(candidates, False, spread_of(evidence.covariance, 1.0), LARGE)
+    judge = Judgement(evidence, evidence, candidates, NO_VETO, sizes)
+    found = Dropping(judge)
+    assert set(found.run()) == {1}
+    assert set(Search(judge).run()) == {0}

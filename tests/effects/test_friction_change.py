@@ -57,3 +57,18 @@ def test_the_span_is_kept_when_shapes_are_refined(robot: Robot) -> None:
     effect = FrictionChange((0,), {"time_constant": 10.0, "span": 100.0})
     assert not effect.finer_steps("span", [])
     assert effect.finer_steps("time_constant", [])
+
+
+def test_what_is_over_before_the_second_recording_is_a_step_and_not_looked_for(
+    robot: Robot,
+) -> None:
+    signals = signals_of(robot, 50)
+    runs = [at(signals, start, f"r{start}") for start in (0.0, 60.0, 120.0)]
+    grid = FrictionChange.grid(robot, (0,), runs)
+    assert grid
+    for shape in grid:
+        found = FrictionChange((0,), shape)
+        assert found.progress(60.0) < 0.9
+        for step in found.finer_steps("time_constant", runs):
+            constant = shape["time_constant"] - step
+            assert FrictionChange((0,), {**shape, "time_constant": constant}).progress(60.0) < 0.9
