@@ -22,7 +22,7 @@ from excite_cli.diagnosis.tracing import Traced
 
 _SAME_QUANTITY, _ONE_OF_TWO = 0.1, 0.5
 _PREDICTABLE = 0.3  # share: less may be all that exceeds the noise, or not
-# Of an effect's columns: 0.03 and 0.23 of a real spring and a motor's inertia, 0.9 of wrong names.
+# Of an effect's columns: 0.03 and 0.23 of what a data sheet vouches for, 0.9 of wrong names.
 _OF_ITS_OWN = 0.5
 _TRIED = 12  # of the strongest candidates of a joint
 
