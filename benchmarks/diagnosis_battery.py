@@ -1,7 +1,7 @@
 """The benchmark behind the diagnosis: effects planted in simulated robots, found or not.
 
     python -m benchmarks.diagnosis_battery [--cases N] [--seed S] [--workers W] [--json FILE]
-                                           [--kind KIND] [--only INDEX …]
+                                           [--kind KIND] [--hard] [--only INDEX …]
 
 A case is a robot whose inertias are 10–30 % off its URDF, four motions of 10 s at 500 Hz (the last
 is sealed), encoder counts, torque noise of 0.5–2 %, a declared model, and something planted: a kind
@@ -25,8 +25,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from threadpoolctl import threadpool_limits
 
-from benchmarks.battery import tables
-from benchmarks.battery.cases import label
+from benchmarks.battery import cases, hard_cases, tables
 from benchmarks.battery.judge import Outcome, judge
 from benchmarks.battery.processes import outcomes_of, write
 
@@ -38,18 +37,28 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--json", type=Path, help="write all outcomes and rates here")
     parser.add_argument("--kind", help="only cases about this kind (or group: clean, two, …)")
+    parser.add_argument("--hard", action="store_true", help="cases in which a search goes wrong")
     parser.add_argument("--only", type=int, nargs="+", help="these cases, with all details")
     arguments = parser.parse_args()
     if arguments.only is not None:
         with threadpool_limits(1):
             for index in arguments.only:
-                print(tables.in_detail(judge(arguments.seed, index)), flush=True)
+                print(
+                    tables.in_detail(judge(arguments.seed, index, hard=arguments.hard)), flush=True
+                )
         return
-    chosen = [i for i in range(arguments.cases) if _asked(arguments.kind, arguments.seed, i)]
+    label = hard_cases.label if arguments.hard else cases.label
+    chosen = [
+        i
+        for i in range(arguments.cases)
+        if arguments.kind is None or arguments.kind in label(arguments.seed, i)
+    ]
     began = time.perf_counter()
     print(tables.HEADER, flush=True)
     outcomes = []
-    for outcome in outcomes_of(_outcome, arguments.seed, chosen, arguments.workers):
+    for outcome in outcomes_of(
+        _hard if arguments.hard else _outcome, arguments.seed, chosen, arguments.workers
+    ):
         outcomes.append(outcome)
         print(tables.line(outcome), flush=True)
         if arguments.json is not None:
@@ -67,12 +76,12 @@ def main() -> None:
     print("\n".join(summary))
 
 
-def _asked(kind: str | None, seed: int, index: int) -> bool:
-    return kind is None or kind in label(seed, index)
-
-
 def _outcome(seed: int, index: int) -> Outcome:
     return judge(seed, index).outcome
+
+
+def _hard(seed: int, index: int) -> Outcome:
+    return judge(seed, index, hard=True).outcome
 
 
 if __name__ == "__main__":

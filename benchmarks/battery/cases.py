@@ -25,7 +25,7 @@ from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.true_robot import true_inertias
 
-Group = Literal["one", "clean", "outside", "two", "absorbed"]
+Group = Literal["one", "clean", "outside", "two", "absorbed", "hard"]
 
 _DECLARED = 0.65  # of the cases
 _ROBOT_SHARES = (0.45, 0.38, 0.17)
@@ -106,13 +106,10 @@ def _attempt(
     if group == "outside" and kind != "outside:torque_hysteresis":
         with_friction = True  # else their friction would be half right a name
     motions = four_motions(of.name, seed, rng)
-    settings = _settings(rng, kind == "correlated")
-    spec = of.spec.model_copy(update={"effects": _FRICTION if with_friction else ()})
-    declared = declared_effects(spec.effects, of.robot)
-    phi = true_inertias(of.robot, settings.inertia_error, settings.seed)
-    known = sized(of.robot, declared, settings.seed)
-    ground = ground_of(of.robot, phi, motions, known, settings.torque_noise)
-    model = model_columns(of, declared, ground)
+    settings = settings_of(rng, kind == "correlated")
+    friction = _FRICTION if with_friction else ()
+    spec = of.spec.model_copy(update={"effects": friction})
+    ground, model = ground_and_model(of, motions, settings, friction)
     planted = _planted(group, kind, of, ground, model, with_friction, rng)
     if planted is None:
         return None
@@ -120,7 +117,22 @@ def _attempt(
     return Case(index, group, of, motions, settings, spec, planted, shows)
 
 
-def _settings(rng: np.random.Generator, correlated: bool) -> SimulationSettings:
+def ground_and_model(
+    of: Arm,
+    motions: Sequence[PlannedMotion],
+    settings: SimulationSettings,
+    friction: tuple[EffectSpec, ...],
+) -> tuple[Ground, Array]:
+    """What sizes are measured on, and a basis of what the declared model explains there."""
+    declared = declared_effects(friction, of.robot)
+    phi = true_inertias(of.robot, settings.inertia_error, settings.seed)
+    known = sized(of.robot, declared, settings.seed)
+    ground = ground_of(of.robot, phi, motions, known, settings.torque_noise)
+    return ground, model_columns(of, declared, ground)
+
+
+def settings_of(rng: np.random.Generator, correlated: bool) -> SimulationSettings:
+    """Noise and encoders, drawn."""
     correlation = 0.0
     if correlated:
         correlation = rng.uniform(0.8, 0.95)

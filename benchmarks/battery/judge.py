@@ -10,14 +10,15 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from benchmarks.battery.cases import Case, label, make_case
+from benchmarks.battery import cases, hard_cases
+from benchmarks.battery.cases import Case
 from benchmarks.battery.scoring import Answer, Found, Name, Plant, Score, identity, score
 from benchmarks.battery.sizes import Sized
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.diagnosis.words import approximation_in_words
-from excite_cli.effects.catalogue import declared_effects
+from excite_cli.effects.catalogue import catalogue, declared_effects
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.quality import checked, raise_for_errors
@@ -69,12 +70,13 @@ class Judged:
     diagnosis: Diagnosis | None = None
 
 
-def judge(seed: int, index: int, with_oracle: bool = True) -> Judged:
+def judge(seed: int, index: int, with_oracle: bool = True, hard: bool = False) -> Judged:
     """Make and judge one case; what goes wrong is part of the outcome."""
-    group, kind = label(seed, index)
+    deck = hard_cases if hard else cases
+    group, kind = deck.label(seed, index)
     outcome = Outcome(index, group, kind)
     try:
-        return _judged(outcome, make_case(seed, index), with_oracle)
+        return _judged(outcome, deck.make_case(seed, index), with_oracle)
     except Exception:
         outcome.error = traceback.format_exc()
         return Judged(outcome)
@@ -159,6 +161,8 @@ def _declarable(planted: Planted, friction: bool, names: tuple[str, ...]) -> lis
     record = EffectRecord(
         effect.kind, tuple(names[j] for j in effect.joints), dict(effect.shape), (), effect.runs
     )
+    if effect.kind not in catalogue():
+        return []  # no declaration knows it
     if friction and effect.kind in ("viscous_friction", "coulomb_friction"):
         return []
     others = identity(Name(record.kind, record.joints), friction)

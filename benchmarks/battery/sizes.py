@@ -110,14 +110,26 @@ def size(
         values = _within(kind, direction * wanted / unit, ground, joints)
     if kind.kind == "friction_drift":
         values = _warming(values, effect, ground)
+    found = sized_as(effect, values, None, ground)
+    return found if found is not None and _sensible(kind, found.ratio, ground) else None
+
+
+def sized_as(effect: Effect, values: Array, ratio: float | None, ground: Ground) -> Sized | None:
+    """An effect with these values, scaled to a `ratio` if one is given; None where none shows."""
+    if ratio is not None:
+        unit = float(ratios(effect, values, ground).max())
+        if not unit > 0.0:
+            return None
+        values = values * ratio / unit
     shares = ratios(effect, values, ground)
-    if not np.isfinite(shares).all() or not _sensible(kind, float(shares.max()), ground):
+    if not np.isfinite(shares).all() or not shares.max() > 0.0:
         return None
     touched = tuple(int(j) for j in np.flatnonzero(shares >= 0.1 * shares.max()))
+    strongest = int(np.argmax(shares))
     return Sized(
         Planted(effect, values),
         float(shares.max()),
-        int(np.argmax(shares)),
+        strongest,
         touched,
         _companions(effect, values),
     )

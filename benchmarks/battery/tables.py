@@ -109,7 +109,7 @@ def rates(outcomes: Sequence[Outcome]) -> list[Rate]:
 def details(outcomes: Sequence[Outcome]) -> list[str]:
     """Figures beside the criteria."""
     found = []
-    for group in ("one", "two", "absorbed", "outside", "clean"):
+    for group in ("one", "two", "absorbed", "outside", "clean", "hard"):
         part = [o for o in outcomes if o.group == group]
         if part:
             found.append(

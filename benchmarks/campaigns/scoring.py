@@ -253,24 +253,6 @@ def _disturbed(plant: Plant, truth: Truth, answer: Answer) -> bool:
     )
 
 
-def _amplified(plant: Plant, truth: Truth) -> float:
-    """By how much a gain of the joint's torque in all runs makes its effects look larger.
-
-    NaN of effects on several joints, of which one has a gain.
-    """
-    gains = [
-        other.sizes["gain"]
-        for other in truth.plants
-        if "gain" in other.sizes
-        and other is not plant
-        and set(other.joints) & set(plant.joints)
-        and not other.runs
-    ]
-    if plant.kinds[0] == "torque_offset" or not gains:
-        return 1.0
-    return 1.0 + sum(gains) if len(plant.joints) == 1 else float("nan")
-
-
 def _sizes(truth: Truth, answer: Answer) -> Iterable[Size]:
     for plant in truth.plants:
         if not plant.required and _disturbed(plant, truth, answer):
@@ -282,6 +264,5 @@ def _sizes(truth: Truth, answer: Answer) -> Iterable[Size]:
                 continue  # of another set of runs: another number
             for name, size in plant.sizes.items():
                 value, std = named.sizes.get(name, (np.nan, np.nan))
-                true = size * _amplified(plant, truth)
-                if np.isfinite([value, std, true]).all() and std > 0:
-                    yield Size(plant.kinds[0], name, true, value, std)
+                if np.isfinite([value, std, size]).all() and std > 0:
+                    yield Size(plant.kinds[0], name, size, value, std)

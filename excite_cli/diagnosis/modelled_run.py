@@ -1,7 +1,6 @@
 """A run as the model sees it: rigid-body quantities, signals for effects, training columns."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns, with_carried
+from excite_cli.identification.regression import effect_columns, with_effects
 from excite_cli.robot.model import Array
 
 
@@ -40,16 +39,7 @@ class ModelledRun:
         run, body = self.run, self._at(phi)
         load = body.load
         signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run.run, run.start)
-        if not len(values):
-            return signals
-        signals = with_carried(signals, effects, values)
-        # Defects of the measurement do not change the torque that they act upon.
-        in_robot = np.repeat(
-            [not effect.data_defect for effect in effects],
-            [len(effect.parameters) for effect in effects],
-        )
-        extra = effect_columns(effects, signals) @ np.where(in_robot, values, 0.0)
-        return replace(signals, torque=load + extra)
+        return with_effects(signals, effects, values)
 
     def _at(self, phi: Array) -> RigidBody:
         """The rigid body at φ; the last one is kept, with all that was computed of it."""

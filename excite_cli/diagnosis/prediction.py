@@ -1,7 +1,7 @@
 """Torque that a fitted model predicts for a prepared run, and its errors."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,10 +9,8 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns, with_carried
+from excite_cli.identification.regression import effect_columns, with_effects
 from excite_cli.robot.model import Array, Robot
-
-_SETTLED = 3
 
 
 @dataclass(frozen=True)
@@ -31,21 +29,9 @@ def predicted(
     Effects that look at the torque see the model's own.
     """
     load = body.load
-    torque = load
-    in_robot = np.repeat(
-        [not effect.data_defect for effect in effects],
-        [len(effect.parameters) for effect in effects],
-    )
-    total = load
-    for _ in range(_SETTLED):
-        signals = Signals(run.t, run.q, run.v, run.a, load, torque, body, run.run, run.start)
-        signals = replace(with_carried(signals, effects, values), torque=torque)
-        columns = effect_columns(effects, signals)
-        total = load + columns @ values
-        if not len(effects):
-            break
-        torque = load + columns @ np.where(in_robot, values, 0.0)
-    return Prediction(load, np.asarray(total))
+    signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run.run, run.start)
+    columns = effect_columns(effects, with_effects(signals, effects, values))
+    return Prediction(load, np.asarray(load + columns @ values))
 
 
 def errors_on(

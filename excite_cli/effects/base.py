@@ -23,7 +23,7 @@ import numpy as np
 
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.effects.parameter import Parameter, Value, deviation
-from excite_cli.effects.rare_sizes import two_deviations, unlikely_distance
+from excite_cli.effects.rare_sizes import nearest_of_sign, two_deviations, unlikely_distance
 from excite_cli.effects.seen import Seen
 from excite_cli.effects.signals import Cotangents, Signals
 from excite_cli.effects.simulated_robot import JOINT_PARTS, SimulatedRobot
@@ -235,12 +235,14 @@ class Effect(ABC):
         return all(parameter.allows(float(value), early) for parameter, value in given)
 
     def nearest(self, values: Array, covariance: Array) -> Array:
-        """The nearest possible values, in units of their error; themselves where no way is known.
+        """The nearest values of possible signs, in units of their error.
 
-        Without a way an impossible sign is a refusal: within its error a single parameter is
-        nothing anyway.
+        Of a single parameter that is zero, and nothing is left.
         """
-        return values
+        signed = np.array([parameter.nonnegative for parameter in self.parameters])
+        if not (signed & (values < 0.0)).any():
+            return values
+        return nearest_of_sign(values, covariance, signed)
 
     def why_impossible(self, values: Array, covariance: Array, early: bool) -> str:
         """Why values that are not `possible` cannot be the error of the fit; empty if they can.

@@ -7,7 +7,9 @@ as it is and joint k times s:
     τ_k = f_v s v_j + f_c s sgn(v_j + s v_k)
 
 The shares f_v v_j of row j and f_v v_k of row k are left to the joints' own viscous friction. With
-s = 1 this is how the Stäubli TX40 is written.
+s = 1 this is how the Stäubli TX40 is written. Where a second shaft turns with v_j − s v_k, as in a
+differential, what shows of f_v is the difference of the two: it may be negative, and either part
+may be missing.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,7 +32,7 @@ class CoupledFriction(Effect):
     function_of: ClassVar = ("speed",)
     scope: ClassVar[Scope] = "pair"
     parameters: ClassVar = (
-        Parameter("viscous", "N·m·s/rad", 0.1, 100.0, nonnegative=True),
+        Parameter("viscous", "N·m·s/rad", 0.1, 100.0),
         Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),
     )
     shapes: ClassVar = (Parameter("direction", "1", -1.0, 1.0),)
@@ -43,6 +45,11 @@ class CoupledFriction(Effect):
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
         """The joints turn the shaft the same way, or against each other."""
         return [{"direction": 1.0}, {"direction": -1.0}]
+
+    def possible(self, values: Array, early: bool) -> bool:
+        """A negative viscous part alone is a positive one of the other direction."""
+        viscous, coulomb = values
+        return super().possible(values, early) and bool(viscous >= 0.0 or coulomb > 0.0)
 
     @property
     def completes(self) -> bool:

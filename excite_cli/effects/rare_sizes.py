@@ -3,6 +3,10 @@
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.dynamics.nearest_inertias import half_of
+from excite_cli.robot.model import Array
 
 # Chance of a true effect to look impossible by the error of the fit, and be refused.
 _CHANCE = 0.01
@@ -22,3 +26,19 @@ def unlikely_distance(count: int) -> float:
     from scipy.stats import chi2  # slow to import
 
     return float(chi2.isf(_CHANCE, count))
+
+
+def nearest_of_sign(values: Array, covariance: Array, signed: NDArray[np.bool_]) -> Array:
+    """The nearest parameters (p,) of which those that are `signed` are not negative.
+
+    minimise (x − values)ᵀ covariance⁻¹ (x − values) subject to x_k ≥ 0, a bounded least-squares
+    problem.
+    """
+    from scipy.optimize import lsq_linear  # slow to import
+
+    whiten = np.linalg.inv(half_of(covariance))
+    lower = np.where(signed, 0.0, -np.inf)
+    found = lsq_linear(
+        whiten, whiten @ values, (lower, np.full(len(values), np.inf)), method="bvls"
+    )
+    return np.asarray(np.where(signed & (found.x <= 1e-12 * np.abs(values)), 0.0, found.x))

@@ -1,7 +1,7 @@
 """Torque that is recorded late: τ_measured(t) = τ(t − δ) ≈ τ − δ dτ/dt.
 
 One delay for all joints of the effect, of all terms of the torque: a lag of friction alone is not
-a delay. It is looked for on all joints together first, then on single ones.
+a delay. It is looked for on all joints together, on those of an arm, and on single ones.
 """
 
 from collections.abc import Mapping
@@ -11,6 +11,7 @@ import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
 from excite_cli.effects.simulated_robot import SimulatedRobot
+from excite_cli.robot.link_frame import branches
 from excite_cli.robot.model import Array, Robot
 
 _MISSED = 3e-3  # of the delay, one standard deviation; measured on simulated arms
@@ -35,9 +36,10 @@ class TorqueDelay(Effect):
 
     @classmethod
     def places(cls, robot: Robot) -> list[tuple[int, ...]]:
-        """All joints together, then each on its own."""
+        """All joints together, those of every arm, then each on its own."""
         every = tuple(range(robot.n))
-        return [every, *((j,) for j in every if robot.n > 1)]
+        arms = [arm for arm in branches(robot) if 1 < len(arm) < robot.n]
+        return [every, *arms, *((j,) for j in every if robot.n > 1)]
 
     def possible(self, values: Array, early: bool) -> bool:
         """Of one joint alone, less than a moment is friction that lags a little."""

@@ -1,9 +1,8 @@
 """A wrong gain of the measured torque: τ_measured = (1 + g) τ.
 
 A wrong torque constant or gear ratio of one joint. The same gain on all joints is absorbed by the
-inertial parameters, which then are all wrong by it. The gain of the joint's friction is absorbed by
-its friction parameters in the same way; what shows is the gain of the rigid-body torque alone.
-Of some runs it is that of all their torque.
+inertial parameters, which then are all wrong by it. It is that of the joint's whole torque:
+friction beside it is told as it is in the robot, not as the sensor shows it.
 """
 
 from collections.abc import Mapping
@@ -15,7 +14,7 @@ from excite_cli.robot.model import Array
 
 
 class TorqueGain(Effect):
-    """τ_j grows by g · (rigid-body torque); in runs of its own by g · (torque)."""
+    """τ_j grows by g · (torque of the model)."""
 
     kind: ClassVar = "torque_gain"
     title: ClassVar = "wrong gain of the measured torque"
@@ -32,9 +31,8 @@ class TorqueGain(Effect):
     changes_between_runs: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
-        """load_j, in runs of its own torque_j, (T, 1, 1)."""
-        seen = signals.torque if self.is_change else signals.load
-        return seen[:, list(self.joints), None]
+        """torque_j, (T, 1, 1)."""
+        return signals.torque[:, list(self.joints), None]
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
@@ -43,6 +41,5 @@ class TorqueGain(Effect):
         robot.gain[list(self.joints)] += values[0]
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
-        """∂/∂load_j or ∂/∂torque_j = weight."""
-        back = signals.only(self.joints[0], weights[:, 0, 0])
-        return Cotangents(torque=back) if self.is_change else Cotangents(load=back)
+        """∂/∂torque_j = weight."""
+        return Cotangents(torque=signals.only(self.joints[0], weights[:, 0, 0]))

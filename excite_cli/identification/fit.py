@@ -27,7 +27,7 @@ from excite_cli.identification.regression import (
     RunColumns,
     effect_columns,
     signals_of,
-    with_carried,
+    with_effects,
 )
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.record import Shown
@@ -101,7 +101,7 @@ class Fit(Shown):
         """Rigid-body torque and τ̂ (T, n) at the working rate, not averaged."""
         values = self.values[self.rank :]
         signals = signals_of(run.prepared, robot, self.phi)
-        columns = effect_columns(self.effects, with_carried(signals, self.effects, values))
+        columns = effect_columns(self.effects, with_effects(signals, self.effects, values))
         return signals.load, signals.load + columns @ values
 
     def _part(self, index: int) -> slice:
@@ -193,7 +193,7 @@ def rebuilt(regression: Regression, phi: Array, values: Array) -> Regression:
     runs = []
     for run in regression.runs:
         signals: Signals = signals_of(run.prepared, regression.robot, phi)
-        signals = with_carried(signals, regression.effects, values)
+        signals = with_effects(signals, regression.effects, values)
         columns = effect_columns(regression.effects, signals)
         runs.append(replace(run, effects=run.prepared.averaged_for_fit(columns)))
     return replace(regression, runs=tuple(runs))

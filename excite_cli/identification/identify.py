@@ -175,8 +175,9 @@ def _hausman(
     try:
         prepared = [prepare(run, processing) for run in runs]
         other = build_regression(
-            training.robot, training.base, training.effects, prepared, found.phi
-        )
+            training.robot, training.base, training.effects, prepared, found.phi,
+            found.values[found.rank :],
+        )  # fmt: skip
     except ExciteError as error:
         return not_testable(str(error))
     return hausman_test(

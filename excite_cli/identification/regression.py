@@ -52,17 +52,26 @@ def signals_of(prepared: PreparedRun, robot: Robot, phi: Array | None = None) ->
     )  # fmt: skip
 
 
-def with_carried(signals: Signals, effects: Sequence[Effect], values: Array) -> Signals:
-    """The same, with the bodies among `effects` in load and torque: gears carry them, too."""
-    if not any(effect.carried for effect in effects):
+def with_effects(signals: Signals, effects: Sequence[Effect], values: Array) -> Signals:
+    """The same, with the torque of `effects` of `values` in it; gears carry bodies among them, too.
+
+    Defects of the measurement are left out: they do not change the torque that they act upon.
+    """
+    if not len(values):
         return signals
-    carried, at = np.zeros_like(signals.load), 0
-    for effect in effects:
-        width = len(effect.parameters)
-        if effect.carried:
-            carried += effect.torque(signals, values[at : at + width])
-        at += width
-    return replace(signals, load=signals.load + carried, torque=signals.torque + carried)
+    in_robot = np.repeat(
+        [not effect.data_defect for effect in effects],
+        [len(effect.parameters) for effect in effects],
+    )
+    carried = np.repeat(
+        [effect.carried for effect in effects], [len(effect.parameters) for effect in effects]
+    )
+    load = signals.load
+    if carried.any():
+        load = load + effect_columns(effects, signals) @ np.where(carried, values, 0.0)
+        signals = replace(signals, load=load, torque=load)
+    rest = effect_columns(effects, signals) @ np.where(in_robot & ~carried, values, 0.0)
+    return replace(signals, torque=load + rest)
 
 
 def effect_columns(effects: Sequence[Effect], signals: Signals) -> Array:
@@ -83,11 +92,17 @@ def build_regression(
     effects: Sequence[Effect],
     runs: Sequence[PreparedRun],
     phi: Array | None = None,
+    values: Array | None = None,
 ) -> Regression:
-    """Columns of every run; effects that look at the torque see the rigid body at `phi`."""
+    """Columns of every run; effects that look at the torque see the rigid body at `phi`.
+
+    With `values` of the effects, they see the torque of these as well.
+    """
     found = []
     for prepared in runs:
         signals = signals_of(prepared, robot, phi)
+        if values is not None:
+            signals = with_effects(signals, effects, values)
         found.append(
             RunColumns(
                 step=prepared.step,

@@ -68,6 +68,18 @@ def leaves(robot: Robot) -> tuple[int, ...]:
     return tuple(j for j in range(robot.n) if j not in parents)
 
 
+def branches(robot: Robot) -> list[tuple[int, ...]]:
+    """For every leaf, the moved joints that carry it and no other leaf: an arm of two, a finger."""
+    first = _first(robot)
+    carried: list[set[int]] = [set() for _ in range(robot.n)]
+    for leaf in leaves(robot):
+        joint = leaf
+        while joint >= 0:
+            carried[joint].add(leaf)
+            joint = int(robot.model.parents[first + joint]) - first
+    return [tuple(j for j in range(robot.n) if carried[j] == {leaf}) for leaf in leaves(robot)]
+
+
 def _first(robot: Robot) -> int:
     """Index of the first moved joint in Pinocchio's model."""
     return int(robot.model.njoints) - robot.n

@@ -175,8 +175,6 @@ def signals() -> list[Signals]:
         ("stribeck_friction", {"stribeck_speed": 0.2}, [0.07, 0.03, 0.012, 0.004]),
         ("torque_saturation", {"level": 10.0}, [0.5, 0.2, 0.08, 0.03, 0.01]),
         ("backlash", {"gap": 0.01}, [1.5e-3, 6e-4, 2e-4, 7e-5]),
-        ("nonlinear_viscous_friction", {"power": 2.0}, []),
-        ("coupled_friction", {"direction": 1.0}, []),
     ],
 )
 def test_shapes_are_refined_as_finely_as_they_are_seen(
@@ -187,6 +185,21 @@ def test_shapes_are_refined_as_finely_as_they_are_seen(
     assert first == dict(shape)
     expected = [value + sign * step for step in steps for sign in (-1, 1)]
     assert [each[name] for each in others] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("kind", "shape", "others"),
+    [
+        ("nonlinear_viscous_friction", {"power": 2.0}, [0.5, 3.0]),
+        ("coupled_friction", {"direction": 1.0}, [-1.0]),
+    ],
+)
+def test_a_shape_that_is_one_of_few_stays_open(
+    kind: str, shape: Mapping[str, float], others: Sequence[float]
+) -> None:
+    ((name, _),) = shape.items()
+    found = shapes_around(effect(kind, **shape), signals())
+    assert [each[name] for each in found] == [shape[name], *others]
 
 
 def test_ripple_is_refined_by_parts_of_a_cycle_and_a_touch_by_parts_of_its_length() -> None:

@@ -1,0 +1,210 @@
+"""Cases in which a search goes wrong: effects that hide, imitate, or stand for each other.
+
+A case follows from (seed, index) alone; topics come in turn, shuffled by the seed. The robot, its
+noise and its motions are those of the other cases (`cases`); what differs is what is planted and
+how many motions there are, the last of which is sealed.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.battery.cases import (
+    Case,
+    Group,
+    ground_and_model,
+    left_over,
+    orthonormal,
+    settings_of,
+    weighted_columns,
+)
+from benchmarks.battery.motions import Arm, arm, four_motions
+from benchmarks.battery.outside import PositionFriction
+from benchmarks.battery.sizes import Ground, Sized, sized_as
+from excite_cli.config.data_spec import EffectSpec
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.robot.model import Array
+
+FRICTION = (EffectSpec(kind="viscous_friction"), EffectSpec(kind="coulomb_friction"))
+_SHOWS = 0.02  # share of an effect's energy that the model and the other effects must leave
+_ATTEMPTS = 80
+
+
+def label(seed: int, index: int) -> tuple[Group, str]:
+    """Group and topic of a case, without making it."""
+    order = np.random.default_rng([seed, 37, index // len(TOPICS)]).permutation(len(TOPICS))
+    return "hard", list(TOPICS)[order[index % len(TOPICS)]]
+
+
+def make_case(seed: int, index: int) -> Case:
+    """The case of a seed and an index."""
+    topic = label(seed, index)[1]
+    rng = np.random.default_rng([seed, 2, index])
+    for _ in range(_ATTEMPTS):
+        case = _attempt(seed, index, topic, rng)
+        if case is not None:
+            return case
+    raise RuntimeError(f"case {index} of seed {seed} ({topic}) cannot be made")
+
+
+def _attempt(seed: int, index: int, topic: str, rng: np.random.Generator) -> Case | None:
+    of = arm(str(rng.choice(_ROBOTS.get(topic, ("ur10", "panda")))))
+    motions = four_motions(of.name, seed, rng)
+    motions = motions[: int(rng.choice(_MOTIONS.get(topic, (4,))))]
+    settings = settings_of(rng, correlated=topic == "constant")
+    friction = FRICTION if rng.uniform() < _DECLARED.get(topic, 0.5) else ()
+    spec = of.spec.model_copy(update={"effects": friction})
+    ground, model = ground_and_model(of, motions, settings, friction)
+    planted = TOPICS[topic](of, ground, rng)
+    if not planted or not _separate(planted, ground, model):
+        return None
+    shows = tuple(left_over(model, one, ground) for one in planted)
+    return Case(index, "hard", of, motions, settings, spec, tuple(planted), shows)
+
+
+def _separate(planted: Sequence[Sized], ground: Ground, model: Array) -> bool:
+    """Whether every effect shows beside the model and all others."""
+    for one in planted:
+        rest = [weighted_columns(o.planted.effect, ground) for o in planted if o is not one]
+        beside = orthonormal(np.hstack([model, *rest]))
+        if left_over(beside, one, ground) < _SHOWS:
+            return False
+    return True
+
+
+def _bent_spring(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
+    """A spring and friction that grows with the square of speed, on one joint."""
+    j = int(rng.integers(of.robot.n))
+    middle = float(np.mean([s.q[:, j].mean() for s in ground.signals]))
+    spring = _one("spring", (j,), {}, [1.0, -middle - 0.3 * rng.normal()], ground, rng)
+    return _all(
+        [spring, _one("nonlinear_viscous_friction", (j,), {"power": 2.0}, [1.0], ground, rng)]
+    )
+
+
+def _strong_refinement(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
+    """Friction that grows with load, and none besides, much larger than anything else."""
+    j = int(rng.integers(of.robot.n))
+    return _all([_one("load_dependent_friction", (j,), {}, [1.0], ground, rng, (0.1, 0.4))])
+
+
+def _many_frictions(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
+    """Coulomb and viscous friction on most joints, and one that grows with load."""
+    found = []
+    for j in range(of.robot.n):
+        for kind in ("viscous_friction", "coulomb_friction"):
+            if rng.uniform() < 0.6:
+                found.append(_one(kind, (j,), {}, [1.0], ground, rng, (0.03, 0.2)))
+    j = int(rng.integers(of.robot.n))
+    return _all(
+        [*found, _one("load_dependent_friction", (j,), {}, [1.0], ground, rng, (0.05, 0.2))]
+    )
+
+
+def _gears(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
+    """Coupled gears with dry friction alone, viscous alone, or both."""
+    places = kind_named("coupled_friction").places(of.robot)
+    place = places[int(rng.integers(len(places)))]
+    parts = [(0.0, 1.0), (1.0, 0.0), (1.0, rng.uniform(0.3, 3.0))][int(rng.integers(3))]
+    shape = {"direction": float(rng.choice([-1.0, 1.0]))}
+    return _all([_one("coupled_friction", place, shape, parts, ground, rng)])
+
+
+def _constant(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
+    """A constant, in noise with a long memory, or beside dry friction that changes with the angle.
+
+    The friction has no name, and is taken for noise with a longer memory still.
+    """
+    j = int(rng.integers(of.robot.n))
+    sign = rng.choice([-1.0, 1.0])
+    found = _one("torque_offset", (j,), {}, [sign], ground, rng, (0.05, 0.3))
+    if found is None or rng.uniform() < 0.5:
+        return _all([found])
+    share = rng.uniform(0.3, 0.6) * found.ratio
+    uneven = PositionFriction((j,), {"phase": float(rng.uniform(0.0, np.pi))})
+    beside = sized_as(uneven, np.ones(1), share, ground)
+    return [] if beside is None else [replace(found, companions=(beside.planted,))]
+
+
+def _slow_ripple(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
+    """A ripple of two to six periods per turn."""
+    j = int(rng.integers(of.robot.n))
+    turn = rng.uniform(0, 2 * np.pi)
+    shape = {"periods": float(rng.integers(2, 7))}
+    return _all([_one("ripple", (j,), shape, [np.cos(turn), np.sin(turn)], ground, rng)])
+
+
+def _shared_delay(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
+    """One delay for all joints, or for those of an arm."""
+    n = of.robot.n
+    joints = tuple(range(n))
+    if of.name == "talos_arms" and rng.uniform() < 0.7:
+        half = n // 2
+        joints = joints[:half] if rng.uniform() < 0.5 else joints[half:]
+    delay = float(np.exp(rng.uniform(*np.log((3e-3, 15e-3)))))
+    return _all([_given("torque_delay", joints, {}, [delay], ground)])
+
+
+def _whole_gain(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
+    """A wrong gain of a joint that has much friction."""
+    j = int(rng.integers(of.robot.n))
+    gain = float(rng.choice([-1.0, 1.0]) * np.exp(rng.uniform(*np.log((0.04, 0.15)))))
+    rubs = [
+        _one(kind, (j,), {}, [1.0], ground, rng, (0.15, 0.35))
+        for kind in ("viscous_friction", "coulomb_friction")
+    ]
+    return _all([_given("torque_gain", (j,), {}, [gain], ground), *rubs])
+
+
+def _one(
+    kind: str,
+    joints: tuple[int, ...],
+    shape: Mapping[str, float],
+    direction: Sequence[float],
+    ground: Ground,
+    rng: np.random.Generator,
+    ratio: tuple[float, float] = (0.04, 0.30),
+) -> Sized | None:
+    """An effect of random size in that direction, a share of the joint's torque."""
+    effect: Effect = kind_named(kind)(joints, shape)
+    wanted = float(np.exp(rng.uniform(*np.log(ratio))))
+    return sized_as(effect, np.asarray(direction, dtype=float), wanted, ground)
+
+
+def _given(
+    kind: str,
+    joints: tuple[int, ...],
+    shape: Mapping[str, float],
+    values: Sequence[float],
+    ground: Ground,
+) -> Sized | None:
+    return sized_as(kind_named(kind)(joints, shape), np.asarray(values, dtype=float), None, ground)
+
+
+def _all(found: Sequence[Sized | None]) -> list[Sized]:
+    """All of them, or none where one has no size."""
+    kept = [one for one in found if one is not None]
+    return kept if len(kept) == len(found) else []
+
+
+TOPICS: Mapping[str, Callable[[Arm, Ground, np.random.Generator], list[Sized]]] = {
+    "bent_spring": _bent_spring,
+    "strong_refinement": _strong_refinement,
+    "many_frictions": _many_frictions,
+    "gears": _gears,
+    "constant": _constant,
+    "slow_ripple": _slow_ripple,
+    "shared_delay": _shared_delay,
+    "whole_gain": _whole_gain,
+}
+_ROBOTS = {"shared_delay": ("talos_arms", "ur10"), "gears": ("ur10", "panda")}
+# Of how many motions, each as likely; a single one is cut into blocks.
+_MOTIONS = {
+    "bent_spring": (1, 1, 2, 4),
+    "strong_refinement": (1, 2),
+    "constant": (1, 2, 4),
+    "slow_ripple": (1, 2, 4),
+}
+_DECLARED = {"bent_spring": 1.0, "strong_refinement": 0.0, "many_frictions": 0.0, "whole_gain": 0.0}
