@@ -65,11 +65,12 @@ def _attempt(seed: int, index: int, topic: str, rng: np.random.Generator) -> Cas
 
 
 def _separate(planted: Sequence[Sized], ground: Ground, model: Array) -> bool:
-    """Whether every effect shows beside the model and all others."""
+    """Whether every effect shows beside the model and all others, and in the noise."""
     for one in planted:
         rest = [weighted_columns(o.planted.effect, ground) for o in planted if o is not one]
         beside = orthonormal(np.hstack([model, *rest]))
-        if left_over(beside, one, ground) < _SHOWS:
+        left = left_over(beside, one, ground)
+        if left < _SHOWS or np.sqrt(left) * one.ratio < ground.noise:
             return False
     return True
 
