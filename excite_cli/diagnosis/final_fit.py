@@ -75,23 +75,30 @@ def _fitted(traced: Traced) -> FinalFit:
 def _by_shape(traced: Traced, i: int) -> Array:
     """Standard deviation (w,) of the sizes of candidate i that its uncertain shape brings.
 
-    The sizes that it has in other shapes, weighted by exp(−Δχ²/2): so likely are these shapes.
+    The sizes that it has in other shapes, weighted by exp(−Δχ²/2): so likely are these shapes, if
+    physics allows the sizes.
     """
     judge, own = traced.judge, traced.candidates[i]
-    others = [
-        k for k, c in enumerate(traced.candidates) if c.place == own.place and c.width == own.width
-    ]
-    if len(others) < 2:
+    sets = {
+        k: [k if c == i else c for c in traced.chosen]
+        for k, c in enumerate(traced.candidates)
+        if c.place == own.place and c.width == own.width
+    }
+    sets = {
+        k: each
+        for k, each in sets.items()
+        if k == i or judge.allowed(judge.plain.solve(each), each, [k])
+    }
+    if len(sets) < 2:
         return np.zeros(own.width)
-    sets = [[k if c == i else c for c in traced.chosen] for k in others]
-    energies = np.array([judge.white.energy(each) for each in sets]) / traced.inflation
+    energies = np.array([judge.white.energy(each) for each in sets.values()]) / traced.inflation
     weights = np.exp(-0.5 * (energies - energies.min()))
     sizes = []
-    for k, each in zip(others, sets, strict=True):
+    for k, each in sets.items():
         parameters = judge.plain.solve(each)
         at = dict(_places(replace(traced, chosen=tuple(each)), len(parameters)))[k]
         sizes.append(parameters[at])
-    from_own = np.square(np.array(sizes) - sizes[others.index(i)])
+    from_own = np.square(np.array(sizes) - sizes[list(sets).index(i)])
     return np.sqrt(weights @ from_own / weights.sum())
 
 

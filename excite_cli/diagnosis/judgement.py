@@ -110,14 +110,15 @@ class Judgement:
         return self.white.energy(chosen) + self._prices(chosen)
 
     def in_order(self, schur: Schur, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        """Whether the first-order friction that `added` refines is in, or has nothing to add."""
+        """Whether the first-order friction that `added` refines is in, or would not be accepted."""
         for i in added:
             for parent in self.parents[i]:
                 if parent in chosen or parent in added:
                     continue
                 gain = schur.singles[parent]
-                if gain.chi2 > self.price(parent, gain.dof) and self.allowed(
-                    self.plain.solve([*chosen, parent]), [*chosen, parent], [parent]
+                if (
+                    gain.chi2 > self.price(parent, gain.dof)
+                    and self.verdict(chosen, [parent]) is Verdict.ACCEPTED
                 ):
                     return False
         return True

@@ -22,6 +22,8 @@ from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.effects.simulated_robot import Coupling, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
+_USUAL_SPEED = 1.0  # rad/s, at which a shaft's two parts are weighed
+
 
 class CoupledFriction(Effect):
     """Friction on v_j + s v_k in the rows of both joints, without their own viscous shares."""
@@ -47,9 +49,9 @@ class CoupledFriction(Effect):
         return [{"direction": 1.0}, {"direction": -1.0}]
 
     def possible(self, values: Array, early: bool) -> bool:
-        """A negative viscous part alone is a positive one of the other direction."""
+        """A negative viscous part that outweighs the dry one belongs to the other direction."""
         viscous, coulomb = values
-        return super().possible(values, early) and bool(viscous >= 0.0 or coulomb > 0.0)
+        return super().possible(values, early) and bool(viscous * _USUAL_SPEED >= -coulomb)
 
     @property
     def completes(self) -> bool:
