@@ -70,3 +70,16 @@ def test_deviations_hold_shapes_that_fit_as_well() -> None:
     assert np.sqrt(found.covariance[-1, -1]) == pytest.approx(1.5 / np.sqrt(2.0), rel=0.05)
     alone = final_fit(traced(data, candidates[:1], (0,)))
     assert np.sqrt(alone.covariance[-1, -1]) < 0.1
+
+
+def test_a_shape_that_physics_refuses_makes_no_size_uncertain() -> None:
+    """Of a shaft without dry friction, one direction fits as the other does, but for the sign."""
+    shaft = catalogue()["coupled_friction"]
+    effects: list[Effect] = [shaft((0, 1), {"direction": s}) for s in (1.0, -1.0)]
+    mix = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.3]])
+    data, candidates = planted(effects, np.array([[2.0, 2.0], [0.0, 0.0]]), mix)
+    found = final_fit(traced(data, candidates, (0,), lambda x, chosen, added: 1 not in added))
+    assert found.traced.chosen == (0,)
+    assert final_fit(traced(data, candidates, (0,))).traced.chosen == ()
+    assert found.parameters[-2] == pytest.approx(2.0, abs=0.1)
+    assert np.sqrt(found.covariance[-2, -2]) < 0.1

@@ -1,5 +1,6 @@
 """Plant and recover, through the program's own filters and columns."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,20 @@ def test_friction_that_follows_the_load_is_settled(robot: Robot, truth: Array) -
     assert found.values[-1] == pytest.approx(0.1, rel=0.02)
     first = fit(rebuilt(regression, standard_parameters(robot), np.zeros(0)), FREE)
     assert first.values[-1] == pytest.approx(found.values[-1], rel=1e-3)
+
+
+def test_a_gain_is_that_of_the_whole_torque_and_friction_that_of_the_robot(
+    robot: Robot, truth: Array
+) -> None:
+    effects = declared_effects((*FRICTION, EffectSpec(kind="torque_gain", joints=("joint_2",))), robot)
+    values = np.append(sized(effects[:-1]), 0.12)
+    data = measured(robot, truth, effects[:-1], values[:-1], noise=0.02)
+    amplified = np.ones(robot.n)
+    amplified[1] += values[-1]
+    data = replace(data, runs=tuple(replace(run, tau=run.tau * amplified) for run in data.runs))
+    found = fit(regression_of(robot, data, effects), FREE)
+    z = (found.values[found.rank :] - values) / found.std[found.rank :]
+    assert np.abs(z).max() < 4.5
 
 
 def test_friction_alone_does_not_follow_the_load(
