@@ -5,18 +5,24 @@ With the rest of the model projected off, c leaves Z_cc and its fitted signal ha
 the Kullback–Leibler divergence between the two is E/2: below 3 no test tells them apart reliably.
 The data themselves may also be undecided where the divergence is larger: then the residual
 energies of the two fits differ by less than 6.
+
+Two named effects of one joint may be told from neither of them a single one, nor a named one from
+two others together (`joint_aliases`): the same with the columns of two side by side.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.evidence import Evidence, Schur
+from excite_cli.diagnosis.evidence import SHARED, Evidence, Schur
+from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.robot.model import Array
 
 UNDECIDED = 3.0  # KL divergence [nats]
+_TRIED = 14  # candidates of one joint that are tried in pairs
 
 
 @dataclass(frozen=True)
@@ -53,7 +59,7 @@ def aliases_of(
         other = schur.singles[i]
         if other.dof == 0 or other.dof > own.dof or other.chi2 < 0.5 * own.chi2:
             continue
-        expected = 0.5 * _left(schur, white, named, i) / inflation
+        expected = 0.5 * _left(schur, white, [named], [i]) / inflation
         observed = 0.5 * (own.chi2 - other.chi2) / inflation
         divergence = min(expected, max(observed, 0.0))
         if divergence < UNDECIDED and allowed(rest, i):
@@ -63,9 +69,73 @@ def aliases_of(
     return sorted(found.values(), key=lambda alias: alias.divergence)
 
 
-def _left(schur: Schur, white: Evidence, named: int, other: int) -> float:
-    """Energy of the named candidate's fitted signal that the other cannot imitate."""
-    c, d = (white.blocks[k] - white.fixed for k in (named, other))
+Members = tuple[int, ...]
+
+
+def joint_aliases(
+    chosen: Sequence[int], judge: Judgement, shown: Sequence[int]
+) -> list[tuple[Members, Members]]:
+    """For every one and every two of the `shown`, on one joint, what stands for them best.
+
+    Of a single one it is a pair that these data cannot tell from it, where none of the two alone
+    could stand for it; of two it is a single one.
+    """
+    local = [i for i in shown if _is_local(judge, i)]
+    found: list[tuple[Members, Members]] = []
+    for named in [*((i,) for i in local), *combinations(local, 2)]:
+        if len({judge.candidates[i].rows for i in named}) > 1:
+            continue
+        best = min(_instead_of(named, chosen, judge), key=lambda each: each[0], default=None)
+        if best is not None:
+            found.append((named, best[1]))
+    return found
+
+
+def _is_local(judge: Judgement, i: int) -> bool:
+    c = judge.candidates[i]
+    return len(c.rows) == 1 and not c.effect.runs
+
+
+def _instead_of(
+    named: Members, chosen: Sequence[int], judge: Judgement
+) -> Iterator[tuple[float, Members]]:
+    """Divergence and members of all that could stand for the `named` ones."""
+    rest = [k for k in chosen if k not in named]
+    schur, inflation = judge.white.schur(rest), judge.rules.inflation
+    whole = schur.gain(*named, absorbed=SHARED).chi2
+    enough = whole - 2.0 * UNDECIDED * inflation
+    taken = {judge.candidates[k].place for k in chosen}
+    shut = {place for k in rest for place in judge.excluded(k)}
+    free = [
+        k
+        for k, c in enumerate(judge.candidates)
+        if c.rows == judge.candidates[named[0]].rows
+        and c.place not in taken | shut
+        and _is_local(judge, k)
+        and schur.singles[k].dof
+    ]
+    if len(named) == 2:
+        tried: list[tuple[Members, float]] = [((k,), schur.singles[k].chi2) for k in free]
+    else:
+        free = [k for k in free if judge.candidates[k].width == 1]
+        free = [k for k in free if schur.singles[k].chi2 < enough]
+        free.sort(key=lambda k: -schur.singles[k].chi2)
+        pairs = [pair for pair in combinations(free[:_TRIED], 2) if judge.together(*pair)]
+        chi2s = schur.pair_chi2(*np.array(pairs).T) if pairs else np.zeros(0)
+        tried = list(zip(pairs, map(float, chi2s), strict=True))
+    for others, chi2 in tried:
+        expected = _left(schur, judge.white, named, others)
+        divergence = 0.5 * min(expected, max(whole - chi2, 0.0)) / inflation
+        together = [*rest, *others]
+        if divergence < UNDECIDED and judge.allowed(judge.plain.solve(together), together, others):
+            yield divergence, others
+
+
+def _left(schur: Schur, white: Evidence, named: Sequence[int], others: Sequence[int]) -> float:
+    """Energy of the fitted signal of the named ones that the others cannot imitate."""
+    c, d = (
+        np.concatenate([white.blocks[k] for k in each]) - white.fixed for each in (named, others)
+    )
     theta = _solve(schur.matrix[np.ix_(c, c)], schur.cross[c])
     mixed = schur.matrix[np.ix_(d, c)] @ theta
     whole = float(theta @ schur.matrix[np.ix_(c, c)] @ theta)

@@ -10,7 +10,7 @@ from scipy.linalg import cholesky
 
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
-from excite_cli.diagnosis.aliases import Alias, aliases_of
+from excite_cli.diagnosis.aliases import Alias, aliases_of, joint_aliases
 from excite_cli.diagnosis.before_after import Played, both_models, on_sealed
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
@@ -28,6 +28,7 @@ from excite_cli.diagnosis.records import (
     Diagnosis,
     EffectRecord,
     Information,
+    JointAlias,
     NamedEffect,
     Unexplained,
 )
@@ -159,6 +160,7 @@ def diagnose(
         parts=on_sealed_ends(model, models, parts.ends, processing),
         untouched=sealed_part.untouched,
         large_rests=rests,
+        joint_aliases=_joint_aliases(traced, doubts, robot),
     )
 
 
@@ -212,6 +214,21 @@ def _unexplained(traced: Traced, robot: Robot) -> tuple[list[Unexplained], Depen
         traced.noise,
         (rules.significance, rules.gain, rules.inflation),
         robot.joint_names,
+    )
+
+
+def _joint_aliases(
+    traced: Traced, doubts: Mapping[int, Approximation], robot: Robot
+) -> tuple[JointAlias, ...]:
+    shown = [i for i in traced.chosen if i not in doubts]
+    return tuple(
+        JointAlias(
+            *(
+                tuple(record_of(traced.candidates[i].effect, robot.joint_names) for i in side)
+                for side in sides
+            )
+        )
+        for sides in joint_aliases(traced.chosen, traced.judge, shown)
     )
 
 

@@ -71,6 +71,14 @@ class NamedEffect(Shown):
 
 
 @dataclass(frozen=True)
+class JointAlias:
+    """Effects that the data cannot tell from those that are `named`; one side is a pair."""
+
+    named: tuple[EffectRecord, ...]
+    others: tuple[EffectRecord, ...]
+
+
+@dataclass(frozen=True)
 class Absorbed:
     """A candidate that shows as a change of parameters of the declared model only."""
 
@@ -222,6 +230,7 @@ class Diagnosis(Shown):
     parts: tuple[SealedEnds, ...] = ()
     untouched: Errors | None = None
     large_rests: tuple[LargeRest, ...] = ()
+    joint_aliases: tuple[JointAlias, ...] = ()
 
     @property
     def good(self) -> bool:

@@ -19,6 +19,7 @@ from excite_cli.diagnosis.records import (
     Diagnosis,
     EffectRecord,
     Information,
+    JointAlias,
     LargeRest,
     NamedEffect,
     Round,
@@ -67,6 +68,7 @@ _LATER: dict[str, Any] = {
     "parts": tuple[SealedEnds, ...],
     "untouched": Errors | None,
     "large_rests": tuple[LargeRest, ...],
+    "joint_aliases": tuple[JointAlias, ...],
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
@@ -176,6 +178,7 @@ def _named_joints(found: Diagnosis) -> set[str]:
         *(each.effect for each in found.effects),
         *(effect for part in found.parts for effect in part.effects),
         *(alias for each in found.effects for alias in each.aliases),
+        *(one for each in found.joint_aliases for one in (*each.named, *each.others)),
         *(suspect.effect for each in found.rounds for suspect in each.suspects),
         *found.absorbed,
     ]

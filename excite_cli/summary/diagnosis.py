@@ -10,6 +10,7 @@ from excite_cli.diagnosis.next_motion import next_experiment
 from excite_cli.diagnosis.records import (
     Diagnosis,
     EffectRecord,
+    JointAlias,
     NamedEffect,
     Round,
     SealedEnds,
@@ -138,7 +139,8 @@ def _effects(found: Diagnosis, verbose: bool) -> Parts:
             f"and {len(small)} small ones (each below {SMALL_SHARE:.1%}): {listed} "
             "(--verbose: sizes)"
         )
-    return [*parts, *(text for named in found.named for text in _other_names(named, everything))]
+    parts += [text for named in found.named for text in _other_names(named, everything)]
+    return [*parts, *(_joint_alias(each, everything) for each in found.joint_aliases)]
 
 
 def _effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -> Table:
@@ -171,6 +173,14 @@ def _other_names(named: NamedEffect, everything: int) -> list[str]:
     if same := other_name_of(named.effect.kind):
         found.append(f"{what} is the same torque as {' and '.join(same)}")
     return found
+
+
+def _joint_alias(alias: JointAlias, everything: int) -> str:
+    named, others = (
+        " with ".join(_what(one, everything) for one in side)
+        for side in (alias.named, alias.others)
+    )
+    return f"{named} cannot be told from: {others}"
 
 
 def _what(record: EffectRecord, everything: int) -> str:
@@ -331,6 +341,10 @@ def _data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
             {**_named(each, runs), "stands_for": approximation_in_words(each.approximates)}
             for each in found.effects
             if each.approximates
+        ],
+        "joint_aliases": [
+            {name: [_record(one) for one in side] for name, side in vars(each).items()}
+            for each in found.joint_aliases
         ],
         "absorbed": [
             {"kind": a.kind, "joints": list(a.joints), "by": list(a.by), "left": a.left}
