@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.records import Diagnosis, NamedEffect
+from excite_cli.diagnosis.records import Diagnosis, JointAlias, NamedEffect
 from excite_cli.diagnosis.traces import EffectTrace, Traces
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
@@ -113,10 +113,25 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
     if named.aliases:
         others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]
         text += f" These data cannot tell it from: {', '.join(others)}."
+    for alias in found.joint_aliases:
+        text += _jointly(named, alias, everything)
     if named.approximates:
         what = approximation_in_words(named.approximates, covariate_in_words)
         text += f" An approximation only: it stands for {what}."
     return text
+
+
+def _jointly(named: NamedEffect, alias: JointAlias, everything: int) -> str:
+    """What these data cannot tell from it and another, or from it where that is a pair."""
+    own = (named.effect.kind, named.effect.joints, named.effect.runs)
+    beside = [each for each in alias.named if (each.kind, each.joints, each.runs) != own]
+    if len(beside) == len(alias.named):
+        return ""
+    others, company = (
+        " with ".join(f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in side)
+        for side in (alias.others, beside)
+    )
+    return f" These data cannot tell it{f' with {company}' if company else ''} from: {others}."
 
 
 def _has_a_line(found: Diagnosis, named: NamedEffect) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.aliases import Alias, aliases_of
+from excite_cli.diagnosis.aliases import Alias, aliases_of, joint_aliases
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
@@ -17,6 +17,7 @@ from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.effects.viscous_friction import ViscousFriction
 from tests.diagnosis.explicit_data import FIXED, prepared
+from tests.diagnosis.test_judgement import judge_of, planted
 
 SAMPLES = 400
 NAMED, NEAR, FAR, ELSEWHERE, WIDE = range(5)
@@ -116,3 +117,34 @@ def test_of_several_shapes_at_a_place_the_nearest_is_kept() -> None:
     }
     best = min(alone, key=lambda i: alone[i][0].divergence)
     assert [alias.candidate for alias in aliases] == [best]
+
+
+def jointly(first: float, second: float, chosen: Sequence[int]) -> list:
+    """The first effect's column is the sum of those of the two others; all on joint 0."""
+    effects = [TorqueOffset((0,)), Armature((0,)), ViscousFriction((0,))]
+    mix = np.array([[1.0, 1.0, 0.0], [1.0, 0.0, 1.0]])
+    torque = np.array([[first, 0.0], [second, 0.0]])
+    return joint_aliases(chosen, judge_of(*planted(effects, mix, torque)), chosen)
+
+
+def test_two_together_may_stand_for_one_and_one_for_two() -> None:
+    assert jointly(3.0, 3.0, [0]) == [((0,), (1, 2))]
+    assert jointly(3.0, 3.0, [1, 2]) == [((1, 2), (0,))]
+
+
+def test_one_of_another_ratio_does_not_stand_for_two() -> None:
+    assert jointly(3.0, 1.0, [1, 2]) == []
+
+
+def test_a_pair_is_not_told_where_one_of_it_is_enough() -> None:
+    effects = [TorqueOffset((0,)), Armature((0,)), ViscousFriction((0,))]
+    mix = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    judge = judge_of(*planted(effects, mix, np.array([[3.0, 0.0], [0.0, 0.0]])))
+    assert joint_aliases([0], judge, [0]) == []
+
+
+def test_a_vetoed_pair_stands_for_nothing() -> None:
+    effects = [TorqueOffset((0,)), Armature((0,)), ViscousFriction((0,))]
+    mix = np.array([[1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])  # the friction would be negative
+    judge = judge_of(*planted(effects, mix, np.array([[3.0, 0.0], [-3.0, 0.0]])))
+    assert joint_aliases([0], judge, [0]) == []

@@ -92,7 +92,9 @@ def test_friction_that_follows_the_load_is_settled(robot: Robot, truth: Array) -
 def test_a_gain_is_that_of_the_whole_torque_and_friction_that_of_the_robot(
     robot: Robot, truth: Array
 ) -> None:
-    effects = declared_effects((*FRICTION, EffectSpec(kind="torque_gain", joints=("joint_2",))), robot)
+    effects = declared_effects(
+        (*FRICTION, EffectSpec(kind="torque_gain", joints=("joint_2",))), robot
+    )
     values = np.append(sized(effects[:-1]), 0.12)
     data = measured(robot, truth, effects[:-1], values[:-1], noise=0.02)
     amplified = np.ones(robot.n)

@@ -12,10 +12,11 @@ from excite_cli.diagnosis.records import (
     Approximation,
     Diagnosis,
     EffectRecord,
+    JointAlias,
     NamedEffect,
     Unexplained,
 )
-from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words
+from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words, title_of
 from excite_cli.effects.base import Value
 from excite_cli.report.chart import Chart
 from excite_cli.report.dependence_section import dependence_section
@@ -123,6 +124,27 @@ def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) ->
     assert "cannot tell it from: nonlinear viscous friction on elbow" in chart.caption
     assert "99.8%" in chart.alternative or "99.9%" in chart.alternative
     assert "speed [rad/s]" in chart.svg
+
+
+@pytest.mark.parametrize(
+    ("beside", "told"),
+    [
+        ((), "cannot tell it from: armature on elbow."),
+        (("spring",), "cannot tell it with spring at the joint on elbow from: "),
+    ],
+)
+def test_evidence_tells_of_pairs(diagnosis: Diagnosis, beside: tuple[str, ...], told: str) -> None:
+    own, other = diagnosis.effects[0].effect, EffectRecord("armature", ("elbow",))
+    named = (own, *(EffectRecord(kind, ("elbow",)) for kind in beside))
+    found = replace(diagnosis, joint_aliases=(JointAlias(named, (other,)),))
+    elsewhere = replace(found, joint_aliases=(JointAlias((other,), (own,)),))
+    captions = []
+    for each in (found, elsewhere, diagnosis):
+        section = effect_section(each)
+        assert section is not None
+        captions.append(charts_of(section)[0].caption)
+    assert told.replace("armature", title_of("armature")) in captions[0]
+    assert captions[1] == captions[2]
 
 
 def test_residuals_tell_sealed_from_training(sections: dict[str, Section]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.records import Approximation, Diagnosis
+from excite_cli.diagnosis.records import Approximation, Diagnosis, JointAlias
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.errors import FileError
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis, write_diagnosis
@@ -106,6 +106,17 @@ def test_the_noise_floor_comes_back_and_older_files_have_none(
     with h5py.File(path, "a") as file:
         del file["records/noise_floor"]
     assert read_diagnosis(path).noise_floor is None
+
+
+def test_pairs_come_back_and_older_files_have_none(diagnosis: Diagnosis, path: Path) -> None:
+    one = diagnosis.effects[0].effect
+    other = replace(one, kind="spring")
+    pairs = (JointAlias((one,), (other, replace(other, runs=("a",)))),)
+    write_diagnosis(path, replace(diagnosis, joint_aliases=pairs))
+    assert read_diagnosis(path).joint_aliases == pairs
+    with h5py.File(path, "a") as file:
+        del file["records/joint_aliases"]
+    assert read_diagnosis(path).joint_aliases == ()
 
 
 def test_verdicts_come_back_and_older_files_have_none(diagnosis: Diagnosis, path: Path) -> None:

@@ -10,6 +10,8 @@ from excite_cli.diagnosis.records import (
     Approximation,
     Assumption,
     Diagnosis,
+    EffectRecord,
+    JointAlias,
     Removed,
     SealedEnds,
 )
@@ -82,6 +84,20 @@ def test_the_noise_floor_stands_beside_the_errors(doubted: Diagnosis) -> None:
 
 def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -> None:
     assert "noise" not in printed(replace(doubted, large_rests=()))
+
+
+def test_pairs_that_cannot_be_told_from_one_effect() -> None:
+    one, other, pair = (EffectRecord(kind, ("elbow",)) for kind in ("spring", "armature", "ripple"))
+    found = replace(make_diagnosis(), joint_aliases=(JointAlias((one,), (other, pair)),))
+    told = "spring on elbow cannot be told from: armature on elbow with ripple on elbow"
+    assert told in " ".join(printed(found).split())
+    data = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
+    assert data == [
+        {
+            "named": [{"kind": "spring", "joints": ["elbow"]}],
+            "others": [{"kind": kind, "joints": ["elbow"]} for kind in ("armature", "ripple")],
+        }
+    ]
 
 
 def test_nothing_is_missing_only_where_nothing_large_is_left(doubted: Diagnosis) -> None:
