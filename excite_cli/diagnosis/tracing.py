@@ -32,6 +32,7 @@ from excite_cli.robot.model import Array
 
 _PASSES = 6
 _SETTLED = 1e-3  # change of the residual energy from pass to pass
+_SAME_SHAPE = 0.02  # half of the relative changes of its numbers: energies say little of them
 _OBVIOUS, _PLAIN_TO_SEE = 8, 0.2
 Progress = Callable[[str, int], None]
 
@@ -111,8 +112,12 @@ class _Fit:
         return {(e.kind, e.joints, e.runs) for e in self.effects}
 
     def close_to(self, other: "_Fit") -> bool:
+        """Whether another fit of the same effects is about the same."""
+        shapes = {(e.kind, e.joints, e.runs): e.shape for e in other.effects}
+        moved = [_distance(e.shape, shapes[e.kind, e.joints, e.runs]) for e in self.effects]
         change = abs(self.energy - other.energy) / max(self.energy, 1e-300)
-        return change < _SETTLED and bool(np.allclose(self.levels, other.levels, rtol=0.02))
+        alike = change < _SETTLED and bool(np.allclose(self.levels, other.levels, rtol=0.02))
+        return alike and max(moved, default=0.0) < _SAME_SHAPE
 
 
 def _first_fit(model: Model, folds: Sequence[int], bodies: Sequence["ModelledRun"]) -> _Fit:
