@@ -168,8 +168,8 @@ def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> floa
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )
 
-    def prepared(coupled: Sequence[tuple[int, int, float]]) -> list[PreparedRun]:
-        return [prepare(run, processing, coupled) for run in parts.training]
+    def prepared(left_out: LeftOut) -> list[PreparedRun]:
+        return [prepare(run, processing, left_out) for run in parts.training]
 
     model = Model(robot, find_base_parameters(robot), declared_effects(spec.effects, robot), None)
     names = [run.name for run in data.runs]

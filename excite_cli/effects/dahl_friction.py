@@ -43,6 +43,7 @@ _DISTANCES = 5e-4, 0.5  # rad
 _SHARES = np.geomspace(1e-3, 0.25, 7)  # of the range; neighbours overlap by 0.9
 _FINER = (1.4, 1.25, 1.15, 1.08, 1.03, 1.01)
 _SLIDING = 0.02  # rad/s at which a record that begins so fast has slid before
+_FORGOTTEN = 4.0  # distances
 _DRAWN = 6.0  # distances beyond which nothing is left of a reversal
 
 
@@ -77,6 +78,10 @@ class DahlFriction(Effect):
     def leftover(self, values: Array) -> float:
         """How friction builds up is not known exactly."""
         return 2e-2
+
+    def forgets_over(self) -> tuple[tuple[int, float], ...]:
+        """Four distances: of what was before a record, 2 % are left then."""
+        return tuple((j, _FORGOTTEN * self.shape["distance"]) for j in self.joints)
 
     def columns(self, signals: Signals) -> Array:
         """z, (T, 1, 1)."""

@@ -16,9 +16,10 @@ from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
-from excite_cli.diagnosis.tracing import _coupled, _usual
+from excite_cli.diagnosis.tracing import _usual
 from excite_cli.effects.base import Effect, Signals, Tier
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.identification.left_out import LeftOut
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import anything, effect
 from tests.diagnosis.test_judgement import TOTAL, on_joint_0, planted
@@ -208,8 +209,8 @@ def test_ripple_is_refined_by_parts_of_a_cycle_and_a_touch_by_parts_of_its_lengt
 
 def test_a_shaft_of_two_joints_must_not_stand_still() -> None:
     effects = [of("viscous_friction"), effect("coupled_friction", 1, 2, direction=-1.0)]
-    assert _coupled(effects) == [(1, 2, -1.0)]
-    assert _coupled([of(kind) for kind in STATED if kind != "coupled_friction"]) == []
+    assert LeftOut.by(effects).coupled == ((1, 2, -1.0),)
+    assert LeftOut.by([of(kind) for kind in STATED if kind != "coupled_friction"]).coupled == ()
 
 
 @pytest.mark.parametrize(("slowest", "left"), [(0.001, 5), (0.03, 3), (10.0, 0)])
