@@ -1,12 +1,13 @@
 """The benchmark behind the diagnosis: effects planted in simulated robots, found or not.
 
     python -m benchmarks.diagnosis_battery [--cases N] [--seed S] [--workers W] [--json FILE]
-                                           [--kind KIND] [--only INDEX …]
+                                           [--kind KIND] [--history] [--only INDEX …]
 
 A case is a robot whose inertias are 10–30 % off its URDF, four motions of 10 s at 500 Hz (the last
 is sealed), encoder counts, torque noise of 0.5–2 %, a declared model, and something planted: a kind
 of the catalogue, two of them, one that is absorbed, one that no name fits, or nothing. Cases follow
-from (seed, index) alone. What is planted is chosen on the motions: 3–30 % of the torque of the
+from (seed, index) alone. `--history` has cases of friction with memory instead: Dahl's, integrated
+in another way than in the catalogue, and another form. What is planted is chosen on the motions: 3–30 % of the torque of the
 joint where it is strongest, some near the noise; what the declared model absorbs is planted in the
 cases about that only.
 
@@ -26,7 +27,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from threadpoolctl import threadpool_limits
 
 from benchmarks.battery import tables
-from benchmarks.battery.cases import label
+from benchmarks.battery.cases import label, label_of_history
 from benchmarks.battery.judge import Outcome, judge
 from benchmarks.battery.processes import outcomes_of, write
 
@@ -38,18 +39,24 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--json", type=Path, help="write all outcomes and rates here")
     parser.add_argument("--kind", help="only cases about this kind (or group: clean, two, …)")
+    parser.add_argument("--history", action="store_true", help="friction with memory")
     parser.add_argument("--only", type=int, nargs="+", help="these cases, with all details")
     arguments = parser.parse_args()
     if arguments.only is not None:
         with threadpool_limits(1):
             for index in arguments.only:
-                print(tables.in_detail(judge(arguments.seed, index)), flush=True)
+                labelled = label_of_history if arguments.history else label
+                print(tables.in_detail(judge(arguments.seed, index, True, labelled)), flush=True)
         return
-    chosen = [i for i in range(arguments.cases) if _asked(arguments.kind, arguments.seed, i)]
+    asked = arguments.kind
+    chosen = [
+        i for i in range(arguments.cases) if arguments.history or _asked(asked, arguments.seed, i)
+    ]
+    judged = _of_history if arguments.history else _outcome
     began = time.perf_counter()
     print(tables.HEADER, flush=True)
     outcomes = []
-    for outcome in outcomes_of(_outcome, arguments.seed, chosen, arguments.workers):
+    for outcome in outcomes_of(judged, arguments.seed, chosen, arguments.workers):
         outcomes.append(outcome)
         print(tables.line(outcome), flush=True)
         if arguments.json is not None:
@@ -73,6 +80,10 @@ def _asked(kind: str | None, seed: int, index: int) -> bool:
 
 def _outcome(seed: int, index: int) -> Outcome:
     return judge(seed, index).outcome
+
+
+def _of_history(seed: int, index: int) -> Outcome:
+    return judge(seed, index, labelled=label_of_history).outcome
 
 
 if __name__ == "__main__":
