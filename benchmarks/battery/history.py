@@ -1,6 +1,6 @@
 """Friction with memory, made in other ways than the catalogue's, to be planted only.
 
-Both are called by the catalogue's name. Of the second it is not quite true: it may as well be
+Both come with the dry friction that they are a part of, and are called by the catalogue's name. Of the second it is not quite true: it may as well be
 told as an approximation, or as unexplained, but by no other name.
 """
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from excite_cli.effects.base import Signals
 from excite_cli.effects.dahl_friction import DahlFriction
+from excite_cli.effects.sign import smooth_sign
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
 
@@ -31,6 +32,7 @@ class DahlBySpeed(DahlFriction):
         """At the joint, by its speed."""
         for j in self.joints:
             robot.remember(j, _BySpeed(float(values[0]), self.shape["distance"]))
+            robot.add_to_joint(j, {"frictionloss": -float(values[0])})
         robot.tell_controller(self, values)
 
 
@@ -57,7 +59,8 @@ class MaxwellSlip(DahlFriction):
         elements = _Elements(1.0, self.shape["distance"])
         q, v = signals.q[:, self.joints[0]], signals.v[:, self.joints[0]]
         elements.begin(float(q[0]), float(v[0]))
-        return np.array([elements.torque(float(x), 0.0) for x in q])[:, None, None]
+        bent = np.array([elements.torque(float(x), 0.0) for x in q])
+        return (bent - smooth_sign(v))[:, None, None]
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
@@ -65,6 +68,7 @@ class MaxwellSlip(DahlFriction):
         """At the joint."""
         for j in self.joints:
             robot.remember(j, _Elements(float(values[0]), self.shape["distance"]))
+            robot.add_to_joint(j, {"frictionloss": -float(values[0])})
         robot.tell_controller(self, values)
 
 

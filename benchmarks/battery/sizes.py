@@ -223,7 +223,12 @@ def _warming(values: Array, effect: Effect, ground: Ground) -> Array:
 
 
 def _companions(effect: Effect, values: Array) -> tuple[Planted, ...]:
-    """The joints' own viscous shares of a coupled shaft, without which it would give energy."""
+    """Plain friction without which it would give energy.
+
+    The joints' own viscous shares of a coupled shaft; the dry friction that has a memory.
+    """
+    if effect.kind == "dahl_friction":
+        return (Planted(kind_named("coulomb_friction")(effect.joints), np.array(values)),)
     coupled = effect.kind in ("coupled_friction", "outside:distant_coupling")
     if not coupled or values[0] == 0.0:
         return ()

@@ -2,11 +2,13 @@
 
 With the bristle state z, s the direction of motion, and d the `distance`,
 
-    τ_j = f z,    dz = (s − z) |dq_j| / d,
+    τ_j = f (z − sgn v_j),    dz = (s − z) |dq_j| / d.
 
-so dτ/dq = σ (1 − s τ/f) with the stiffness σ = f/d: Dahl's solid friction of exponent one. After a
-reversal from steady sliding τ/f = s (1 − 2 e^(−x/d)), x the way since. In steady sliding it is
-Coulomb friction of size f, and for a small d it is Coulomb friction throughout.
+It deviates from the Coulomb friction beside it, and vanishes in steady sliding: Coulomb friction
+stays what data sheets say. Friction that is f z altogether, Dahl's solid friction of exponent one
+with the stiffness σ = f/d at a reversal, is Coulomb friction of size f and this of size f. After a
+reversal from steady sliding z = s (1 − 2 e^(−x/d)), x the way since. As z itself nearly all of it
+would be Coulomb friction for a short d, and what is its own too small a share to be tested.
 
 Along a way Δ without a reversal the solution is exact, however long it is,
 
@@ -50,7 +52,7 @@ _DRAWN = 6.0  # distances beyond which nothing is left of a reversal
 
 
 class DahlFriction(Effect):
-    """τ_j = f z, f ≥ 0, with z following the direction of motion over `distance`."""
+    """τ_j = f (z − sgn v_j), f ≥ 0, with z following the direction of motion over `distance`."""
 
     kind: ClassVar = "dahl_friction"
     title: ClassVar = "dry friction with memory (Dahl)"
@@ -63,7 +65,6 @@ class DahlFriction(Effect):
     defaults: ClassVar = {"distance": 0.03}
     surprise: ClassVar = 2.0
     refines: ClassVar = ("viscous_friction", "coulomb_friction")
-    deviates_from: ClassVar = refines
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
@@ -86,14 +87,17 @@ class DahlFriction(Effect):
         return tuple((j, _FORGOTTEN * self.shape["distance"]) for j in self.joints)
 
     def columns(self, signals: Signals) -> Array:
-        """z, (T, 1, 1)."""
-        return _Path.of(signals, self.joints[0], self.shape["distance"]).state[::2, None, None]
+        """z − sgn v_j, (T, 1, 1)."""
+        j = self.joints[0]
+        state = _Path.of(signals, j, self.shape["distance"]).state[::2]
+        return (state - smooth_sign(signals.v[:, j]))[:, None, None]
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
-        """The recursion backwards: λ_k = weight_k + ∂z_{k+1}/∂z_k λ_{k+1}."""
+        """The recursion backwards, λ_k = weight_k + ∂z_{k+1}/∂z_k λ_{k+1}, and the sign's slope."""
         j = self.joints[0]
         path = _Path.of(signals, j, self.shape["distance"])
         by_q, by_v = path.pull_back(weights[:, 0, 0])
+        by_v -= weights[:, 0, 0] * smooth_sign_slope(signals.v[:, j])
         return Cotangents(q=signals.only(j, by_q), v=signals.only(j, by_v))
 
     def abscissa(self, signals: Signals) -> Abscissa:
@@ -117,9 +121,10 @@ class DahlFriction(Effect):
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
     ) -> None:
-        """A bristle at the joint, which follows it from control step to control step."""
+        """A bristle at the joint in place of as much dry friction, which must be there."""
         for j in self.joints:
             robot.remember(j, _Bristle(float(values[0]), self.shape["distance"]))
+            robot.add_to_joint(j, {"frictionloss": -float(values[0])})
         robot.tell_controller(self, values)
 
 
@@ -205,7 +210,7 @@ def _recursion(factors: Array, terms: Array) -> Array:
 
 
 class _Bristle:
-    """The state of one joint of a simulated robot."""
+    """f z of one joint of a simulated robot."""
 
     def __init__(self, friction: float, distance: float) -> None:
         self._friction, self._distance = friction, distance

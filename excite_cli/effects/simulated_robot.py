@@ -88,7 +88,7 @@ class SimulatedRobot(Protocol):
         """What `joint` turns at the reference posture with all others held [kg·m²]."""
 
     def add_to_joint(self, joint: int, parts: Mapping[str, float]) -> None:
-        """More of these attributes of MuJoCo's joint (`JOINT_PARTS`); springs add up."""
+        """More, or less, of these attributes of MuJoCo's joint (`JOINT_PARTS`); springs add up."""
 
     def apply(self, effect: "Effect", values: Array) -> None:
         """The effect's own formula acts as a torque at every control step."""

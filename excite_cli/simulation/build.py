@@ -122,7 +122,8 @@ def make(build: Build, step: float) -> Plant:
     Raises
     ------
     RobotError
-        A joint moves no inertia, or its springs are too stiff to be simulated.
+        A joint moves no inertia or has less than no dry friction, or its springs are too stiff to
+        be simulated.
     """
     soft = sorted(build.soft)
     couplings = [(c.first, c.second, c.direction) for c in build.couplings]
@@ -148,6 +149,7 @@ def make(build: Build, step: float) -> Plant:
     model.qpos_spring[motor] = np.divide(
         -constant, stiff, out=np.zeros(len(stiff)), where=stiff > 0
     )
+    _check_friction(build)
     _check_inertia(build, plant)
     refresh(plant)
     _shorten(plant, step)
@@ -191,6 +193,18 @@ def _full(plant: Plant, data: Any, q: Array) -> Array:
         mujoco.mj_mulM(plant.model, data, full[column], unit)
         unit[column] = 0.0
     return full
+
+
+def _check_friction(build: Build) -> None:
+    """What takes the place of dry friction needs as much of it."""
+    short = build.friction < -1e-9
+    if short.any():
+        name = build.robot.joint_names[int(np.argmax(short))]
+        raise RobotError(
+            f"joint '{name}' of the simulated robot lacks {-build.friction[short][0]:.3g} N·m of "
+            "dry friction, of which a planted effect is a part. Plant more of it: --effect "
+            f"'coulomb_friction@{name}=…'."
+        )
 
 
 def _check_inertia(build: Build, plant: Plant) -> None:

@@ -37,6 +37,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
     "asymmetric_friction": (4.0, 3, False),
     "stribeck_friction": (2.0, 2, False),
     "load_dependent_friction": (1.0, 2, True),
+    "dahl_friction": (2.0, 2, False),
     "friction_drift": (15.0, 3, False),
     "friction_change": (4.0, 2, False),
     "coupled_friction": (3.0, 2, True),
@@ -58,6 +59,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
 REFINED: Mapping[str, tuple[str, ...]] = {
     "nonlinear_viscous_friction": STRAIGHT,
     "stribeck_friction": STRAIGHT,
+    "dahl_friction": STRAIGHT,
     "friction_drift": STRAIGHT,
     "friction_change": ("coulomb_friction", "viscous_friction"),
     "coupled_friction": STRAIGHT,
@@ -68,6 +70,7 @@ REFINED: Mapping[str, tuple[str, ...]] = {
 LEAVES = {
     "base_tilt": 0.045, "encoder_offset": 0.0225, "torque_saturation": 4e-3, "elasticity": 2e-2,
     "backlash": 1e-2, "torque_delay": 1e-2, "stribeck_friction": 2e-2, "friction_change": 3e-2,
+    "dahl_friction": 2e-2,
 }  # fmt: skip
 
 
@@ -174,6 +177,7 @@ def signals() -> list[Signals]:
     ("kind", "shape", "steps"),
     [
         ("stribeck_friction", {"stribeck_speed": 0.2}, [0.07, 0.03, 0.012, 0.004]),
+        ("dahl_friction", {"distance": 0.1}, [0.04, 0.025, 0.015, 8e-3, 3e-3, 1e-3]),
         ("torque_saturation", {"level": 10.0}, [0.5, 0.2, 0.08, 0.03, 0.01]),
         ("backlash", {"gap": 0.01}, [1.5e-3, 6e-4, 2e-4, 7e-5]),
         ("nonlinear_viscous_friction", {"power": 2.0}, []),
