@@ -1,7 +1,8 @@
 """Friction with memory, made in other ways than the catalogue's, to be planted only.
 
-Both come with the dry friction that they are a part of, and are called by the catalogue's name. Of the second it is not quite true: it may as well be
-told as an approximation, or as unexplained, but by no other name.
+Both come with the dry friction that they are a part of, and are called by the catalogue's name. Of
+the second it is not quite true: it may as well be told as an approximation, or as unexplained, but
+by no other name.
 """
 
 from collections.abc import Mapping

@@ -69,9 +69,7 @@ class Judged:
     diagnosis: Diagnosis | None = None
 
 
-def judge(
-    seed: int, index: int, with_oracle: bool = True, labelled: Label = label
-) -> Judged:
+def judge(seed: int, index: int, with_oracle: bool = True, labelled: Label = label) -> Judged:
     """Make and judge one case; what goes wrong is part of the outcome."""
     group, kind = labelled(seed, index)
     outcome = Outcome(index, group, kind)

@@ -43,8 +43,8 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.effects.placing import told_on
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
-from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare, require_motion
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing

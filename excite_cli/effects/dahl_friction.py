@@ -19,8 +19,8 @@ and where the joint reverses between two samples, it turns where evenly changing
 s is smoothed as for all friction (`smooth_sign` of Δ over the time step), and |Δ| likewise with a
 larger width, lest noise around a standstill wear the memory off: of 10 s with a noise of one in
 2^16 counts, 4 % at d = 10 mrad (with the sign's width 28 %; where positions are filtered at 40
-instead of 10 Hz, 89 %). A record that begins in motion is taken to have slid before (z = s), one that begins at rest
-to be relaxed (z = 0), and fits leave out what comes before either is forgotten.
+instead of 10 Hz, 89 %). A record that begins in motion is taken to have slid before (z = s), one
+that begins at rest to be relaxed (z = 0), and fits leave out what comes before either is forgotten.
 """
 
 from collections.abc import Mapping, Sequence
@@ -194,7 +194,11 @@ def _with_turning_points(q: Array, v: Array, step: float) -> tuple[Array, Array]
     points = np.empty(2 * len(q) - 1)
     points[::2], points[1::2] = q, between
     half = 0.5 * step * turns / change**2
-    derivatives = [np.where(turns, 1.0, 0.5), half * before * (before - 2.0 * after), half * before**2]
+    derivatives = [
+        np.where(turns, 1.0, 0.5),
+        half * before * (before - 2.0 * after),
+        half * before**2,
+    ]
     return points, np.stack(derivatives, axis=1)
 
 

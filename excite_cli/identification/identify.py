@@ -28,8 +28,8 @@ from excite_cli.identification.hausman import (
     instrument_dataset,
     not_testable,
 )
-from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import prepare, require_motion
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import Regression, build_regression

@@ -49,9 +49,7 @@ def rubbing(kind: type[Effect], joint: int, size: float, distance: float) -> lis
 
 
 def names(found: Diagnosis) -> list[tuple[str, str]]:
-    return [
-        (e.effect.kind, e.effect.joints[0]) for e in found.effects if e.approximates is None
-    ]
+    return [(e.effect.kind, e.effect.joints[0]) for e in found.effects if e.approximates is None]
 
 
 def test_dahl_friction_is_named_with_its_size_and_distance() -> None:
