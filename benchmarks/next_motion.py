@@ -145,6 +145,7 @@ def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> floa
     from excite_cli.diagnosis.tracing import Model, trace
     from excite_cli.dynamics.base_parameters import find_base_parameters
     from excite_cli.effects.catalogue import declared_effects
+    from excite_cli.identification.left_out import LeftOut
     from excite_cli.identification.prepare import PreparedRun, prepare
     from excite_cli.identification.processing import choose_processing
     from excite_cli.identification.split import split
@@ -168,8 +169,8 @@ def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> floa
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )
 
-    def prepared(coupled: Sequence[tuple[int, int, float]]) -> list[PreparedRun]:
-        return [prepare(run, processing, coupled) for run in parts.training]
+    def prepared(left_out: LeftOut) -> list[PreparedRun]:
+        return [prepare(run, processing, left_out) for run in parts.training]
 
     model = Model(robot, find_base_parameters(robot), declared_effects(spec.effects, robot), None)
     names = [run.name for run in data.runs]

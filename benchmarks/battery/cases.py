@@ -2,16 +2,18 @@
 
 A case follows from (seed, index) alone. Cases come in decks of 36: every kind of the catalogue
 once, seven clean ones, two outside the catalogue, three with two effects, two that are absorbed; a
-deck is shuffled by its seed.
+deck is shuffled by its seed. Friction with memory is in cases of its own: two of three are Dahl's,
+on one joint or on two.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
 import numpy as np
 
+from benchmarks.battery.history import HISTORY
 from benchmarks.battery.motions import ROBOTS, Arm, arm, four_motions
 from benchmarks.battery.outside import OUTSIDE
 from benchmarks.battery.sizes import Ground, Sized, ground_of, size
@@ -25,7 +27,7 @@ from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.true_robot import true_inertias
 
-Group = Literal["one", "clean", "outside", "two", "absorbed", "hard"]
+Group = Literal["one", "clean", "outside", "two", "absorbed", "hard", "history"]
 
 _DECLARED = 0.65  # of the cases
 _ROBOT_SHARES = (0.45, 0.38, 0.17)
@@ -59,10 +61,14 @@ class Case:
         return bool(self.spec.effects)
 
 
+Label = Callable[[int, int], tuple[Group, str]]
+
+
 @cache
 def _kinds() -> tuple[str, ...]:
-    """Kinds that four recordings of one robot show; those of campaigns have their own battery."""
-    return tuple(name for name, kind in catalogue().items() if not kind.of_campaign)
+    """Kinds that four recordings of one robot show and that have no cases of their own."""
+    own = {kind.kind for kind in HISTORY.values()}
+    return tuple(n for n, kind in catalogue().items() if not kind.of_campaign and n not in own)
 
 
 @cache
@@ -85,9 +91,14 @@ def label(seed: int, index: int) -> tuple[Group, str]:
     return _deck(seed, index // length)[index % length]
 
 
-def make_case(seed: int, index: int) -> Case:
+def label_of_history(seed: int, index: int) -> tuple[Group, str]:
+    """As `label`, of cases of friction with memory."""
+    return "history", ("dahl_by_speed", "dahl_by_speed", "maxwell_slip")[index % 3]
+
+
+def make_case(seed: int, index: int, labelled: Label = label) -> Case:
     """The case of a seed and an index."""
-    group, kind = label(seed, index)
+    group, kind = labelled(seed, index)
     rng = np.random.default_rng([seed, 1, index])
     for _ in range(_ATTEMPTS):
         case = _attempt(seed, index, group, kind, rng)
@@ -164,6 +175,8 @@ def _planted(
         kinds = {each.kind: each for each in OUTSIDE}
         found = one_effect(kinds[kind], of, ground, model, (0.05, np.inf), rng)
         return None if found is None else (found,)
+    if group == "history":
+        return _history(HISTORY[kind], of, ground, model, rng)
     if group == "absorbed":
         hidden = list(rng.permutation(_HIDDEN))
         for name in hidden:
@@ -172,6 +185,24 @@ def _planted(
                 return (found,)
         return None
     return _two(of, ground, model, with_friction, rng)
+
+
+def _history(
+    kind: type[Effect], of: Arm, ground: Ground, model: Array, rng: np.random.Generator
+) -> tuple[Sized, ...] | None:
+    """On one joint, or on two in a quarter of the cases, where it is no plain friction."""
+    plain = declared_effects(_FRICTION, of.robot)
+    columns = [weighted_columns(effect, ground) for effect in plain]
+    beside = orthonormal(np.hstack([model, *columns]))
+    found: list[Sized] = []
+    for at in rng.permutation(of.robot.n):
+        one = size(kind, (int(at),), ground, rng)
+        if one is None or one.ratio**2 * left_over(beside, one, ground) < ground.noise**2:
+            continue
+        found.append(one)
+        if len(found) == 2 or rng.uniform() > 0.25:
+            return tuple(found)
+    return tuple(found) or None
 
 
 def one_effect(

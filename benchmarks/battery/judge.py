@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from benchmarks.battery import cases, hard_cases
 from benchmarks.battery.cases import Case
+from benchmarks.battery.decks import DECKS
 from benchmarks.battery.scoring import Answer, Found, Name, Plant, Score, identity, score
 from benchmarks.battery.sizes import Sized
 from excite_cli.config.data_spec import EffectSpec
@@ -70,13 +70,12 @@ class Judged:
     diagnosis: Diagnosis | None = None
 
 
-def judge(seed: int, index: int, with_oracle: bool = True, hard: bool = False) -> Judged:
-    """Make and judge one case; what goes wrong is part of the outcome."""
-    deck = hard_cases if hard else cases
-    group, kind = deck.label(seed, index)
+def judge(seed: int, index: int, with_oracle: bool = True, deck: str = "catalogue") -> Judged:
+    """Make and judge one case of a deck; what goes wrong is part of the outcome."""
+    group, kind = DECKS[deck].label(seed, index)
     outcome = Outcome(index, group, kind)
     try:
-        return _judged(outcome, deck.make_case(seed, index), with_oracle)
+        return _judged(outcome, DECKS[deck].make_case(seed, index), with_oracle)
     except Exception:
         outcome.error = traceback.format_exc()
         return Judged(outcome)
@@ -99,7 +98,7 @@ def _judged(outcome: Outcome, case: Case, with_oracle: bool) -> Judged:
     _fill(outcome, found, _score(case, found, dataset))
     outcome.before = found.before.mean_relative_moving
     outcome.after = found.after.mean_relative_moving
-    if with_oracle and case.group != "outside":
+    if with_oracle and case.group not in ("outside", "history"):
         began = time.perf_counter()
         best = oracle(case, dataset)
         outcome.seconds["oracle"] = time.perf_counter() - began
@@ -247,6 +246,7 @@ def _fill(outcome: Outcome, found: Diagnosis, result: Score) -> None:
             "joints": list(each.effect.joints),
             "shape": each.effect.shape,
             "values": list(each.effect.values),
+            "sizes": {name: (x.value, x.std) for name, x in each.parameters.items()},
             "runs": list(each.effect.runs),
             "p_value": each.p_value,
             "share": each.share_of_residual,

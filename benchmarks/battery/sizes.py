@@ -23,6 +23,7 @@ _NEAR_SHARE = 0.25  # of the cases
 _ACCEPTED = (0.9, 0.40)  # least, in units of 1.5 × noise or 3 %; and largest ratio
 _STRIBECK_EXCESS = 0.4  # at most, of the joint's torque RMS
 _STRIBECK_SPEEDS = (0.03, 0.3)  # rad/s
+_DAHL_DISTANCES = (0.01, 0.2)  # rad
 _SAMPLES = 250
 
 # Kinds that say their size themselves: low, high of the first number.
@@ -172,6 +173,8 @@ def _draw(
         shape = {"power": float(rng.choice([0.5, 2.0, 3.0]))}
     elif name == "stribeck_friction":
         shape = {"stribeck_speed": float(np.exp(rng.uniform(*np.log(_STRIBECK_SPEEDS))))}
+    elif name == "dahl_friction":
+        shape = {"distance": float(np.exp(rng.uniform(*np.log(_DAHL_DISTANCES))))}
     elif name == "coupled_friction":
         shape = {"direction": float(rng.choice([-1.0, 1.0]))}
     elif name == "torque_saturation":
@@ -232,7 +235,12 @@ def _warming(values: Array, effect: Effect, ground: Ground) -> Array:
 
 
 def _companions(effect: Effect, values: Array) -> tuple[Planted, ...]:
-    """The joints' own viscous shares of a coupled shaft, without which it would give energy."""
+    """Plain friction without which it would give energy.
+
+    The joints' own viscous shares of a coupled shaft; the dry friction that has a memory.
+    """
+    if effect.kind == "dahl_friction":
+        return (Planted(kind_named("coulomb_friction")(effect.joints), np.array(values)),)
     coupled = effect.kind in ("coupled_friction", "outside:distant_coupling")
     if not coupled or values[0] == 0.0:
         return ()

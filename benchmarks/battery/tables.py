@@ -92,7 +92,7 @@ def rates(outcomes: Sequence[Outcome]) -> list[Rate]:
     planted = [o for o in outcomes if o.group != "clean"]
     nameable = [o for o in planted if o.group != "outside"]
     clean = [o for o in outcomes if o.group == "clean"]
-    named = [o for o in nameable if o.right and o.group != "absorbed"]
+    named = [o for o in nameable if o.right and o.group not in ("absorbed", "history")]
     good = [o for o in named if o.ratio <= RATIO and o.joint_ratio <= RATIO]
     return [
         Rate("detected", sum(o.detected for o in planted), len(planted), 0.95, True),
@@ -109,7 +109,7 @@ def rates(outcomes: Sequence[Outcome]) -> list[Rate]:
 def details(outcomes: Sequence[Outcome]) -> list[str]:
     """Figures beside the criteria."""
     found = []
-    for group in ("one", "two", "absorbed", "outside", "clean", "hard"):
+    for group in ("one", "two", "absorbed", "outside", "history", "hard", "clean"):
         part = [o for o in outcomes if o.group == group]
         if part:
             found.append(
@@ -128,7 +128,25 @@ def details(outcomes: Sequence[Outcome]) -> list[str]:
             f"{robot:11} {len(part)} cases: right {_count(o.right for o in part)}, "
             f"wrong name {_count(o.wrong for o in part)}"
         )
-    return [*found, _seconds(outcomes)]
+    return [*found, *_sizes(outcomes), _seconds(outcomes)]
+
+
+def _sizes(outcomes: Sequence[Outcome]) -> list[str]:
+    """Of friction with memory: its size in standard deviations from the truth, and its distance."""
+    rows: dict[str, list[tuple[float, float]]] = {}
+    for o in outcomes:
+        for p in o.planted if o.group == "history" else ():
+            for f in o.found:
+                if (f["kind"], f["joints"]) == (p["kind"], p["joints"]):
+                    value, std = f["sizes"]["friction"]
+                    distance = f["shape"]["distance"] / p["shape"]["distance"]
+                    rows.setdefault(o.kind, []).append(((value - p["values"][0]) / std, distance))
+    return [
+        f"{kind:14} {len(found)} sizes, {_count(abs(z) < 2.0 for z, _ in found)} within 2 sd "
+        f"(worst {max((z for z, _ in found), key=abs):.1f}); distance found/planted "
+        f"{min(d for _, d in found):.2f} to {max(d for _, d in found):.2f}"
+        for kind, found in rows.items()
+    ]
 
 
 def _seconds(outcomes: Sequence[Outcome]) -> str:

@@ -44,6 +44,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.effects.placing import told_on
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
+from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare, require_motion
 from excite_cli.identification.prior import prior_rows
@@ -178,8 +179,8 @@ def _traced(
     """What is found in the training parts."""
     progress("filtering", 0)
 
-    def prepared(coupled: Sequence[tuple[int, int, float]]) -> list[PreparedRun]:
-        return [prepare(run, processing, coupled) for run in parts.training]
+    def prepared(left_out: LeftOut) -> list[PreparedRun]:
+        return [prepare(run, processing, left_out) for run in parts.training]
 
     return trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
 

@@ -27,11 +27,13 @@ from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect, Signals, Tier
 from excite_cli.effects.seen import Seen
+from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
 _PASSES = 6
 _SETTLED = 1e-3  # change of the residual energy from pass to pass
+_SAME_SHAPE = 0.02  # half of the relative changes of its numbers: energies say little of them
 _OBVIOUS, _PLAIN_TO_SEE = 8, 0.2
 Progress = Callable[[str, int], None]
 
@@ -60,17 +62,17 @@ class Traced:
 def trace(
     model: Model,
     spec: DiagnosisSpec,
-    prepared: Callable[[Sequence[tuple[int, int, float]]], list[PreparedRun]],
+    prepared: Callable[[LeftOut], list[PreparedRun]],
     folds: Sequence[int],
     run_names: Sequence[str],
     progress: Progress,
 ) -> Traced:
     """Find the effects that `model` lacks.
 
-    `prepared` gives the training parts, for coupled joints (j, k, s) that were found.
+    `prepared` gives the training parts, without samples that effects which were found ask to leave.
     """
-    coupled = _coupled(model.declared)
-    runs = prepared(coupled)
+    left_out = LeftOut.by(model.declared)
+    runs = prepared(left_out)
     bodies = [ModelledRun(model, run) for run in runs]
     fit = _first_fit(model, folds, bodies)
     traced: Traced | None = None
@@ -88,9 +90,9 @@ def trace(
         fit = now
         if settled:
             break
-        if _coupled((*model.declared, *fit.effects)) != coupled:
-            coupled = _coupled((*model.declared, *fit.effects))
-            for body, run in zip(bodies, prepared(coupled), strict=True):
+        before, left_out = left_out, LeftOut.by((*model.declared, *fit.effects))
+        if left_out != before:
+            for body, run in zip(bodies, prepared(left_out), strict=True):
                 body.take(run)
     assert traced is not None
     return traced
@@ -111,8 +113,12 @@ class _Fit:
         return {(e.kind, e.joints, e.runs) for e in self.effects}
 
     def close_to(self, other: "_Fit") -> bool:
+        """Whether another fit of the same effects is about the same."""
+        shapes = {(e.kind, e.joints, e.runs): e.shape for e in other.effects}
+        moved = [_distance(e.shape, shapes[e.kind, e.joints, e.runs]) for e in self.effects]
         change = abs(self.energy - other.energy) / max(self.energy, 1e-300)
-        return change < _SETTLED and bool(np.allclose(self.levels, other.levels, rtol=0.02))
+        alike = change < _SETTLED and bool(np.allclose(self.levels, other.levels, rtol=0.02))
+        return alike and max(moved, default=0.0) < _SAME_SHAPE
 
 
 def _first_fit(model: Model, folds: Sequence[int], bodies: Sequence["ModelledRun"]) -> _Fit:
@@ -186,6 +192,7 @@ def _one_pass(
         candidates = with_columns(possible, signals, data.runs)
     plain = data.evidence(candidates, NoiseModel.white(fit.levels))
     usual = _usual(candidates, _carried_over(fit.effects, candidates))
+    usual = _of_best_shapes(plain, candidates, usual)
     usual = _with_the_obvious(plain, candidates, usual)
     left = data.residuals(candidates, usual, plain.solve(usual))
     noise = fit_noise(left, [run.usable for run in data.runs])
@@ -254,6 +261,21 @@ def _usual(candidates: Sequence[Candidate], found: Sequence[int]) -> list[int]:
     return usual
 
 
+def _of_best_shapes(
+    plain: Evidence, candidates: Sequence[Candidate], usual: Sequence[int]
+) -> list[int]:
+    """Each in the shape that leaves least: what a wrong shape leaves has a memory, and is no noise.
+
+    Whitened by it, all shapes near the wrong one would look alike.
+    """
+    best = list(usual)
+    for k, i in enumerate(usual):
+        shapes = [s for s, c in enumerate(candidates) if c.place == candidates[i].place]
+        if len(shapes) > 1:
+            best[k] = min(shapes, key=lambda s: plain.energy([*best[:k], s, *best[k + 1 :]]))
+    return best
+
+
 def _with_the_obvious(
     plain: Evidence, candidates: Sequence[Candidate], usual: list[int]
 ) -> list[int]:
@@ -279,8 +301,3 @@ def _with_the_obvious(
         else:
             return usual
     return usual
-
-
-def _coupled(effects: Sequence[Effect]) -> list[tuple[int, int, float]]:
-    """Joints j, k whose gears rub on v_j + s v_k."""
-    return sorted(shaft for effect in effects for shaft in effect.coupled_speeds())

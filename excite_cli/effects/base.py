@@ -310,6 +310,10 @@ class Effect(ABC):
         """Joints j, k and s of which v_j + s v_k must not stand still: columns are wrong there."""
         return ()
 
+    def forgets_over(self) -> tuple[tuple[int, float], ...]:
+        """Joints and ways [rad] that they must have gone in a run before columns are right."""
+        return ()
+
     def abscissa(self, signals: Signals) -> Abscissa | None:
         """The quantity over which a person sees the effect; None: the torque it predicts.
 

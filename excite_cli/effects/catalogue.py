@@ -21,6 +21,7 @@ from excite_cli.effects.cable_force import CableForce
 from excite_cli.effects.contact import Contact
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.coupled_friction import CoupledFriction
+from excite_cli.effects.dahl_friction import DahlFriction
 from excite_cli.effects.elasticity import Elasticity
 from excite_cli.effects.encoder_offset import EncoderOffset
 from excite_cli.effects.friction_change import FrictionChange
@@ -48,6 +49,7 @@ _OURS: tuple[type[Effect], ...] = (
     AsymmetricFriction,
     StribeckFriction,
     LoadDependentFriction,
+    DahlFriction,
     FrictionDrift,
     FrictionChange,
     CoupledFriction,

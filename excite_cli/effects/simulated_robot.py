@@ -52,6 +52,16 @@ class Push:
     end: float
 
 
+class Hysteresis(Protocol):
+    """Torque of one joint that depends on where the joint came from."""
+
+    def begin(self, q: float, v: float) -> None:
+        """A run begins at this position and speed."""
+
+    def torque(self, q: float, v: float) -> float:
+        """What is taken off the motor's torque at the next control step; asked once a step."""
+
+
 class SimulatedRobot(Protocol):
     """One run's robot while effects are put into it; arrays are (n,) per moved joint.
 
@@ -78,10 +88,13 @@ class SimulatedRobot(Protocol):
         """What `joint` turns at the reference posture with all others held [kg·m²]."""
 
     def add_to_joint(self, joint: int, parts: Mapping[str, float]) -> None:
-        """More of these attributes of MuJoCo's joint (`JOINT_PARTS`); springs add up."""
+        """More, or less, of these attributes of MuJoCo's joint (`JOINT_PARTS`); springs add up."""
 
     def apply(self, effect: "Effect", values: Array) -> None:
         """The effect's own formula acts as a torque at every control step."""
+
+    def remember(self, joint: int, hysteresis: Hysteresis) -> None:
+        """The torque of `hysteresis` acts on `joint`, which it follows from step to step."""
 
     def tell_controller(self, effect: "Effect", values: Array) -> None:
         """The robot's controller knows the effect and compensates a share of it."""

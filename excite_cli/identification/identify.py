@@ -28,6 +28,7 @@ from excite_cli.identification.hausman import (
     instrument_dataset,
     not_testable,
 )
+from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import prepare, require_motion
 from excite_cli.identification.processing import Processing, choose_processing
@@ -132,7 +133,8 @@ def _regression(
     runs: Sequence[Run],
     processing: Processing,
 ) -> Regression:
-    return build_regression(robot, base, effects, [prepare(run, processing) for run in runs])
+    prepared = [prepare(run, processing, LeftOut.by(effects)) for run in runs]
+    return build_regression(robot, base, effects, prepared)
 
 
 def judged(
@@ -173,7 +175,8 @@ def _hausman(
     runs = split(instruments, *cut).training
     processing = replace(processing, velocity="differentiated")
     try:
-        prepared = [prepare(run, processing) for run in runs]
+        left_out = LeftOut.by(training.effects)
+        prepared = [prepare(run, processing, left_out) for run in runs]
         other = build_regression(
             training.robot, training.base, training.effects, prepared, found.phi,
             found.values[found.rank :],

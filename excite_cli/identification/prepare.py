@@ -17,6 +17,7 @@ from excite_cli.identification.averages import (
     reach,
     without,
 )
+from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Run
 from excite_cli.measurement.run_identity import RunId
@@ -77,12 +78,8 @@ class PreparedRun:
         return np.stack(parts, axis=1)
 
 
-def prepare(
-    run: Run, processing: Processing, coupled: Sequence[tuple[int, int, float]] = ()
-) -> PreparedRun:
-    """Filter, differentiate, cut borders, and average.
-
-    `coupled` (j, k, s): the gears of joints j and k rub on v_j + s v_k, which then sticks as well.
+def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> PreparedRun:
+    """Filter, differentiate, cut borders, and average; fits use nothing that is `left_out`.
 
     Raises
     ------
@@ -118,7 +115,8 @@ def prepare(
     of_torque = average_rows(len(run.t[inside]), centers * stride, run.step, cutoff)
     recorded = run.usable()[inside]
     speed = np.abs(np.asarray(averages @ v[keep]))
-    counted = recorded & _sliding(v, run.step, processing, coupled)[inside]
+    counted = recorded & _sliding(v, run.step, processing, left_out.coupled)[inside]
+    counted &= left_out.on_the_way(q[inside])
     joints = range(run.q.shape[1])
     for_fit = [without(of_torque, counted[:, j]) for j in joints]
     # The very same weights for the columns: left out at the working rate, other stretches of time

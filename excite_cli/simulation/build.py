@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from excite_cli.effects.base import Effect
-from excite_cli.effects.simulated_robot import Coupling, Push, Transmission
+from excite_cli.effects.simulated_robot import Coupling, Hysteresis, Push, Transmission
 from excite_cli.errors import RobotError
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
@@ -24,7 +24,8 @@ _HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)  # flanks of a gear
 class Build:
     """One run's robot while effects are built into it; arrays are (n,) per moved joint.
 
-    `springs` are k and c of k q + c. `looped` effects act through their own formula at every step;
+    `springs` are k and c of k q + c. `looped` effects act through their own formula at every step,
+    `hystereses` through the memory of a joint;
     `compensated` ones are known to the controller;
     `recorded` ones change what is written down. `reading` (n, 2): sharpness and level of the
     saturation of the recorded torque. `start`: when the run begins, on the campaign's clock [s].
@@ -48,6 +49,7 @@ class Build:
     couplings: list[Coupling] = field(default_factory=list)
     pushes: list[Push] = field(default_factory=list)
     looped: list[Planted] = field(default_factory=list)
+    hystereses: list[tuple[int, Hysteresis]] = field(default_factory=list)
     compensated: list[Planted] = field(default_factory=list)
     recorded: list[Planted] = field(default_factory=list)
     start: float = 0.0
@@ -90,6 +92,10 @@ class Build:
         """Through the effect's own formula, at every step."""
         self.looped.append(Planted(effect, values))
 
+    def remember(self, joint: int, hysteresis: Hysteresis) -> None:
+        """On one joint, from step to step."""
+        self.hystereses.append((joint, hysteresis))
+
     def tell_controller(self, effect: Effect, values: Array) -> None:
         """For the controller to compensate."""
         self.compensated.append(Planted(effect, values))
@@ -116,7 +122,8 @@ def make(build: Build, step: float) -> Plant:
     Raises
     ------
     RobotError
-        A joint moves no inertia, or its springs are too stiff to be simulated.
+        A joint moves no inertia or has less than no dry friction, or its springs are too stiff to
+        be simulated.
     """
     soft = sorted(build.soft)
     couplings = [(c.first, c.second, c.direction) for c in build.couplings]
@@ -142,6 +149,7 @@ def make(build: Build, step: float) -> Plant:
     model.qpos_spring[motor] = np.divide(
         -constant, stiff, out=np.zeros(len(stiff)), where=stiff > 0
     )
+    _check_friction(build)
     _check_inertia(build, plant)
     refresh(plant)
     _shorten(plant, step)
@@ -185,6 +193,18 @@ def _full(plant: Plant, data: Any, q: Array) -> Array:
         mujoco.mj_mulM(plant.model, data, full[column], unit)
         unit[column] = 0.0
     return full
+
+
+def _check_friction(build: Build) -> None:
+    """What takes the place of dry friction needs as much of it."""
+    short = build.friction < -1e-9
+    if short.any():
+        name = build.robot.joint_names[int(np.argmax(short))]
+        raise RobotError(
+            f"joint '{name}' of the simulated robot lacks {-build.friction[short][0]:.3g} N·m of "
+            "dry friction, of which a planted effect is a part. Plant more of it: --effect "
+            f"'coulomb_friction@{name}=…'."
+        )
 
 
 def _check_inertia(build: Build, plant: Plant) -> None:

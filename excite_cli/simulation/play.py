@@ -51,6 +51,8 @@ def play(build: Build, plant: Plant, reference: Reference, gains: Gains) -> Play
     _engage(build, plant, data, reference.feed_forward[0])
     mujoco.mj_forward(model, data)
     effects = _Effects(build, plant, data) if build.looped else None
+    for j, hysteresis in build.hystereses:
+        hysteresis.begin(float(reference.q[0, j]), float(reference.v[0, j]))
     pushing = _Pushing(build, plant, data) if build.pushes else None
     period = float(reference.t[1] - reference.t[0])
     substeps = round(period / model.opt.timestep)
@@ -73,6 +75,9 @@ def play(build: Build, plant: Plant, reference: Reference, gains: Gains) -> Play
         tau[k] = torque
         if effects is not None:
             torque = torque - effects.at(reference.t[k] + 0.5 * period, qk, vk, 0.5 * period)
+        for j, hysteresis in build.hystereses:
+            # Half a step ahead, since the torque stands for the whole step.
+            torque[j] -= hysteresis.torque(float(qk[j] + 0.5 * period * vk[j]), float(vk[j]))
         if pushing is not None:
             pushing.at(reference.t[k])
         applied[motor] = torque

@@ -16,9 +16,10 @@ from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
-from excite_cli.diagnosis.tracing import _coupled, _usual
+from excite_cli.diagnosis.tracing import _usual
 from excite_cli.effects.base import Effect, Signals, Tier
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.identification.left_out import LeftOut
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import anything, effect
 from tests.diagnosis.test_judgement import TOTAL, on_joint_0, planted
@@ -36,6 +37,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
     "asymmetric_friction": (4.0, 3, False),
     "stribeck_friction": (2.0, 2, False),
     "load_dependent_friction": (1.0, 2, True),
+    "dahl_friction": (2.0, 2, False),
     "friction_drift": (15.0, 3, False),
     "friction_change": (4.0, 2, False),
     "coupled_friction": (3.0, 2, True),
@@ -57,6 +59,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
 REFINED: Mapping[str, tuple[str, ...]] = {
     "nonlinear_viscous_friction": STRAIGHT,
     "stribeck_friction": STRAIGHT,
+    "dahl_friction": STRAIGHT,
     "friction_drift": STRAIGHT,
     "friction_change": ("coulomb_friction", "viscous_friction"),
     "coupled_friction": STRAIGHT,
@@ -67,6 +70,7 @@ REFINED: Mapping[str, tuple[str, ...]] = {
 LEAVES = {
     "base_tilt": 0.045, "encoder_offset": 0.0225, "torque_saturation": 4e-3, "elasticity": 2e-2,
     "backlash": 1e-2, "torque_delay": 1e-2, "stribeck_friction": 2e-2, "friction_change": 3e-2,
+    "dahl_friction": 2e-2,
 }  # fmt: skip
 
 
@@ -173,6 +177,7 @@ def signals() -> list[Signals]:
     ("kind", "shape", "steps"),
     [
         ("stribeck_friction", {"stribeck_speed": 0.2}, [0.07, 0.03, 0.012, 0.004]),
+        ("dahl_friction", {"distance": 0.1}, [0.04, 0.025, 0.015, 8e-3, 3e-3, 1e-3]),
         ("torque_saturation", {"level": 10.0}, [0.5, 0.2, 0.08, 0.03, 0.01]),
         ("backlash", {"gap": 0.01}, [1.5e-3, 6e-4, 2e-4, 7e-5]),
     ],
@@ -221,8 +226,8 @@ def test_ripple_is_refined_by_parts_of_a_cycle_and_a_touch_by_parts_of_its_lengt
 
 def test_a_shaft_of_two_joints_must_not_stand_still() -> None:
     effects = [of("viscous_friction"), effect("coupled_friction", 1, 2, direction=-1.0)]
-    assert _coupled(effects) == [(1, 2, -1.0)]
-    assert _coupled([of(kind) for kind in STATED if kind != "coupled_friction"]) == []
+    assert LeftOut.by(effects).coupled == ((1, 2, -1.0),)
+    assert LeftOut.by([of(kind) for kind in STATED if kind != "coupled_friction"]).coupled == ()
 
 
 @pytest.mark.parametrize(("slowest", "left"), [(0.001, 5), (0.03, 3), (10.0, 0)])

@@ -15,6 +15,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Parameter, Signals
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.errors import RobotError
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import assemble
 from excite_cli.simulation.planned_motion import PlannedMotion
@@ -67,6 +68,28 @@ def test_coulomb_friction_is_a_jump_and_nothing_between(robot: Robot) -> None:
     keep, _, v, _ = moving(simulation)
     assert left[keep, ELBOW] == pytest.approx(4.0 * np.sign(v), abs=0.08)
     others_untouched(left)
+
+
+def test_dahl_friction_builds_up_over_its_distance(robot: Robot) -> None:
+    """All of the dry friction: 1 − 2 exp(−way/distance) after each reversal from sliding."""
+    dry = planted("coulomb_friction", (ELBOW,), 4.0)
+    simulation = played(robot, dry, planted("dahl_friction", (ELBOW,), 4.0, distance=0.04))
+    left = beyond_rigid(robot, simulation)[:, ELBOW]
+    q, v, _ = (inner(x)[:, ELBOW] for x in states(simulation.dataset.runs[0]))
+    turns = np.flatnonzero(np.diff(np.sign(v)))
+    assert len(turns) > 3
+    checked = 0
+    for before, turn, after in zip([0, *turns], turns, [*turns[1:], len(v)], strict=False):
+        if abs(q[turn] - q[before]) < 0.2:  # of what was before, more than 1 % is left
+            continue
+        way = np.abs(q[turn + 10 : after] - q[turn])
+        expected = 4.0 * np.sign(v[turn + 1]) * (1.0 - 2.0 * np.exp(-way / 0.04))
+        assert left[turn + 10 : after] == pytest.approx(expected, abs=0.15)
+        checked += 1
+    assert checked >= 2
+    others_untouched(beyond_rigid(robot, simulation))
+    with pytest.raises(RobotError, match=r"lacks 1 N·m of dry .* 'coulomb_friction@elbow_joint=…'"):
+        played(robot, dry, planted("dahl_friction", (ELBOW,), 5.0))
 
 
 def test_viscous_friction(robot: Robot) -> None:
@@ -366,7 +389,7 @@ def test_every_kind_of_the_catalogue_can_be_planted(robot: Robot, clean: Simulat
         "stribeck_friction", "load_dependent_friction", "friction_drift", "ripple", "cable_force",
         "nonlinear_viscous_friction", "coupled_friction", "base_tilt", "payload",
         "encoder_offset", "contact", "elasticity", "backlash", "torque_offset", "torque_gain",
-        "torque_delay", "torque_saturation",
+        "torque_delay", "torque_saturation", "dahl_friction",
     }  # fmt: skip
     for name in sorted(set(catalogue()) - tested):
         kind = catalogue()[name]
@@ -384,6 +407,7 @@ CHANGED = {
     "coulomb_friction": {"friction", "compensated"},
     "armature": {"armature", "compensated"},
     "spring": {"springs", "compensated"},
+    "dahl_friction": {"hystereses", "friction", "compensated"},
     "coupled_friction": {"couplings", "looped", "compensated"},
     "elasticity": {"soft"},
     "backlash": {"soft"},

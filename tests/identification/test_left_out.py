@@ -1,0 +1,49 @@
+"""Samples that no fit may use: until a joint has gone its way."""
+
+import numpy as np
+
+from excite_cli.config.data_spec import FilterSpec
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.prepare import prepare
+from excite_cli.identification.processing import choose_processing
+from excite_cli.measurement.dataset import Run
+
+
+def test_a_joint_counts_once_it_has_gone_its_way() -> None:
+    q = np.stack([np.linspace(0.0, 1.0, 101), np.linspace(0.0, -2.0, 101)], axis=1)
+    there = LeftOut(ways=((1, 0.5),)).on_the_way(q)
+    assert there[:, 0].all()
+    assert np.flatnonzero(there[:, 1])[0] == 25
+    assert LeftOut().on_the_way(q).all()
+
+
+def test_of_a_run_that_hardly_goes_further_a_third_of_the_way_is_enough() -> None:
+    swinging = 0.1 * np.sin(np.linspace(0.0, 4 * np.pi, 801))[:, None]  # 0.8 rad altogether
+    first = np.flatnonzero(LeftOut(ways=((0, 5.0),)).on_the_way(swinging)[:, 0])[0]
+    assert np.abs(np.diff(swinging[: first + 1, 0])).sum() > 0.8 / 3 - 1e-3
+    assert 200 < first < 300
+
+
+def test_it_is_what_effects_ask_for() -> None:
+    dahl, pair = kind_named("dahl_friction"), kind_named("coupled_friction")
+    effects = [dahl((1,), {"distance": 0.01}), pair((0, 1), {"direction": -1.0}), dahl((0,), {
+        "distance": 0.02
+    })]  # fmt: skip
+    assert LeftOut.by(effects) == LeftOut(((0, 1, -1.0),), ((0, 0.08), (1, 0.04)))
+
+
+def test_a_fit_uses_nothing_of_it() -> None:
+    t = np.arange(2000) / 200.0
+    q = np.stack([np.sin(t), np.cos(1.3 * t)], axis=1)
+    run = Run("run", t, q, 5.0 * q)
+    processing = choose_processing([run], FilterSpec())
+    every = prepare(run, processing)
+    some = prepare(run, processing, LeftOut(ways=((1, 1.0),)))
+    gone = np.abs(some.averaged(some.q)[:, 1] - some.q[0, 1])
+    early = np.arange(len(gone)) < np.argmax(gone > 0.8)
+    assert every.usable[early, 1].any()
+    assert not some.usable[early, 1].any()
+    assert np.array_equal(every.usable[:, 0], some.usable[:, 0])
+    assert some.usable[-20:, 1].any()
+    assert np.array_equal(some.valid, every.valid)  # errors are of all that was measured
