@@ -62,7 +62,11 @@ class Case:
 @cache
 def _kinds() -> tuple[str, ...]:
     """Kinds that four recordings of one robot show; those of campaigns have their own battery."""
-    return tuple(name for name, kind in catalogue().items() if not kind.of_campaign)
+    return tuple(
+        name
+        for name, kind in catalogue().items()
+        if not (kind.of_campaign or kind.follows_covariate)
+    )
 
 
 @cache

@@ -38,7 +38,9 @@ def predicted(
     )
     total = load
     for _ in range(_SETTLED):
-        signals = Signals(run.t, run.q, run.v, run.a, load, torque, body, run.run, run.start)
+        signals = Signals(
+            run.t, run.q, run.v, run.a, load, torque, body, run.run, run.start, run.covariates
+        )
         signals = replace(with_carried(signals, effects, values), torque=torque)
         columns = effect_columns(effects, signals)
         total = load + columns @ values
