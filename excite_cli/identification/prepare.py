@@ -33,8 +33,9 @@ class PreparedRun:
     """One run (or block of it) ready for regression.
 
     `t` (T,) from the start of the recording `run` (at `start` [s] on the campaign's clock), `q, v,
-    a, tau_raw` (T, n) and `covariates` (T,) at the working rate with borders cut; `averages` (M, T) gives filtered and
-    decimated values, at `step`, of any column: A x; `moving` (M, n) where the joint itself moves.
+    a, tau_raw` (T, n) and `covariates` (T,) at the working rate with borders cut; `averages` (M, T)
+    gives filtered and decimated values, at `step`, of any column: A x; `moving` (M, n) where the
+    joint itself moves.
 
     What torque is judged by leaves out invalid samples of its joint: `tau` (M, n) are averages of
     the others, `valid` (M, n) where enough is left, `valid_averages` those of each joint.

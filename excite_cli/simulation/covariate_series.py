@@ -33,11 +33,11 @@ class CovariateSeries:
 
     @classmethod
     def warming(
-        cls, name: str, start: float, end: float, constant: float, noise: float = 0.0
+        cls, name: str, start: float, end: float, time_constant: float, noise: float = 0.0
     ) -> "CovariateSeries":
-        """end + (start − end) exp(−t/constant)."""
-        clock = np.linspace(0.0, _SPAN * constant, _POINTS)
-        values = end + (start - end) * np.exp(-clock / constant)
+        """end + (start − end) exp(−t/time_constant)."""
+        clock = np.linspace(0.0, _SPAN * time_constant, _POINTS)
+        values = end + (start - end) * np.exp(-clock / time_constant)
         return cls(name, tuple(clock.tolist()), tuple(values.tolist()), noise)
 
     def at(self, clock: Array) -> Array:
@@ -87,9 +87,7 @@ def _parsed(text: str) -> CovariateSeries:
         given[key] = _number(number, where)
     if given["time_constant"] <= 0.0 or given["noise"] < 0.0:
         raise ConfigError(f"{where}: time_constant must be positive, noise not negative.")
-    return CovariateSeries.warming(
-        name, start, given["end"], given["time_constant"], given["noise"]
-    )
+    return CovariateSeries.warming(name, start, **given)
 
 
 def _of_table(name: str, path: Path, where: str) -> CovariateSeries:
