@@ -28,4 +28,4 @@ class CovariateOffset(OfCovariate):
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """The column."""
-        return Abscissa(self.covariate, "unit", signals.covariates[self.covariate])
+        return Abscissa(f"column {self.covariate}", "unit", signals.covariates[self.covariate])
