@@ -47,7 +47,7 @@ def recorded(simulated: Dataset, instruments: Instruments) -> Recorded:
         rng = np.random.default_rng([instruments.seed, 7, k])
         added = noise_of(run, instruments.noise, instruments.correlation, rng)
         noise[run.name] = added
-        epoch = instruments.epochs[k] if instruments.epochs else None
+        epoch = instruments.epochs[k] if instruments.epochs else run.epoch
         columns = {name: values for name, values in run.extra.items() if values.ndim == 1}
         good = replace(run, tau=run.tau + added, extra=columns, epoch=epoch)
         sound.append(good)
