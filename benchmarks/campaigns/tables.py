@@ -104,9 +104,8 @@ def groups(outcomes: Sequence[Outcome]) -> list[str]:
         f"{'group':18} {'cases':>5} {'right':>7} {'wrong':>5} {'silent':>6} {'alarm':>5} "
         f"{'refused':>7} {'worse unsaid':>12} {'sizes in 2 sd':>13} {'s':>6}"
     )
-    rows = [
-        _row(group, [o for o in outcomes if o.group == group]) for group in (*GROUPS, *WITH_COLUMNS)
-    ]
+    every = (*GROUPS, *WITH_COLUMNS)
+    rows = [_row(group, [o for o in outcomes if o.group == group]) for group in every]
     return [head, *filter(None, rows), _row("all", outcomes)]
 
 

@@ -13,9 +13,9 @@ class EffectTrace:
 
     `kind`, `joints`, `runs` and `covariate` are the effect's. `rows` names the joints of the
     columns; `part` (k,) numbers the stretches of time, `t` (k,) [s] from the start of their run.
-    `x` (k, rows) [`unit`] is `quantity`, within one `period` if that is given; with no quantity, `x` is the
-    effect's own torque. `own` and `partial` (k, rows) are C_e θ_e and p; NaN where a joint stands,
-    reverses or is not known.
+    `x` (k, rows) [`unit`] is `quantity`, within one `period` if that is given; with no quantity,
+    `x` is the effect's own torque. `own` and `partial` (k, rows) are C_e θ_e and p; NaN where a
+    joint stands, reverses or is not known.
     """
 
     kind: str
