@@ -105,7 +105,10 @@ def possible_effects(
         ]
         found += [(effect, tests * len(names)) for effect, tests in changed]
     if not found:
-        raise ConfigError("diagnosis: every effect to be looked for is declared or excluded.")
+        raise ConfigError(
+            "diagnosis: every effect to be looked for is declared or excluded, or follows a column "
+            "of the log, of which measurement.covariates names none."
+        )
     return found
 
 

@@ -1,0 +1,143 @@
+"""A joint whose friction falls by half with a temperature, in MuJoCo: six runs in forty minutes.
+
+The robot pauses and cools in between, so that time is no substitute for the column.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from excite_cli.config.load import load_spec
+from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.change_words import changes_in_words
+from excite_cli.diagnosis.diagnose import diagnose
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.measurement.covariates import with_declared
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.robot.model import Robot, build_robot
+from tests.cli.program import SMOKE
+from tests.diagnosis.test_changes import (
+    ALWAYS,
+    ELBOW,
+    PITCH,
+    RATE,
+    RUNS,
+    YAW,
+    motion,
+    planted,
+    what,
+)
+
+pytest.importorskip("mujoco")
+
+from excite_cli.simulation.covariate_series import CovariateSeries
+from excite_cli.simulation.planted import plant
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.simulate import simulate
+
+KINDS = (
+    "[viscous_friction,coulomb_friction,torque_offset,friction_change,friction_drift,"
+    "covariate_friction,covariate_offset]"
+)
+CLOCK = tuple(np.linspace(0.0, 2400.0, RUNS))
+TEMP = CovariateSeries("temp", CLOCK, (25.0, 39.0, 45.0, 33.0, 28.0, 41.0), 0.2)
+AMBIENT = CovariateSeries("ambient", CLOCK, (20.0, 20.6, 20.1, 21.0, 21.3, 20.8), 0.05)
+AT_25, COULOMB, VISCOUS = 25.0, 4.1, 1.0  # both fall by half over 20 degrees
+
+
+@pytest.fixture(scope="module")
+def spec() -> Spec:
+    return load_spec(SMOKE, [f"diagnosis.kinds={KINDS}"])
+
+
+@pytest.fixture(scope="module")
+def robot(spec: Spec) -> Robot:
+    return build_robot(spec.robot, SMOKE.parent)
+
+
+@pytest.fixture(scope="module")
+def base(robot: Robot) -> BaseParameters:
+    return find_base_parameters(robot)
+
+
+@pytest.fixture(scope="module")
+def measured(robot: Robot) -> Dataset:
+    slopes = {"viscous_slope": -VISCOUS / 40.0, "reference": AT_25}
+    kind = kind_named("covariate_friction")
+    effects = [
+        planted("coulomb_friction", YAW, 3.0),
+        planted("coulomb_friction", PITCH, COULOMB),
+        planted("viscous_friction", PITCH, VISCOUS),
+        planted("coulomb_friction", ELBOW, 2.0),
+        plant(kind, (PITCH,), -COULOMB / 40.0, slopes, covariate="temp"),
+    ]
+    pause = (CLOCK[-1] - 4.0 * RUNS) / (RUNS - 1)
+    settings = SimulationSettings(rate=RATE, lead_in=0.5, pause=pause, covariates=(TEMP, AMBIENT))
+    motions = [motion(robot, number) for number in range(1, RUNS + 1)]
+    return simulate(robot, motions, settings, effects).dataset
+
+
+def diagnosed(
+    robot: Robot, base: BaseParameters, spec: Spec, data: Dataset, columns: Sequence[str]
+) -> Diagnosis:
+    measurement = spec.measurement.model_copy(update={"covariates": tuple(columns)})
+    declared = spec.model_copy(update={"measurement": measurement})
+    return diagnose(robot, base, with_declared(data, columns), declared)
+
+
+@pytest.fixture(scope="module")
+def told(robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset) -> Diagnosis:
+    return diagnosed(robot, base, spec, measured, ["ambient", "temp"])
+
+
+@pytest.fixture(scope="module")
+def untold(robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset) -> Diagnosis:
+    return diagnosed(robot, base, spec, measured, [])
+
+
+def test_the_temperature_is_named_and_the_decoy_is_not(told: Diagnosis) -> None:
+    assert what(told) == ALWAYS | {("covariate_friction", "shoulder_pitch", ())}
+    (found,) = [each for each in told.effects if each.effect.covariate]
+    assert found.effect.covariate == "temp"
+    assert not found.approximates
+    for name, true in (("coulomb_slope", -COULOMB / 40.0), ("viscous_slope", -VISCOUS / 40.0)):
+        size = found.parameters[name]
+        assert size.value == pytest.approx(true, abs=max(3.0 * size.std, 0.02 * abs(true)))
+
+
+def test_friction_beside_it_is_that_at_the_reference(told: Diagnosis) -> None:
+    (found,) = [each for each in told.effects if each.effect.covariate]
+    reference = found.parameters["reference"].value
+    assert reference == pytest.approx(np.mean(TEMP.values[:-1]), abs=1.0)
+    (dry,) = [
+        each.parameters["coulomb"].value
+        for each in told.effects
+        if (each.effect.kind, each.effect.joints) == ("coulomb_friction", ("shoulder_pitch",))
+    ]
+    assert dry == pytest.approx(COULOMB * (1.0 - (reference - AT_25) / 40.0), rel=0.03)
+    assert any(
+        text.startswith("Coulomb friction of shoulder_pitch falls by 0.1")
+        and f"N·m per unit of temp; it is {dry:.3g} at {reference:.4g}." in text
+        for text in changes_in_words(told)
+    )
+
+
+def test_with_the_column_the_sealed_error_is_that_of_noise_and_without_it_more(
+    told: Diagnosis, untold: Diagnosis
+) -> None:
+    joint = "shoulder_pitch"
+    assert told.after.relative_moving[joint] < 0.02 < 0.04 < untold.after.relative_moving[joint]
+    assert not told.joints_left
+
+
+def test_without_the_column_a_change_over_time_is_named(untold: Diagnosis) -> None:
+    changed = {
+        each.effect.kind
+        for each in untold.effects
+        if each.effect.joints == ("shoulder_pitch",)
+        and (each.effect.runs or each.effect.kind in ("friction_change", "friction_drift"))
+    }
+    assert changed
