@@ -26,7 +26,9 @@ from excite_cli.effects.base import Signals
 from excite_cli.robot.model import Array
 
 _MOST_NAMED = 3
-_LEAST_SHARE = 0.02
+# Of 208 simulated campaigns, seven had less told, two of them of robots without any defect, and all
+# of joints on which fits leave noise alone; of those with something left, none had.
+_LEAST_SHARE = 0.05
 _PLAIN_TO_SEE = 0.1  # of the error on runs left out
 
 
