@@ -54,6 +54,7 @@ GROUPS = (*_CHANGES, "short_moves", "stale_packets", "one_training_run", "severa
 _BY_COLUMN: dict[str, Draw] = {
     "friction_by_column": friction_by_column,
     "offset_by_column": offset_by_column,
+    "friction_trend_beside_columns": planting.friction_trend,
 }
 WITH_COLUMNS = (*_BY_COLUMN, "clean_columns")
 FIRST_WITH_COLUMNS = 10_000

@@ -30,7 +30,7 @@ from excite_cli.summary.simulation import simulation_answer as simulation_answer
 from excite_cli.trajectory.chain import Segment
 
 # What of the config's measurement section changes neither positions nor torques when it is read.
-_KEPT = {"filter", "topic", "rate"}
+_KEPT = {"filter", "topic", "rate", "covariates"}
 
 
 @checked("motions")

@@ -4,20 +4,28 @@ The robot pauses and cools in between, so that time is no substitute for the col
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.data_spec import EffectSpec
+from excite_cli.config.load import load_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.change_words import changes_in_words
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.effects.catalogue import kind_named
+from excite_cli.errors import ConfigError
+from excite_cli.export.found_config import found_config
+from excite_cli.identification.identify import identify
 from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.model import Robot, build_robot
+from excite_cli.store.diagnosis_file import read_diagnosis, write_diagnosis
+from excite_cli.store.fit_file import read_fit, write_fit
 from tests.cli.program import SMOKE
 from tests.diagnosis.test_changes import (
     ALWAYS,
@@ -80,12 +88,15 @@ def measured(robot: Robot) -> Dataset:
     return simulate(robot, motions, settings, effects).dataset
 
 
+def declaring(spec: Spec, columns: Sequence[str]) -> Spec:
+    measurement = spec.measurement.model_copy(update={"covariates": tuple(columns)})
+    return spec.model_copy(update={"measurement": measurement})
+
+
 def diagnosed(
     robot: Robot, base: BaseParameters, spec: Spec, data: Dataset, columns: Sequence[str]
 ) -> Diagnosis:
-    measurement = spec.measurement.model_copy(update={"covariates": tuple(columns)})
-    declared = spec.model_copy(update={"measurement": measurement})
-    return diagnose(robot, base, with_declared(data, columns), declared)
+    return diagnose(robot, base, with_declared(data, columns), declaring(spec, columns))
 
 
 @pytest.fixture(scope="module")
@@ -141,3 +152,38 @@ def test_without_the_column_a_change_over_time_is_named(untold: Diagnosis) -> No
         and (each.effect.runs or each.effect.kind in ("friction_change", "friction_drift"))
     }
     assert changed
+
+
+def test_what_was_found_is_stored_and_goes_into_a_config_that_is_identified(
+    robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset, told: Diagnosis,
+    tmp_path: Path,
+) -> None:  # fmt: skip
+    columns = ["ambient", "temp"]
+    given = declaring(spec, columns)
+    write_diagnosis(tmp_path / "d.h5", replace(told, config=spec_as_yaml(given)))
+    back = read_diagnosis(tmp_path / "d.h5")
+    assert [each.effect for each in back.effects] == [each.effect for each in told.effects]
+    better = tmp_path / "better.yaml"
+    text = found_config(given, SMOKE.parent, back, better)
+    better.write_text(text, encoding="utf-8")
+    declared = load_spec(better, [])
+    found = identify(robot, base, with_declared(measured, columns), declared)
+    at = found.fit.names.index("covariate_friction.coulomb_slope[shoulder_pitch; temp]")
+    assert found.fit.values[at] == pytest.approx(-COULOMB / 40.0, rel=0.03)
+    write_fit(tmp_path / "f.h5", found, text, str(tmp_path), robot.fingerprint())
+    assert read_fit(tmp_path / "f.h5").fit.effects == found.fit.effects
+    undeclared = declaring(declared, ["ambient"])
+    with pytest.raises(ConfigError, match=r"covariate: 'temp' is not declared.*ambient"):
+        identify(robot, base, with_declared(measured, ["ambient"]), undeclared)
+
+
+def test_what_fits_no_name_is_told_to_depend_on_the_column(
+    robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset
+) -> None:
+    plain = ("viscous_friction", "coulomb_friction", "torque_offset")
+    diagnosis = spec.diagnosis.model_copy(update={"kinds": plain, "exclude": plain[:2]})
+    effects = (EffectSpec(kind=plain[0]), EffectSpec(kind=plain[1]))
+    bare = spec.model_copy(update={"diagnosis": diagnosis, "effects": effects})
+    found = diagnosed(robot, base, bare, measured, ["ambient", "temp"])
+    (left,) = [each for each in found.unexplained if each.joint == "shoulder_pitch"]
+    assert left.depends_on[0].code == "column[temp]"
