@@ -40,6 +40,6 @@ def _write_run(group: Any, run: Run) -> None:
     for name, array in arrays.items():
         if array is not None:
             group[name] = array
-    for name, array in (run.extra | run.covariates).items():
+    for name, array in run.extra.items():
         if name not in arrays:
             group[name.replace("/", "_")] = np.asarray(array)
