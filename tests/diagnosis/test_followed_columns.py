@@ -1,6 +1,7 @@
 """A joint whose friction falls by half with a temperature, in MuJoCo: six runs in forty minutes.
 
-The robot pauses and cools in between, so that time is no substitute for the column.
+The robot pauses and cools in between, so that time is no substitute for the column. Friction of
+another joint falls with time, and so does a battery.
 """
 
 from collections.abc import Sequence
@@ -15,9 +16,9 @@ from excite_cli.config.load import load_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.change_words import changes_in_words
 from excite_cli.diagnosis.diagnose import diagnose
-from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
-from excite_cli.effects.catalogue import kind_named
+from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError
 from excite_cli.export.found_config import found_config
 from excite_cli.identification.identify import identify
@@ -53,6 +54,8 @@ KINDS = (
 CLOCK = tuple(np.linspace(0.0, 2400.0, RUNS))
 TEMP = CovariateSeries("temp", CLOCK, (25.0, 39.0, 45.0, 33.0, 28.0, 41.0), 0.2)
 AMBIENT = CovariateSeries("ambient", CLOCK, (20.0, 20.6, 20.1, 21.0, 21.3, 20.8), 0.05)
+BATTERY = CovariateSeries("battery", CLOCK, tuple(np.linspace(50.0, 44.0, RUNS)), 0.01)
+COLUMNS = ["ambient", "battery", "temp"]
 AT_25, COULOMB, VISCOUS = 25.0, 4.1, 1.0  # both fall by half over 20 degrees
 
 
@@ -75,15 +78,18 @@ def base(robot: Robot) -> BaseParameters:
 def measured(robot: Robot) -> Dataset:
     slopes = {"viscous_slope": -VISCOUS / 40.0, "reference": AT_25}
     kind = kind_named("covariate_friction")
+    line = {"time_constant": 20.0 * CLOCK[-1], "span": CLOCK[-1]}
     effects = [
         planted("coulomb_friction", YAW, 3.0),
         planted("coulomb_friction", PITCH, COULOMB),
         planted("viscous_friction", PITCH, VISCOUS),
         planted("coulomb_friction", ELBOW, 2.0),
+        planted("friction_change", ELBOW, -0.9, **line),
         plant(kind, (PITCH,), -COULOMB / 40.0, slopes, covariate="temp"),
     ]
     pause = (CLOCK[-1] - 4.0 * RUNS) / (RUNS - 1)
-    settings = SimulationSettings(rate=RATE, lead_in=0.5, pause=pause, covariates=(TEMP, AMBIENT))
+    covariates = (TEMP, AMBIENT, BATTERY)
+    settings = SimulationSettings(rate=RATE, lead_in=0.5, pause=pause, covariates=covariates)
     motions = [motion(robot, number) for number in range(1, RUNS + 1)]
     return simulate(robot, motions, settings, effects).dataset
 
@@ -101,7 +107,7 @@ def diagnosed(
 
 @pytest.fixture(scope="module")
 def told(robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset) -> Diagnosis:
-    return diagnosed(robot, base, spec, measured, ["ambient", "temp"])
+    return diagnosed(robot, base, spec, measured, COLUMNS)
 
 
 @pytest.fixture(scope="module")
@@ -109,9 +115,29 @@ def untold(robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset) ->
     return diagnosed(robot, base, spec, measured, [])
 
 
+def followed(found: Diagnosis, joint: str = "shoulder_pitch") -> NamedEffect:
+    """What is told of that joint beside plain friction."""
+    (one,) = [
+        each
+        for each in found.effects
+        if each.effect.joints == (joint,) and catalogue()[each.effect.kind].changes_of
+    ]
+    return one
+
+
+def test_a_column_that_says_the_same_as_time_is_its_alias(told: Diagnosis) -> None:
+    found = followed(told, "elbow")
+    names = {(each.kind, each.covariate) for each in (found.effect, *found.aliases)}
+    assert names >= {("covariate_friction", "battery"), ("friction_change", "")}
+
+
 def test_the_temperature_is_named_and_the_decoy_is_not(told: Diagnosis) -> None:
-    assert what(told) == ALWAYS | {("covariate_friction", "shoulder_pitch", ())}
-    (found,) = [each for each in told.effects if each.effect.covariate]
+    found = followed(told)
+    assert {each for each in what(told) if each[1] != "elbow"} == {
+        *(each for each in ALWAYS if each[1] != "elbow"),
+        ("covariate_friction", "shoulder_pitch", ()),
+    }
+    assert "ambient" not in {each.effect.covariate for each in told.effects}
     assert found.effect.covariate == "temp"
     assert not found.approximates
     for name, true in (("coulomb_slope", -COULOMB / 40.0), ("viscous_slope", -VISCOUS / 40.0)):
@@ -120,7 +146,7 @@ def test_the_temperature_is_named_and_the_decoy_is_not(told: Diagnosis) -> None:
 
 
 def test_friction_beside_it_is_that_at_the_reference(told: Diagnosis) -> None:
-    (found,) = [each for each in told.effects if each.effect.covariate]
+    found = followed(told)
     reference = found.parameters["reference"].value
     assert reference == pytest.approx(np.mean(TEMP.values[:-1]), abs=1.0)
     (dry,) = [
@@ -158,8 +184,7 @@ def test_what_was_found_is_stored_and_goes_into_a_config_that_is_identified(
     robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset, told: Diagnosis,
     tmp_path: Path,
 ) -> None:  # fmt: skip
-    columns = ["ambient", "temp"]
-    given = declaring(spec, columns)
+    given = declaring(spec, COLUMNS)
     write_diagnosis(tmp_path / "d.h5", replace(told, config=spec_as_yaml(given)))
     back = read_diagnosis(tmp_path / "d.h5")
     assert [each.effect for each in back.effects] == [each.effect for each in told.effects]
@@ -167,7 +192,7 @@ def test_what_was_found_is_stored_and_goes_into_a_config_that_is_identified(
     text = found_config(given, SMOKE.parent, back, better)
     better.write_text(text, encoding="utf-8")
     declared = load_spec(better, [])
-    found = identify(robot, base, with_declared(measured, columns), declared)
+    found = identify(robot, base, with_declared(measured, COLUMNS), declared)
     at = found.fit.names.index("covariate_friction.coulomb_slope[shoulder_pitch; temp]")
     assert found.fit.values[at] == pytest.approx(-COULOMB / 40.0, rel=0.03)
     write_fit(tmp_path / "f.h5", found, text, str(tmp_path), robot.fingerprint())
