@@ -112,7 +112,10 @@ def told(robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset) -> D
 
 @pytest.fixture(scope="module")
 def untold(robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset) -> Diagnosis:
-    return diagnosed(robot, base, spec, measured, [])
+    """With few kinds: the runs of what changed take time to search."""
+    few = spec.diagnosis.model_copy(update={"kinds": ("coulomb_friction", "friction_change")})
+    update = {"diagnosis": few, "effects": (EffectSpec(kind="viscous_friction"),)}
+    return diagnosed(robot, base, spec.model_copy(update=update), measured, [])
 
 
 def followed(found: Diagnosis, joint: str = "shoulder_pitch") -> NamedEffect:
