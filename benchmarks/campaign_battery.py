@@ -1,7 +1,7 @@
 """Campaigns as robots make them: runs that differ, short moves, faulty packets, unknown maps.
 
     python -m benchmarks.campaign_battery [--cases N] [--seed S] [--workers W] [--json FILE]
-                                          [--group GROUP] [--only INDEX …]
+                                          [--group GROUP] [--columns] [--only INDEX …]
 
 A case is a MuJoCo robot whose inertias are 10–30 % off its URDF, two to eight runs of which one is
 sealed, and something that the config does not declare; see `benchmarks/campaigns/cases.py` for the
@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.battery.processes import outcomes_of, write
 from benchmarks.campaigns import tables
-from benchmarks.campaigns.cases import GROUPS, group_of
+from benchmarks.campaigns.cases import FIRST_WITH_COLUMNS, GROUPS, WITH_COLUMNS, group_of
 from benchmarks.campaigns.judge import Outcome, judge
 
 
@@ -34,7 +34,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--json", type=Path, help="write all outcomes and rates here")
-    parser.add_argument("--group", choices=GROUPS, help="only cases of this group")
+    parser.add_argument("--group", choices=(*GROUPS, *WITH_COLUMNS), help="only cases of it")
+    parser.add_argument("--columns", action="store_true", help="logs with further columns")
     parser.add_argument("--only", type=int, nargs="+", help="these cases, with all details")
     arguments = parser.parse_args()
     if arguments.only is not None:
@@ -42,9 +43,10 @@ def main() -> None:
             for index in arguments.only:
                 print(tables.in_detail(judge(arguments.seed, index)), flush=True)
         return
+    first = FIRST_WITH_COLUMNS if arguments.columns else 0
     chosen = [
         index
-        for index in range(arguments.cases)
+        for index in range(first, first + arguments.cases)
         if arguments.group in (None, group_of(arguments.seed, index))
     ]
     began = time.perf_counter()

@@ -68,7 +68,11 @@ Label = Callable[[int, int], tuple[Group, str]]
 def _kinds() -> tuple[str, ...]:
     """Kinds that four recordings of one robot show and that have no cases of their own."""
     own = {kind.kind for kind in HISTORY.values()}
-    return tuple(n for n, kind in catalogue().items() if not kind.of_campaign and n not in own)
+    return tuple(
+        name
+        for name, kind in catalogue().items()
+        if not (kind.of_campaign or kind.follows_covariate or name in own)
+    )
 
 
 @cache

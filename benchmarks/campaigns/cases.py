@@ -1,10 +1,11 @@
 """Cases of the battery of campaigns: what was recorded, how, and what was in the robot.
 
 A case follows from (seed, index) alone. Cases come in decks of sixteen, one of every group, that
-the seed shuffles: 208 cases hold thirteen of each.
+the seed shuffles: 208 cases hold thirteen of each. From `FIRST_WITH_COLUMNS` on they are logs with
+further columns, their groups in turn.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
@@ -13,6 +14,13 @@ from benchmarks.battery.cases import model_columns
 from benchmarks.battery.motions import Arm
 from benchmarks.battery.sizes import ground_of
 from benchmarks.campaigns import planting
+from benchmarks.campaigns.columns import (
+    drawn_series,
+    friction_by_column,
+    offset_by_column,
+    pause_of,
+    with_columns,
+)
 from benchmarks.campaigns.instruments import Instruments
 from benchmarks.campaigns.mechanisms import MovedCenters
 from benchmarks.campaigns.motions import series, short_moves
@@ -29,7 +37,8 @@ from excite_cli.simulation.planted import Planted
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.true_robot import true_inertias
 
-CLEAN = ("clean_white", "clean_colored", "clean_centers")
+_CLEAN_DECK = ("clean_white", "clean_colored", "clean_centers")
+CLEAN = (*_CLEAN_DECK, "clean_columns")
 _CHANGES: dict[str, Draw] = {
     "payload": planting.payload,
     "payload_on_leaf": planting.payload_on_leaf,
@@ -41,7 +50,14 @@ _CHANGES: dict[str, Draw] = {
     "contact": planting.contact,
     "unknown_map": planting.unknown_map,
 }
-GROUPS = (*_CHANGES, "short_moves", "stale_packets", "one_training_run", "several", *CLEAN)
+GROUPS = (*_CHANGES, "short_moves", "stale_packets", "one_training_run", "several", *_CLEAN_DECK)
+_BY_COLUMN: dict[str, Draw] = {
+    "friction_by_column": friction_by_column,
+    "offset_by_column": offset_by_column,
+    "friction_trend_beside_columns": planting.friction_trend,
+}
+WITH_COLUMNS = (*_BY_COLUMN, "clean_columns")
+FIRST_WITH_COLUMNS = 10_000
 
 # What short moves, faulty packets and single training runs are asked about.
 _SIMPLE = (
@@ -99,6 +115,8 @@ class Case:
 
 def group_of(seed: int, index: int) -> str:
     """The group of a case, without making it."""
+    if index >= FIRST_WITH_COLUMNS:
+        return WITH_COLUMNS[index % len(WITH_COLUMNS)]
     return _deck(seed, index // len(GROUPS))[index % len(GROUPS)]
 
 
@@ -133,6 +151,13 @@ def _attempt(index: int, group: str, rng: np.random.Generator) -> Case | None:
     modelled = declared if friction == "declared" else ()
     phi = true_inertias(of.robot, settings.inertia_error, settings.seed)
     ground = ground_of(of.robot, phi, motions, inside, instruments.noise)
+    if group in WITH_COLUMNS:
+        columns = drawn_series(rng)
+        ground = with_columns(ground, motions, columns)
+        settings = replace(settings, covariates=columns, pause=pause_of(motions))
+        names = tuple(str(name) for name in rng.permutation([each.name for each in columns]))
+        measurement = spec.measurement.model_copy(update={"covariates": names})
+        spec = spec.model_copy(update={"measurement": measurement})
     scene = Scene(
         of,
         ground,
@@ -158,7 +183,7 @@ def _run_names(group: str, rng: np.random.Generator) -> tuple[str, ...]:
     count = int(rng.integers(3, 9))
     if group == "one_training_run":
         count = 2
-    elif group == "friction_trend":
+    elif group == "friction_trend" or group in WITH_COLUMNS:
         count = int(rng.integers(5, 9))
     return tuple(f"run_{k}" for k in range(1, count + 1))
 
@@ -233,8 +258,8 @@ def _plants(
 ) -> tuple[Plant, ...] | None:
     if group in CLEAN:
         return ()
-    if group in _CHANGES:
-        found = _CHANGES[group](scene, rng)
+    if group in _CHANGES or group in _BY_COLUMN:
+        found = (_CHANGES | _BY_COLUMN)[group](scene, rng)
         return None if found is None else (found,)
     if group == "several":
         return _several(scene, friction, rng)

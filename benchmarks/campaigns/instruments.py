@@ -47,8 +47,9 @@ def recorded(simulated: Dataset, instruments: Instruments) -> Recorded:
         rng = np.random.default_rng([instruments.seed, 7, k])
         added = noise_of(run, instruments.noise, instruments.correlation, rng)
         noise[run.name] = added
-        epoch = instruments.epochs[k] if instruments.epochs else None
-        good = replace(run, tau=run.tau + added, extra={}, epoch=epoch)
+        epoch = instruments.epochs[k] if instruments.epochs else run.epoch
+        columns = {name: values for name, values in run.extra.items() if values.ndim == 1}
+        good = replace(run, tau=run.tau + added, extra=columns, epoch=epoch)
         sound.append(good)
         faulty.append(_lost(_stale(good, instruments.stale, rng), instruments.dropped, rng))
     return Recorded(
@@ -87,4 +88,5 @@ def _lost(run: Run, share: float, rng: np.random.Generator) -> Run:
 
 def _taken(run: Run, rows: NDArray[np.intp]) -> Run:
     dq = None if run.dq is None else run.dq[rows]
-    return replace(run, q=run.q[rows], tau=run.tau[rows], dq=dq)
+    extra = {name: values[rows] for name, values in run.extra.items()}
+    return replace(run, q=run.q[rows], tau=run.tau[rows], dq=dq, extra=extra)

@@ -183,7 +183,7 @@ def _named(each: NamedEffect, refined: set[tuple[str, tuple[str, ...]]]) -> Name
 
 def _called(record: EffectRecord) -> Called:
     runs = frozenset(run.split("/")[0] for run in record.runs)
-    return Called(Name(record.kind, record.joints), runs)
+    return Called(Name(record.kind, record.joints), runs, record.covariate)
 
 
 def _left(found: Diagnosis) -> list[str]:
@@ -234,6 +234,7 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score) -> 
             "kind": each.effect.kind,
             "joints": list(each.effect.joints),
             "runs": list(each.effect.runs),
+            "covariate": each.effect.covariate,
             "parameters": {n: [v.value, v.std] for n, v in each.parameters.items()},
             "p_value": each.p_value,
             "share": each.share_of_residual,

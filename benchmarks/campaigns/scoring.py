@@ -30,10 +30,11 @@ _TWO_SIDED = ("coulomb_friction", "viscous_friction", "torque_offset", "torque_g
 
 @dataclass(frozen=True)
 class Called:
-    """A name and the runs it is said of; no runs: all."""
+    """A name, the runs it is said of (none: all), and the column that it is said to follow."""
 
     name: Name
     runs: frozenset[str] = frozenset()
+    covariate: str = ""
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ def _means(named: Named, plant: Plant, truth: Truth, answer: Answer) -> bool:
 
 
 def _is(called: Called, plant: Plant, truth: Truth, answer: Answer) -> bool:
-    if not plant.nameable:
+    if not plant.nameable or called.covariate != plant.covariate:
         return False
     if plant.by_run:
         return _is_trend(called, plant, truth)

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from benchmarks.battery.tables import Rate
-from benchmarks.campaigns.cases import CLEAN, GROUPS
+from benchmarks.campaigns.cases import CLEAN, GROUPS, WITH_COLUMNS
 from benchmarks.campaigns.judge import Judged, Outcome
 from benchmarks.campaigns.scoring import Size
 
@@ -50,6 +50,7 @@ def _named(o: Outcome) -> str:
     words = []
     for each in o.named:
         runs = f" in {'+'.join(each['runs'])}" if each["runs"] else ""
+        runs += f" by {each['covariate']}" if each["covariate"] else ""
         mark = "" if each["judged"] == "true" else f" ({each['judged']})"
         words.append(f"{each['kind']}@{where(each['joints'])}{runs}{mark}")
     if o.unexplained:
@@ -103,7 +104,8 @@ def groups(outcomes: Sequence[Outcome]) -> list[str]:
         f"{'group':18} {'cases':>5} {'right':>7} {'wrong':>5} {'silent':>6} {'alarm':>5} "
         f"{'refused':>7} {'worse unsaid':>12} {'sizes in 2 sd':>13} {'s':>6}"
     )
-    rows = [_row(group, [o for o in outcomes if o.group == group]) for group in GROUPS]
+    every = (*GROUPS, *WITH_COLUMNS)
+    rows = [_row(group, [o for o in outcomes if o.group == group]) for group in every]
     return [head, *filter(None, rows), _row("all", outcomes)]
 
 

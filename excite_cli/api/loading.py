@@ -16,6 +16,7 @@ from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parame
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.measurement.catalogue import read_dataset
+from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.quality import raise_for_errors
 from excite_cli.robot.described import describe
@@ -188,7 +189,7 @@ def dataset_of(
     Raises
     ------
     FileError, ConfigError, MissingExtraError
-        The data are of other joints; see `load_data`.
+        The data are of other joints, or lack a declared column; see `load_data`.
     """
     if not isinstance(data, Dataset):
         return load_data(problem, data, tell)
@@ -205,7 +206,7 @@ def dataset_of(
                 f"run '{run.label}': time, positions or torques are NaN or infinite. `load_data` "
                 "fills and masks such samples in files; take them out of data of your own."
             )
-    return data
+    return with_declared(data, problem.spec.measurement.covariates)
 
 
 def tell_findings(findings: Iterable[Finding], tell: Tell) -> None:

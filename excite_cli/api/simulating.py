@@ -18,6 +18,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.export.timed import repeated
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.simulation.covariate_series import parse_series as parse_series
 from excite_cli.simulation.engine import load_mujoco
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
 from excite_cli.simulation.planted import parse_planted
@@ -29,7 +30,7 @@ from excite_cli.summary.simulation import simulation_answer as simulation_answer
 from excite_cli.trajectory.chain import Segment
 
 # What of the config's measurement section changes neither positions nor torques when it is read.
-_KEPT = {"filter", "topic", "rate"}
+_KEPT = {"filter", "topic", "rate", "covariates"}
 
 
 @checked("motions")
@@ -138,10 +139,11 @@ def _attributes(
 ) -> dict[str, object]:
     """What the data file says about its making."""
     truth = found.truth.record(problem.robot.joint_names)
+    columns = [each.name for each in settings.covariates]  # their values are in the runs
     return {
         "simulated": True,
         "seed": settings.seed,
-        "settings": json.dumps(asdict(settings)),
+        "settings": json.dumps({**asdict(replace(settings, covariates=())), "covariates": columns}),
         "truth": json.dumps(truth, ensure_ascii=False),
         "config": spec_as_yaml(problem.spec),
         "versions": json.dumps(versions()),

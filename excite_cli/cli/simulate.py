@@ -27,8 +27,19 @@ def simulate(
             rich_help_panel=_ROBOT,
             metavar="KIND@JOINT=VALUE",
             help="Put an effect into the robot (may be repeated); in full: "
-            "KIND@JOINT,…=VALUE,NAME:VALUE,…;runs:RUN|RUN.",
+            "KIND@JOINT,…=VALUE,NAME:VALUE,…;runs:RUN|RUN;covariate:COLUMN.",
             autocompletion=complete_effect,
+        ),
+    ] = None,
+    covariate: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--covariate",
+            rich_help_panel=_MEASURED,
+            metavar="NAME=START",
+            help="A further column that effects may follow (may be repeated); in full: "
+            "NAME=START,end:VALUE,time_constant:SECONDS,noise:SD over the campaign, or "
+            "NAME=FILE.csv with columns t and NAME.",
         ),
     ] = None,
     motion: Annotated[
@@ -153,9 +164,12 @@ def simulate(
       excite simulate ur10.yaml ur10.h5 -o loaded.h5 \\
           --effect coulomb_friction@elbow_joint,wrist_1_joint=2 \\
           --effect 'payload@all=1.5;runs:motion_2'
+      excite simulate ur10.yaml ur10.h5 -o warm.h5 --repeat 4 --pause 300 \\
+          --covariate temp=25,end:45,time_constant:600,noise:0.2 \\
+          --effect 'covariate_friction@elbow_joint=-0.1,reference:25;covariate:temp'
     """
     from excite_cli.api.loading import load_case
-    from excite_cli.api.simulating import SimulationSettings, simulation_answer
+    from excite_cli.api.simulating import SimulationSettings, parse_series, simulation_answer
     from excite_cli.api.simulating import simulate as simulate_motions
     from excite_cli.api.threads import single_threaded
 
@@ -174,6 +188,7 @@ def simulate(
             periods=periods,
             pause=pause,
             torque_limits=torque_limits,
+            covariates=parse_series(covariate or ()),
         )
         with terminal.live("simulating") as line:
             found = simulate_motions(

@@ -30,6 +30,9 @@ class EffectSpec(Section):
     runs: Literal["all"] | tuple[str, ...] = Field(
         "all", description="runs it is present in, or stretches of them between gaps (`b/2`)"
     )
+    covariate: str = Field(
+        "", description="column that it follows, one of measurement.covariates, if its kind does"
+    )
 
 
 PerJoint = Finite | dict[str, Finite]
@@ -105,6 +108,11 @@ class MeasurementSpec(Section):
     )
     names: dict[str, str] = Field(
         default_factory=dict, description="name in the file -> joint of the robot"
+    )
+    covariates: tuple[str, ...] = Field(
+        (),
+        description="further columns of the files that friction or offsets may follow, as "
+        "[temp_j1, ambient]; what belongs to a joint has its name at the end",
     )
     trust: bool = Field(
         False, description="take order and signs of the columns as they are, whatever the URDF says"

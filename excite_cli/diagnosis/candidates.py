@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.config.data_spec import DiagnosisSpec
-from excite_cli.diagnosis.in_runs import Place, SeenRuns, changes, effects_of_runs
+from excite_cli.diagnosis.in_runs import SeenRuns, changes, effects_of_runs
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.diagnosis.run_sets import sets_looked_at
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named
+from excite_cli.effects.place import Place
 from excite_cli.effects.placing import places_named
 from excite_cli.errors import ConfigError, ExciteWarning
 from excite_cli.identification.prepare import PreparedRun
@@ -38,8 +39,8 @@ class Candidate:
 
     @property
     def place(self) -> Place:
-        """Kind, joints and runs: candidates that differ in shape only share it."""
-        return self.effect.kind, self.effect.joints, self.effect.runs
+        """What candidates that differ in shape only share."""
+        return self.effect.place
 
     @property
     def width(self) -> int:
@@ -55,7 +56,8 @@ def possible_effects(
 ) -> list[tuple[Effect, int]]:
     """All effects to be tested but those declared, and how many tests each stands for.
 
-    `around` are shapes for (kind, joints, runs) that were found already.
+    `around` are shapes at places where effects were found already. Kinds that follow a column of
+    the log are none where no column is declared, so that they cost the others nothing.
 
     Raises
     ------
@@ -65,8 +67,10 @@ def possible_effects(
     for name in (*([] if spec.kinds == "all" else spec.kinds), *spec.exclude):
         kind_named(name, "diagnosis")
     names = list(catalogue()) if spec.kinds == "all" else list(spec.kinds)
-    known = {(e.kind, e.joints) for e in declared}
-    known_in_runs = {(e.kind, e.joints, e.runs) for e in declared}
+    if not seen.covariates:
+        names = [name for name in names if not catalogue()[name].follows_covariate]
+    known = {effect.place._replace(runs=()) for effect in declared}
+    known_in_runs = {effect.place for effect in declared}
     found: list[tuple[Effect, int]] = []
     for name in names:
         if name in spec.exclude:
@@ -85,14 +89,13 @@ def possible_effects(
             warnings.warn(words, ExciteWarning, stacklevel=2)
             continue
         count = max(tests, len(effects)) * len(names)
-        for known_place, near in around.items():
-            if known_place[0] == name:
-                again = [kind(known_place[1], shape, known_place[2]) for shape in near]
+        for at, near in around.items():
+            if at.kind == name:
+                again = [kind(at.joints, shape, at.runs, at.covariate) for shape in near]
                 if again[0].is_change:
                     changed = _with(changed, again[0])
                     continue
-                kept = [e for e in effects if (e.kind, e.joints, e.runs) != known_place]
-                effects = kept + again
+                effects = [effect for effect in effects if effect.place != at] + again
         slowest = spec.moving_speed or DEFAULT_MOVING
         found += [
             (effect, count)
@@ -102,7 +105,10 @@ def possible_effects(
         ]
         found += [(effect, tests * len(names)) for effect, tests in changed]
     if not found:
-        raise ConfigError("diagnosis: every effect to be looked for is declared or excluded.")
+        raise ConfigError(
+            "diagnosis: every effect to be looked for is declared or excluded, or follows a column "
+            "of the log, of which measurement.covariates names none."
+        )
     return found
 
 
@@ -121,19 +127,26 @@ def _places(kind: type[Effect], robot: Robot, spec: DiagnosisSpec) -> list[tuple
 def _of_kind(
     kind: type[Effect],
     places: Sequence[tuple[int, ...]],
-    known: Container[tuple[str, tuple[int, ...]]],
+    known: Container[Place],
     seen: SeenRuns,
 ) -> tuple[list[Effect], int]:
     """All effects of a kind at places that are not `known`, and how many tests they stand for."""
     effects: list[Effect] = []
     tests = 0
     for place in places:
-        if (kind.kind, place) in known:
+        if Place(kind.kind, place) in known:
             continue
         if kind.per_run:
             effects += effects_of_runs(kind, place, seen)
             tried = kind.tests_of_grid(seen.robot, place, seen.signals[:1])
             tests += sets_looked_at(len(seen.runs)) * tried
+        elif kind.follows_covariate:
+            for name in seen.covariates:
+                if Place(kind.kind, place, covariate=name) not in known:
+                    alone = [signals.with_covariate(name) for signals in seen.signals]
+                    shapes = kind.tuned(seen.robot, place, alone, seen.residuals)
+                    effects += [kind(place, shape, covariate=name) for shape in shapes]
+                    tests += kind.tests_of_grid(seen.robot, place, alone)
         else:
             shapes = kind.tuned(seen.robot, place, seen.signals, seen.residuals)
             effects += [kind(place, shape) for shape in shapes]
@@ -209,6 +222,7 @@ def record_of(
         dict(effect.shape),
         tuple(float(value) for value in values),
         effect.runs,
+        covariate=effect.covariate,
     )
 
 
@@ -216,4 +230,4 @@ def effect_of(record: EffectRecord, joint_names: Sequence[str]) -> Effect:
     """The effect that a record names."""
     joints = tuple(list(joint_names).index(joint) for joint in record.joints)
     shape: Mapping[str, float] = dict(record.shape)
-    return catalogue()[record.kind](joints, shape, record.runs)
+    return catalogue()[record.kind](joints, shape, record.runs, record.covariate)

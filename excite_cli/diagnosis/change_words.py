@@ -1,4 +1,4 @@
-"""What changed from run to run, in words: the value before and after, not only their difference."""
+"""What changed, in words: the value before and after, not only their difference."""
 
 from collections.abc import Iterator
 
@@ -11,21 +11,26 @@ _LONG = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 
 def changes_in_words(found: Diagnosis) -> list[str]:
-    """A sentence for everything that changed over the campaign, or in some runs."""
+    """A sentence for all that changed over the campaign, with a column, or in some runs."""
     return [text for named in found.named for text in _told(found, named)]
 
 
 def _told(found: Diagnosis, named: NamedEffect) -> Iterator[str]:
     record = named.effect
     kind = catalogue().get(record.kind)
-    if kind is None or not (kind.of_campaign or (kind.changes_between_runs and record.runs)):
+    if kind is None or not (kind.changes_of or (kind.changes_between_runs and record.runs)):
         return
-    changed = kind.refines if kind.of_campaign else (record.kind,)
+    changed = kind.changes_of or (record.kind,)
     for parameter, of in zip(kind.parameters, changed, strict=False):
         change, start = named.parameters[parameter.name], _shared(found, of, record.joints)
-        if start is None or abs(change.value) <= _SURE * change.std:
+        if abs(change.value) <= _SURE * change.std:
             continue
         what = f"{catalogue()[of].title} of {', '.join(record.joints)}"
+        if record.covariate:
+            yield what + _by_column(change, start, record.shape.get("reference"))
+            continue
+        if start is None:
+            continue
         end = Value(start + change.value, change.std, catalogue()[of].parameters[0].unit)
         if kind.of_campaign:
             how = "fell" if abs(end.value) < abs(start) else "rose"
@@ -34,6 +39,15 @@ def _told(found: Diagnosis, named: NamedEffect) -> Iterator[str]:
         else:
             runs = ", ".join(record.runs)
             yield f"{what}: {end.value:.3g} instead of {start:.3g} {end.unit} in {runs}."
+
+
+def _by_column(slope: Value, there: float | None, reference: float | None) -> str:
+    """` falls by 0.021 N·m per unit of temp_j1; it is 1.3 at 35.2.`"""
+    how = "falls" if slope.value < 0.0 else "rises"
+    told = f" {how} by {abs(slope.value):.3g} {slope.unit}"
+    return told + (
+        "." if there is None or reference is None else f"; it is {there:.3g} at {reference:.4g}."
+    )
 
 
 def _shared(found: Diagnosis, kind: str, joints: tuple[str, ...]) -> float | None:

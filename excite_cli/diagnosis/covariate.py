@@ -16,6 +16,7 @@ _SYMBOLS: dict[Source, str] = {
     "speed": "v",
     "acceleration": "a",
     "load": "load",
+    "covariate": "column",
 }
 _OF_SYMBOLS = {symbol: quantity for quantity, symbol in _SYMBOLS.items()}
 
@@ -32,7 +33,8 @@ class Aspect(StrEnum):
 class Covariate:
     """`quantity` of `joint`; `own` stands for that of whichever joint is looked at.
 
-    Time, and which run it is, belong to no joint.
+    Time, and which run it is, belong to no joint; of a further column of the log, `joint` is its
+    name.
     """
 
     quantity: Source
@@ -50,7 +52,9 @@ class Covariate:
     @property
     def common(self) -> "Covariate":
         """The same for every joint: direction, history and load are each joint's own."""
-        if self.aspect is Aspect.VALUE and self.quantity != "load":
+        if self.quantity == "covariate" or (
+            self.aspect is Aspect.VALUE and self.quantity != "load"
+        ):
             return self
         return Covariate(self.quantity, "", self.aspect, own=True)
 

@@ -109,7 +109,8 @@ def _same_quantity(
     traced: Traced, i: int, depends_on: Sequence[Covariate], joint_names: Sequence[str]
 ) -> bool:
     effect = traced.candidates[i].effect
-    own = ("", *(joint_names[j] for j in effect.joints))  # time belongs to no joint
+    # Time belongs to no joint, and a column of the log neither.
+    own = ("", effect.covariate, *(joint_names[j] for j in effect.joints))
     return any(each.like in effect.function_of and each.joint in own for each in depends_on)
 
 

@@ -97,6 +97,7 @@ def _trace(
         x=masked(over),
         own=masked(picked(own)),
         partial=masked(picked(partial)),
+        covariate=effect.covariate,
     )
 
 

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from excite_cli.diagnosis.candidates import Place
 from excite_cli.diagnosis.correlated_covariance import covariance_of
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.dynamics.nearest_inertias import half_of
+from excite_cli.effects.place import Place
 from excite_cli.robot.model import Array
 
 # Relative sd of every size, beside what noise says: filters, differentiated positions and motion

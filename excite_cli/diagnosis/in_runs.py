@@ -20,6 +20,7 @@ from excite_cli.diagnosis.run_sets import (
     sets_looked_at,
 )
 from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.place import Place
 from excite_cli.identification.declared_states import States, declared_sets
 from excite_cli.robot.model import Array, Robot
 
@@ -27,7 +28,6 @@ _CHANGES = 3  # sets of runs in which one joint's friction, offset or gain may h
 _LOOKED_AT = 1000  # samples of a part, at most, from which the runs of an effect are told
 
 Runs = tuple[str, ...]
-Place = tuple[str, tuple[int, ...], Runs]
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,11 @@ class SeenRuns:
     def trained(self) -> list[str]:
         """Names of the runs that parts belong to."""
         return [run for run in self.runs if any(s.run.is_among((run,)) for s in self.signals)]
+
+    @property
+    def covariates(self) -> list[str]:
+        """Columns of the log that are declared for effects to follow."""
+        return list(self.signals[0].covariates)
 
     def parts_of(self, runs: Collection[str]) -> list[int]:
         """Indices of the parts of some runs."""
@@ -102,7 +107,7 @@ def changes(
     return [
         (effect, count)
         for effect, count in found
-        if (effect.kind, effect.joints, effect.runs) not in known and not whole <= set(effect.runs)
+        if effect.place not in known and not whole <= set(effect.runs)
     ]
 
 

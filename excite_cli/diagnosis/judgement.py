@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from excite_cli.diagnosis.candidates import Candidate, Place
+from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import SHARED, Evidence, Gain, Schur
 from excite_cli.diagnosis.verdict import Verdict
+from excite_cli.effects.place import Place
 from excite_cli.robot.model import Array
 
 # It stays in beside its refinement unless it is useless there (χ² units).
@@ -74,7 +75,7 @@ class Judgement:
     def excluded(self, candidate: int) -> list[Place]:
         """Places that must stay empty while it is in."""
         effect = self.candidates[candidate].effect
-        return [(kind, effect.joints, effect.runs) for kind in self._exclusive[effect.kind]]
+        return [effect.place._replace(kind=kind) for kind in self._exclusive[effect.kind]]
 
     def together(self, one: int, other: int) -> bool:
         """Whether both kinds may be named for one joint."""

@@ -38,7 +38,9 @@ class ModelledRun:
         """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
         run, body = self.run, self._at(phi)
         load = body.load
-        signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run.run, run.start)
+        signals = Signals(
+            run.t, run.q, run.v, run.a, load, load, body, run.run, run.start, run.covariates
+        )
         return with_effects(signals, effects, values)
 
     def _at(self, phi: Array) -> RigidBody:

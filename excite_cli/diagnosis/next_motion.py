@@ -185,4 +185,5 @@ def _spec_of(effect: Effect, robot: Robot) -> EffectSpec:
 
 
 def _as_data(record: EffectRecord) -> dict[str, Any]:
-    return {"kind": record.kind, "joints": list(record.joints), "shape": dict(record.shape)}
+    found = {"kind": record.kind, "joints": list(record.joints), "shape": dict(record.shape)}
+    return found | ({"covariate": record.covariate} if record.covariate else {})

@@ -29,7 +29,9 @@ def predicted(
     Effects that look at the torque see the model's own.
     """
     load = body.load
-    signals = Signals(run.t, run.q, run.v, run.a, load, load, body, run.run, run.start)
+    signals = Signals(
+        run.t, run.q, run.v, run.a, load, load, body, run.run, run.start, run.covariates
+    )
     columns = effect_columns(effects, with_effects(signals, effects, values))
     return Prediction(load, np.asarray(load + columns @ values))
 

@@ -18,7 +18,8 @@ from excite_cli.shown.record import Shown
 class EffectRecord:
     """An effect by name: kind, names of its joints, shape, linear parameters, runs (all: empty).
 
-    `link`: of something carried, the link in whose frame its numbers are told.
+    `link`: of something carried, the link in whose frame its numbers are told. `covariate`: the
+    column of the log that it follows, if any.
     """
 
     kind: str
@@ -27,6 +28,7 @@ class EffectRecord:
     values: tuple[float, ...] = ()
     runs: tuple[str, ...] = ()
     link: str = ""
+    covariate: str = ""
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ def _words(traced: Traced, i: int, joint_names: Sequence[str]) -> str:
     where = ", ".join(joint_names[j] for j in effect.joints)
     if len(effect.joints) == len(joint_names) > 2:
         where = "all joints"
-    return f"{effect.kind} on {where}"
+    return f"{effect.kind} on {where}" + (f", by {effect.covariate}" if effect.covariate else "")
 
 
 def _residual(traced: Traced, chosen: Sequence[int]) -> Array:

@@ -32,6 +32,7 @@ _WINDOW = 5.0  # s: long data are represented by stretches of this length
 _FEWEST_ROWS = 60
 _LENGTH = 1.5  # ℓ, in standard deviations of a quantity
 _RIDGES = (1.0, 0.1, 0.01)  # λ; k is one on its diagonal
+_SLOW = {"time", "run", "covariate"}
 _CLEARER = 0.15  # of what one quantity leaves, a second one must explain
 
 
@@ -76,7 +77,7 @@ class Rest:
         pair = max(
             (self._predicted(one * other, _RIDGES[1:2]), (a.code, b.code), (a, b))
             for (a, one), (b, other) in combinations(self._paired(), 2)
-            if {a.quantity, b.quantity} != {"time", "run"}  # any series is a function of both
+            if not {a.quantity, b.quantity} <= _SLOW  # any series is a function of both
         )
         best = pair if pair[0] - single[0] > _CLEARER * (1.0 - single[0]) else single
         return Structure(max(everything, best[0], 0.0), max(best[0], 0.0), best[2])
@@ -125,6 +126,9 @@ class Quantities:
         self._past_q = averaged(histories([s.q for s in signals]))
         self._past_load = averaged(histories([s.load for s in signals]))
         self._t = averaged([s.t for s in signals])
+        self._columns = {
+            name: averaged([s.covariates[name] for s in signals]) for name in signals[0].covariates
+        }
 
     def rest(self, joint: int, residuals: Sequence[Array]) -> Rest | None:
         """The residual of a joint and its kernels; None where too few samples are known.
@@ -158,6 +162,8 @@ class Quantities:
                 for t, run in zip(self._t, self._data.runs, strict=True)
             ],
         )
+        for name, series in self._columns.items():
+            yield Covariate("covariate", name), [x[:, None] for x in series]
         for k, name in enumerate(self._names):
             yield Covariate("position", name), [x[:, k, None] for x in self._q]
             yield Covariate("speed", name), [x[:, k, None] for x in self._v]

@@ -11,11 +11,11 @@ from excite_cli.robot.model import Array
 class EffectTrace:
     """Training samples of one effect, on the joints where it shows most, the strongest first.
 
-    `kind`, `joints` and `runs` are the effect's. `rows` names the joints of the columns; `part`
-    (k,) numbers the stretches of time, `t` (k,) [s] from the start of their run. `x` (k, rows)
-    [`unit`] is `quantity`, within one `period` if that is given; with no quantity, `x` is the
-    effect's own torque. `own` and `partial` (k, rows) are C_e θ_e and p; NaN where a joint stands,
-    reverses or is not known.
+    `kind`, `joints`, `runs` and `covariate` are the effect's. `rows` names the joints of the
+    columns; `part` (k,) numbers the stretches of time, `t` (k,) [s] from the start of their run.
+    `x` (k, rows) [`unit`] is `quantity`, within one `period` if that is given; with no quantity,
+    `x` is the effect's own torque. `own` and `partial` (k, rows) are C_e θ_e and p; NaN where a
+    joint stands, reverses or is not known.
     """
 
     kind: str
@@ -30,6 +30,7 @@ class EffectTrace:
     x: Array
     own: Array
     partial: Array
+    covariate: str = ""
 
 
 @dataclass(frozen=True)

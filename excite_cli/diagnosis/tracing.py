@@ -110,7 +110,7 @@ class _Fit:
 
     @property
     def places(self) -> set:
-        return {(e.kind, e.joints, e.runs) for e in self.effects}
+        return {effect.place for effect in self.effects}
 
     def close_to(self, other: "_Fit") -> bool:
         """Whether another fit of the same effects is about the same."""
@@ -171,17 +171,17 @@ def _one_pass(
     candidates: list[Candidate] = []
     if spec.rounds:
         # Kinds that are searched on the residual must see what the last search gave to one of them.
-        # Likewise the runs of what is in some of them only, or changes from run to run.
+        # Likewise the runs of what is in some of them only, or changes with time or a column.
         plain_kinds = np.repeat(
             [
-                effect.tier != Tier.LAST and not effect.runs and not effect.of_campaign
+                effect.tier != Tier.LAST and not (effect.runs or effect.changes_of)
                 for effect in effects
             ],
             [len(effect.parameters) for effect in effects],
         )
         steady = [body.signals(fit.phi, effects, fit.values * plain_kinds) for body in bodies]
         raw = [body.run.tau_raw - s.torque for body, s in zip(bodies, steady, strict=True)]
-        found = {(e.kind, e.joints, e.runs): e for e in fit.effects}
+        found = {effect.place: effect for effect in fit.effects}
         shapes = {
             place: shapes_around(effect, signals) if effect.shape else [{}]
             for place, effect in found.items()
@@ -226,11 +226,7 @@ def _carried_over(found: Sequence[Effect], candidates: Sequence[Candidate]) -> l
     """Where the effects found before are among the new candidates, by nearest shape."""
     chosen = []
     for effect in found:
-        same = [
-            i
-            for i, c in enumerate(candidates)
-            if c.place == (effect.kind, effect.joints, effect.runs)
-        ]
+        same = [i for i, c in enumerate(candidates) if c.place == effect.place]
         if same:
             chosen.append(
                 min(same, key=lambda i: _distance(candidates[i].effect.shape, effect.shape))

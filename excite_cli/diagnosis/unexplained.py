@@ -1,8 +1,8 @@
 """What is still structured and fits no name: on what does it depend?
 
 Smooth functions of one quantity at a time are tested like any candidate: time, position, speed and
-acceleration of every joint, the joint's own direction and load, and where its position and its load
-came from (hysteresis).
+acceleration of every joint, the joint's own direction and load, where its position and its load
+came from (hysteresis), and declared columns of the log, in each direction of motion.
 """
 
 from collections.abc import Callable, Sequence
@@ -283,6 +283,10 @@ def _quantities(
     heaviest = max(float(np.abs(s.load[:, joint]).max()) for s in signals) + 1e-12
     made.append(lambda s: _odd_even(s.load[:, joint] / heaviest)[:, :3])
     covariates.append(Covariate("load", joint_names[joint]))
+    for name in signals[0].covariates:
+        seen = np.concatenate([s.covariates[name] for s in signals])
+        made.append(partial(_of_column, name, joint, float(seen.mean()), float(np.ptp(seen))))
+        covariates.append(Covariate("covariate", name))
     columns = [
         tuple(
             run.averaged_for_fit(make(s)[:, None], [joint])
@@ -307,6 +311,12 @@ def _of_direction_and_position(k: int, s: Signals) -> Array:
 
 def _of_acceleration(k: int, scale: float, s: Signals) -> Array:
     return _odd_even(s.a[:, k] / scale)[:, :3]
+
+
+def _of_column(name: str, joint: int, middle: float, width: float, s: Signals) -> Array:
+    """Even and odd in the direction of motion: friction may follow a column."""
+    powers = _powers(s.covariates[name] - middle, width)
+    return np.concatenate([powers, np.tanh(1e3 * s.v[:, joint, None]) * powers], axis=1)
 
 
 def _powers(t: Array, longest: float) -> Array:

@@ -29,6 +29,7 @@ _QUANTITIES: dict[Source, str] = {
     "speed": "speed",
     "acceleration": "acceleration",
     "load": "rigid-body torque",
+    "covariate": "column",
 }
 
 
@@ -52,11 +53,13 @@ def other_name_of(kind: str) -> tuple[str, ...]:
 
 
 def place_in_words(record: EffectRecord, joints: int) -> str:
-    """Where an effect is, on a robot with so many joints; with its runs, if not in all."""
+    """Where an effect is, on a robot with so many joints; with its column and runs, if any."""
     whole = len(record.joints) == joints > 2
     where = "all joints" if whole else ", ".join(record.joints)
     if record.link:
         where = f"{where}, frame of {record.link}"
+    if record.covariate:
+        where = f"{where}, by {record.covariate}"
     return f"{where} ({', '.join(record.runs)})" if record.runs else where
 
 
@@ -85,6 +88,8 @@ def covariate_in_words(covariate: Covariate) -> str:
     words = _QUANTITIES[covariate.quantity]
     if covariate.own:
         words = f"own {words}"
+    elif covariate.quantity == "covariate":
+        words = covariate.joint
     elif covariate.joint:
         words = f"{words} of {covariate.joint}"
     if covariate.aspect is Aspect.HISTORY:

@@ -22,7 +22,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from excite_cli.dynamics.nearest_inertias import half_of
+from excite_cli.effects.abscissa import Abscissa, Quantity, of_one_joint
 from excite_cli.effects.parameter import Parameter, Value, deviation
+from excite_cli.effects.place import Place
 from excite_cli.effects.rare_sizes import nearest_of_sign, two_deviations, unlikely_distance
 from excite_cli.effects.seen import Seen
 from excite_cli.effects.signals import Cotangents, Signals
@@ -32,7 +34,6 @@ from excite_cli.robot.link_frame import LinkFrame
 from excite_cli.robot.model import Array, Robot
 
 Scope = Literal["joint", "pair", "robot"]
-Quantity = Literal["position", "speed", "acceleration", "load", "time"]
 Picture = Literal["cloud", "window"]
 
 # By how much a shape parameter is changed, up and down, once its effect is found.
@@ -48,37 +49,17 @@ class Tier(IntEnum):
 
 
 @dataclass(frozen=True)
-class Abscissa:
-    """What the torque of an effect is drawn over: `values` (T,) in `unit`, and their name.
-
-    Values that lie a `period` apart are the same place, if there is one.
-    """
-
-    name: str
-    unit: str
-    values: Array
-    period: float | None = None
-
-
-# Of one joint: name, unit, and where `Signals` has it.
-_DRAWN_OVER: Mapping[Quantity, tuple[str, str, str]] = {
-    "position": ("angle", "rad", "q"),
-    "speed": ("speed", "rad/s", "v"),
-    "acceleration": ("acceleration", "rad/s²", "a"),
-    "load": ("rigid-body torque", "N·m", "load"),
-}
-
-
-@dataclass(frozen=True)
 class Effect(ABC):
     """An effect on given joints with given shape (values of its non-linear parameters).
 
     `runs`: the recordings, or stretches of them, in which it is present; empty means all.
+    `covariate`: the column of the log that it follows, if its kind follows one.
     """
 
     joints: tuple[int, ...]
     shape: Mapping[str, float] = field(default_factory=dict)
     runs: tuple[str, ...] = ()
+    covariate: str = ""
 
     kind: ClassVar[str]
     title: ClassVar[str]
@@ -93,8 +74,10 @@ class Effect(ABC):
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
     # In all runs, but its size may change from run to run: in runs of its own it is that change.
     changes_between_runs: ClassVar[bool] = False
-    # Its columns look at the campaign's clock; its parameters are changes of those of `refines`.
-    of_campaign: ClassVar[bool] = False
+    of_campaign: ClassVar[bool] = False  # its columns look at the campaign's clock
+    # Looked for once for every declared column of the log; its grid sees signals with that alone.
+    follows_covariate: ClassVar[bool] = False
+    changes_of: ClassVar[tuple[str, ...]] = ()  # kinds whose size its parameters change, in order
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
     # A body that one joint carries: part of the load of joints, and named by its link if one likes.
     carried: ClassVar[bool] = False
@@ -162,6 +145,11 @@ class Effect(ABC):
     ) -> int:
         """How many independent tests the choice of the non-linear parameters stands for."""
         return len(cls.grid(robot, joints, signals))
+
+    @property
+    def place(self) -> Place:
+        """Kind, joints, runs and column: effects that differ in shape only share it."""
+        return Place(self.kind, self.joints, self.runs, self.covariate)
 
     def active(self, run: RunId) -> bool:
         """Whether the effect is present in `run`."""
@@ -321,10 +309,7 @@ class Effect(ABC):
         """
         if len(self.joints) != 1 or len(self.function_of) != 1:
             return None
-        if self.function_of[0] not in _DRAWN_OVER:
-            return None
-        name, unit, series = _DRAWN_OVER[self.function_of[0]]
-        return Abscissa(name, unit, getattr(signals, series)[:, self.joints[0]])
+        return of_one_joint(self.function_of[0], signals, self.joints[0])
 
     def seen_from(self, link: LinkFrame) -> Array:
         """Linear parameters in the frame of `link`: that matrix (p, p) times `values`."""

@@ -21,6 +21,8 @@ from excite_cli.effects.cable_force import CableForce
 from excite_cli.effects.contact import Contact
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.coupled_friction import CoupledFriction
+from excite_cli.effects.covariate_friction import CovariateFriction
+from excite_cli.effects.covariate_offset import CovariateOffset
 from excite_cli.effects.dahl_friction import DahlFriction
 from excite_cli.effects.elasticity import Elasticity
 from excite_cli.effects.encoder_offset import EncoderOffset
@@ -52,10 +54,12 @@ _OURS: tuple[type[Effect], ...] = (
     DahlFriction,
     FrictionDrift,
     FrictionChange,
+    CovariateFriction,
     CoupledFriction,
     Armature,
     Spring,
     TorqueOffset,
+    CovariateOffset,
     TorqueGain,
     TorqueDelay,
     TorqueSaturation,
@@ -117,7 +121,7 @@ def _loaded(point: EntryPoint) -> tuple[type[Effect] | None, str]:
 
 def _names_of_none(kind: type[Effect], kinds: Mapping[str, type[Effect]]) -> str:
     """What `kind` says of kinds that there are not; empty if it says nothing of such."""
-    for trait in ("refines", "excludes", "same_as", "deviates_from"):
+    for trait in ("refines", "excludes", "same_as", "deviates_from", "changes_of"):
         for name in getattr(kind, trait):
             if name not in kinds:
                 return f"`{trait}` names '{name}', which does not exist.{nearest(name, kinds)}"
@@ -179,6 +183,20 @@ def _built(spec: EffectSpec, index: int, robot: Robot) -> list[Effect]:
                 f"{where}.shape: {spec.kind} has no parameter '{name}'.{nearest(name, known)} "
                 f"Allowed: {', '.join(known) or 'none'}."
             )
+    require_covariate(kind, spec.covariate, f"{where}.covariate")
     shape, _ = kind.planted(0.0, spec.shape)
     runs = () if spec.runs == "all" else spec.runs
-    return [kind(place, shape, runs) for place in places]
+    return [kind(place, shape, runs, spec.covariate) for place in places]
+
+
+def require_covariate(kind: type[Effect], covariate: str, where: str) -> None:
+    """Raise ConfigError unless a column of the log is named exactly where the kind follows one."""
+    if kind.follows_covariate and not covariate:
+        raise ConfigError(
+            f"{where}: {kind.kind} follows a column of the log. Name one of those in "
+            "measurement.covariates."
+        )
+    if covariate and not kind.follows_covariate:
+        raise ConfigError(
+            f"{where}: {kind.kind} follows no column of the log; leave '{covariate}' out."
+        )

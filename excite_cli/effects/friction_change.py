@@ -12,6 +12,7 @@ where files have no stamps, the pauses between them are not known.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -47,6 +48,7 @@ class FrictionChange(Effect):
     excitable: ClassVar = False
     why_not_excitable: ClassVar = "it shows between recordings; a motion lasts too short"
     refines: ClassVar = ("coulomb_friction", "viscous_friction")
+    changes_of: ClassVar = refines
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
@@ -76,7 +78,7 @@ class FrictionChange(Effect):
     def _quicker(self, step: float) -> "FrictionChange":
         """The same with a time constant that is smaller by `step`."""
         constant = self.shape["time_constant"] - step
-        return FrictionChange(self.joints, {**self.shape, "time_constant": constant}, self.runs)
+        return replace(self, shape={**self.shape, "time_constant": constant})
 
     def leftover(self, values: Array) -> float:
         """What another curve from its start to its end would leave of it."""

@@ -1,5 +1,6 @@
 """What an effect sees of a motion, and how its derivative is handed back."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +16,8 @@ class Signals:
 
     `t` (T,) from the start of the run [s]; `q, v, a` (T, n); `load` (T, n) rigid-body torque of
     the model so far, `torque` (T, n) all of it with the effects found; `body` gives the derivatives
-    of the rigid-body torque. `start` is the campaign's time at t = 0 [s].
+    of the rigid-body torque. `start` is the campaign's time at t = 0 [s]. `covariates` (T,) by name
+    are further columns of the log that effects may follow, in whatever unit they were recorded.
     """
 
     t: Array
@@ -27,6 +29,7 @@ class Signals:
     body: RigidBody
     run: RunId = field(default_factory=RunId)
     start: float = 0.0
+    covariates: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def clock(self) -> Array:
@@ -38,7 +41,12 @@ class Signals:
         at, body = slice(None, None, step), self.body
         thin = RigidBody(body.robot, body.phi, body.q[at], body.v[at], body.a[at])
         series = {name: getattr(self, name)[at] for name in ("t", "q", "v", "a", "load", "torque")}
-        return replace(self, **series, body=thin)
+        others = {name: values[at] for name, values in self.covariates.items()}
+        return replace(self, **series, body=thin, covariates=others)
+
+    def with_covariate(self, name: str) -> "Signals":
+        """The same with that column of the log alone."""
+        return replace(self, covariates={name: self.covariates[name]})
 
     def rate(self, x: Array) -> Array:
         """dx/dt by central differences along the first axis."""

@@ -113,8 +113,9 @@ class EffectColumns:
 
 
 def column_names(effect: Effect, robot: Robot) -> list[str]:
-    """`kind[joints].parameter` of every linear parameter, with the shape where there is one."""
+    """`kind[joints].parameter` of every linear parameter, with column and shape, if any."""
     joints = ",".join(robot.joint_names[j] for j in effect.joints)
+    joints += f";{effect.covariate}" if effect.covariate else ""
     shape = "".join(f";{name}={value:.6g}" for name, value in effect.shape.items())
     return [f"{effect.kind}[{joints}{shape}].{p.name}" for p in effect.parameters]
 

@@ -52,7 +52,7 @@ def parameters_yaml(robot: Robot, fit: Fit) -> str:
 
 
 def effect_specs(effects: Sequence[Effect], joint_names: Sequence[str]) -> list[dict[str, Any]]:
-    """Effects as the entries of `effects:`; those of one kind, shape and runs share an entry."""
+    """Effects as the entries of `effects:`; alike but for joints, they share an entry."""
     entries: list[dict[str, Any]] = []
     for effect in effects:
         joints = [joint_names[j] for j in effect.joints]
@@ -61,6 +61,8 @@ def effect_specs(effects: Sequence[Effect], joint_names: Sequence[str]) -> list[
             entry["shape"] = {key: float(value) for key, value in effect.shape.items()}
         if effect.runs:
             entry["runs"] = list(effect.runs)
+        if effect.covariate:
+            entry["covariate"] = effect.covariate
         rest = {key: value for key, value in entry.items() if key != "joints"}
         like = next(
             (

@@ -1,4 +1,4 @@
-"""Runs that the configuration names must be in the data, and not all of them sealed."""
+"""Runs and columns that effects of the configuration name must be in the data."""
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
@@ -11,13 +11,21 @@ from excite_cli.measurement.dataset import Dataset
 def check_declared_runs(spec: Spec, dataset: Dataset) -> None:
     """Refuse effects and states that are declared for a run which `dataset` does not hold.
 
+    And effects that follow a column which is not declared.
+
     Raises
     ------
     ConfigError
-        There is no run of such a name, or its state is of a kind that all runs share.
+        There is no run or column of such a name, or a state is of a kind that all runs share.
     """
-    names = dataset.names
+    names, columns = dataset.names, spec.measurement.covariates
     for index, effect in enumerate(spec.effects or ()):
+        if effect.covariate and effect.covariate not in columns:
+            raise ConfigError(
+                f"effects[{index}].covariate: '{effect.covariate}' is not declared."
+                f"{nearest(effect.covariate, columns)} measurement.covariates: "
+                f"{', '.join(columns) or 'none'}."
+            )
         for name in () if effect.runs == "all" else effect.runs:
             if name not in names:
                 raise ConfigError(

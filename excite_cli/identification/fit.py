@@ -177,9 +177,9 @@ def follows_model(regression: Regression) -> bool:
         return False
     prepared = regression.runs[0].prepared
     cut = slice(0, _PROBE)
-    brief = replace(
-        prepared, t=prepared.t[cut], q=prepared.q[cut], v=prepared.v[cut], a=prepared.a[cut]
-    )
+    series = {name: getattr(prepared, name)[cut] for name in ("t", "q", "v", "a")}
+    covariates = {name: values[cut] for name, values in prepared.covariates.items()}
+    brief = replace(prepared, **series, covariates=covariates)
     cad = standard_parameters(regression.robot)
     one, other = (
         effect_columns(regression.effects, signals_of(brief, regression.robot, phi))
@@ -271,6 +271,7 @@ def effect_parameter_names(
     places = [
         ",".join(joint_names[j] for j in effect.joints)
         + (f"; {', '.join(effect.runs)}" if effect.is_change else "")
+        + (f"; {effect.covariate}" if effect.covariate else "")
         for effect in effects
     ]
     return tuple(

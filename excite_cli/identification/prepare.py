@@ -1,7 +1,7 @@
 """From a raw run to smooth, differentiated motion, and the averages all columns go through."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,9 @@ class PreparedRun:
     """One run (or block of it) ready for regression.
 
     `t` (T,) from the start of the recording `run` (at `start` [s] on the campaign's clock), `q, v,
-    a, tau_raw` (T, n) at the working rate with borders cut; `averages` (M, T) gives filtered and
-    decimated values, at `step`, of any column: A x; `moving` (M, n) where the joint itself moves.
+    a, tau_raw` (T, n) and `covariates` (T,) at the working rate with borders cut; `averages` (M, T)
+    gives filtered and decimated values, at `step`, of any column: A x; `moving` (M, n) where the
+    joint itself moves.
 
     What torque is judged by leaves out invalid samples of its joint: `tau` (M, n) are averages of
     the others, `valid` (M, n) where enough is left, `valid_averages` those of each joint.
@@ -61,6 +62,7 @@ class PreparedRun:
     usable: NDArray[np.bool_]
     step: float
     start: float = 0.0
+    covariates: Mapping[str, Array] = field(default_factory=dict)
 
     def averaged(self, columns: Array) -> Array:
         """A applied along the first axis of (T, …)."""
@@ -145,6 +147,7 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
         usable=np.stack([filled(for_fit[j]) & filled(fit_averages[j]) for j in joints], axis=1),
         step=float((centers[1] - centers[0]) * h),
         start=run.start,
+        covariates={name: values[keep] for name, values in run.covariates.items()},
     )
 
 

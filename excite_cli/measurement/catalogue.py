@@ -12,6 +12,7 @@ from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.given_files import require_stored
 from excite_cli.measurement.arrange import arrange, check_names, listed
 from excite_cli.measurement.bag_reader import BagReader
+from excite_cli.measurement.covariates import DeclaredCovariates
 from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.hdf5_reader import Hdf5Reader
@@ -66,6 +67,7 @@ def read_dataset(
     runs: list[Run] = []
     taken: set[str] = set()
     seen: set[str] = set()
+    covariates = DeclaredCovariates(spec.covariates)
     for path in paths:
         raws = reader_for(path).read(path, options)
         seen.update(name for raw in raws for column in raw.columns.values() for name in column)
@@ -75,12 +77,14 @@ def read_dataset(
             run, more = arrange(raw, joint_names, spec.names, str(path))
             t, epoch = _seconds(raw, spec)
             run = replace(run, t=t, epoch=epoch, origin=Origin(str(path), raw.place))
+            run = covariates.take(run, raw, spec.names)
             arranged.append(to_joints(run, spec, joint_names, turning))
             findings += more
         parts, more = _checked(path, arranged, spec, joint_names, known)
         runs += parts
         findings += more
     _check_all_met(spec.names, seen)
+    findings += covariates.check()
     return Dataset(joint_names, tuple(runs), tuple(map(str, paths)), tuple(findings))
 
 

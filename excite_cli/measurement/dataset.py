@@ -39,7 +39,8 @@ class Run(Shown):
 
     `name` is the recording's, `part` says which part of it. `valid` (T, n): samples that may be
     used, per joint (false where saturated, stuck or bridged). `extra` holds further channels of the
-    file, (T,) or (T, m), untouched. `epoch`: seconds from 1970 (UTC) to t = 0, where the data know;
+    file, (T,) or (T, m), untouched; `covariates` (T,) are those that the configuration declares for
+    effects to follow. `epoch`: seconds from 1970 (UTC) to t = 0, where the data know;
     `start`: the campaign's time at t = 0 [s], once it is known (`campaign_clock`). `recorded` (T,):
     where samples were interpolated, the hash of the nearest one in the file.
     """
@@ -56,6 +57,7 @@ class Run(Shown):
     epoch: float | None = None
     start: float = 0.0
     recorded: NDArray[np.uint64] | None = None
+    covariates: dict[str, Array] = field(default_factory=dict)
 
     @property
     def id(self) -> RunId:
@@ -95,6 +97,7 @@ class Run(Shown):
             dq=None if self.dq is None else self.dq[cut],
             valid=None if self.valid is None else self.valid[cut],
             extra={key: value[cut] for key, value in self.extra.items()},
+            covariates={name: value[cut] for name, value in self.covariates.items()},
             recorded=None if self.recorded is None else self.recorded[cut],
         )
 

@@ -81,6 +81,7 @@ def rows_of(run: Run, rows: Mask | NDArray[np.int64]) -> Run:
         dq=None if run.dq is None else run.dq[rows],
         valid=None if run.valid is None else run.valid[rows],
         extra={key: value[rows] for key, value in run.extra.items()},
+        covariates={name: value[rows] for name, value in run.covariates.items()},
     )
 
 
@@ -115,12 +116,13 @@ def _fill_speed(run: Run, joints: tuple[str, ...]) -> tuple[Array | None, list[F
 
 
 def _filled(values: Array) -> Array:
-    """Linear between what is known; 0 where nothing is."""
-    filled, places = values.copy(), np.arange(len(values))
-    for column in filled.T:
-        known = known_values(column)
-        if not known.any():
-            column[:] = 0.0
-        elif not known.all():
-            column[~known] = np.interp(places[~known], places[known], column[known])
-    return filled
+    """Every column of (T, n) as `filled_between`."""
+    return np.column_stack([filled_between(column) for column in values.T])
+
+
+def filled_between(values: Array) -> Array:
+    """Values (T,), linear between what is known; 0 where nothing is."""
+    known, places = known_values(values), np.arange(len(values))
+    if not known.any():
+        return np.zeros(len(values))
+    return values if known.all() else np.interp(places, places[known], values[known])

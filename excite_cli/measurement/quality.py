@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement.channel_order import check_order
+from excite_cli.measurement.covariates import without_missing_covariates
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.dead_channels import dead_channels
 from excite_cli.measurement.missing_values import without_missing
@@ -27,8 +28,10 @@ def checked(
     whole = []
     for run in runs:
         kept, more = without_missing(run, joints)
-        whole.append(kept)
         findings += more
+        kept, more = without_missing_covariates(kept)
+        findings += more
+        whole.append(kept)
     whole, more = dead_channels(whole, joints)
     findings += more
     parts: list[Run] = []

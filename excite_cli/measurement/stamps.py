@@ -255,6 +255,7 @@ def _resampled(run: Run, notes: _Notes) -> Run:
         dq=None if run.dq is None else _linear(run.t, run.dq, grid),
         valid=None if valid.all() else valid,
         extra={key: _linear(run.t, value, grid) for key, value in run.extra.items()},
+        covariates={k: _linear(run.t, value, grid) for k, value in run.covariates.items()},
         recorded=row_hashes(run)[_nearest(run.t, grid)],
     )
 

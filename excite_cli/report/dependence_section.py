@@ -137,6 +137,8 @@ def _picture(
     found: Diagnosis, traces: Traces, unexplained: Unexplained, covariate: Covariate
 ) -> list[Chart]:
     """What is left of the joint over the covariate; nothing if too few samples are known."""
+    if covariate.quantity not in _SERIES:
+        return []  # of columns of the log no trace is kept
     timed = covariate.quantity == "time"
     names = list(found.joint_names)
     j = names.index(unexplained.joint)

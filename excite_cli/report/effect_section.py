@@ -89,8 +89,8 @@ def _cards(found: Diagnosis, traces: Traces, effects: Sequence[NamedEffect]) -> 
 
 def _trace_of(named: NamedEffect, traces: Traces) -> EffectTrace | None:
     record = named.effect
-    key = (record.kind, record.joints, record.runs)
-    return next((t for t in traces.effects if (t.kind, t.joints, t.runs) == key), None)
+    key = (record.kind, record.joints, record.runs, record.covariate)
+    return next((t for t in traces.effects if (t.kind, t.joints, t.runs, t.covariate) == key), None)
 
 
 def _capital(text: str) -> str:

@@ -11,6 +11,7 @@ from excite_cli.effects.simulated_robot import Coupling, Hysteresis, Push, Trans
 from excite_cli.errors import RobotError
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
+from excite_cli.simulation.covariate_series import CovariateSeries
 from excite_cli.simulation.engine import load_mujoco
 from excite_cli.simulation.mujoco_model import Plant, build_plant, refresh
 from excite_cli.simulation.planted import Planted
@@ -28,7 +29,8 @@ class Build:
     `hystereses` through the memory of a joint;
     `compensated` ones are known to the controller;
     `recorded` ones change what is written down. `reading` (n, 2): sharpness and level of the
-    saturation of the recorded torque. `start`: when the run begins, on the campaign's clock [s].
+    saturation of the recorded torque. `start`: when the run begins, on the campaign's clock [s];
+    `series` of what effects may follow.
     """
 
     robot: Robot
@@ -53,6 +55,7 @@ class Build:
     compensated: list[Planted] = field(default_factory=list)
     recorded: list[Planted] = field(default_factory=list)
     start: float = 0.0
+    series: tuple[CovariateSeries, ...] = ()
 
     @classmethod
     def bare(cls, robot: Robot, phi: Array, run: RunId) -> "Build":
@@ -74,6 +77,10 @@ class Build:
             gain=zeros[5],
             offset=zeros[6],
         )
+
+    def covariates(self, t: Array) -> dict[str, Array]:
+        """What effects may follow, by name, at instants `t` (T,) of the run [s]."""
+        return {each.name: each.at(self.start + t) for each in self.series}
 
     def link_inertia(self, joint: int) -> float:
         """What `joint` turns at the reference posture with all others held [kg·m²]."""
@@ -106,10 +113,15 @@ class Build:
 
 
 def assemble(
-    robot: Robot, phi: Array, run: RunId, planted: Iterable[Planted], start: float = 0.0
+    robot: Robot,
+    phi: Array,
+    run: RunId,
+    planted: Iterable[Planted],
+    start: float = 0.0,
+    series: tuple[CovariateSeries, ...] = (),
 ) -> Build:
     """The robot of one run with the effects that are active in it."""
-    build = replace(Build.bare(robot, phi, run), start=start)
+    build = replace(Build.bare(robot, phi, run), start=start, series=series)
     for each in planted:
         if each.effect.active(run):
             each.effect.build_into(build, each.values, each.named())

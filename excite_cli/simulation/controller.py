@@ -65,9 +65,10 @@ def compensated(build: Build, reference: Reference, share: float) -> Reference:
         return reference
     load = reference.feed_forward
     body = RigidBody(build.robot, build.phi, reference.q, reference.v, reference.a)
+    t = np.maximum(reference.t, 0.0)
     signals = Signals(
-        np.maximum(reference.t, 0.0), reference.q, reference.v, reference.a, load, load, body,
-        build.run, build.start,
+        t, reference.q, reference.v, reference.a, load, load, body, build.run, build.start,
+        build.covariates(t),
     )  # fmt: skip
     extra = np.sum([p.effect.torque(signals, p.values) for p in build.compensated], axis=0)
     return replace(reference, feed_forward=load + share * extra)

@@ -1,6 +1,7 @@
 """Plausible sizes for the effects that the configuration declares: the robot has them too."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.robot.model import Array, Robot
+from excite_cli.simulation.covariate_series import CovariateSeries
 from excite_cli.simulation.planted import Planted
 
 _SHARE = (0.03, 0.10)  # of the joint's torque RMS, per parameter
@@ -15,18 +17,28 @@ _SAMPLES, _STATES = 200, 7  # random states, and their seed
 _LEAST = 1e-3  # of the largest joint's torque RMS
 
 
-def sized(robot: Robot, effects: Sequence[Effect], seed: int) -> tuple[Planted, ...]:
+def sized(
+    robot: Robot,
+    effects: Sequence[Effect],
+    seed: int,
+    covariates: Sequence[CovariateSeries] = (),
+) -> tuple[Planted, ...]:
     """Each effect with values that give 3–10 % of the joint's torque RMS on brisk random states.
 
     They depend on the robot and the seed alone: the same robot plays every motion.
 
     Kinds that act on the whole robot, and defects of the data, take a twentieth of the upper end
-    of their usual range.
+    of their usual range. `covariates` are the columns of the log that effects follow.
     """
     if not effects:
         return ()
     rng = np.random.default_rng([seed, 1])
-    signals = _signals(robot)
+    followed = {
+        each.name: np.interp(np.linspace(0, 1, _SAMPLES), np.linspace(0, 1, len(each.values)),
+                             each.values)
+        for each in covariates
+    }  # fmt: skip
+    signals = replace(_signals(robot), covariates=followed)
     load = np.sqrt(np.mean(signals.load**2, axis=0))
     load = np.maximum(load, _LEAST * load.max() + 1e-9)
     planted = []
@@ -39,7 +51,7 @@ def sized(robot: Robot, effects: Sequence[Effect], seed: int) -> tuple[Planted, 
         )
         if effect.data_defect or effect.scope == "robot":
             shape, values = type(effect).planted(effect.parameters[0].high / 20, effect.shape)
-            effect = type(effect)(effect.joints, shape, effect.runs)
+            effect = replace(effect, shape=shape)
         else:
             unit = _per_unit(effect, signals)
             size = share * load[list(effect.joints)].min() / np.maximum(unit, 1e-6)

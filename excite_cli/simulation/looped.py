@@ -55,7 +55,8 @@ class LoopedEffects:
         q, v, a, load = states
         build = self._build
         body = RigidBody(build.robot, build.phi, q, v, a, model=self._model)
-        return Signals(times, q, v, a, load, load, body, build.run, build.start)
+        covariates = build.covariates(times)
+        return Signals(times, q, v, a, load, load, body, build.run, build.start, covariates)
 
 
 def _total(planted: Sequence[Planted], signals: Signals) -> Array:

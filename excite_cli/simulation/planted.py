@@ -1,6 +1,6 @@
 """Effects put into the simulated robot, and the words that ask for them.
 
-`kind@joint[,joint…]=value[,name:value…][;runs:name|name]`, for example
+`kind@joint[,joint…]=value[,name:value…][;runs:name|name][;covariate:column]`, for example
 `coulomb_friction@elbow_joint=4`, `stribeck_friction@j2=3,stribeck_speed:0.05` or
 `payload@gripper_link=1.5;runs:motion_2`.
 """
@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import kind_named
+from excite_cli.effects.catalogue import kind_named, require_covariate
 from excite_cli.effects.placing import places_named
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.robot.model import Array, Robot
 
-FORM = "kind@joint[,joint…]=value[,name:value…][;runs:name|name]"
+FORM = "kind@joint[,joint…]=value[,name:value…][;runs:name|name][;covariate:column]"
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,7 @@ class Planted:
             "values": [float(value) for value in self.values],
             "extra": dict(self.extra),
             "runs": list(self.effect.runs),
+            "covariate": self.effect.covariate,
             "declared": self.declared,
         }
 
@@ -61,6 +62,7 @@ def plant(
     value: float,
     others: Mapping[str, float] | None = None,
     runs: tuple[str, ...] = (),
+    covariate: str = "",
 ) -> Planted:
     """One effect of `kind` on `joints`, with `value` and named `others`.
 
@@ -72,7 +74,7 @@ def plant(
         value, others = first, {kind.known_by: value, **others}
     extra = {name: others.pop(name) for name in kind.settings if name in others}
     shape, values = kind.planted(value, others)
-    return Planted(kind(joints, shape, runs), values, extra)
+    return Planted(kind(joints, shape, runs, covariate), values, extra)
 
 
 def parse_planted(
@@ -98,10 +100,11 @@ def parse_planted(
         )
     kind = kind_named(kind_name.strip(), where)
     value, others = _numbers(numbers, kind, where)
-    chosen = _runs(clauses, takes, where)
+    runs, covariate = _clauses(clauses, takes, where)
+    require_covariate(kind, covariate, where)
     names = [name.strip() for name in joints_text.split(",")]
     places = places_named(kind, names, robot, where)
-    return tuple(plant(kind, joints, value, others, chosen) for joints in places)
+    return tuple(plant(kind, joints, value, others, runs, covariate) for joints in places)
 
 
 def _numbers(text: str, kind: type[Effect], where: str) -> tuple[float, dict[str, float]]:
@@ -146,21 +149,33 @@ def _number(text: str, where: str) -> float:
     return value
 
 
-def _runs(
+def _clauses(
     clauses: Sequence[str], takes: Mapping[str, Sequence[str]], where: str
-) -> tuple[str, ...]:
+) -> tuple[tuple[str, ...], str]:
+    """The runs and the column of the log that are named after `;`."""
+    runs: tuple[str, ...] = ()
+    covariate = ""
+    for clause in clauses:
+        word, colon, names = (part.strip() for part in clause.partition(":"))
+        if word not in ("runs", "covariate") or not colon or not names:
+            raise ConfigError(
+                f"{where}: after ';' only 'runs:name|name' and 'covariate:column' are allowed."
+            )
+        if word == "covariate":
+            covariate = names
+        else:
+            runs += _runs(names, takes, where)
+    return tuple(dict.fromkeys(runs)), covariate
+
+
+def _runs(names: str, takes: Mapping[str, Sequence[str]], where: str) -> tuple[str, ...]:
     runs = [run for each in takes.values() for run in each]
     known = {**{run: (run,) for run in runs}, **takes}
     chosen: list[str] = []
-    for clause in clauses:
-        word, colon, names = (part.strip() for part in clause.partition(":"))
-        if word != "runs" or not colon or not names:
-            raise ConfigError(f"{where}: after ';' only 'runs:name|name' is allowed.")
-        for name in (part.strip() for part in names.split("|")):
-            if name not in known:
-                raise ConfigError(
-                    f"{where}: there is no run '{name}'.{nearest(name, runs)} "
-                    f"Runs: {', '.join(runs)}."
-                )
-            chosen += known[name]
-    return tuple(dict.fromkeys(chosen))
+    for name in (part.strip() for part in names.split("|")):
+        if name not in known:
+            raise ConfigError(
+                f"{where}: there is no run '{name}'.{nearest(name, runs)} Runs: {', '.join(runs)}."
+            )
+        chosen += known[name]
+    return tuple(chosen)

@@ -83,7 +83,8 @@ def _other_defects(build: Build, t: Array, q: Array, tau: Array) -> Array:
     spline = CubicSpline(t, q)
     v, a = spline(t, 1), spline(t, 2)
     body = RigidBody(build.robot, build.phi, q, v, a)
-    signals = Signals(t, q, v, a, tau, tau, body, build.run, build.start)
+    covariates = build.covariates(t)
+    signals = Signals(t, q, v, a, tau, tau, body, build.run, build.start, covariates)
     return np.sum([p.effect.torque(signals, p.values) for p in build.recorded], axis=0)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.errors import ConfigError
+from excite_cli.simulation.covariate_series import CovariateSeries
 
 MOST_REPEATED = 10_000
 _MOST_SAMPLES = 20_000_000
@@ -20,7 +21,8 @@ class SimulationSettings:
     `inertia_error`: how far the true inertias are from the URDF. `repeat`: takes of each motion,
     `periods` of it in each; `pause` [s] between recordings, which then have absolute stamps.
     `bandwidth` of the controller [rad/s], `compensation`: the share of friction and springs that it
-    knows. `torque_limits`: the motors stop at the robot's effort limits.
+    knows. `torque_limits`: the motors stop at the robot's effort limits. `covariates`: further
+    columns of the log, which effects may follow.
     """
 
     seed: int = 1
@@ -38,6 +40,7 @@ class SimulationSettings:
     compensation: float = 0.8
     lead_in: float = 1.0
     torque_limits: bool = False
+    covariates: tuple[CovariateSeries, ...] = ()
 
     @property
     def physics_step(self) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from excite_cli.effects.base import Effect
-from excite_cli.errors import ConfigError
+from excite_cli.errors import ConfigError, nearest
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
@@ -87,7 +87,9 @@ def simulate(
         raise ConfigError("periods: only periodic motions (family: fourier) can go on.")
     settings.require_room(motion.duration for motion in motions)
     phi = true_inertias(robot, settings.inertia_error, settings.seed)
-    planted = (*sized(robot, declared, settings.seed), *effects)
+    for effect in (*declared, *(each.effect for each in effects)):
+        _require_column(effect, settings)
+    planted = (*sized(robot, declared, settings.seed, settings.covariates), *effects)
     runs: list[Run] = []
     tracking: dict[str, Array] = {}
     with silent_engine():
@@ -102,6 +104,22 @@ def simulate(
                 start = _next_start(run, settings)
     dataset = Dataset(robot.joint_names, tuple(runs), ("simulated",))
     return Simulation(dataset, Truth(phi, planted), tracking)
+
+
+def _dated(effect: Effect) -> bool:
+    """Whether it is not the same in two takes that differ only in when they begin."""
+    return effect.of_campaign or bool(effect.covariate)
+
+
+def _require_column(effect: Effect, settings: SimulationSettings) -> None:
+    names = [each.name for each in settings.covariates]
+    if effect.covariate and effect.covariate not in names:
+        raise ConfigError(
+            f"{effect.kind} follows '{effect.covariate}', a column that the simulated log does not "
+            f"have.{nearest(effect.covariate, names)} Give it: --covariate "
+            f"'{effect.covariate}=25,end:45,time_constant:600', or leave the effect out "
+            "(--no-declared)."
+        )
 
 
 def _takes(
@@ -125,11 +143,11 @@ def _takes(
     played: dict[tuple[float, ...], Played] = {}
     for name in names:
         run_id = RunId(name)
-        build = assemble(robot, phi, run_id, planted, start)
+        build = assemble(robot, phi, run_id, planted, start, settings.covariates)
         if settings.torque_limits:
             build.clip = np.minimum(build.clip, robot.limits.effort)
         present = [p.effect.active(run_id) for p in planted]
-        dated = any(p.effect.of_campaign for p, here in zip(planted, present, strict=True) if here)
+        dated = any(_dated(p.effect) for p, here in zip(planted, present, strict=True) if here)
         active = (*present, start if dated else 0.0)
         if active not in played:
             plant = make(build, settings.physics_step)
@@ -141,7 +159,9 @@ def _takes(
         rng = np.random.default_rng(numbers)
         run = record(build, played[active], duration, settings, rng)
         epoch = _FIRST_DAY + start if settings.pause else None
-        run = replace(run, extra={"q_ref": motion.states(run.t)[0]}, start=start, epoch=epoch)
+        extra = {"q_ref": motion.states(run.t)[0]}
+        extra |= {s.name: s.recorded(start + run.t, rng) for s in settings.covariates}
+        run = replace(run, extra=extra, start=start, epoch=epoch)
         start = _next_start(run, settings)
         yield run, _tracking_error(reference, played[active], duration)
 

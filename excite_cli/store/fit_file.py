@@ -42,6 +42,7 @@ class _StoredEffect:
     joints: tuple[int, ...]
     shape: dict[str, float]
     runs: tuple[str, ...]
+    covariate: str = ""  # files of earlier versions have none
 
 
 def write_fit(
@@ -119,6 +120,7 @@ def _effect_data(effect: Effect) -> dict[str, Any]:
         "joints": list(effect.joints),
         "shape": dict(effect.shape),
         "runs": list(effect.runs),
+        "covariate": effect.covariate,
     }
 
 
@@ -219,7 +221,9 @@ def _effect(stored: _StoredEffect, path: str, joints: int) -> Effect:
         raise ValueError(f"the effect '{stored.kind}' has no such shape, or acts on no such joint")
     if not stored.joints and kind.scope != "robot":
         raise ValueError(f"the effect '{stored.kind}' acts on no joint")
-    return kind(stored.joints, stored.shape, stored.runs)
+    if kind.follows_covariate != bool(stored.covariate):
+        raise ValueError(f"the effect '{stored.kind}' follows no column, or lacks the one it does")
+    return kind(stored.joints, stored.shape, stored.runs, stored.covariate)
 
 
 def _consistent(group: Any, phi: int, effects: int) -> ConsistentParameters | None:

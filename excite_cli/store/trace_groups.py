@@ -14,6 +14,7 @@ from excite_cli.store import checked
 
 _TORQUE = ("q", "v", "a", "load", "measured", "predicted")
 _EFFECT = ("x", "own", "partial")
+_TEXTS = ("kind", "quantity", "unit", "covariate")
 
 
 def write_torque_traces(group: Any, traces: Sequence[TorqueTrace]) -> None:
@@ -65,7 +66,7 @@ def write_traces(group: Any, traces: Traces) -> None:
         own = effects.create_group(str(number))
         names = {"joints": trace.joints, "runs": trace.runs, "rows": trace.rows}
         own.attrs.update({name: json.dumps(value) for name, value in names.items()})
-        own.attrs.update({"kind": trace.kind, "quantity": trace.quantity, "unit": trace.unit})
+        own.attrs.update({name: getattr(trace, name) for name in _TEXTS})
         own.attrs["period"] = np.nan if trace.period is None else trace.period
         _write_arrays(own, {name: getattr(trace, name) for name in ("part", "t", *_EFFECT)})
     dependence = group.create_group("dependence")
@@ -109,7 +110,7 @@ def _effect(own: Any) -> EffectTrace:
         name: checked.array(own[name], (len(t), len(rows)), finite=False) for name in _EFFECT
     }
     period = checked.number(own.attrs, "period")
-    texts: dict[str, Any] = {n: checked.text(own.attrs, n) for n in ("kind", "quantity", "unit")}
+    texts: dict[str, Any] = {name: checked.text(own.attrs, name, "") for name in _TEXTS}
     return EffectTrace(
         **texts,
         joints=_names(own, "joints"),

@@ -301,6 +301,8 @@ def _record(record: EffectRecord) -> dict[str, Any]:
         found["shape"] = dict(record.shape)
     if record.runs:
         found["runs"] = list(record.runs)
+    if record.covariate:
+        found["covariate"] = record.covariate
     return found
 
 
@@ -309,6 +311,7 @@ def _named(named: NamedEffect, runs: list[str]) -> dict[str, Any]:
         "kind": named.effect.kind,
         "joints": list(named.effect.joints),
         **({"link": named.effect.link} if named.effect.link else {}),
+        **({"covariate": named.effect.covariate} if named.effect.covariate else {}),
         "parameters": {name: asdict(value) for name, value in named.parameters.items()},
         "p_value": named.p_value,
         "share_of_residual": named.share_of_residual,

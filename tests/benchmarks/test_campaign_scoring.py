@@ -124,3 +124,22 @@ def test_sizes_of_friction_beside_what_was_missed_do_not_count(
     coulomb = Named(Called(Name("coulomb_friction", ("j1",))), sizes={"coulomb": (1.5, 0.1)})
     names = (coulomb, named("spring", joint)) if found else (coulomb,)
     assert len(score(truth, Answer(names)).sizes) == counts
+
+
+@pytest.mark.parametrize(
+    ("column", "other", "right", "wrong"),
+    [
+        ("temp", "", True, False),
+        ("fan", "", False, True),
+        ("fan", "temp", True, False),
+        ("", "", False, True),
+    ],
+)
+def test_what_follows_a_column_is_named_with_it(
+    column: str, other: str, right: bool, wrong: bool
+) -> None:
+    name = Name("covariate_friction", ("j1",))
+    there = Plant((name.kind,), name.joints, (), covariate="temp")
+    aliases = (Called(name, covariate=other),) if other else ()
+    result = judged(there, Named(Called(name, covariate=column), aliases))
+    assert (result.right, result.wrong) == (right, wrong)

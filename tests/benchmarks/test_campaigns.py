@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from benchmarks.campaigns import judge as judging
-from benchmarks.campaigns.cases import CLEAN, GROUPS, Case, group_of, make_case
+from benchmarks.campaigns.cases import (
+    CLEAN,
+    FIRST_WITH_COLUMNS,
+    GROUPS,
+    WITH_COLUMNS,
+    Case,
+    group_of,
+    make_case,
+)
 from benchmarks.campaigns.instruments import Instruments, recorded
 from benchmarks.campaigns.judge import Judged, Outcome, campaign, judge, rests
 from benchmarks.campaigns.mechanisms import solid
@@ -40,6 +48,20 @@ def test_a_case_follows_from_seed_and_index() -> None:
     assert one.instruments == again.instruments
     assert np.array_equal(one.planted[0].values, again.planted[0].values)
     assert one.instruments != other.instruments
+
+
+def test_logs_with_columns_are_cases_of_their_own_with_the_temperature_among_them() -> None:
+    for index, group in enumerate(WITH_COLUMNS, FIRST_WITH_COLUMNS):
+        assert group_of(SEED, index) == group
+    index = FIRST_WITH_COLUMNS + WITH_COLUMNS.index("offset_by_column")
+    case = make_case(SEED, index)
+    names = [each.name for each in case.settings.covariates]
+    assert sorted(case.spec.measurement.covariates) == sorted(names)
+    assert 2 <= len(names) <= 4
+    (plant,) = (each for each in case.plants if each.required)
+    assert plant.covariate == names[0]
+    warm = case.settings.covariates[0].at(np.linspace(0.0, 2400.0, 200))
+    assert np.diff(warm).min() < 0.0 < np.diff(warm).max()
 
 
 @pytest.mark.parametrize("group", ["payload", "friction_once", "offset_change", "gain_change"])

@@ -12,6 +12,10 @@ from tests.cli.program import SMOKE, Program
 pytest.importorskip("mujoco")
 
 EFFECTS = ("--effect", "coulomb_friction@elbow=1.5", "--effect", "payload@all=0.5;runs:motion_2")
+WARM = (
+    "--covariate", "temp=25,end:45,time_constant:600,noise:0.1", "--pause", "300",
+    "--effect", "covariate_offset@elbow=0.2,reference:25;covariate:temp",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +25,7 @@ def simulated(
     """The answer of `excite simulate`, and the file."""
     folder = tmp_path_factory.mktemp("simulate")
     path = folder / "data.h5"
-    arguments = (SMOKE, two_motions.path, "-o", path, "--rate", "200", *EFFECTS)
+    arguments = (SMOKE, two_motions.path, "-o", path, "--rate", "200", *EFFECTS, *WARM)
     return Program(folder, cache).answer("simulate", *arguments), path
 
 
@@ -33,7 +37,9 @@ def test_the_answer_names_runs_effects_and_file(simulated: tuple[Any, Path]) -> 
     assert [(e["kind"], e["joints"]) for e in planted] == [
         ("coulomb_friction", ["elbow"]),
         ("payload", ["slide"]),
+        ("covariate_offset", ["elbow"]),
     ]
+    assert planted[2]["covariate"] == "temp"
     assert planted[0]["parameters"]["coulomb"] == {"value": 1.5, "unit": "N·m"}
     assert planted[1]["runs"] == ["motion_2"]
     assert answer["output"] == str(path)
@@ -50,10 +56,12 @@ def test_the_file_is_measured_data_with_its_truth(
         assert file.attrs["seed"] == 1
         assert json.loads(file.attrs["settings"])["torque_noise"] == 0.01
         assert "smoke_arm.urdf" in file.attrs["config"]
+        warmer = file["runs/motion_2/temp"][()]
         run = file["runs/motion_1"]
         t, q, tau, dq = (run[key][()] for key in ("t", "q", "tau", "dq"))
     assert names == ["shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide"]
     assert t == pytest.approx(np.arange(1200) / 200)
+    assert warmer.mean() == pytest.approx(45.0 - 20.0 * np.exp(-309.0 / 600.0), abs=0.2)
     assert q.shape == tau.shape == dq.shape == (1200, 5)
     with h5py.File(two_motions.path) as planned:
         wanted, times = planned["motions/1/q"][()], planned["motions/1/t"][()]
@@ -100,6 +108,8 @@ def test_people_get_tables_and_quiet_ones_nothing_else(excite: Program, two_moti
     [
         (("--effect", "coulomb_friction@elbw=1"), "Did you mean 'elbow'?"),
         (("--motion", "7"), "has no motion 7; it has 1, 2"),
+        (("--effect", "covariate_offset@elbow=1;covariate:temp"), "--covariate 'temp=25,"),
+        (("--covariate", "temp=warm"), "'warm' is not a finite number"),
         (("--rate", "9000"), "rate: 9000 Hz cannot be recorded"),
         (("--set", "robot.joints=[elbow]"), "moves other joints than"),
     ],

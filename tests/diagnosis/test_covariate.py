@@ -17,6 +17,7 @@ from excite_cli.diagnosis.covariate import Aspect, Covariate
         ("direction and q[elbow]", Covariate("position", "elbow", Aspect.DIRECTION)),
         ("own history of load", Covariate("load", "", Aspect.HISTORY, own=True)),
         ("own load", Covariate("load", own=True)),
+        ("column[temp [°C]]", Covariate("covariate", "temp [°C]")),
     ],
 )
 def test_a_code_stands_for_one_covariate(code: str, covariate: Covariate) -> None:
@@ -35,6 +36,8 @@ def test_what_each_joint_has_of_its_own_loses_its_name() -> None:
     assert load.common == Covariate("load", own=True)
     past = Covariate("position", "elbow", Aspect.HISTORY)
     assert past.common == Covariate("position", "", Aspect.HISTORY, own=True)
+    column = Covariate("covariate", "temp", Aspect.DIRECTION)
+    assert column.common == column
     angle = Covariate("position", "elbow")
     assert angle.common == angle
 

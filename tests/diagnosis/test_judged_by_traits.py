@@ -40,6 +40,8 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
     "dahl_friction": (2.0, 2, False),
     "friction_drift": (15.0, 3, False),
     "friction_change": (4.0, 2, False),
+    "covariate_friction": (4.0, 2, False),
+    "covariate_offset": (4.0, 2, False),
     "coupled_friction": (3.0, 2, True),
     "armature": (1.0, 2, True),
     "spring": (12.0, 2, True),
@@ -62,6 +64,7 @@ REFINED: Mapping[str, tuple[str, ...]] = {
     "dahl_friction": STRAIGHT,
     "friction_drift": STRAIGHT,
     "friction_change": ("coulomb_friction", "viscous_friction"),
+    "covariate_friction": ("coulomb_friction", "viscous_friction"),
     "coupled_friction": STRAIGHT,
     "asymmetric_friction": ("coulomb_friction", "torque_offset"),
     "load_dependent_friction": ("coulomb_friction",),
@@ -71,6 +74,7 @@ LEAVES = {
     "base_tilt": 0.045, "encoder_offset": 0.0225, "torque_saturation": 4e-3, "elasticity": 2e-2,
     "backlash": 1e-2, "torque_delay": 1e-2, "stribeck_friction": 2e-2, "friction_change": 3e-2,
     "dahl_friction": 2e-2,
+    "covariate_friction": 5e-2, "covariate_offset": 5e-2,
 }  # fmt: skip
 
 

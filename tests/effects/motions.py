@@ -21,7 +21,9 @@ def states(robot: Robot, samples: int, step: float, seed: int = 0) -> tuple[Arra
 def signals_at(robot: Robot, t: Array, q: Array, v: Array, a: Array, run: str = "") -> Signals:
     """Signals whose model is the rigid bodies of the URDF alone."""
     body = RigidBody(robot, standard_parameters(robot), q, v, a)
-    return Signals(t, q, v, a, body.load, body.load, body, RunId(run))
+    # A kind that follows a column of the log finds it under no name, unless it is given one.
+    column = {"": 20.0 + t + np.sin(3.0 * t)}
+    return Signals(t, q, v, a, body.load, body.load, body, RunId(run), covariates=column)
 
 
 def signals_of(robot: Robot, samples: int = 200, step: float = 0.02, seed: int = 0) -> Signals:

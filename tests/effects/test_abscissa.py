@@ -26,7 +26,9 @@ def signals(robot: Robot) -> Signals:
     q = np.sin(2.0 * t[:, None] + phase)
     v, a = 2.0 * np.cos(2.0 * t[:, None] + phase), -4.0 * q
     body = RigidBody(robot, standard_parameters(robot), q, v, a)
-    return Signals(t, q, v, a, body.load, 1.5 * body.load, body, RunId("r1"))
+    column = {"": 20.0 + t}
+    run = RunId("r1")
+    return Signals(t, q, v, a, body.load, 1.5 * body.load, body, run, covariates=column)
 
 
 @pytest.mark.parametrize("kind", sorted(catalogue()))

@@ -36,7 +36,7 @@ def smallest(kind: type[Effect]) -> Effect:
 @pytest.mark.parametrize("name", NAMES)
 def test_traits_name_only_kinds_of_the_catalogue(name: str) -> None:
     kind = KINDS[name]
-    named = {*kind.refines, *kind.excludes, *kind.same_as, *kind.deviates_from}
+    named = {*kind.refines, *kind.excludes, *kind.same_as, *kind.deviates_from, *kind.changes_of}
     assert named <= set(NAMES) - {name}
     assert kind.surprise >= 0.0
     assert not set(kind.settings) & {p.name for p in (*kind.parameters, *kind.shapes)}
@@ -142,6 +142,7 @@ def test_packages_above_know_no_kind_by_name(package: str) -> None:
     shared = {
         "base",
         "catalogue",
+        "place",
         "placing",
         "simulated_robot",
         "parameter",

@@ -12,7 +12,7 @@ from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.measurement.reader import MAX_VALUES
-from tests.measurement.recordings import JOINTS, read, recorded, without_speed
+from tests.measurement.recordings import JOINTS, only, read, recorded, without_speed
 
 
 def flat(path: Path, names: Any = JOINTS) -> Path:
@@ -41,7 +41,7 @@ def test_written_data_come_back(tmp_path: Path) -> None:
     path = tmp_path / "new" / "data.h5"
     write_dataset(path, Dataset(JOINTS, (first, second)), {"seed": 3, "effects": ["spring"]})
     data = read(path)
-    assert data.findings == ()
+    assert "further columns: temperature." in only(data.findings, "further_columns").text
     assert [run.name for run in data.runs] == ["a", "b/1"]
     for run, back in zip((first, second), data.runs, strict=True):
         for name in ("t", "q", "tau"):

@@ -84,7 +84,7 @@ def test_a_record_says_everything_by_name(robot: Robot) -> None:
         ("stribeck_friction@elbow_joint=4,0.1", "'0.1' is not name:value"),
         ("coupled_friction@elbow_joint=4", "acts on two joints; name exactly two"),
         ("payload@all=1;runs:motion_3", "no run 'motion_3'"),
-        ("payload@all=1;motion_2", "only 'runs:name|name' is allowed"),
+        ("payload@all=1;motion_2", "only 'runs:name|name' and 'covariate:column'"),
     ],
 )
 def test_messages(robot: Robot, text: str, words: str) -> None:

@@ -1,0 +1,85 @@
+"""Effects that follow a column of the log: formulas, reference, and how they are declared."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from excite_cli.config.data_spec import EffectSpec
+from excite_cli.effects.catalogue import declared_effects
+from excite_cli.effects.covariate_friction import CovariateFriction
+from excite_cli.effects.covariate_offset import CovariateOffset
+from excite_cli.effects.signals import Signals
+from excite_cli.errors import ConfigError
+from excite_cli.robot.model import Robot
+from tests.effects.motions import signals_of
+from tests.robot.random_robots import random_robot
+
+AT_20 = {"reference": 20.0}
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return random_robot(5, joints=3, branches=False, prismatic=False)
+
+
+@pytest.fixture(scope="module")
+def signals(robot: Robot) -> Signals:
+    """Twenty degrees at first, thirty at the end."""
+    found = signals_of(robot, 300)
+    return replace(found, covariates={"temp": 20.0 + found.t * 10.0 / found.t[-1], "fan": found.t})
+
+
+def test_friction_changes_with_the_column_and_is_nothing_at_the_reference(signals: Signals) -> None:
+    effect = CovariateFriction((1,), AT_20, (), "temp")
+    tau = effect.torque(signals, np.array([-0.2, 0.05]))[:, 1]
+    v, warmer = signals.v[:, 1], signals.covariates["temp"] - 20.0
+    fast = np.abs(v) > 0.01
+    assert tau[fast] == pytest.approx((warmer * (-0.2 * np.sign(v) + 0.05 * v))[fast])
+    assert tau[0] == 0.0
+
+
+def test_an_offset_changes_with_the_column_however_the_joint_moves(signals: Signals) -> None:
+    tau = CovariateOffset((2,), AT_20, (), "temp").torque(signals, np.array([0.3]))
+    assert tau[:, 2] == pytest.approx(0.3 * (signals.covariates["temp"] - 20.0))
+    assert not tau[:, :2].any()
+
+
+def test_the_reference_is_the_mean_of_what_was_seen(robot: Robot, signals: Signals) -> None:
+    own = signals.with_covariate("temp")
+    warm = replace(own, covariates={"temp": np.full(len(own.t), 40.0)})
+    ((shape),) = CovariateFriction.grid(robot, (0,), [own, warm])
+    assert shape["reference"] == pytest.approx(32.5)
+    assert not CovariateFriction((0,), shape).finer_steps("reference", [own])
+
+
+def test_a_column_that_stands_still_is_not_looked_at(robot: Robot, signals: Signals) -> None:
+    still = replace(signals, covariates={"temp": np.full(len(signals.t), 21.7)})
+    assert CovariateOffset.grid(robot, (0,), [still, still]) == []
+
+
+def test_every_other_instant_has_every_other_value(signals: Signals) -> None:
+    assert signals.every(2).covariates["temp"] == pytest.approx(signals.covariates["temp"][::2])
+
+
+def test_sizes_are_told_per_unit_of_the_column() -> None:
+    effect = CovariateFriction((0,), AT_20, (), "temp")
+    told = effect.report(np.array([-0.2, 0.05]), np.eye(2))
+    assert told["coulomb_slope"].unit == "N·m per unit of temp"
+    assert told["viscous_slope"].unit == "N·m·s/rad per unit of temp"
+    assert (told["reference"].value, told["reference"].unit) == (20.0, "units of temp")
+
+
+def test_two_columns_on_a_joint_are_two_places() -> None:
+    places = {CovariateFriction((0,), AT_20, (), name).place for name in ("temp", "fan", "temp")}
+    assert len(places) == 2
+
+
+def test_a_declared_effect_names_its_column(robot: Robot) -> None:
+    spec = EffectSpec(kind="covariate_friction", joints=("joint_2",), covariate="temp")
+    (effect,) = declared_effects((spec,), robot)
+    assert (effect.covariate, effect.shape) == ("temp", {"reference": 0.0})
+    with pytest.raises(ConfigError, match=r"effects\[0\].covariate: covariate_friction follows"):
+        declared_effects((EffectSpec(kind="covariate_friction"),), robot)
+    with pytest.raises(ConfigError, match=r"coulomb_friction follows no column.*'temp'"):
+        declared_effects((EffectSpec(kind="coulomb_friction", covariate="temp"),), robot)
