@@ -17,7 +17,8 @@ from pathlib import Path
 from benchmarks.altered.alterations import ALTERATIONS, Alteration
 from benchmarks.altered.recordings import NAMES, Recording, recording
 from excite_cli.api.diagnosing import diagnose
-from excite_cli.api.loading import Case
+from excite_cli.api.loading import Case, load_data
+from excite_cli.diagnosis.plausibility import check_dataset
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import ExciteError
 from excite_cli.measurement.dataset import Dataset, Finding
@@ -47,12 +48,14 @@ class Said:
         return f"{self.status} {errors:16s} {missed}{', '.join(more) or '-'} | {', '.join(self.names)}"
 
 
-def said(case: Case, data: Dataset) -> Said:
-    """As `excite diagnose` does, the data from a file."""
+def said(case: Case, data: Dataset, checks: bool) -> Said:
+    """As `excite diagnose` does, the data from a file; or its `checks` of the data alone."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.h5"
         write_dataset(path, data, {})
         try:
+            if checks:
+                return Said(0, _checked(case, path), (), float("nan"), float("nan"))
             found = diagnose(case, path, tell=lambda note: None)
         except ExciteError as error:
             refused = Finding("refused", "error", str(error).replace(f"{path}: ", ""))
@@ -60,6 +63,11 @@ def said(case: Case, data: Dataset) -> Said:
     before, after = (e.mean_relative_moving for e in (found.before, found.after))
     status = 0 if found.good else 1
     return Said(status, found.findings, tuple(_names(found)), before, after)
+
+
+def _checked(case: Case, path: Path) -> tuple[Finding, ...]:
+    data = load_data(case, path, tell=lambda note: None)
+    return (*data.findings, *check_dataset(case.robot, data, case.spec))
 
 
 def _names(found: Diagnosis) -> Iterator[str]:
@@ -73,12 +81,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--log", nargs="+", choices=NAMES, default=NAMES)
     parser.add_argument("--only", nargs="+", help="alterations whose names contain one of these")
+    parser.add_argument("--checks", action="store_true", help="of the data alone: no diagnosis")
     parser.add_argument("--keys", action="store_true", help="once more with the key that settles it")
     parser.add_argument("--text", action="store_true", help="print all that is said")
     arguments = parser.parse_args()
     for name in arguments.log:
         of = recording(name)
-        usual = said(of.case, of.data)
+        usual = said(of.case, of.data, arguments.checks)
         print(f"\n{name}: {usual.line(frozenset(), ())}", flush=True)
         for title, alteration in _chosen(of, arguments.only):
             _row(of, title, alteration, usual, arguments)
@@ -99,7 +108,7 @@ def _row(
     of: Recording, title: str, alteration: Alteration, usual: Said, arguments: argparse.Namespace
 ) -> None:
     data = alteration.alter(of.data, of.case.robot)
-    found = said(of.case, data)
+    found = said(of.case, data, arguments.checks)
     print(f"  {title:27s} {found.line(usual.kinds, alteration.told)}", flush=True)
     if arguments.text:
         for each in found.findings:
@@ -107,7 +116,7 @@ def _row(
                 print(f"      {each.severity} {each.kind} ({each.run}): {each.text}")
     keys = dict(alteration.keys(of.data.joint_names))
     if keys and arguments.keys:
-        settled = said(of.with_keys(keys), data)
+        settled = said(of.with_keys(keys), data, arguments.checks)
         print(f"    {'with its key':25s} {settled.line(usual.kinds, ())}", flush=True)
 
 

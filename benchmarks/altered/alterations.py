@@ -143,15 +143,15 @@ ALTERATIONS: dict[str, Alteration] = {
         _exchanged(1, 2, "q", "dq", "tau"), ("implausible",), _names(1, 2)),
     "last two joints exchanged": Alteration(
         _exchanged(-2, -1, "q", "dq", "tau"), ("implausible",), _names(-2, -1)),
-    "torque in steps of 5": Alteration(_quantised(5.0), ("torque_resolution",)),
+    "torque in steps of 5": Alteration(_quantised(5.0), ("torque_steps",)),
     "torque in steps of 0.5": Alteration(_quantised(0.5)),
     "torque in steps of 0.05": Alteration(_quantised(0.05)),
     "clock 10 % slow": Alteration(
         _clock(0.9, True), ("clock",), lambda names: {"clock": 1 / 0.9}, speeds=True),
     "clock 10 % slow, no speeds": Alteration(
         _clock(0.9, False), ("clock",), lambda names: {"clock": 1 / 0.9}),
-    "speeds lag by 0.05 s": Alteration(_slow_speeds(0.05), ("speed_lag",), speeds=True),
-    "speeds lag by 0.2 s": Alteration(_slow_speeds(0.2), ("speed_lag",), speeds=True),
+    "speeds lag by 0.05 s": Alteration(_slow_speeds(0.05), ("lag",), speeds=True),
+    "speeds lag by 0.2 s": Alteration(_slow_speeds(0.2), ("lag",), speeds=True),
     "without gravity": Alteration(
         _without_gravity, ("no_gravity",), lambda names: {"gravity": "subtracted"}),
     "torque in mN·m": Alteration(_scaled(1e3), ("torque_scale",), _constant(1e-3)),
@@ -160,8 +160,7 @@ ALTERATIONS: dict[str, Alteration] = {
         lambda names: {"torque": "motor", "gear_ratio": dict.fromkeys(names, 100.0)}),
     "joint 2 in mN·m": Alteration(_scaled(1e3, 1), ("torque_scale",), _constant(1e-3, 1)),
     "joint 3 before its gear": Alteration(_scaled(1e-2, 2), ("torque_scale",), _constant(100.0, 2)),
-    "joint 2 in per cent of 300": Alteration(_scaled(1 / 3, 1), ("torque_scale",),
-        _constant(3.0, 1)),
+    "joint 2 in per cent of 300": Alteration(_scaled(1 / 3, 1), (), _constant(3.0, 1)),
     "torque of another run": Alteration(
         _torque_of_another_run, ("implausible", "foreign_torque"), several=True),
     "10 Hz": Alteration(_rate(10.0), ("slow_rate",)),

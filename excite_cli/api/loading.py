@@ -15,6 +15,7 @@ from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.identification.gravity import with_gravity
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.quality import raise_for_errors
@@ -161,6 +162,8 @@ def load_data(
         (~robot.sliding).astype(float),
     )
     raise_for_errors(data)
+    if problem.spec.measurement.gravity == "subtracted":
+        data = with_gravity(robot, data)
     tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs_in_words(data)}"))
     tell_findings(data.findings, tell)
     return data

@@ -64,7 +64,7 @@ def choose_processing(
         A cut-off lies beyond half the recorded rate, or measured speeds are requested and absent.
     """
     fs = float(np.median([1.0 / run.step for run in runs]))
-    frequency, power = _spectra(runs, fs)
+    frequency, power = spectra(runs, fs)
     bandwidth = _bandwidth(frequency, power)
     reasons: list[str] = []
     position = _position_cutoff(spec, frequency, power, fs, bandwidth, reasons)
@@ -90,7 +90,7 @@ def choose_processing(
     )  # fmt: skip
 
 
-def _spectra(runs: Sequence[Run], fs: float) -> tuple[Array, Array]:
+def spectra(runs: Sequence[Run], fs: float) -> tuple[Array, Array]:
     """Mean spectrum of the positions (F, n) over the runs, on one grid of frequencies."""
     from scipy.signal import welch  # takes a second to import
 

@@ -133,7 +133,8 @@ def _named(raws: list[RawRun], path: Path, taken: set[str]) -> list[RawRun]:
 def _seconds(raw: RawRun, spec: MeasurementSpec) -> tuple[Array, float | None]:
     """Stamps in seconds, and the time from 1970 to their zero, if known.
 
-    Those counted from 1970 start at 0, to keep their digits.
+    Those counted from 1970 start at 0, to keep their digits. A clock that is declared to run slow
+    or fast (`measurement.clock`) is put right.
     """
     t = np.asarray(raw.t, dtype=float)
     factor = 1.0 if raw.seconds else SECONDS[spec.time]
@@ -143,7 +144,7 @@ def _seconds(raw: RawRun, spec: MeasurementSpec) -> tuple[Array, float | None]:
         t = t - known[0]
         if known[0] * factor > SINCE_1970:
             epoch = float(known[0] * factor)
-    return t * factor, epoch
+    return t * (factor * spec.clock), epoch
 
 
 def _check_all_met(names: dict[str, str], seen: set[str]) -> None:

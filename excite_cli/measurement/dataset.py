@@ -41,7 +41,8 @@ class Run(Shown):
     used, per joint (false where saturated, stuck or bridged). `extra` holds further channels of the
     file, (T,) or (T, m), untouched. `epoch`: seconds from 1970 (UTC) to t = 0, where the data know;
     `start`: the campaign's time at t = 0 [s], once it is known (`campaign_clock`). `recorded` (T,):
-    where samples were interpolated, the hash of the nearest one in the file.
+    where samples were interpolated, the hash of the nearest one in the file. `torque_step` (n,):
+    what torques are multiples of, 0 where they are not.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Run(Shown):
     epoch: float | None = None
     start: float = 0.0
     recorded: NDArray[np.uint64] | None = None
+    torque_step: Array | None = None
 
     @property
     def id(self) -> RunId:

@@ -13,6 +13,7 @@ from excite_cli.measurement.channel_order import check_order
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.dead_channels import dead_channels
 from excite_cli.measurement.missing_values import without_missing
+from excite_cli.measurement.resolution import with_torque_steps
 from excite_cli.measurement.saturation import mask_saturated
 from excite_cli.measurement.stamps import equidistant
 from excite_cli.measurement.stuck import mask_stuck
@@ -31,6 +32,8 @@ def checked(
         findings += more
     whole, more = dead_channels(whole, joints)
     findings += more
+    whole, more = with_torque_steps(whole, joints)
+    findings += more
     parts: list[Run] = []
     for run in whole:
         for mask in (mask_saturated, mask_stuck):
@@ -39,8 +42,11 @@ def checked(
         even, more = equidistant(run)
         parts += even
         findings += more
-    findings += check_units(parts, spec, joints, limits)
-    findings += check_order(parts, joints)
+    order = check_order(parts, joints, spec.filter.velocity == "measured")
+    units = check_units(parts, spec, joints, limits)
+    if any(found.kind == "lag" for found in order):  # which is why a gain is odd
+        units = [found for found in units if found.kind not in ("gain", "clock")]
+    findings += units + order
     return parts, list(dict.fromkeys(findings))
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.measurement.clock import check_clock
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.speeds import Speeds, speeds
 from excite_cli.measurement.torque import SECONDS
@@ -54,7 +55,7 @@ def check_units(
             runs, found, spec, limits, where
         )
     if not findings:
-        findings = _odd_gains(found, joints, where)
+        findings = check_clock(runs, where) or _odd_gains(found, joints, where)
         findings += _outside(runs, joints, limits, where)
     return findings + _torque(runs, joints, limits, where)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.errors import FileError
-from excite_cli.measurement.channel_order import speed_lag
+from excite_cli.measurement.speed_lag import speed_lag
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.quality import raise_for_errors, sentence
 from tests.measurement.recordings import JOINTS, check, only, recorded, without_speed

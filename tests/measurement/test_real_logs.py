@@ -11,7 +11,7 @@ import pytest
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement.catalogue import read_dataset
-from excite_cli.measurement.channel_order import speed_lag
+from excite_cli.measurement.speed_lag import speed_lag
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.quality import raise_for_errors
 

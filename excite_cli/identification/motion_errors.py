@@ -1,0 +1,106 @@
+"""How wrong differentiated positions are: what coarse encoders add, and what a slow rate takes.
+
+Positions in counts of s are wrong by s/√12, spread over all frequencies up to half the rate f_s; of
+that the filter of positions lets pass what lies below its cut-off f_c, so speeds and accelerations
+are wrong by
+
+    σ_v² = s²/12 · 2/f_s · (2π)² f_c³/3,        σ_a² = s²/12 · 2/f_s · (2π)⁴ f_c⁵/5.
+
+Of motion at a frequency f, that filter (run forwards and backwards) and central differences over h
+keep H(f) = sinc(2 f h)/(1 + (f/f_c)⁸) in the speed; the acceleration is differentiated twice, and
+keeps H(f) sinc(2 f h). What is lost follows from the spectrum of the positions.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.identification.processing import Processing, spectra
+from excite_cli.measurement.dataset import Array, Finding, Run
+from excite_cli.measurement.resolution import lattice_step
+
+# Relative errors of speed and acceleration that are told; inertias are then low by the square.
+_SPEED, _ACCELERATION = 0.05, 0.15
+_ABOVE = 4.0  # times the floor of the spectrum: less of it is noise, not motion
+_ENOUGH = 12.0  # times the highest frequency of the motion: a rate that loses little
+
+
+@dataclass(frozen=True)
+class MotionErrors:
+    """Shares of the RMS of every joint's speed and acceleration (2, n): `counted`, `lost`."""
+
+    counts: Array
+    counted: Array
+    lost: Array
+
+
+def motion_errors(runs: Sequence[Run], processing: Processing) -> MotionErrors:
+    """By the encoders' counts, and by the rate; `counts` (n,) in rad (m), 0 where unknown."""
+    fs = processing.recorded_rate
+    cutoff = processing.position_cutoff or fs / 2
+    n = runs[0].q.shape[1]
+    counts = np.array([lattice_step(np.concatenate([r.q[:, j] for r in runs])) for j in range(n)])
+    frequency, power = spectra(runs, fs)
+    motion = np.where(power > _ABOVE * np.median(power[frequency > 0.3 * fs], axis=0), power, 0.0)
+    f = frequency[:, None]
+    kept = np.sinc(2 * f / fs) / (1 + (f / cutoff) ** 8)
+    speed, push = ((2 * np.pi * f) ** (2 * k) * motion for k in (1, 2))
+    total = np.array([speed.sum(axis=0), push.sum(axis=0)])
+    gone = np.array([
+        (speed * (1 - kept) ** 2).sum(axis=0),
+        (push * (1 - kept * np.sinc(2 * f / fs)) ** 2).sum(axis=0),
+    ])  # fmt: skip
+    noise = counts**2 / 12 * 2 / fs
+    added = np.array([
+        noise * (2 * np.pi) ** 2 * cutoff**3 / 3,
+        noise * (2 * np.pi) ** 4 * cutoff**5 / 5,
+    ])  # fmt: skip
+    width = frequency[1] - frequency[0]
+    return MotionErrors(counts, _root(added, total * width), _root(gone, total))
+
+
+def _root(part: Array, whole: Array) -> Array:
+    return np.sqrt(np.divide(part, whole, out=np.zeros_like(part), where=whole > 0))
+
+
+def check_motion(
+    runs: Sequence[Run], processing: Processing, names: Sequence[str]
+) -> tuple[Finding, ...]:
+    """Warnings where positions are too coarse, or too rare, for what is made of them."""
+    errors, fs = motion_errors(runs, processing), processing.recorded_rate
+    found = []
+    coarse = _told(errors.counted)
+    if coarse.any():
+        joints = tuple(names[j] for j in np.flatnonzero(coarse))
+        steps = ", ".join(f"{errors.counts[j]:.2g}" for j in np.flatnonzero(coarse))
+        text = (
+            f"positions of {', '.join(joints)} come in steps of {steps} rad (m): speeds are wrong "
+            f"by {_shares(errors.counted[0, coarse])}, accelerations by "
+            f"{_shares(errors.counted[1, coarse])}, which makes inertias too small and puts "
+            "friction off where joints are slow. Record finer positions (of the motors, with "
+            "measurement.position: motor), or set measurement.filter.position [Hz] lower than "
+            f"{processing.position_cutoff or fs / 2:.3g}"
+        )
+        found.append(Finding("coarse_positions", "warning", text, "", joints))
+    slow = _told(errors.lost)
+    if slow.any():
+        joints = tuple(names[j] for j in np.flatnonzero(slow))
+        text = (
+            f"at {fs:.3g} Hz, with positions cut off at {processing.position_cutoff or fs / 2:.3g} "
+            f"Hz, speeds of {', '.join(joints)} lose {_shares(errors.lost[0, slow])} and "
+            f"accelerations {_shares(errors.lost[1, slow])}: inertias and friction come out wrong "
+            f"by as much. Record at {_ENOUGH * processing.bandwidth:.2g} Hz or more, move more "
+            "slowly, or set measurement.filter.position [Hz] yourself"
+        )
+        found.append(Finding("slow_rate", "warning", text, "", joints))
+    return tuple(found)
+
+
+def _told(errors: Array) -> np.ndarray:
+    return np.asarray((errors[0] > _SPEED) | (errors[1] > _ACCELERATION))
+
+
+def _shares(errors: Array) -> str:
+    low, high = errors.min(), errors.max()
+    return f"{high:.0%}" if high - low < 0.01 else f"{low:.0%} to {high:.0%}"
