@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.foreign_torques import check_runs
 from excite_cli.diagnosis.rearranged import (
     CLEAR,
     PRICE,
@@ -70,6 +71,9 @@ def check_plausibility(
     scale = check_scale(robot, samples, declared, names)
     if any(found.kind == "no_gravity" for found in scale):
         return scale  # order and signs are judged by the whole torque
+    foreign = check_runs(model, runs)
+    if foreign:
+        return (*scale, *foreign)
     return (*scale, *_check_arrangement(names, samples, model, declared))
 
 

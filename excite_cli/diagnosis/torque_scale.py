@@ -28,9 +28,10 @@ _FACTOR = 4.0
 _KNOWN = 2.0  # weight over its standard deviation from which a joint is judged
 _OWN = 0.05  # share of the energy of g that no other column has
 _ROWS = 40
-_GONE, _INERTIA = 0.2, 0.3  # |k| at most, m at least, of torques without gravity
+# k of torques without gravity, whose masses may be off by a half; the least m; and what may be left
+# of them by the URDF's dynamics with gravity added.
+_GONE, _INERTIA, _FITS = (-0.6, 0.3), 0.3, 0.15
 _HEAVY = 0.5  # weight over torque: less would not be missed
-_FITS = 0.5  # of what does not fit, that is left with gravity added
 _POWER = 0.4  # in log: a factor so near to a power of ten is taken for it
 
 
@@ -49,12 +50,12 @@ def check_scale(
 ) -> tuple[Finding, ...]:
     """At most one warning: torques of another unit, or without gravity."""
     found = _weights(robot, samples)
-    gone = found.judged & (np.abs(found.k) < _GONE) & (found.m > _INERTIA) & (found.heavy > _HEAVY)
     here = found.judged & (found.heavy > _HEAVY)
+    gone = here & (found.k > _GONE[0]) & (found.k < _GONE[1]) & (found.m > _INERTIA)
     if gone.sum() > 1 and gone.sum() >= 0.5 * here.sum():
         left, whole = _left(robot, samples, gone)
-        if whole < _FITS * left:
-            return (_without_gravity((left, whole), gone, names),)
+        if whole < min(_FITS, left):
+            return (_without_gravity(found, whole, gone, names),)
     off = found.judged & ((found.k > _FACTOR) | ((found.k < 1 / _FACTOR) & (found.heavy > _FACTOR)))
     if not off.any():
         return ()
@@ -98,13 +99,14 @@ def _left(robot: Robot, samples: Samples, joints: NDArray[np.bool_]) -> tuple[fl
 
 
 def _without_gravity(
-    left: tuple[float, float], gone: NDArray[np.bool_], names: Sequence[str]
+    found: _Weight, left: float, gone: NDArray[np.bool_], names: Sequence[str]
 ) -> Finding:
     joints = tuple(names[j] for j in np.flatnonzero(gone))
+    shares = ", ".join(f"{found.k[j]:.2f}" for j in np.flatnonzero(gone))
     text = (
-        f"gravity seems to be subtracted from the torques of {', '.join(joints)}: as they are, "
-        f"{left[0]:.0%} of them do not fit the URDF with any friction or stiffness; with its "
-        f"gravity added {left[1]:.0%}. Record the whole torque; or, if the controller subtracted "
+        f"gravity seems to be subtracted from torques: those of {', '.join(joints)} hold {shares} "
+        "times the weight that these joints carry by the URDF; with it added, all but "
+        f"{left:.0%} of them fits. Record the whole torque; or, if the controller subtracted "
         "the gravity of this URDF, write measurement.gravity: subtracted, and it is added again. "
         "If the data are right as they are, say so: measurement.trust: true"
     )

@@ -16,13 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.identification.processing import Processing, spectra
-from excite_cli.measurement.dataset import Array, Finding, Run
+from excite_cli.identification.processing import ABOVE_FLOOR, Processing, spectra
+from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.resolution import lattice_step
 
-# Relative errors of speed and acceleration that are told; inertias are then low by the square.
-_SPEED, _ACCELERATION = 0.05, 0.15
-_ABOVE = 4.0  # times the floor of the spectrum: less of it is noise, not motion
+# Relative errors of speed and acceleration that are told. What is lost is lost in the same way all
+# the time, and inertias and friction are off by as much; what counts add is noise, and makes
+# inertias too small by its square.
+_LOST, _COUNTED = (0.015, 0.04), (0.05, 0.15)
+_FASTEST = 10.0  # Hz, of motion
 _ENOUGH = 12.0  # times the highest frequency of the motion: a rate that loses little
 
 
@@ -42,7 +44,7 @@ def motion_errors(runs: Sequence[Run], processing: Processing) -> MotionErrors:
     n = runs[0].q.shape[1]
     counts = np.array([lattice_step(np.concatenate([r.q[:, j] for r in runs])) for j in range(n)])
     frequency, power = spectra(runs, fs)
-    motion = np.where(power > _ABOVE * np.median(power[frequency > 0.3 * fs], axis=0), power, 0.0)
+    motion = _of_motion(frequency, power, fs)
     f = frequency[:, None]
     kept = np.sinc(2 * f / fs) / (1 + (f / cutoff) ** 8)
     speed, push = ((2 * np.pi * f) ** (2 * k) * motion for k in (1, 2))
@@ -60,6 +62,14 @@ def motion_errors(runs: Sequence[Run], processing: Processing) -> MotionErrors:
     return MotionErrors(counts, _root(added, total * width), _root(gone, total))
 
 
+def _of_motion(frequency: Array, power: Array, fs: float) -> Array:
+    """The spectrum (F, n) up to where it meets its floor; the rest is noise."""
+    floor = np.median(power[frequency > 0.3 * fs], axis=0)
+    met = np.logical_or.accumulate(power < ABOVE_FLOOR * floor, axis=0)
+    met[0] = False
+    return np.where(met | (frequency[:, None] > _FASTEST), 0.0, power)
+
+
 def _root(part: Array, whole: Array) -> Array:
     return np.sqrt(np.divide(part, whole, out=np.zeros_like(part), where=whole > 0))
 
@@ -70,10 +80,10 @@ def check_motion(
     """Warnings where positions are too coarse, or too rare, for what is made of them."""
     errors, fs = motion_errors(runs, processing), processing.recorded_rate
     found = []
-    coarse = _told(errors.counted)
+    coarse = _told(errors.counted, _COUNTED)
     if coarse.any():
         joints = tuple(names[j] for j in np.flatnonzero(coarse))
-        steps = ", ".join(f"{errors.counts[j]:.2g}" for j in np.flatnonzero(coarse))
+        steps = ", ".join(dict.fromkeys(f"{each:.2g}" for each in errors.counts[coarse]))
         text = (
             f"positions of {', '.join(joints)} come in steps of {steps} rad (m): speeds are wrong "
             f"by {_shares(errors.counted[0, coarse])}, accelerations by "
@@ -83,7 +93,7 @@ def check_motion(
             f"{processing.position_cutoff or fs / 2:.3g}"
         )
         found.append(Finding("coarse_positions", "warning", text, "", joints))
-    slow = _told(errors.lost)
+    slow = _told(errors.lost, _LOST)
     if slow.any():
         joints = tuple(names[j] for j in np.flatnonzero(slow))
         text = (
@@ -97,10 +107,10 @@ def check_motion(
     return tuple(found)
 
 
-def _told(errors: Array) -> np.ndarray:
-    return np.asarray((errors[0] > _SPEED) | (errors[1] > _ACCELERATION))
+def _told(errors: Array, least: tuple[float, float]) -> Mask:
+    return np.asarray((errors > np.array(least)[:, None]).any(axis=0))
 
 
 def _shares(errors: Array) -> str:
     low, high = errors.min(), errors.max()
-    return f"{high:.0%}" if high - low < 0.01 else f"{low:.0%} to {high:.0%}"
+    return f"{100 * high:.2g} %" if high < 1.1 * low else f"{100 * low:.2g} to {100 * high:.2g} %"

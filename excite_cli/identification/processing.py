@@ -16,7 +16,7 @@ from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Array, Run
 
 # The signal has met its floor where the spectrum is below this multiple of it.
-_ABOVE_FLOOR = 20.0
+ABOVE_FLOOR = 20.0
 _HIGHEST_POSITION, _LOWEST_POSITION = 40.0, 8.0  # Hz
 _SHARE_OF_SPEED = 0.99
 _PARALLEL_BY_BANDWIDTH, _HIGHEST_PARALLEL, _LOWEST_PARALLEL = 6.0, 12.0, 4.0
@@ -118,7 +118,7 @@ def _position_cutoff(
     if spec.position != "auto":
         return _given_cutoff("position", spec.position, fs)
     floor = np.median(power[frequency > 0.3 * fs], axis=0)
-    above = power > _ABOVE_FLOOR * floor
+    above = power > ABOVE_FLOOR * floor
     last = [frequency[np.flatnonzero(~column)[0]] if not column.all() else fs for column in above.T]
     found = float(np.median(last))
     lowest = max(_LOWEST_POSITION, 5.0 * bandwidth)

@@ -1,6 +1,6 @@
 """Torques that come in steps: how large the steps are, and what they hide.
 
-A torque that is rounded to multiples of a step is wrong by up to half of it, by step/√12 on average.
+A torque that is rounded to multiples of a step is wrong by up to half of it, step/√12 on average.
 While a joint moves through many steps that is noise; where the torque stays on one step the error
 stays as well, and no filter takes it out. So the step is kept with the run, for standard deviations
 (`identification.rounding`), and told where it is more than a few per cent of the torque.

@@ -38,7 +38,8 @@ def check_lag(runs: Sequence[Run], used: bool, where: str) -> list[Finding]:
             f"leaves {filtered:.2g} of them, a delay {delayed:.2g})"
         )
     else:
-        what = f"come {abs(lag) * 1e3:.3g} ms {'after' if lag > 0 else 'before'} the change of position"
+        way = "after" if lag > 0 else "before"
+        what = f"come {abs(lag) * 1e3:.3g} ms {way} the change of position"
     use = (
         "measurement.filter.velocity: measured makes accelerations of them; write differentiated"
         if used
