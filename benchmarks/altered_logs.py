@@ -2,10 +2,15 @@
 
     python -m benchmarks.altered_logs [--only ur10 … | 'torque in' …] [--keys] [--text]
 
-Recordings of simulated and of real robots are altered the ways that files go wrong, and diagnosed as
-a user would: exit status, what is said of the data that is not said of the unaltered file, what is
-named, and the error on held-out data before and after. With `--keys` once more with the key that
-settles it.
+Recordings of simulated and of real robots are altered the ways that files go wrong, and diagnosed
+as a user would: exit status, what is said of the data that is not said of the unaltered file, what
+is named, and the error on held-out data before and after. With `--keys` once more with the key that
+settles it; `!` where a mistake is not told.
+
+    python -m benchmarks.altered_logs --sound 56 [--seed 21]
+
+The data of sound recordings are checked as `identify` and `diagnose` check them: how many are
+refused, and of how many something is said that is not so.
 """
 
 import argparse
@@ -16,6 +21,7 @@ from pathlib import Path
 
 from benchmarks.altered.alterations import ALTERATIONS, Alteration
 from benchmarks.altered.recordings import NAMES, Recording, recording
+from benchmarks.altered.sound import TRUE, sound_logs
 from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.loading import Case, load_data
 from excite_cli.diagnosis.plausibility import check_dataset
@@ -45,18 +51,19 @@ class Said:
         more = sorted(self.kinds - usual)
         missed = "! " if told and not (self.kinds & set(told) or self.status == 2) else ""
         errors = f"{self.before:.1%} → {self.after:.1%}"
-        return f"{self.status} {errors:16s} {missed}{', '.join(more) or '-'} | {', '.join(self.names)}"
+        names = ", ".join(self.names)
+        return f"{self.status} {errors:16s} {missed}{', '.join(more) or '-'} | {names}"
 
 
-def said(case: Case, data: Dataset, checks: bool) -> Said:
+def said(case: Case, data: Dataset, checks: bool, sealed: str | None = None) -> Said:
     """As `excite diagnose` does, the data from a file; or its `checks` of the data alone."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.h5"
         write_dataset(path, data, {})
         try:
             if checks:
-                return Said(0, _checked(case, path), (), float("nan"), float("nan"))
-            found = diagnose(case, path, tell=lambda note: None)
+                return Said(0, _checked(case, path, sealed), (), float("nan"), float("nan"))
+            found = diagnose(case, path, sealed, tell=lambda note: None)
         except ExciteError as error:
             refused = Finding("refused", "error", str(error).replace(f"{path}: ", ""))
             return Said(2, (refused,), (), float("nan"), float("nan"))
@@ -67,7 +74,7 @@ def said(case: Case, data: Dataset, checks: bool) -> Said:
 
 def _checked(case: Case, path: Path) -> tuple[Finding, ...]:
     data = load_data(case, path, tell=lambda note: None)
-    return (*data.findings, *check_dataset(case.robot, data, case.spec))
+    return (*data.findings, *check_dataset(case.robot, data, case.spec, sealed))
 
 
 def _names(found: Diagnosis) -> Iterator[str]:
@@ -82,15 +89,34 @@ def main() -> None:
     parser.add_argument("--log", nargs="+", choices=NAMES, default=NAMES)
     parser.add_argument("--only", nargs="+", help="alterations whose names contain one of these")
     parser.add_argument("--checks", action="store_true", help="of the data alone: no diagnosis")
-    parser.add_argument("--keys", action="store_true", help="once more with the key that settles it")
+    parser.add_argument("--keys", action="store_true", help="again with the key that settles it")
     parser.add_argument("--text", action="store_true", help="print all that is said")
+    parser.add_argument("--sound", type=int, help="check so many sound campaigns, and real logs")
+    parser.add_argument("--seed", type=int, default=21, help="of the sound campaigns")
     arguments = parser.parse_args()
+    if arguments.sound is not None:
+        check_sound(arguments.sound, arguments.seed)
+        return
     for name in arguments.log:
         of = recording(name)
         usual = said(of.case, of.data, arguments.checks)
         print(f"\n{name}: {usual.line(frozenset(), ())}", flush=True)
         for title, alteration in _chosen(of, arguments.only):
             _row(of, title, alteration, usual, arguments)
+
+
+def check_sound(simulated: int, seed: int) -> None:
+    """Print what is said of sound recordings, and how often that is wrong."""
+    logs, refused, warned = 0, 0, 0
+    for log in sound_logs(simulated, seed):
+        found = said(log.case, log.data, checks=True, sealed=log.sealed)
+        wrong = found.kinds - TRUE
+        logs, refused, warned = logs + 1, refused + (found.status == 2), warned + bool(wrong)
+        print(f"  {log.name:44s} {', '.join(sorted(wrong)) or '-'}", flush=True)
+        for each in found.findings:
+            if each.kind in wrong:
+                print(f"      {each.severity} {each.kind} ({each.run}): {each.text}", flush=True)
+    print(f"{logs} sound logs: {refused} refused, {warned - refused} with a false warning")
 
 
 def _chosen(of: Recording, only: Sequence[str] | None) -> Iterator[tuple[str, Alteration]]:

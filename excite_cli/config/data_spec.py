@@ -76,7 +76,8 @@ class MeasurementSpec(Section):
     )
     gear_ratio: PerJoint = Field(1.0, description="motor turns per turn of the joint, with sign")
     torque_constant: PerJoint = Field(
-        1.0, description="[N·m/A] at the motor, for torque: current; of other units, N·m in one of them"
+        1.0,
+        description="[N·m/A] at the motor, for torque: current; of another unit, N·m in one of it",
     )
     coupling: dict[str, dict[str, Finite]] = Field(
         default_factory=dict,

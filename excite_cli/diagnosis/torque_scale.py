@@ -4,10 +4,10 @@ Where a joint moves, its torque is fitted by least squares as
 
     τ ≈ k g(q) + m (τ_URDF − g(q)) + b v + c sgn v,
 
-with the URDF's gravity g. Masses may be wrong by a half, but not by a factor of `_FACTOR`: a k beyond
-that is another unit, the torque before a gear, or a counterbalance. A k of about 0 on all joints that
-carry weight, where inertia shows, is a torque from which the controller took gravity away. Joints
-whose weight the URDF hardly knows (masses 30 %, centres of mass 3 cm) are not judged.
+with the URDF's gravity g. Masses may be wrong by a half, but not by a factor of `_FACTOR`: a k
+beyond that is another unit, the torque before a gear, or a counterbalance. A k of about 0 on most
+joints that carry weight, where inertia shows, is a torque from which the controller took gravity
+away. Joints whose weight the URDF hardly knows (masses 30 %, centres of mass 3 cm) are not judged.
 """
 
 from collections.abc import Sequence

@@ -121,10 +121,7 @@ def _covariance(
     bread = solution.inverse
     if weights is not None:
         bread = _curvature(runs, solution.x, sigma, extra)
-        runs = [
-            replace(run, weights=weight)
-            for run, weight in zip(runs, weights, strict=True)
-        ]
+        runs = [replace(run, weights=weight) for run, weight in zip(runs, weights, strict=True)]
     found = estimate_covariance(runs, solution.x, bread, sigma)
     if extra is None:
         return found

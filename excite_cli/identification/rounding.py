@@ -1,8 +1,8 @@
 """What rounded torques leave uncertain: an error that stays while the recorded torque stays.
 
-A torque that is recorded in steps of s is wrong by what is uniform within ± s/2. Between two changes
-of the recorded value the error is taken for one number of variance s²/12, independent from stretch
-to stretch: an error that a slow motion does not average out.
+A torque that is recorded in steps of s is wrong by what is uniform within ± s/2. Between two
+changes of the recorded value the error is taken for one number of variance s²/12, independent from
+stretch to stretch: an error that a slow motion does not average out.
 """
 
 import numpy as np

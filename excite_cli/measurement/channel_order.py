@@ -11,9 +11,7 @@ from excite_cli.measurement.speeds import speeds
 _FOREIGN, _OWN, _OPPOSITE = 0.9, 0.5, -0.8
 
 
-def check_order(
-    runs: Sequence[Run], joints: tuple[str, ...], used: bool = False
-) -> list[Finding]:
+def check_order(runs: Sequence[Run], joints: tuple[str, ...], used: bool = False) -> list[Finding]:
     """Recorded speeds that follow another joint's positions, go the other way, or lag behind.
 
     `used`: accelerations are made of the recorded speeds.

@@ -46,7 +46,9 @@ def check_clock(runs: Sequence[Run], where: str) -> list[Finding]:
 
 def _gains(runs: Sequence[Run]) -> Array:
     """Gain of every joint that moves; NaN where the speeds are not the positions' own."""
-    moved, integrated = (np.concatenate(each) for each in zip(*map(_over_windows, runs)))
+    moved, integrated = (
+        np.concatenate(each) for each in zip(*map(_over_windows, runs), strict=True)
+    )
     own = np.sum(moved**2, axis=0)
     moves = own > 1e-4 * own.max()
     gains = np.sum(moved * integrated, axis=0)[moves] / own[moves]

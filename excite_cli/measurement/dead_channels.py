@@ -59,10 +59,11 @@ def _of_run(
             findings.append(Finding("held", "warning", text, run.name, (joint,)))
         elif not still[j]:
             text = (
-                f"torque of {joint} is constant at {level:.6g} while it moves: the channel is "
-                "dead, or another one was meant (measurement.channels, measurement.names)"
+                f"torque of {joint} is constant at {level + 0.0:.6g} while it moves: the channel is "
+                "dead or too coarse for it (leave the joint out of robot.joints), or another one "
+                "was meant (measurement.channels, measurement.names)"
             )
-            findings.append(Finding("dead", "error", text, run.name, (joint,)))
+            findings.append(Finding("dead_torque", "error", text, run.name, (joint,)))
     for j in np.flatnonzero(stands & ~silent & ~still):
         text = f"position of {joints[j]} is constant at {run.q[0, j]:.6g} in this run"
         findings.append(Finding("held", "note", text, run.name, (joints[j],)))
@@ -73,7 +74,9 @@ def _of_run(
         if dead:
             text = f"recorded speed of {', '.join(dead)} is constant while its position changes; "
             findings.append(
-                Finding("dead", "warning", text + "recorded speeds are not used", run.name, dead)
+                Finding(
+                    "dead_speed", "warning", text + "recorded speeds are not used", run.name, dead
+                )
             )
             run = replace(run, dq=None)
     return run, findings

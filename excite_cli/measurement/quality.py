@@ -12,6 +12,7 @@ from excite_cli.errors import FileError
 from excite_cli.measurement.channel_order import check_order
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.dead_channels import dead_channels
+from excite_cli.measurement.merged_findings import merged
 from excite_cli.measurement.missing_values import without_missing
 from excite_cli.measurement.resolution import with_torque_steps
 from excite_cli.measurement.saturation import mask_saturated
@@ -54,7 +55,7 @@ def raise_for_errors(dataset: Dataset) -> None:
     """Raise one FileError that lists every finding of severity `error`; else do nothing."""
     errors = [found for found in dataset.findings if found.severity == "error"]
     if errors:
-        lines = "".join(f"\n- {sentence(found)}" for found in errors)
+        lines = "".join(f"\n- {sentence(found)}" for found in merged(errors))
         raise FileError(f"{', '.join(dataset.sources)}: these data cannot be used:{lines}")
 
 

@@ -223,11 +223,11 @@ def _torque(
             f"torque of {joints[j]} reaches {largest[j]:.4g} N·m, {share[j]:.3g} times its effort "
             "limit: a placeholder in the URDF, or another unit"
         )
-        return [Finding("units", "note", text, where, (joints[j],))]
+        return [Finding("torque_units", "note", text, where, (joints[j],))]
     if 0 < share.max() < 0.01:
         text = (
             f"torques stay below {share.max():.2g} of the effort limits: are they of the motors, "
             "before the gears (measurement.torque: motor)?"
         )
-        return [Finding("units", "warning", text, where)]
+        return [Finding("torque_units", "warning", text, where)]
     return []

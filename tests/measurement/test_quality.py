@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from excite_cli.errors import FileError
-from excite_cli.measurement.speed_lag import speed_lag
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.quality import raise_for_errors, sentence
+from excite_cli.measurement.speed_lag import speed_lag
 from tests.measurement.recordings import JOINTS, check, only, recorded, without_speed
 
 
@@ -116,8 +116,8 @@ def test_odd_gain_offset_and_torque() -> None:
 
 
 def test_dead_torque() -> None:
-    error(check(with_tau(recorded(), 1, 0.0))[1], "dead", "torque of elbow is constant at 0")
-    error(check(with_tau(recorded(), 1, np.nan))[1], "dead", "torque of elbow is NaN")
+    error(check(with_tau(recorded(), 1, 0.0))[1], "dead_torque", "torque of elbow is constant at 0")
+    error(check(with_tau(recorded(), 1, np.nan))[1], "dead_torque", "torque of elbow is NaN")
 
 
 def test_dead_position() -> None:
@@ -144,7 +144,7 @@ def test_dead_speed_is_not_used() -> None:
     run = recorded()
     assert run.dq is not None
     (back,), findings = check(replace(run, dq=run.dq * [1, 0, 1]))
-    assert "elbow is constant" in only(findings, "dead").text
+    assert "elbow is constant" in only(findings, "dead_speed").text
     assert back.dq is None
 
 
@@ -206,7 +206,7 @@ def test_stale_messages_are_masked() -> None:
     q[300:304], tau[300:304] = q[299], tau[299]
     q[900], tau[900] = q[899], tau[899]
     (back,), findings = check(replace(run, q=q, tau=tau))
-    assert "5 of 1600 samples" in only(findings, "stuck").text
+    assert "5 of 1600 samples" in only(findings, "stale").text
     assert np.flatnonzero(~back.usable()[:, 0]).tolist() == [300, 301, 302, 303, 900]
 
 
@@ -220,7 +220,7 @@ def test_a_torque_that_stands_for_a_while() -> None:
 
 def test_missing_torque_is_masked_for_its_joint() -> None:
     (back,), findings = check(with_tau(recorded(), 1, np.inf, slice(100, 130)))
-    assert "30 of 1600" in only(findings, "nan").text
+    assert "30 of 1600" in only(findings, "nan_torque").text
     assert np.flatnonzero(~back.usable()[:, 1]).tolist() == list(range(100, 130))
     assert back.usable()[:, [0, 2]].all()
     assert np.isfinite(back.tau).all()

@@ -11,9 +11,9 @@ import pytest
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement.catalogue import read_dataset
-from excite_cli.measurement.speed_lag import speed_lag
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.quality import raise_for_errors
+from excite_cli.measurement.speed_lag import speed_lag
 
 LOGS = Path(__file__).resolve().parents[2] / "data"
 ROBOTS = {
