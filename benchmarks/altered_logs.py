@@ -72,7 +72,7 @@ def said(case: Case, data: Dataset, checks: bool, sealed: str | None = None) -> 
     return Said(status, found.findings, tuple(_names(found)), before, after)
 
 
-def _checked(case: Case, path: Path) -> tuple[Finding, ...]:
+def _checked(case: Case, path: Path, sealed: str | None = None) -> tuple[Finding, ...]:
     data = load_data(case, path, tell=lambda note: None)
     return (*data.findings, *check_dataset(case.robot, data, case.spec, sealed))
 

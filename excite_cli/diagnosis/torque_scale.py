@@ -28,6 +28,7 @@ _FACTOR = 4.0
 _KNOWN = 2.0  # weight over its standard deviation from which a joint is judged
 _OWN = 0.05  # share of the energy of g that no other column has
 _ROWS = 40
+_DUST = 1e-3  # of the largest weight: less is an axis that stands upright
 # k of torques without gravity, whose masses may be off by a half; the least m; and what may be left
 # of them by the URDF's dynamics with gravity added.
 _GONE, _INERTIA, _FITS = (-0.6, 0.3), 0.3, 0.15
@@ -56,7 +57,9 @@ def check_scale(
         left, whole = _left(robot, samples, gone)
         if whole < min(_FITS, left):
             return (_without_gravity(found, whole, gone, names),)
-    off = found.judged & ((found.k > _FACTOR) | ((found.k < 1 / _FACTOR) & (found.heavy > _FACTOR)))
+    shows = np.abs(found.k) * found.heavy > _HEAVY
+    light = (found.k < 1 / _FACTOR) & (found.heavy > _FACTOR)
+    off = found.judged & (((found.k > _FACTOR) & shows) | light)
     if not off.any():
         return ()
     return (_another_unit(found, off, declared, names),)
@@ -72,12 +75,14 @@ def _weights(robot: Robot, samples: Samples) -> _Weight:
     deviation = np.sqrt(np.square(unsure).sum(axis=-1))
     k, m, heavy = np.ones(n), np.ones(n), np.zeros(n)
     judged = np.zeros(n, bool)
+    dust = _DUST * np.abs(gravity).max(initial=0.0)
     for j in range(n):
         rows = samples.moves[:, j] & samples.known[:, j]
         if rows.sum() < _ROWS or not samples.tau[rows, j].any():
             continue
         g, v, tau = gravity[rows, j], samples.v[rows, j], samples.tau[rows, j]
         known = np.linalg.norm(g) > _KNOWN * np.linalg.norm(deviation[rows, j])
+        known &= np.abs(g).max() > dust
         others = np.column_stack([inertial[rows, j], v, np.sign(v)])
         own = g - others @ np.linalg.lstsq(others, g, rcond=None)[0]
         judged[j] = known and np.square(own).sum() > _OWN * np.square(g).sum()

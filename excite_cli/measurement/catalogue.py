@@ -15,6 +15,7 @@ from excite_cli.measurement.bag_reader import BagReader
 from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.hdf5_reader import Hdf5Reader
+from excite_cli.measurement.joined_files import is_part, joined
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.quality import checked
 from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOptions
@@ -66,8 +67,7 @@ def read_dataset(
     runs: list[Run] = []
     taken: set[str] = set()
     seen: set[str] = set()
-    for path in paths:
-        raws = reader_for(path).read(path, options)
+    for path, raws in _recordings(paths, options):
         seen.update(name for raw in raws for column in raw.columns.values() for name in column)
         named = _named(raws, path, taken)
         arranged = []
@@ -82,6 +82,20 @@ def read_dataset(
         findings += more
     _check_all_met(spec.names, seen)
     return Dataset(joint_names, tuple(runs), tuple(map(str, paths)), tuple(findings))
+
+
+def _recordings(paths: Sequence[Path], options: ReadOptions) -> list[tuple[Path, list[RawRun]]]:
+    """What the files hold; those with some channels of a recording are joined, the first's place.
+
+    Of one recording only: which file belongs to which of several cannot be known.
+    """
+    read = [(path, reader_for(path).read(path, options)) for path in paths]
+    parts = [(path, raw) for path, raws in read for raw in raws if is_part(raw)]
+    found = [(path, [raw for raw in raws if not is_part(raw)]) for path, raws in read]
+    if parts:
+        path, whole = joined(parts)
+        found[list(paths).index(path)][1].append(whole)
+    return [(path, raws) for path, raws in found if raws]
 
 
 def _checked(path: Path, runs: list[Run], *about: Any) -> tuple[list[Run], list[Finding]]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from excite_cli.measurement.dataset import Array, Finding, Run
 
-_TOLD = 0.05  # RMS of the rounding, as a share of the torque's standard deviation
+_TOLD = 0.1  # RMS of the rounding, as a share of the torque's standard deviation
 _OFF = 0.02  # share by which the smallest gap may miss a step; and how often that may add up
 _MOST = 5
 _REPEATED = 0.9  # more different values than this share of samples are no lattice

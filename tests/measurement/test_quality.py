@@ -106,9 +106,9 @@ def test_odd_gain_offset_and_torque() -> None:
     assert "elbow is 1.6 times" in found.text
     found = only(check(with_q(run, run.q + np.array([0, 3.5, 0])))[1], "outside_limits")
     assert "measurement.offset" in found.text
-    found = only(check(replace(run, tau=run.tau * 100))[1], "units")
+    found = only(check(replace(run, tau=run.tau * 100))[1], "torque_units")
     assert found.severity == "note"
-    found = only(check(replace(run, tau=run.tau / 100))[1], "units")
+    found = only(check(replace(run, tau=run.tau / 100))[1], "torque_units")
     assert "measurement.torque: motor" in found.text
 
 
@@ -231,7 +231,7 @@ def test_missing_positions_are_bridged_or_split() -> None:
     q = run.q.copy()
     q[500:502, 0] = np.nan
     (back,), findings = check(with_q(run, q))
-    assert [found.kind for found in findings] == ["nan", "bridged"]
+    assert [found.kind for found in findings] == ["nan_position", "bridged"]
     np.testing.assert_allclose(back.q, run.q, atol=1e-5)
     assert np.flatnonzero(~back.usable().any(axis=1)).tolist() == [500, 501]
     q[800:900, 2] = np.nan
@@ -245,10 +245,10 @@ def test_missing_speed_and_stamps() -> None:
     assert run.dq is not None
     dq, t = run.dq.copy(), run.t.copy()
     dq[7, 1] = np.nan
-    assert only(check(replace(run, dq=dq))[1], "nan").severity == "note"
+    assert only(check(replace(run, dq=dq))[1], "nan_speed").severity == "note"
     dq[:, 1] = np.nan
     (back,), findings = check(replace(run, dq=dq))
-    only(findings, "nan")
+    only(findings, "nan_speed")
     assert back.dq is None
     t[40] = np.nan
     assert [found.kind for found in check(replace(run, t=t))[1]] == ["nan", "bridged"]
@@ -296,7 +296,7 @@ def test_stale_messages_are_filled_and_masked_be_they_slow_or_close(rate: float)
         stale[at + 1 : at + 1 + length] = True
     held = np.maximum.accumulate(np.where(stale, 0, np.arange(len(run.t))))
     runs, findings = check(replace(run, q=run.q[held], tau=run.tau[held], dq=None))
-    assert only(findings, "stuck").severity == "warning"
+    assert only(findings, "stale").severity == "warning"
     assert np.array_equal(runs[0].usable(), np.tile(~stale[:, None], run.tau.shape[1]))
     step = np.abs(np.diff(run.q, axis=0)).max()
     assert np.abs(runs[0].q - run.q).max() < 0.5 * step
