@@ -93,7 +93,7 @@ def _recordings(paths: Sequence[Path], options: ReadOptions) -> list[tuple[Path,
     parts = [(path, raw) for path, raws in read for raw in raws if is_part(raw)]
     found = [(path, [raw for raw in raws if not is_part(raw)]) for path, raws in read]
     if parts:
-        path, whole = joined(parts)
+        path, whole = joined(parts, options)
         found[list(paths).index(path)][1].append(whole)
     return [(path, raws) for path, raws in found if raws]
 

@@ -47,9 +47,10 @@ class CsvReader(Reader):
 def _no_columns(path: Path, channel: str, wanted: ReadOptions, words: str) -> str:
     called = wanted.called(channel) or channel
     return (
-        f"{path} has no columns '{called}_<joint>'; its columns: {words}. A file holds one run, or "
-        "channels of it: t, q_<joint>, …, tau_<joint>, … (and dq_<joint>). A channel of another "
-        f"name: measurement.channels: {{{channel}: …}}."
+        f"{path} has no columns '{called}_<joint>'; its columns: {words}. A file holds one run: "
+        "t, q_<joint>, …, tau_<joint>, … (and dq_<joint>), or some of these channels, which are "
+        "joined with those of the other files. A channel of another name: measurement.channels: "
+        f"{{{channel}: …}}."
     )
 
 

@@ -62,8 +62,8 @@ def _of_run(
         elif not still[j]:
             text = (
                 f"torque of {joint} is constant at {level + 0.0:.6g} while it moves: the channel "
-                "is dead or too coarse for it (leave the joint out of robot.joints), or another one "
-                "was meant (measurement.channels, measurement.names)"
+                "is dead or too coarse for it (leave the joint out of robot.joints), or another "
+                "one was meant (measurement.channels, measurement.names)"
             )
             findings.append(Finding("dead_torque", "error", text, run.name, (joint,)))
     for j in np.flatnonzero(stands & ~silent & ~still):

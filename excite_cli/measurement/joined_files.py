@@ -5,18 +5,19 @@ positions or torques, it is joined with the others of that kind by its time stam
 the same to the last digit: nothing is interpolated or guessed.
 """
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 
 from excite_cli.errors import FileError
+from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.dataset import Array
-from excite_cli.measurement.reader import RawRun
+from excite_cli.measurement.reader import RawRun, ReadOptions
 
-_WORDS = {"q": "positions", "tau": "torques"}
+_WORDS = {"q": "positions", "tau": "torques"}  # without which nothing can be said
 
 
 def is_part(raw: RawRun) -> bool:
@@ -24,7 +25,7 @@ def is_part(raw: RawRun) -> bool:
     return any(not raw.columns.get(channel) for channel in _WORDS)
 
 
-def joined(parts: Sequence[tuple[Path, RawRun]]) -> tuple[Path, RawRun]:
+def joined(parts: Sequence[tuple[Path, RawRun]], wanted: ReadOptions) -> tuple[Path, RawRun]:
     """One recording of all channels, named by what the files' names begin with alike.
 
     Raises
@@ -52,13 +53,17 @@ def joined(parts: Sequence[tuple[Path, RawRun]]) -> tuple[Path, RawRun]:
         others: dict[str, Array] = {**whole.others, **raw.others}
         findings = (*whole.findings, *raw.findings)
         whole = replace(whole, columns=columns, others=others, findings=findings)
-    missing = next((word for channel, word in _WORDS.items() if not whole.columns.get(channel)), "")
-    if missing:
-        raise FileError(
-            f"{names}: there are no {missing}. Give their file too, or name the channels: "
-            "measurement.channels: {q: …, tau: …}."
-        )
+    for channel, word in _WORDS.items():
+        if not whole.columns.get(channel):
+            there = [f"{name}_<joint>" for name, by_joint in whole.columns.items() if by_joint]
+            raise FileError(
+                f"{names}: no columns '{wanted.called(channel) or channel}_<joint>', so there are "
+                f"no {word}; there are: {listed([*there, *whole.others])}. Give the file that has "
+                "them as well, or the name they go by: "
+                f"measurement.channels: {{{channel}: …}}."
+            )
     positions = list(whole.columns["q"])
     stems = [each.name.split(".")[0] for each, _ in parts]
-    name = os.path.commonprefix(stems).rstrip("_-. ") or stems[0]
+    alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*stems, strict=False))
+    name = "".join(letters[0] for letters in alike).rstrip("_-. ") or stems[0]
     return path, replace(whole, name=name, numbered=all(each.isdigit() for each in positions))
