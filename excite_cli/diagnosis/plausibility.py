@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.clock_by_gravity import check_clock
 from excite_cli.diagnosis.foreign_torques import check_runs
 from excite_cli.diagnosis.rearranged import (
     CLEAR,
@@ -130,7 +131,7 @@ def check_recorded(
     processing: Processing,
     declared: MeasurementSpec,
 ) -> tuple[Finding, ...]:
-    """What is to be known of the runs that are fitted: their motion, and `check_plausibility`.
+    """What is to be known of the runs that are fitted: motion, clock, and `check_plausibility`.
 
     A cut-off of the positions that is `declared` is taken as it is.
 
@@ -142,7 +143,10 @@ def check_recorded(
     motion: tuple[Finding, ...] = ()
     if declared.filter.position == "auto":
         motion = check_motion(runs, processing, robot.joint_names)
-    return (*motion, *check_plausibility(robot, prepared, declared))
+    if declared.trust:
+        return motion
+    clock = check_clock(robot, runs, samples_of(prepared, _SAMPLES))
+    return (*motion, *clock, *check_plausibility(robot, prepared, declared))
 
 
 def _settled(names: Sequence[str], declared: MeasurementSpec) -> NDArray[np.bool_]:

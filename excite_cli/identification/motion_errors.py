@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.identification.processing import ABOVE_FLOOR, Processing, spectra
+from excite_cli.identification.processing import ABOVE_FLOOR, HIGHEST_BY_RATE, Processing, spectra
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.resolution import lattice_step
 
@@ -25,7 +25,8 @@ from excite_cli.measurement.resolution import lattice_step
 # inertias too small by its square.
 _LOST, _COUNTED = (0.015, 0.04), (0.05, 0.15)
 _FASTEST = 10.0  # Hz, of motion
-_ENOUGH = 12.0  # times the highest frequency of the motion: a rate that loses little
+# A rate that loses little: 25 times the highest frequency of the motion, which a slow rate hides.
+_ENOUGH, _TWICE = 25.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -93,18 +94,25 @@ def check_motion(
             f"{processing.position_cutoff or fs / 2:.3g}"
         )
         found.append(Finding("coarse_positions", "warning", text, "", joints))
-    slow = _told(errors.lost, _LOST)
+    slow = _told(errors.lost, _LOST) & _limited_by_rate(processing)
     if slow.any():
         joints = tuple(names[j] for j in np.flatnonzero(slow))
+        enough = max(_ENOUGH * processing.bandwidth, _TWICE * fs)
         text = (
             f"at {fs:.3g} Hz, with positions cut off at {processing.position_cutoff or fs / 2:.3g} "
             f"Hz, speeds of {', '.join(joints)} lose {_shares(errors.lost[0, slow])} and "
             f"accelerations {_shares(errors.lost[1, slow])}: inertias and friction come out wrong "
-            f"by as much. Record at {_ENOUGH * processing.bandwidth:.2g} Hz or more, move more "
+            f"by as much. Record at {enough:.2g} Hz or more, move more "
             "slowly, or set measurement.filter.position [Hz] yourself"
         )
         found.append(Finding("slow_rate", "warning", text, "", joints))
     return tuple(found)
+
+
+def _limited_by_rate(processing: Processing) -> bool:
+    """Whether a higher rate would let the filter of positions pass more."""
+    cutoff = processing.position_cutoff
+    return cutoff is None or cutoff > 0.99 * HIGHEST_BY_RATE * processing.recorded_rate
 
 
 def _told(errors: Array, least: tuple[float, float]) -> Mask:

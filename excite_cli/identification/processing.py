@@ -18,6 +18,7 @@ from excite_cli.measurement.dataset import Array, Run
 # The signal has met its floor where the spectrum is below this multiple of it.
 ABOVE_FLOOR = 20.0
 _HIGHEST_POSITION, _LOWEST_POSITION = 40.0, 8.0  # Hz
+HIGHEST_BY_RATE = 0.2  # of the recorded rate, for the cut-off of positions
 _SHARE_OF_SPEED = 0.99
 _PARALLEL_BY_BANDWIDTH, _HIGHEST_PARALLEL, _LOWEST_PARALLEL = 6.0, 12.0, 4.0
 # Standard deviation of a Gaussian average in time, times its -3 dB frequency.
@@ -122,10 +123,10 @@ def _position_cutoff(
     last = [frequency[np.flatnonzero(~column)[0]] if not column.all() else fs for column in above.T]
     found = float(np.median(last))
     lowest = max(_LOWEST_POSITION, 5.0 * bandwidth)
-    chosen = float(min(max(found, lowest), _HIGHEST_POSITION, fs / 5.0))
+    chosen = float(min(max(found, lowest), _HIGHEST_POSITION, HIGHEST_BY_RATE * fs))
     reasons.append(
         f"positions cut off at {chosen:.3g} Hz: their spectrum meets its floor at {found:.3g} Hz "
-        f"(kept within {lowest:.3g} and {min(_HIGHEST_POSITION, fs / 5):.3g} Hz)"
+        f"(kept within {lowest:.3g} and {min(_HIGHEST_POSITION, HIGHEST_BY_RATE * fs):.3g} Hz)"
     )
     return chosen
 

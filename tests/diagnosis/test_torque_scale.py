@@ -1,4 +1,4 @@
-"""Torques of another unit, without gravity, or of another run; and sound ones of all kinds."""
+"""Torques of another unit, without gravity, or of another run, a clock; and sound recordings."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -106,3 +106,19 @@ def test_torques_of_another_run_are_told_with_the_run_that_they_belong_to(
     assert (found.kind, found.severity, found.run) == ("foreign_torque", "warning", "run_1")
     assert "they fit the motion of run_2" in found.text
     assert told(robot, mixed, trust=True) == ()
+
+
+def test_a_clock_that_is_off_is_seen_by_gravity_where_there_are_no_speeds(
+    robot: Robot, sound: Dataset
+) -> None:
+    def slow(run: Run, speeds: bool) -> Run:
+        return replace(run, t=0.9 * run.t, dq=run.dq if speeds else None)
+
+    runs = [slow(run, speeds=False) for run in sound.runs]
+    (found,) = told(robot, replace(sound, runs=tuple(runs)))
+    assert (found.kind, found.severity) == ("clock", "warning")
+    key = float(found.text.split("measurement.clock: ")[1].split(". If")[0])
+    assert key == pytest.approx(1 / 0.9, rel=0.02)
+    right = tuple(replace(run, t=key * run.t) for run in runs)
+    assert told(robot, replace(sound, runs=right)) == ()
+    assert told(robot, replace(sound, runs=tuple(runs)), trust=True) == ()

@@ -42,6 +42,7 @@ def test_a_slow_rate() -> None:
     assert errors.lost == pytest.approx(measured(run), rel=0.5)
     text = told(run)["slow_rate"]
     assert "at 12 Hz" in text
+    assert "Record at" in text
     assert "measurement.filter.position" in text
 
 
