@@ -88,7 +88,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--log", nargs="+", choices=NAMES, default=NAMES)
     parser.add_argument("--only", nargs="+", help="alterations whose names contain one of these")
-    parser.add_argument("--checks", action="store_true", help="of the data alone: no diagnosis")
+    parser.add_argument("--checks", action="store_true", help="of the altered data alone: no diagnosis")
     parser.add_argument("--keys", action="store_true", help="again with the key that settles it")
     parser.add_argument("--text", action="store_true", help="print all that is said")
     parser.add_argument("--sound", type=int, help="check so many sound campaigns, and real logs")
@@ -142,7 +142,7 @@ def _row(
                 print(f"      {each.severity} {each.kind} ({each.run}): {each.text}")
     keys = dict(alteration.keys(of.data.joint_names))
     if keys and arguments.keys:
-        settled = said(of.with_keys(keys), data, arguments.checks)
+        settled = said(of.with_keys(keys), data, checks=False)
         print(f"    {'with its key':25s} {settled.line(usual.kinds, ())}", flush=True)
 
 

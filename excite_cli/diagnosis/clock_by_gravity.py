@@ -2,9 +2,9 @@
 
 With a recorded second that lasts c seconds, speeds are v/c and accelerations a/c². Inertias,
 friction of every kind and offsets adapt to that; what does not is g: the same masses that are
-accelerated are weighed. So all inertias and friction are fitted to the torques for some c, and the c
-that leaves least is told if it leaves far less than c = 1 does. Robots whose torque is friction or
-weight alone do not show it, and large effects that are not in this model hide it.
+accelerated are weighed. So all inertias and friction are fitted to the torques for some c, and the
+c that leaves least is told if it leaves far less than c = 1 does. Robots whose torque is friction
+or weight alone do not show it, and large effects that are not in this model hide it.
 """
 
 from collections.abc import Sequence

@@ -103,7 +103,7 @@ def _check_arrangement(
     text = _message(names, straight, best, rivals)
     if _certain(best, straight):
         raise FileError(f"the measured data contradict the robot: {text}")
-    joints = tuple(names[j] for j in np.flatnonzero(best.change.touched))
+    joints = tuple(names[j] for j in np.flatnonzero(best.change.touched).tolist())
     text = f"the measured data may contradict the robot: {text}"
     return (Finding("implausible", "warning", text.removesuffix("."), "", joints),)
 

@@ -106,7 +106,7 @@ def _left(robot: Robot, samples: Samples, joints: NDArray[np.bool_]) -> tuple[fl
 def _without_gravity(
     found: _Weight, left: float, gone: NDArray[np.bool_], names: Sequence[str]
 ) -> Finding:
-    joints = tuple(names[j] for j in np.flatnonzero(gone))
+    joints = tuple(names[j] for j in np.flatnonzero(gone).tolist())
     shares = ", ".join(f"{found.k[j]:.2f}" for j in np.flatnonzero(gone))
     text = (
         f"gravity seems to be subtracted from torques: those of {', '.join(joints)} hold {shares} "
@@ -121,7 +121,7 @@ def _without_gravity(
 def _another_unit(
     found: _Weight, off: NDArray[np.bool_], declared: MeasurementSpec, names: Sequence[str]
 ) -> Finding:
-    joints = tuple(names[j] for j in np.flatnonzero(off))
+    joints = tuple(names[j] for j in np.flatnonzero(off).tolist())
     shares = ", ".join(f"{found.k[j]:.3g}" for j in np.flatnonzero(off))
     k = np.log(np.maximum(np.abs(found.k), 1e-9))
     every = bool(1 < off.sum() > 0.5 * found.judged.sum() and np.ptp(k[off]) < 1.0)

@@ -83,7 +83,7 @@ def check_motion(
     found = []
     coarse = _told(errors.counted, _COUNTED)
     if coarse.any():
-        joints = tuple(names[j] for j in np.flatnonzero(coarse))
+        joints = tuple(names[j] for j in np.flatnonzero(coarse).tolist())
         steps = ", ".join(dict.fromkeys(f"{each:.2g}" for each in errors.counts[coarse]))
         text = (
             f"positions of {', '.join(joints)} come in steps of {steps} rad (m): speeds are wrong "
@@ -96,7 +96,7 @@ def check_motion(
         found.append(Finding("coarse_positions", "warning", text, "", joints))
     slow = _told(errors.lost, _LOST) & _limited_by_rate(processing)
     if slow.any():
-        joints = tuple(names[j] for j in np.flatnonzero(slow))
+        joints = tuple(names[j] for j in np.flatnonzero(slow).tolist())
         enough = max(_ENOUGH * processing.bandwidth, _TWICE * fs)
         text = (
             f"at {fs:.3g} Hz, with positions cut off at {processing.position_cutoff or fs / 2:.3g} "
