@@ -33,6 +33,8 @@ _TWO_SD = 4.0  # of χ²
 # A second band so much weaker than the first was filtered before it was recorded.
 _FILTERED = 0.2
 _REVERSAL = 0.15  # s around a reversal, whose friction is in all bands
+_AVERAGED = 0.08  # s
+_RESPONSE = 1.0  # s
 _LEAST_SECONDS = 2.0
 _STRETCH, _FEWEST_STRETCHES = 0.5, 6  # s
 
@@ -63,24 +65,29 @@ def band_noise(
     bands = [band for band in _BANDS if band[1] <= _HIGHEST * processing.recorded_rate]
     if len(bands) < _WHITE:
         return BandNoise(np.full(n, np.nan), np.full(n, np.nan))
-    energies, seconds = np.zeros((2, len(bands), n)), np.zeros(n)
+    energies, counted = np.zeros((2, len(bands), n)), np.zeros((len(bands), n))
+    seconds = np.zeros(n)
     stretches: list[list[Array]] = [[] for _ in bands[:_WHITE]]
     for run, fit, torque in zip(recorded, prepared, predicted, strict=True):
-        sliding = _sliding(run, fit, processing.moving_speed)
+        v = np.stack([np.interp(run.t, fit.t, column) for column in fit.v.T], axis=1)
+        good = run.usable() & np.isfinite(run.tau) & ~_near_reversal(v, run.step)
+        sliding = good & (np.abs(v) > processing.moving_speed)
         seconds += sliding.sum(axis=0) * run.step
-        measured = _bridged(run)
-        series = (measured, measured - _at_recorded_rate(torque, run, fit))
+        left = run.tau - _at_recorded_rate(torque, run, fit)
+        series = [_bridged(x, good, run.step) for x in (run.tau, left)]
         for k, band in enumerate(bands):
+            kept = np.where(sliding, _kept(good, run.step, band), 0.0)
+            counted[k] += kept.sum(axis=0) * run.step
             squares = [np.square(_passed(x, run.step, band)) for x in series]
             for energy, square in zip(energies, squares, strict=True):
                 energy[k] += np.where(sliding, square, 0.0).sum(axis=0) * run.step
             if k < _WHITE:
-                stretches[k].append(_stretches(np.minimum(*squares), sliding, run.step))
+                stretches[k].append(_stretches(np.minimum(*squares), kept, run.step))
     energy = energies.min(axis=0)
     usual = np.stack([_usual(np.concatenate(own)) for own in stretches])
     known = seconds > _LEAST_SECONDS
     widths = np.array([high - low for low, high in bands])
-    power = energy / np.where(known, seconds, np.nan) / widths[:, None]
+    power = energy / np.where(known & (counted > 0.0), counted, np.nan) / widths[:, None]
     white, coloured = np.full(n, np.nan), np.full(n, np.nan)
     known &= np.nan_to_num(power[1]) > _FILTERED * np.nan_to_num(power[0])
     for j in np.flatnonzero(known & (power > 0).all(axis=0)):
@@ -99,32 +106,51 @@ def band_noise(
     return BandNoise(white, coloured)
 
 
-def _sliding(run: Run, fit: PreparedRun, moving: float) -> Mask:
-    """Samples (T, n) in which a joint moves and is not near a reversal, nor is anything invalid."""
-    v = np.stack([np.interp(run.t, fit.t, column) for column in fit.v.T], axis=1)
+def _near_reversal(v: Array, step: float) -> Mask:
+    """Samples (T, n) near a change of sign of v (T, n), or near the ends."""
     crossing = np.zeros(v.shape)
     crossing[1:] = np.signbit(v[1:]) != np.signbit(v[:-1])
     crossing[[0, -1]] = 1.0
-    window = np.ones(2 * round(_REVERSAL / run.step) + 1)
-    near = np.stack([np.convolve(column, window, "same") for column in crossing.T], axis=1) > 0.5
-    return np.asarray(~near & (np.abs(v) > moving) & run.usable())
+    window = np.ones(2 * round(_REVERSAL / step) + 1)
+    return np.stack([np.convolve(column, window, "same") for column in crossing.T], axis=1) > 0.5
 
 
-def _bridged(run: Run) -> Array:
-    """Torque (T, n) with straight lines over samples that must not be used."""
-    tau, good = run.tau.copy(), run.usable() & np.isfinite(run.tau)
-    for j in np.flatnonzero(~good.all(axis=0) & good.any(axis=0)):
-        tau[:, j] = np.interp(run.t, run.t[good[:, j]], tau[good[:, j], j])
-    return np.where(np.isfinite(tau), tau, 0.0)
+def _bridged(x: Array, good: Mask, step: float) -> Array:
+    """Series (T, n) with the smooth average of what is around where it is not good.
+
+    A jump there would ring in every band, and a line from one noisy sample to another adds noise.
+    """
+    from scipy.ndimage import gaussian_filter1d  # takes a second to import
+
+    width = _AVERAGED / step
+    total, count = (
+        gaussian_filter1d(each, width, axis=0, mode="constant", truncate=8.0)
+        for each in (np.where(good, x, 0.0), good.astype(float))
+    )
+    return np.where(good, x, total / np.maximum(count, 1e-12))
 
 
-def _stretches(square: Array, sliding: Mask, step: float) -> Array:
-    """Mean power (S, n) of stretches of `_STRETCH` in which a joint slides for the most, or NaN."""
+def _kept(good: Mask, step: float, band: tuple[float, float]) -> Array:
+    """Share (T, n) of the power of white noise that passes the band, with averages over the rest.
+
+    Σ h² over what is good, h the filter's response to an impulse.
+    """
+    from scipy.signal import fftconvolve  # takes a second to import
+
+    impulse = np.zeros((2 * round(_RESPONSE / step) + 1, 1))
+    impulse[len(impulse) // 2] = 1.0
+    squares = np.square(_passed(impulse, step, band))
+    share = fftconvolve(good.astype(float), squares / squares.sum(), "same", axes=0)
+    return np.clip(share, 0.0, 1.0)
+
+
+def _stretches(square: Array, kept: Array, step: float) -> Array:
+    """Mean power (S, n) of stretches of `_STRETCH` of which most is `kept`, or NaN."""
     length = max(1, round(_STRETCH / step))
     edges = np.arange(0, max(len(square) - length + 1, 1), length)
-    count = np.add.reduceat(sliding.astype(float), edges, axis=0)
-    power = np.add.reduceat(np.where(sliding, square, 0.0), edges, axis=0)
-    return np.asarray(np.where(count > 0.5 * length, power / np.maximum(count, 1.0), np.nan))
+    count = np.add.reduceat(kept, edges, axis=0)
+    power = np.add.reduceat(np.where(kept > 0.0, square, 0.0), edges, axis=0)
+    return np.asarray(np.where(count > 0.5 * length, power / np.maximum(count, 1e-12), np.nan))
 
 
 def _usual(power: Array) -> Array:

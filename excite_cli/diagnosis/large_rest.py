@@ -26,7 +26,7 @@ _PERHAPS = 1.6  # a word, that noise with a memory may be as large
 _PREDICTABLE = 0.3  # share; of noise with a memory hardly anything is
 _SAID = 0.2  # a quantity that predicts less is no answer
 _UNKNOWN = 0.003  # of the torque's RMS: a word where noise is not known
-_SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no word
+_SMALLEST = 1e-3  # of the torque's RMS: what is smaller needs no word
 
 
 def large_rests(

@@ -197,8 +197,6 @@ class Search:
                 if len(trial) > self._most:
                     continue
                 cost = self.judge.cost(trial)  # parents are cheaper than `saved` says
-                if cost < best and self.judge.loses(rest, i, move):
-                    continue
                 refined = len(move) == 1 and i in self.judge.parents[move[0]]
                 if refined and self.judge.too_small([*rest, i], move):
                     continue
@@ -209,6 +207,7 @@ class Search:
                         or self.judge.in_order(schur, rest, move)
                     )
                     and self.judge.allowed(self.plain.solve(trial), trial, move)
+                    and not self.judge.loses(rest, i, move)  # last: it takes longest
                 ):
                     best, found = cost, trial
         return found

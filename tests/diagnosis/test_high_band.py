@@ -72,3 +72,17 @@ def test_torque_that_was_filtered_says_nothing_of_its_noise() -> None:
 def test_slow_recordings_say_nothing_of_their_noise() -> None:
     found, _ = measured(coloured(0.0, 3, 40.0), 40.0)
     assert np.isnan(found.white).all()
+
+
+def test_jumps_at_frequent_reversals_are_no_noise() -> None:
+    rate, jump = 500.0, 10.0
+    t = np.arange(0.0, 8.0, 1.0 / rate)
+    q = np.stack([0.3 * np.sin(2.0 * np.pi * 1.1 * t)], axis=1)
+    noise = np.random.default_rng(5).normal(size=(len(t), 1))
+    dry = jump * np.sign(np.cos(2.0 * np.pi * 1.1 * t))[:, None]
+    p, run = processing(rate), Run("run", t, q, noise + dry)
+    fit = prepare(run, p)
+    found = band_noise([run], [fit], [0.0 * fit.q], p)
+    alone = prepare(Run("run", t, q, noise), p)
+    rms = np.sqrt(np.mean(alone.tau_fit[fit.usable[:, 0], 0] ** 2))
+    assert found.white[0] == pytest.approx(rms, rel=0.3)

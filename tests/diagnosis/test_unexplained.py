@@ -104,6 +104,34 @@ def test_the_noise_of_another_joint_does_not_hide_it(
     assert [record.joint for record in records] == [regression.robot.joint_names[1]]
 
 
+@pytest.mark.parametrize(("times", "told"), [(3.0, True), (0.3, False)])
+def test_structure_of_a_thousandth_of_the_torque_is_not_told(
+    regression: Regression, signals: list[Signals], times: float, told: bool
+) -> None:
+    torque = np.concatenate([run.prepared.tau_fit[:, 0] for run in regression.runs])
+    size = times * 1e-3 * np.sqrt(np.mean(torque**2))
+    extra = white(regression, 4, 0.3 * size)
+    for run, s, more in zip(regression.runs, signals, extra, strict=True):
+        wave = np.stack([np.sqrt(2.0) * size * np.sin(7.0 * s.q[:, 0]), 0 * s.t], axis=1)
+        more += run.prepared.averaged_for_fit(wave)
+    assert bool(found(regression, signals, extra, np.full(2, 0.3 * size))) == told
+
+
+def test_a_joint_that_is_not_told_of_does_not_keep_another_silent(
+    regression: Regression, signals: list[Signals]
+) -> None:
+    """Of joint 0 a structure is sure, but small beside its torque."""
+    torque = np.concatenate([run.prepared.tau_fit[:, 0] for run in regression.runs])
+    size = np.array([3e-4 * np.sqrt(np.mean(torque**2)), 1.0])
+    levels = np.array([0.05, 1.0]) * size
+    extra = white(regression, 6, levels)
+    for run, s, more in zip(regression.runs, signals, extra, strict=True):
+        waves = np.sqrt(2.0) * size * np.sin(7.0 * s.q)
+        more += run.prepared.averaged_for_fit(waves)
+    records = found(regression, signals, extra, levels)
+    assert [record.joint for record in records] == [regression.robot.joint_names[1]]
+
+
 def test_white_noise_has_no_names(regression: Regression, signals: list[Signals]) -> None:
     alarms = [seed for seed in range(40) if found(regression, signals, white(regression, seed))]
     assert len(alarms) <= 2  # 5 %
