@@ -88,7 +88,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--log", nargs="+", choices=NAMES, default=NAMES)
     parser.add_argument("--only", nargs="+", help="alterations whose names contain one of these")
-    parser.add_argument("--checks", action="store_true", help="of the altered data alone: no diagnosis")
+    parser.add_argument(
+        "--checks", action="store_true", help="of the altered data alone: no diagnosis"
+    )
     parser.add_argument("--keys", action="store_true", help="again with the key that settles it")
     parser.add_argument("--text", action="store_true", help="print all that is said")
     parser.add_argument("--sound", type=int, help="check so many sound campaigns, and real logs")

@@ -77,9 +77,9 @@ def declared(spec: MeasurementSpec, joints: tuple[str, ...]) -> list[Finding]:
     """Findings about a declaration that contradicts itself."""
     findings = []
     ratio = _per_joint(spec.gear_ratio, joints)
-    if spec.torque != "link" and (ratio == 1.0).all():
+    if spec.torque == "motor" and (ratio == 1.0).all():
         text = (
-            f"measurement.torque is '{spec.torque}', and every gear_ratio is 1: give "
+            "measurement.torque is 'motor', and every gear_ratio is 1: give "
             "measurement.gear_ratio unless the motors drive the joints directly"
         )
         findings.append(Finding("no_ratio", "warning", text))

@@ -85,7 +85,9 @@ def test_bag_and_hdf5_of_the_same_recording() -> None:
 
 
 def test_motor_side_tables_say_what_they_need(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"its columns: Joint_1, .*separate files must be joined"):
+    with pytest.raises(
+        FileError, match=r"its columns: Joint_1, .*joined with those of the other files"
+    ):
         load("tx40", "curr_data.csv.gz")
     # Joined, as the message says: columns with their channel's name, and the rate declared.
     tables = [
