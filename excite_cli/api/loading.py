@@ -15,9 +15,11 @@ from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.identification.gravity import with_gravity
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset, Finding
+from excite_cli.measurement.merged_findings import merged
 from excite_cli.measurement.quality import raise_for_errors
 from excite_cli.robot.described import describe
 from excite_cli.robot.model import Robot, build_robot
@@ -162,6 +164,8 @@ def load_data(
         (~robot.sliding).astype(float),
     )
     raise_for_errors(data)
+    if problem.spec.measurement.gravity == "subtracted":
+        data = with_gravity(robot, data)
     tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs_in_words(data)}"))
     tell_findings(data.findings, tell)
     return data
@@ -210,9 +214,6 @@ def dataset_of(
 
 
 def tell_findings(findings: Iterable[Finding], tell: Tell) -> None:
-    """What was noticed; the same of several runs is reported once."""
-    runs: dict[tuple[str, str], list[str]] = {}
-    for finding in findings:
-        runs.setdefault((finding.severity, finding.text), []).append(finding.run or "")
-    for (severity, text), names in runs.items():
-        tell(Note(_LEVELS[severity], text, ", ".join(name for name in names if name)))
+    """What was noticed, each kind in one sentence."""
+    for found in merged(findings):
+        tell(Note(_LEVELS[found.severity], found.text, found.run))

@@ -73,8 +73,15 @@ class MeasurementSpec(Section):
         "link",
         description="link: at the joint; motor: before the gear; current: before motor and gear",
     )
+    gravity: Literal["included", "subtracted"] = Field(
+        "included",
+        description="subtracted: from the torque, by a controller; that of the URDF is added again",
+    )
     gear_ratio: PerJoint = Field(1.0, description="motor turns per turn of the joint, with sign")
-    torque_constant: PerJoint = Field(1.0, description="[N·m/A] at the motor, for torque: current")
+    torque_constant: PerJoint = Field(
+        1.0,
+        description="[N·m/A] at the motor, for torque: current; of another unit, N·m in one of it",
+    )
     coupling: dict[str, dict[str, Finite]] = Field(
         default_factory=dict,
         description="further shares of other motors' torques (after their gears) in a joint's "
@@ -96,6 +103,9 @@ class MeasurementSpec(Section):
         default_factory=dict, description="-1 where recorded speeds have the opposite sign"
     )
     time: Literal["s", "ms", "us", "ns"] = Field("s", description="unit of the time stamps")
+    clock: Positive = Field(
+        1.0, description="true seconds in a second of the time stamps, of a clock that is off"
+    )
     angle: Literal["rad", "deg"] = Field(
         "rad", description="of positions and speeds; prismatic joints are in m either way"
     )

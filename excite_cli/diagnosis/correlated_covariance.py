@@ -2,7 +2,7 @@
 
 x̂ = A⁻¹ Xᵀ W y with A = Xᵀ W X, so cov = A⁻¹ (Xᵀ W Σ W X) A⁻¹. With an autoregression, Σ = H Hᵀ
 where H filters white noise, and Xᵀ W Σ W X is the Gram matrix of Hᵀ W X: the columns filtered
-backwards.
+backwards. Torques that are recorded in steps add what their rounding leaves uncertain.
 """
 
 from collections.abc import Sequence
@@ -34,6 +34,9 @@ def covariance_of(
             taps = np.concatenate([[1.0], -noise.coefficients[joint]])
             filtered = lfilter([noise.sigma[joint]], taps, x[::-1], axis=0)
             spread += filtered.T @ filtered
+            if run.rounding and (rounding := run.rounding[joint]) is not None:
+                rounded = rounding.T @ x
+                spread += rounded.T @ rounded
     if data.prior_precision is not None:
         at = np.arange(len(data.prior_precision))
         normal[at, at] += data.prior_precision

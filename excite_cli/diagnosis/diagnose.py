@@ -20,7 +20,7 @@ from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.final_fit import final_fit
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.large_rest import large_rests
-from excite_cli.diagnosis.plausibility import check_plausibility
+from excite_cli.diagnosis.plausibility import check_recorded
 from excite_cli.diagnosis.records import (
     Absorbed,
     Approximation,
@@ -87,7 +87,7 @@ def diagnose(
     processing, training = _prepared(spec, parts)
     require_motion(training, processing, robot.joint_names)
     kept = [prepare(run, processing) for run in parts.sealed]  # refused early where too short
-    suspicious = check_plausibility(robot, training, spec.measurement)
+    suspicious = check_recorded(robot, parts.training, training, processing, spec.measurement)
     traced = _traced(model, spec, parts, processing, progress)
     with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
     if with_ends.ends:

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.clock_by_gravity import check_clock
+from excite_cli.diagnosis.foreign_torques import check_runs
 from excite_cli.diagnosis.rearranged import (
     CLEAR,
     PRICE,
@@ -27,12 +29,14 @@ from excite_cli.diagnosis.rearranged import (
     positions_changed,
     torques_changed,
 )
-from excite_cli.diagnosis.torque_shares import RoughModel, samples_of
+from excite_cli.diagnosis.torque_scale import check_scale
+from excite_cli.diagnosis.torque_shares import RoughModel, Samples, samples_of
 from excite_cli.errors import FileError
+from excite_cli.identification.motion_errors import check_motion
 from excite_cli.identification.prepare import PreparedRun, prepare
-from excite_cli.identification.processing import choose_processing
+from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.split import split
-from excite_cli.measurement.dataset import Dataset, Finding
+from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Array, Robot
 
 _SAMPLES = 600
@@ -65,9 +69,23 @@ def check_plausibility(
     names, samples, model = robot.joint_names, samples_of(runs, _SAMPLES), RoughModel(robot)
     if not len(samples.q):
         return ()  # nobody moves: there is nothing to judge
+    scale = check_scale(robot, samples, declared, names)
+    if any(found.kind == "no_gravity" for found in scale):
+        return scale  # order and signs are judged by the whole torque
+    foreign = check_runs(model, runs)
+    if foreign:
+        return (*scale, *foreign)
+    return (*scale, *_check_arrangement(names, samples, model, declared))
+
+
+def _check_arrangement(
+    names: Sequence[str], samples: Samples, model: RoughModel, declared: MeasurementSpec
+) -> tuple[Finding, ...]:
+    """Order of columns, and signs."""
+    n = len(names)
     table = model.shares_left(samples)
-    here = np.arange(robot.n)
-    straight = Verdict(Change.none(robot.n), table[here, here, 0])
+    here = np.arange(n)
+    straight = Verdict(Change.none(n), table[here, here, 0])
     if straight.left.max() < _GOOD:
         return ()
     settled = _settled(names, declared)
@@ -85,7 +103,7 @@ def check_plausibility(
     text = _message(names, straight, best, rivals)
     if _certain(best, straight):
         raise FileError(f"the measured data contradict the robot: {text}")
-    joints = tuple(names[j] for j in np.flatnonzero(best.change.touched))
+    joints = tuple(names[j] for j in np.flatnonzero(best.change.touched).tolist())
     text = f"the measured data may contradict the robot: {text}"
     return (Finding("implausible", "warning", text.removesuffix("."), "", joints),)
 
@@ -93,7 +111,7 @@ def check_plausibility(
 def check_dataset(
     robot: Robot, dataset: Dataset, spec: Spec, sealed: str | None = None
 ) -> tuple[Finding, ...]:
-    """As `check_plausibility`, for all runs but the sealed part, filtered as `spec` says.
+    """As `check_recorded`, for all runs but the sealed part, filtered as `spec` says.
 
     Raises
     ------
@@ -102,7 +120,33 @@ def check_dataset(
     """
     runs = split(dataset, sealed, spec.diagnosis.block).training
     processing = choose_processing(runs, spec.measurement.filter, spec.diagnosis.moving_speed)
-    return check_plausibility(robot, [prepare(run, processing) for run in runs], spec.measurement)
+    prepared = [prepare(run, processing) for run in runs]
+    return check_recorded(robot, runs, prepared, processing, spec.measurement)
+
+
+def check_recorded(
+    robot: Robot,
+    runs: Sequence[Run],
+    prepared: Sequence[PreparedRun],
+    processing: Processing,
+    declared: MeasurementSpec,
+) -> tuple[Finding, ...]:
+    """What is to be known of the runs that are fitted: motion, clock, and `check_plausibility`.
+
+    A cut-off of the positions that is `declared` is taken as it is.
+
+    Raises
+    ------
+    FileError
+        As `check_plausibility`.
+    """
+    motion: tuple[Finding, ...] = ()
+    if declared.filter.position == "auto":
+        motion = check_motion(runs, processing, robot.joint_names)
+    if declared.trust:
+        return motion
+    clock = check_clock(robot, runs, samples_of(prepared, _SAMPLES))
+    return (*motion, *clock, *check_plausibility(robot, prepared, declared))
 
 
 def _settled(names: Sequence[str], declared: MeasurementSpec) -> NDArray[np.bool_]:

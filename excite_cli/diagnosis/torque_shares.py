@@ -82,7 +82,7 @@ class RoughModel:
     def __init__(self, robot: Robot) -> None:
         self._robot, self._dynamics = robot, InverseDynamics(robot)
         self._phi = standard_parameters(robot)
-        self._spread = _spread(robot, self._phi)
+        self._spread = spread_of(robot, self._phi)
 
     def shares_left(self, samples: Samples) -> Array:
         """Share (n, n, 2) of the deviation of torque k that the motion of joint j leaves.
@@ -112,8 +112,8 @@ class RoughModel:
         return passive, regressor * self._spread
 
 
-def _spread(robot: Robot, phi: Array) -> Array:
-    """Standard deviations (P,) of the standard parameters."""
+def spread_of(robot: Robot, phi: Array) -> Array:
+    """Standard deviations (P,) of the standard parameters: masses 30 %, centres of mass 3 cm."""
     spread = inertial_prior(robot, phi, _UNCERTAIN).std.reshape(-1, 10).copy()
     mass = spread[:, :1] / _UNCERTAIN
     own = _UNCERTAIN * phi.reshape(-1, 10)[:, 1:4]

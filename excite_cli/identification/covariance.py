@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
+from scipy.sparse import csr_matrix
 
 from excite_cli.identification.factors import Mask
 from excite_cli.identification.noise import Noise, noise_of
@@ -22,12 +23,16 @@ MOST_ENLARGED = 4.0
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of one run: `columns` (M, n, p), `tau`, `usable` (M, n), `weights` (M, n) or None."""
+    """Rows of one run: `columns` (M, n, p), `tau`, `usable` (M, n), `weights` (M, n) or None.
+
+    `rounding`: per joint what is uncertain in torques that come in steps (`rounding_of`).
+    """
 
     columns: Array
     tau: Array
     usable: Mask
     weights: Array | None = None
+    rounding: tuple[csr_matrix | None, ...] = ()
 
     def residual(self, x: Array) -> Array:
         """τ − C x (M, n), zero where unusable."""
@@ -83,6 +88,12 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         mixed = np.einsum("tjp,jk->tkp", spread, root).reshape(-1, p)
         meat += mixed.T @ mixed
+    for run in runs:
+        for j, rounding in enumerate(run.rounding):
+            if rounding is not None:
+                x = np.where(run.usable[:, j, None], run.columns[:, j], 0.0) / sigma[j] ** 2
+                rounded = rounding.T @ (x if run.weights is None else x * run.weights[:, j, None])
+                meat += rounded.T @ rounded
     matrix = inverse @ meat @ inverse
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = white / np.diag(matrix)

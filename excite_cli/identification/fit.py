@@ -116,7 +116,8 @@ def columns_of(run: RunColumns, base: BaseParameters) -> Array:
 
 def rows_of(run: RunColumns, base: BaseParameters) -> Rows:
     """Rows of a run for the least-squares fit."""
-    return Rows(columns_of(run, base), run.tau, run.usable)
+    rounding = run.prepared.rounding
+    return Rows(columns_of(run, base), run.tau, run.usable, rounding=rounding)
 
 
 def fit(regression: Regression, spec: IdentificationSpec | None = None) -> Fit:

@@ -7,7 +7,7 @@ count by the number of independent ones that they stand for.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -100,7 +100,7 @@ def _without_dust(runs: Sequence[Rows], sizes: Array) -> Sequence[Rows]:
     dust = columns * sizes <= _EXACT * torque
     if not dust.any():
         return runs
-    return [Rows(run.columns * ~dust, run.tau, run.usable, run.weights) for run in runs]
+    return [replace(run, columns=run.columns * ~dust) for run in runs]
 
 
 def _weighted_factors(runs: Sequence[Rows], weights: Sequence[Array]) -> list[Array]:
@@ -121,10 +121,7 @@ def _covariance(
     bread = solution.inverse
     if weights is not None:
         bread = _curvature(runs, solution.x, sigma, extra)
-        runs = [
-            Rows(run.columns, run.tau, run.usable, weight)
-            for run, weight in zip(runs, weights, strict=True)
-        ]
+        runs = [replace(run, weights=weight) for run, weight in zip(runs, weights, strict=True)]
     found = estimate_covariance(runs, solution.x, bread, sigma)
     if extra is None:
         return found

@@ -19,6 +19,7 @@ from excite_cli.identification.averages import (
 )
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.processing import Processing
+from excite_cli.identification.rounding import rounding_of
 from excite_cli.measurement.dataset import Array, Run
 from excite_cli.measurement.run_identity import RunId
 
@@ -43,7 +44,8 @@ class PreparedRun:
 
     For fits every joint has averages of its own, which leave out invalid samples and those in
     which it stands or reverses; `tau_fit` (M, n) are those of the torque, `usable` (M, n) where
-    enough is left.
+    enough is left. `rounding`: what is uncertain in them where torques are recorded in steps, per
+    joint (`rounding_of`).
     """
 
     run: RunId
@@ -63,6 +65,7 @@ class PreparedRun:
     step: float
     start: float = 0.0
     covariates: Mapping[str, Array] = field(default_factory=dict)
+    rounding: tuple[csr_matrix | None, ...] = ()
 
     def averaged(self, columns: Array) -> Array:
         """A applied along the first axis of (T, …)."""
@@ -148,6 +151,18 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
         step=float((centers[1] - centers[0]) * h),
         start=run.start,
         covariates={name: values[keep] for name, values in run.covariates.items()},
+        rounding=_rounding(run, for_fit, tau),
+    )
+
+
+def _rounding(run: Run, averages: Sequence[csr_matrix], tau: Array) -> tuple:
+    """Per joint what its steps leave uncertain; nothing where torques come in none."""
+    if run.torque_step is None:
+        return ()
+    steps = run.torque_step.tolist()
+    return tuple(
+        rounding_of(each, tau[:, j], steps[j]) if steps[j] else None
+        for j, each in enumerate(averages)
     )
 
 

@@ -16,8 +16,9 @@ from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Array, Run
 
 # The signal has met its floor where the spectrum is below this multiple of it.
-_ABOVE_FLOOR = 20.0
+ABOVE_FLOOR = 20.0
 _HIGHEST_POSITION, _LOWEST_POSITION = 40.0, 8.0  # Hz
+HIGHEST_BY_RATE = 0.2  # of the recorded rate, for the cut-off of positions
 _SHARE_OF_SPEED = 0.99
 _PARALLEL_BY_BANDWIDTH, _HIGHEST_PARALLEL, _LOWEST_PARALLEL = 6.0, 12.0, 4.0
 # Standard deviation of a Gaussian average in time, times its -3 dB frequency.
@@ -64,7 +65,7 @@ def choose_processing(
         A cut-off lies beyond half the recorded rate, or measured speeds are requested and absent.
     """
     fs = float(np.median([1.0 / run.step for run in runs]))
-    frequency, power = _spectra(runs, fs)
+    frequency, power = spectra(runs, fs)
     bandwidth = _bandwidth(frequency, power)
     reasons: list[str] = []
     position = _position_cutoff(spec, frequency, power, fs, bandwidth, reasons)
@@ -90,7 +91,7 @@ def choose_processing(
     )  # fmt: skip
 
 
-def _spectra(runs: Sequence[Run], fs: float) -> tuple[Array, Array]:
+def spectra(runs: Sequence[Run], fs: float) -> tuple[Array, Array]:
     """Mean spectrum of the positions (F, n) over the runs, on one grid of frequencies."""
     from scipy.signal import welch  # takes a second to import
 
@@ -118,14 +119,14 @@ def _position_cutoff(
     if spec.position != "auto":
         return _given_cutoff("position", spec.position, fs)
     floor = np.median(power[frequency > 0.3 * fs], axis=0)
-    above = power > _ABOVE_FLOOR * floor
+    above = power > ABOVE_FLOOR * floor
     last = [frequency[np.flatnonzero(~column)[0]] if not column.all() else fs for column in above.T]
     found = float(np.median(last))
     lowest = max(_LOWEST_POSITION, 5.0 * bandwidth)
-    chosen = float(min(max(found, lowest), _HIGHEST_POSITION, fs / 5.0))
+    chosen = float(min(max(found, lowest), _HIGHEST_POSITION, HIGHEST_BY_RATE * fs))
     reasons.append(
         f"positions cut off at {chosen:.3g} Hz: their spectrum meets its floor at {found:.3g} Hz "
-        f"(kept within {lowest:.3g} and {min(_HIGHEST_POSITION, fs / 5):.3g} Hz)"
+        f"(kept within {lowest:.3g} and {min(_HIGHEST_POSITION, HIGHEST_BY_RATE * fs):.3g} Hz)"
     )
     return chosen
 

@@ -16,6 +16,7 @@ from excite_cli.measurement.covariates import DeclaredCovariates
 from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.hdf5_reader import Hdf5Reader
+from excite_cli.measurement.joined_files import is_part, joined
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.quality import checked
 from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOptions
@@ -68,8 +69,7 @@ def read_dataset(
     taken: set[str] = set()
     seen: set[str] = set()
     covariates = DeclaredCovariates(spec.covariates)
-    for path in paths:
-        raws = reader_for(path).read(path, options)
+    for path, raws in _recordings(paths, options):
         seen.update(name for raw in raws for column in raw.columns.values() for name in column)
         named = _named(raws, path, taken)
         arranged = []
@@ -86,6 +86,20 @@ def read_dataset(
     _check_all_met(spec.names, seen)
     findings += covariates.check()
     return Dataset(joint_names, tuple(runs), tuple(map(str, paths)), tuple(findings))
+
+
+def _recordings(paths: Sequence[Path], options: ReadOptions) -> list[tuple[Path, list[RawRun]]]:
+    """What the files hold; those with some channels of a recording are joined, the first's place.
+
+    Of one recording only: which file belongs to which of several cannot be known.
+    """
+    read = [(path, reader_for(path).read(path, options)) for path in paths]
+    parts = [(path, raw) for path, raws in read for raw in raws if is_part(raw)]
+    found = [(path, [raw for raw in raws if not is_part(raw)]) for path, raws in read]
+    if parts:
+        path, whole = joined(parts, options)
+        found[list(paths).index(path)][1].append(whole)
+    return [(path, raws) for path, raws in found if raws]
 
 
 def _checked(path: Path, runs: list[Run], *about: Any) -> tuple[list[Run], list[Finding]]:
@@ -137,7 +151,8 @@ def _named(raws: list[RawRun], path: Path, taken: set[str]) -> list[RawRun]:
 def _seconds(raw: RawRun, spec: MeasurementSpec) -> tuple[Array, float | None]:
     """Stamps in seconds, and the time from 1970 to their zero, if known.
 
-    Those counted from 1970 start at 0, to keep their digits.
+    Those counted from 1970 start at 0, to keep their digits. A clock that is declared to run slow
+    or fast (`measurement.clock`) is put right.
     """
     t = np.asarray(raw.t, dtype=float)
     factor = 1.0 if raw.seconds else SECONDS[spec.time]
@@ -147,7 +162,7 @@ def _seconds(raw: RawRun, spec: MeasurementSpec) -> tuple[Array, float | None]:
         t = t - known[0]
         if known[0] * factor > SINCE_1970:
             epoch = float(known[0] * factor)
-    return t * factor, epoch
+    return t * (factor * spec.clock), epoch
 
 
 def _check_all_met(names: dict[str, str], seen: set[str]) -> None:

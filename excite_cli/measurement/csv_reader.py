@@ -8,7 +8,7 @@ from excite_cli.errors import FileError, nearest
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.csv_table import read_table
 from excite_cli.measurement.dataset import Array
-from excite_cli.measurement.reader import RawRun, Reader, ReadOptions, times_from_rate
+from excite_cli.measurement.reader import CHANNELS, RawRun, Reader, ReadOptions, times_from_rate
 
 _NUMBERED = re.compile(r"_?\[?(\d+)\]?$")
 
@@ -20,14 +20,16 @@ class CsvReader(Reader):
     suffixes = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz")
 
     def read(self, path: Path, wanted: ReadOptions) -> list[RawRun]:
-        """The file's only run; columns are matched by name."""
+        """The file's only run; columns are matched by name.
+
+        Where positions or torques are not in it, it is a part of a run (`joined_files`).
+        """
         table = read_table(path)
-        columns = dict(table.columns)
+        columns = {_bare(name): values for name, values in table.columns.items()}
         words = listed(list(columns))
-        if not any(_joint_of(name, wanted.called("q") or "q") for name in columns):
+        there = [c for c in CHANNELS if (w := wanted.called(c)) and _joints(columns, w)]
+        if not there:
             raise FileError(_no_columns(path, "q", wanted, words))
-        if not any(_joint_of(name, wanted.called("tau") or "tau") for name in columns):
-            raise FileError(_no_columns(path, "tau", wanted, words))
         time = wanted.called("t")
         stamped = time is not None and time in columns
         if stamped:
@@ -45,9 +47,9 @@ class CsvReader(Reader):
 def _no_columns(path: Path, channel: str, wanted: ReadOptions, words: str) -> str:
     called = wanted.called(channel) or channel
     return (
-        f"{path} has no columns '{called}_<joint>'; its columns: {words}. One file holds one run: "
-        "t, q_<joint>, …, tau_<joint>, … (and dq_<joint>); positions and torques in separate "
-        f"files must be joined first. A channel of another name: measurement.channels: "
+        f"{path} has no columns '{called}_<joint>'; its columns: {words}. A file holds one run: "
+        "t, q_<joint>, …, tau_<joint>, … (and dq_<joint>), or some of these channels, which are "
+        "joined with those of the other files. A channel of another name: measurement.channels: "
         f"{{{channel}: …}}."
     )
 
@@ -62,26 +64,43 @@ def _joint_of(column: str, channel: str) -> str:
     return rest[1:] if rest.startswith("_") else ""
 
 
+def _joints(columns: Mapping[str, Array], channel: str) -> dict[str, str]:
+    """Columns of a channel, and their joints: `<channel>_<joint>`, else `<joint>_<channel>`."""
+    found = {name: joint for name in columns if (joint := _joint_of(name, channel))}
+    if found:
+        return found
+    end = f"_{channel}"
+    return {name: name.removesuffix(end) for name in columns if name.endswith(end) and name != end}
+
+
+def _bare(name: str) -> str:
+    """A column's name without the dash that lists have before it."""
+    return name.removeprefix("-").strip() or name
+
+
 def _by_channel(
     columns: Mapping[str, Array], wanted: ReadOptions
 ) -> tuple[dict[str, dict[str, Array]], dict[str, Array]]:
     """Columns sorted into channel -> joint; what ends in no joint's name stands apart."""
     channels: dict[str, dict[str, Array]] = {"q": {}}
     others: dict[str, Array] = {}
-    called = {name: wanted.called(name) for name in ("q", "dq", "tau")}
-    names = {joint for name in columns if (joint := _joint_of(name, called["q"] or "q"))}
-    longest_first = sorted(names, key=len, reverse=True)
+    called = {name: wanted.called(name) for name in CHANNELS}
+    # Longer names first, so that `tau_q_…` or `dq_…` are not taken for another channel.
+    ranked = sorted(called.items(), key=lambda c: -len(c[1] or ""))
+    places: dict[str, tuple[str, str]] = {}
+    for channel, word in ranked:
+        for name, joint in (_joints(columns, word) if word else {}).items():
+            places.setdefault(name, (channel, joint))
+    longest_first = sorted((joint for c, joint in places.values() if c == "q"), key=len)[::-1]
     for name, values in columns.items():
-        # Longer prefixes first, so that `tau_q_…` or `dq_…` are not taken for another channel.
-        for channel, prefix in sorted(called.items(), key=lambda c: -len(c[1] or "")):
-            if prefix and (joint := _joint_of(name, prefix)):
-                channels.setdefault(channel, {})[joint] = values
-                break
+        if name in places:
+            channel, joint = places[name]
+            channels.setdefault(channel, {})[joint] = values
+            continue
+        end = next((j for j in longest_first if name.endswith(f"_{j}")), "")
+        if end:
+            channel = wanted.channel(name[: -len(end) - 1])
+            channels.setdefault(channel, {})[end] = values
         else:
-            end = next((j for j in longest_first if name.endswith(f"_{j}")), "")
-            if end:
-                channel = wanted.channel(name[: -len(end) - 1])
-                channels.setdefault(channel, {})[end] = values
-            else:
-                others[wanted.channel(name)] = values
+            others[wanted.channel(name)] = values
     return channels, others

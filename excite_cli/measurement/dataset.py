@@ -42,7 +42,8 @@ class Run(Shown):
     file, (T,) or (T, m), untouched; `covariates` (T,) are those that the configuration declares for
     effects to follow. `epoch`: seconds from 1970 (UTC) to t = 0, where the data know;
     `start`: the campaign's time at t = 0 [s], once it is known (`campaign_clock`). `recorded` (T,):
-    where samples were interpolated, the hash of the nearest one in the file.
+    where samples were interpolated, the hash of the nearest one in the file. `torque_step` (n,):
+    what torques are multiples of, 0 where they are not.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Run(Shown):
     start: float = 0.0
     recorded: NDArray[np.uint64] | None = None
     covariates: dict[str, Array] = field(default_factory=dict)
+    torque_step: Array | None = None
 
     @property
     def id(self) -> RunId:

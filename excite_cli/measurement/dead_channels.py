@@ -7,6 +7,8 @@ import numpy as np
 
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run, Severity
 
+_MOSTLY, _FEWEST = 0.6, 50  # share of samples in motion with one torque; and how many there must be
+
 
 def dead_channels(runs: Sequence[Run], joints: tuple[str, ...]) -> tuple[list[Run], list[Finding]]:
     """Name dead and copied channels; joints held still in a single run are masked in it.
@@ -59,13 +61,15 @@ def _of_run(
             findings.append(Finding("held", "warning", text, run.name, (joint,)))
         elif not still[j]:
             text = (
-                f"torque of {joint} is constant at {level:.6g} while it moves: the channel is "
-                "dead, or another one was meant (measurement.channels, measurement.names)"
+                f"torque of {joint} is constant at {level + 0.0:.6g} while it moves: the channel "
+                "is dead or too coarse for it (leave the joint out of robot.joints), or another "
+                "one was meant (measurement.channels, measurement.names)"
             )
-            findings.append(Finding("dead", "error", text, run.name, (joint,)))
+            findings.append(Finding("dead_torque", "error", text, run.name, (joint,)))
     for j in np.flatnonzero(stands & ~silent & ~still):
         text = f"position of {joints[j]} is constant at {run.q[0, j]:.6g} in this run"
         findings.append(Finding("held", "note", text, run.name, (joints[j],)))
+    findings += _mostly_constant(run, joints, silent | stands)
     if masked.any():
         run = replace(run, valid=run.usable() & ~masked)
     if run.dq is not None:
@@ -73,10 +77,31 @@ def _of_run(
         if dead:
             text = f"recorded speed of {', '.join(dead)} is constant while its position changes; "
             findings.append(
-                Finding("dead", "warning", text + "recorded speeds are not used", run.name, dead)
+                Finding(
+                    "dead_speed", "warning", text + "recorded speeds are not used", run.name, dead
+                )
             )
             run = replace(run, dq=None)
     return run, findings
+
+
+def _mostly_constant(run: Run, joints: tuple[str, ...], known: Mask) -> list[Finding]:
+    """Torques that hold one and the same number most of the time while their joint moves."""
+    findings = []
+    moves = np.zeros(run.q.shape, bool)
+    moves[1:] = np.diff(run.q, axis=0) != 0
+    for j in np.flatnonzero(~known & (moves.sum(axis=0) >= _FEWEST)):
+        levels, counts = np.unique(run.tau[moves[:, j], j], return_counts=True)
+        share = counts.max() / counts.sum()
+        if share > _MOSTLY:
+            text = (
+                f"torque of {joints[j]} is exactly {levels[counts.argmax()] + 0.0:.6g} in "
+                f"{share:.0%} of the samples in which it moves: the channel says little of it, "
+                "being too coarse, cut off near zero or not this joint's. Leave the joint out of "
+                "robot.joints, or name another channel (measurement.channels, measurement.names)"
+            )
+            findings.append(Finding("mostly_constant", "warning", text, run.name, (joints[j],)))
+    return findings
 
 
 def _copies(run: Run, joints: tuple[str, ...]) -> list[Finding]:

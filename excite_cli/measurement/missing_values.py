@@ -52,7 +52,7 @@ def without_missing(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Findin
                 f"position of {joint} is NaN or infinite in {_share(missing, len(run.t))}; these "
                 "instants are taken out for all joints"
             )
-            findings.append(Finding("nan", "warning", text, run.name, (joint,)))
+            findings.append(Finding("nan_position", "warning", text, run.name, (joint,)))
     if np.count_nonzero(rows) < 2:
         raise FileError(
             f"Run {run.name}: no instant has a time stamp and the positions of all joints "
@@ -97,10 +97,10 @@ def _fill_torque(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]
                 f"torque of {joint} is NaN or infinite throughout: the channel is dead. Leave the "
                 "run out, or the joint out of robot.joints"
             )
-            findings.append(Finding("dead", "error", text, run.name, (joint,)))
+            findings.append(Finding("dead_torque", "error", text, run.name, (joint,)))
         elif missing:
             text = f"torque of {joint} is NaN or infinite in {_share(missing, len(run.t))}; masked"
-            findings.append(Finding("nan", "warning", text, run.name, (joint,)))
+            findings.append(Finding("nan_torque", "warning", text, run.name, (joint,)))
     return replace(run, tau=_filled(run.tau), valid=run.usable() & known), findings
 
 
@@ -110,9 +110,9 @@ def _fill_speed(run: Run, joints: tuple[str, ...]) -> tuple[Array | None, list[F
     names = tuple(np.array(joints)[~known.all(axis=0)])
     if not known.any(axis=0).all():
         text = f"recorded speed of {', '.join(names)} is NaN; recorded speeds are not used"
-        return None, [Finding("nan", "warning", text, run.name, names)]
+        return None, [Finding("nan_speed", "warning", text, run.name, names)]
     text = f"recorded speed of {', '.join(names)} is NaN in {np.count_nonzero(~known)} places"
-    return _filled(run.dq), [Finding("nan", "note", f"{text}; filled", run.name, names)]
+    return _filled(run.dq), [Finding("nan_speed", "note", f"{text}; filled", run.name, names)]
 
 
 def _filled(values: Array) -> Array:

@@ -13,7 +13,9 @@ from excite_cli.measurement.channel_order import check_order
 from excite_cli.measurement.covariates import without_missing_covariates
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.dead_channels import dead_channels
+from excite_cli.measurement.merged_findings import merged
 from excite_cli.measurement.missing_values import without_missing
+from excite_cli.measurement.resolution import with_torque_steps
 from excite_cli.measurement.saturation import mask_saturated
 from excite_cli.measurement.stamps import equidistant
 from excite_cli.measurement.stuck import mask_stuck
@@ -34,6 +36,8 @@ def checked(
         whole.append(kept)
     whole, more = dead_channels(whole, joints)
     findings += more
+    whole, more = with_torque_steps(whole, joints)
+    findings += more
     parts: list[Run] = []
     for run in whole:
         for mask in (mask_saturated, mask_stuck):
@@ -42,8 +46,11 @@ def checked(
         even, more = equidistant(run)
         parts += even
         findings += more
-    findings += check_units(parts, spec, joints, limits)
-    findings += check_order(parts, joints)
+    order = check_order(parts, joints, spec.filter.velocity == "measured")
+    units = check_units(parts, spec, joints, limits)
+    if any(found.kind == "lag" for found in order):  # which is why a gain is odd
+        units = [found for found in units if found.kind not in ("gain", "clock")]
+    findings += units + order
     return parts, list(dict.fromkeys(findings))
 
 
@@ -51,7 +58,7 @@ def raise_for_errors(dataset: Dataset) -> None:
     """Raise one FileError that lists every finding of severity `error`; else do nothing."""
     errors = [found for found in dataset.findings if found.severity == "error"]
     if errors:
-        lines = "".join(f"\n- {sentence(found)}" for found in errors)
+        lines = "".join(f"\n- {sentence(found)}" for found in merged(errors))
         raise FileError(f"{', '.join(dataset.sources)}: these data cannot be used:{lines}")
 
 

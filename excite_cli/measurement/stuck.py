@@ -33,7 +33,7 @@ def mask_stuck(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]:
             f"{np.count_nonzero(stale)} of {len(run.t)} samples repeat the one before in every "
             "position and torque while the robot moves: stale messages; filled and masked"
         )
-        findings.append(Finding("stuck", "warning", text, run.name))
+        findings.append(Finding("stale", "warning", text, run.name))
         valid[stale] = False
         run = _filled(run, stale)
     same = np.vstack([np.zeros((1, len(joints)), bool), run.tau[1:] == run.tau[:-1]])

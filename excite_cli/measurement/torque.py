@@ -77,21 +77,21 @@ def declared(spec: MeasurementSpec, joints: tuple[str, ...]) -> list[Finding]:
     """Findings about a declaration that contradicts itself."""
     findings = []
     ratio = _per_joint(spec.gear_ratio, joints)
-    if spec.torque != "link" and (ratio == 1.0).all():
+    if spec.torque == "motor" and (ratio == 1.0).all():
         text = (
-            f"measurement.torque is '{spec.torque}', and every gear_ratio is 1: give "
+            "measurement.torque is 'motor', and every gear_ratio is 1: give "
             "measurement.gear_ratio unless the motors drive the joints directly"
         )
-        findings.append(Finding("units", "warning", text))
+        findings.append(Finding("no_ratio", "warning", text))
     if spec.torque == "link" and spec.position == "link" and (ratio != 1.0).any():
         text = (
             "measurement.gear_ratio is given but not applied, for the torque is at the link; "
             "write measurement.torque: motor if it is not"
         )
-        findings.append(Finding("units", "warning", text))
+        findings.append(Finding("ratio_not_applied", "warning", text))
     if spec.torque != "current" and (_per_joint(spec.torque_constant, joints) != 1.0).any():
         text = "measurement.torque_constant is given but not applied: torque is not 'current'"
-        findings.append(Finding("units", "warning", text))
+        findings.append(Finding("constant_not_applied", "warning", text))
     return findings
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.measurement.clock import check_clock
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.speeds import Speeds, speeds
 from excite_cli.measurement.torque import SECONDS
@@ -54,7 +55,7 @@ def check_units(
             runs, found, spec, limits, where
         )
     if not findings:
-        findings = _odd_gains(found, joints, where)
+        findings = check_clock(runs, where) or _odd_gains(found, joints, where)
         findings += _outside(runs, joints, limits, where)
     return findings + _torque(runs, joints, limits, where)
 
@@ -222,11 +223,11 @@ def _torque(
             f"torque of {joints[j]} reaches {largest[j]:.4g} N·m, {share[j]:.3g} times its effort "
             "limit: a placeholder in the URDF, or another unit"
         )
-        return [Finding("units", "note", text, where, (joints[j],))]
+        return [Finding("torque_units", "note", text, where, (joints[j],))]
     if 0 < share.max() < 0.01:
         text = (
             f"torques stay below {share.max():.2g} of the effort limits: are they of the motors, "
             "before the gears (measurement.torque: motor)?"
         )
-        return [Finding("units", "warning", text, where)]
+        return [Finding("torque_units", "warning", text, where)]
     return []

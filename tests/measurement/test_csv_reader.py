@@ -180,7 +180,7 @@ def test_empty_fields_words_and_a_cut_row(tmp_path: Path) -> None:
     lines[100] = ",".join([*fields[:4], "", *fields[5:]])
     path.write_text("\n".join(lines) + "\n7.9,0.1")
     data = read(path)
-    assert [found.kind for found in data.findings] == ["truncated", "words", "nan"]
+    assert [found.kind for found in data.findings] == ["truncated", "words", "nan_torque"]
     assert len(data.runs[0].t) == 1600
     valid = data.runs[0].usable()
     assert not valid[99, 0]

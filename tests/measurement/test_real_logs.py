@@ -11,9 +11,9 @@ import pytest
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement.catalogue import read_dataset
-from excite_cli.measurement.channel_order import speed_lag
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.quality import raise_for_errors
+from excite_cli.measurement.speed_lag import speed_lag
 
 LOGS = Path(__file__).resolve().parents[2] / "data"
 ROBOTS = {
@@ -85,7 +85,9 @@ def test_bag_and_hdf5_of_the_same_recording() -> None:
 
 
 def test_motor_side_tables_say_what_they_need(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"its columns: Joint_1, .*separate files must be joined"):
+    with pytest.raises(
+        FileError, match=r"its columns: Joint_1, .*joined with those of the other files"
+    ):
         load("tx40", "curr_data.csv.gz")
     # Joined, as the message says: columns with their channel's name, and the rate declared.
     tables = [

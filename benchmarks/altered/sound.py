@@ -1,0 +1,56 @@
+"""Sound recordings, of which nothing should be said: simulated campaigns, and real robots.
+
+Campaigns are those of `benchmarks.campaigns`: several robots, series and short moves, payloads,
+friction that changes, noise with and without memory, encoders of 17 to 21 bits. Every third one has
+encoders of 15 bits and torques in steps of a hundredth of their largest.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.altered.recordings import CONFIGS, REAL, recording
+from benchmarks.campaigns.cases import make_case
+from benchmarks.campaigns.judge import campaign
+from excite_cli.api.loading import Case
+from excite_cli.measurement.dataset import Dataset, Run
+
+_COUNT = 2 * np.pi / 2**15
+_STEP = 0.01  # of the largest torque of a joint
+# Faults of packets are in some campaigns, and told rightly.
+TRUE = frozenset({"stale", "bridged", "jitter", "gap", "short_part"})
+
+
+@dataclass(frozen=True)
+class Sound:
+    """A recording as it is, the config for it, and the run that is sealed."""
+
+    name: str
+    case: Case
+    data: Dataset
+    sealed: str | None = None
+
+
+def sound_logs(simulated: int, seed: int) -> Iterator[Sound]:
+    """Recordings of real robots, whole and run by run, then campaigns."""
+    for name in REAL:
+        of = recording(name)
+        yield Sound(name, of.case, of.data)
+        for run in of.data.runs if len(of.data.runs) > 1 else ():
+            yield Sound(f"{name} {run.name}", of.case, replace(of.data, runs=(run,)))
+    for index in range(simulated):
+        case = make_case(seed, index)
+        data = campaign(case).dataset
+        coarse = index % 3 == 0
+        if coarse:
+            data = replace(data, runs=tuple(map(_coarse, data.runs)))
+        name = f"{index} {case.group} {case.robot.name}{' coarse' if coarse else ''}"
+        yield Sound(name, Case(case.spec, CONFIGS, case.robot.robot), data, case.sealed)
+
+
+def _coarse(run: Run) -> Run:
+    step = _STEP * np.abs(run.tau).max(axis=0)
+    return replace(
+        run, q=_COUNT * np.round(run.q / _COUNT), tau=step * np.round(run.tau / step), dq=run.dq
+    )

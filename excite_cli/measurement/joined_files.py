@@ -1,0 +1,69 @@
+"""Files that hold channels of one recording each, joined to the recording.
+
+A logger may write positions, speeds and torques into files of their own. Where a file lacks
+positions or torques, it is joined with the others of that kind by its time stamps, which must be
+the same to the last digit: nothing is interpolated or guessed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+
+from excite_cli.errors import FileError
+from excite_cli.measurement.arrange import listed
+from excite_cli.measurement.dataset import Array
+from excite_cli.measurement.reader import RawRun, ReadOptions
+
+_WORDS = {"q": "positions", "tau": "torques"}  # without which nothing can be said
+
+
+def is_part(raw: RawRun) -> bool:
+    """Whether it lacks positions or torques."""
+    return any(not raw.columns.get(channel) for channel in _WORDS)
+
+
+def joined(parts: Sequence[tuple[Path, RawRun]], wanted: ReadOptions) -> tuple[Path, RawRun]:
+    """One recording of all channels, named by what the files' names begin with alike.
+
+    Raises
+    ------
+    FileError
+        Stamps differ, a channel is there twice, or positions or torques are in none of them.
+    """
+    path, whole = parts[0]
+    names = ", ".join(each.name for each, _ in parts)
+    for other, raw in parts[1:]:
+        if len(raw.t) != len(whole.t) or not np.array_equal(raw.t, whole.t, equal_nan=True):
+            raise FileError(
+                f"{names}: {path.name} and {other.name} hold channels of one recording each, with "
+                "other time stamps. Put them on the same stamps, or into one file."
+            )
+        columns = {channel: dict(by_joint) for channel, by_joint in whole.columns.items()}
+        for channel, by_joint in raw.columns.items():
+            twice = sorted(set(columns.get(channel, {})) & set(by_joint))
+            if twice:
+                raise FileError(
+                    f"{names}: '{channel}' of {twice[0]} is in more than one of these files. Give "
+                    "the files of one recording whose channels are apart, each channel once."
+                )
+            columns.setdefault(channel, {}).update(by_joint)
+        others: dict[str, Array] = {**whole.others, **raw.others}
+        findings = (*whole.findings, *raw.findings)
+        whole = replace(whole, columns=columns, others=others, findings=findings)
+    for channel, word in _WORDS.items():
+        if not whole.columns.get(channel):
+            there = [f"{name}_<joint>" for name, by_joint in whole.columns.items() if by_joint]
+            raise FileError(
+                f"{names}: no columns '{wanted.called(channel) or channel}_<joint>', so there are "
+                f"no {word}; there are: {listed([*there, *whole.others])}. Give the file that has "
+                "them as well, or the name they go by: "
+                f"measurement.channels: {{{channel}: …}}."
+            )
+    positions = list(whole.columns["q"])
+    stems = [each.name.split(".")[0] for each, _ in parts]
+    alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*stems, strict=False))
+    name = "".join(letters[0] for letters in alike).rstrip("_-. ") or stems[0]
+    return path, replace(whole, name=name, numbered=all(each.isdigit() for each in positions))

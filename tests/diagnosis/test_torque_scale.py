@@ -1,0 +1,122 @@
+"""Torques of another unit, without gravity, or of another run, a clock; and sound recordings."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.api.loading import Case, load_data
+from excite_cli.config.load import load_spec
+from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.plausibility import check_dataset
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.measurement.dataset import Dataset, Finding, Run
+from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.robot.model import Array, Robot
+from excite_cli.simulation.planted import plant
+from excite_cli.simulation.simulate import simulate
+from tests.simulation.arms import IDEAL, arm, motion
+
+SPEC: Spec = load_spec(Path(__file__).resolve().parents[2] / "configs" / "ur10.yaml")
+FRICTION = [10.0, 15.0, 8.0, 3.0, 2.0, 1.0]  # N·m
+SHOULDER, ELBOW = "shoulder_lift_joint", "elbow_joint"
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return arm()
+
+
+@pytest.fixture(scope="module")
+def sound(robot: Robot) -> Dataset:
+    """Three motions of an arm whose masses are 10 to 30 % off, with dry friction; one is sealed."""
+    rubbing = [plant(kind_named("coulomb_friction"), (j,), x) for j, x in enumerate(FRICTION)]
+    motions = [motion(robot, seed, f"run_{seed}") for seed in (1, 2, 3)]
+    settings = replace(IDEAL, rate=200.0, torque_noise=0.01, inertia_error=0.2)
+    return simulate(robot, motions, settings, rubbing).dataset
+
+
+def told(robot: Robot, data: Dataset, **declared: object) -> tuple[Finding, ...]:
+    measured = SPEC.measurement.model_copy(update=declared)
+    return check_dataset(robot, data, SPEC.model_copy(update={"measurement": measured}))
+
+
+def with_torque(data: Dataset, change: Callable[[Run], Array]) -> Dataset:
+    runs = tuple(replace(run, tau=change(run), extra={}) for run in data.runs)
+    return replace(data, runs=runs)
+
+
+def without_gravity(robot: Robot, run: Run) -> Array:
+    rest = np.zeros_like(run.q)
+    return run.tau - InverseDynamics(robot).torques(run.q, rest, rest)
+
+
+def test_sound_torques_raise_no_word(robot: Robot, sound: Dataset) -> None:
+    assert told(robot, sound) == ()
+    halved = with_torque(sound, lambda run: 0.5 * run.tau)  # masses may be off by as much
+    assert told(robot, halved) == ()
+
+
+@pytest.mark.parametrize(("factor", "constant"), [(1e3, "0.001"), (1e-2, "100")])
+def test_all_torques_in_another_unit(
+    robot: Robot, sound: Dataset, factor: float, constant: str
+) -> None:
+    wrong = with_torque(sound, lambda run: factor * run.tau)
+    (found,) = told(robot, wrong)
+    assert (found.kind, found.severity) == ("torque_scale", "warning")
+    assert set(found.joints) >= {SHOULDER, ELBOW}
+    assert f"measurement.torque_constant: {constant}," in found.text
+    assert "measurement.torque: motor" in found.text
+    assert told(robot, wrong, trust=True) == ()
+
+
+def test_one_torque_in_another_unit(robot: Robot, sound: Dataset) -> None:
+    scale = np.where(np.arange(6) == 2, 1e3, 1.0)
+    (found,) = told(robot, with_torque(sound, lambda run: scale * run.tau))
+    assert found.joints == (ELBOW,)
+    assert "shoulder_lift_joint: 1, elbow_joint: 0.001, wrist_1_joint: 1" in found.text
+
+
+def test_gravity_that_is_subtracted_is_told_and_its_key_adds_it(
+    robot: Robot, sound: Dataset, tmp_path: Path
+) -> None:
+    lost = with_torque(sound, lambda run: without_gravity(robot, run))
+    (found,) = told(robot, lost)
+    assert (found.kind, found.severity) == ("no_gravity", "warning")
+    assert set(found.joints) >= {SHOULDER, ELBOW}
+    assert "measurement.gravity: subtracted" in found.text
+    write_dataset(tmp_path / "log.h5", lost, {})
+    measured = SPEC.measurement.model_copy(update={"gravity": "subtracted"})
+    spec = SPEC.model_copy(update={"measurement": measured})
+    back = load_data(Case(spec, tmp_path, robot), tmp_path / "log.h5", tell=lambda note: None)
+    for run, known in zip(back.runs, sound.runs, strict=True):
+        np.testing.assert_allclose(run.tau, known.tau, atol=1e-9)
+    assert check_dataset(robot, back, spec) == ()
+
+
+def test_torques_of_another_run_are_told_with_the_run_that_they_belong_to(
+    robot: Robot, sound: Dataset
+) -> None:
+    first, second, third = sound.runs
+    mixed = replace(sound, runs=(replace(first, tau=second.tau), second, third))
+    (found,) = told(robot, mixed)
+    assert (found.kind, found.severity, found.run) == ("foreign_torque", "warning", "run_1")
+    assert "they fit the motion of run_2" in found.text
+    assert told(robot, mixed, trust=True) == ()
+
+
+def test_a_clock_that_is_off_is_seen_by_gravity_where_there_are_no_speeds(robot: Robot) -> None:
+    """Of an arm without friction; that of `sound` is half of the torque of its wrists."""
+    motions = [motion(robot, seed, f"run_{seed}") for seed in (1, 2)]
+    data = simulate(robot, motions, replace(IDEAL, rate=200.0, torque_noise=0.01)).dataset
+    runs = [replace(run, t=0.9 * run.t, dq=None) for run in data.runs]
+    (found,) = told(robot, replace(data, runs=tuple(runs)))
+    assert (found.kind, found.severity) == ("clock", "warning")
+    key = float(found.text.split("measurement.clock: ")[1].split(". If")[0])
+    assert key == pytest.approx(1 / 0.9, rel=0.02)
+    right = tuple(replace(run, t=key * run.t) for run in runs)
+    assert told(robot, replace(data, runs=right)) == ()
+    assert told(robot, replace(data, runs=tuple(runs)), trust=True) == ()
