@@ -267,3 +267,21 @@ def test_what_can_be_predicted_and_is_more_makes_a_name_doubtful(
     unforeseen = replace(rest, noise=0.1, predictable=0.0, depends_on=())  # 0.99 exceed the noise
     found = approximations(traced(data, candidates, [0]), [], NAMES, [unforeseen])
     assert found == ({0: Approximation()} if certain else {})
+
+
+@pytest.mark.parametrize(("size", "expected"), [(1.3, {0}), (1.5, set())])
+@pytest.mark.parametrize("kind", ["torque_offset", "coulomb_friction"])
+def test_a_mean_beside_a_large_rest_is_doubted_for_all_of_it(
+    kind: str, size: float, expected: set[int]
+) -> None:
+    """The residual has the energy one; 0.35 of it can be predicted, 0.99 are no noise."""
+    mean = effect(kind)
+    if kind == "coulomb_friction":
+        mean = replace(mean, runs=("a",))
+    data, candidates = planted([mean], np.array([[size, 0.0]]))
+    depends = (Covariate("position", "b"), Covariate("speed", "b"))
+    rest = LargeRest("a", 1.0, 0.1, 0.1, "band", True, 0.35, depends)
+    found = approximations(traced(data, candidates, [0]), [], NAMES, [rest])
+    assert set(found) == expected
+    data, candidates = planted([effect("armature")], np.array([[size, 0.0]]))
+    assert approximations(traced(data, candidates, [0]), [], NAMES, [rest]) == {}
