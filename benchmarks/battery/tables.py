@@ -132,19 +132,27 @@ def details(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def _sizes(outcomes: Sequence[Outcome]) -> list[str]:
-    """Of friction with memory: its size in standard deviations from the truth, and its distance."""
-    rows: dict[str, list[tuple[float, float]]] = {}
+    """Of friction with memory: size and distance beside what was planted.
+
+    Of a form that is not Dahl's, part of the friction is Coulomb's to these data.
+    """
+    rows: dict[str, list[tuple[float, float, float]]] = {}
     for o in outcomes:
         for p in o.planted if o.group == "history" else ():
             for f in o.found:
                 if (f["kind"], f["joints"]) == (p["kind"], p["joints"]):
-                    value, std = f["sizes"]["friction"]
+                    (value, std), true = f["sizes"]["friction"], p["values"][0]
                     distance = f["shape"]["distance"] / p["shape"]["distance"]
-                    rows.setdefault(o.kind, []).append(((value - p["values"][0]) / std, distance))
+                    found = ((value - true) / std, value / true, distance)
+                    rows.setdefault(o.kind, []).append(found)
     return [
-        f"{kind:14} {len(found)} sizes, {_count(abs(z) < 2.0 for z, _ in found)} within 2 sd "
-        f"(worst {max((z for z, _ in found), key=abs):.1f}); distance found/planted "
-        f"{min(d for _, d in found):.2f} to {max(d for _, d in found):.2f}"
+        f"{kind:14} {len(found)} sizes, {_count(abs(each[0]) < 2.0 for each in found)} within 2 sd"
+        + "".join(
+            f"; {name} found/planted {min(column):.2f} to {max(column):.2f}"
+            for name, column in zip(
+                ("size", "distance"), [*zip(*found, strict=True)][1:], strict=True
+            )
+        )
         for kind, found in rows.items()
     ]
 

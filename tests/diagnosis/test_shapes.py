@@ -1,4 +1,4 @@
-"""Shapes from pass to pass of a search: when they have settled, and which noise is seen in."""
+"""Shapes from pass to pass: when they have settled, and in which of them noise is measured."""
 
 from dataclasses import replace
 
