@@ -44,7 +44,8 @@ def aliases_of(
 ) -> list[Alias]:
     """Candidates that could replace `named` beside the `rest`, nearest first, one per place.
 
-    Places in `taken` are named already.
+    Places in `taken` are named already. By how much there is more of it in some runs is no other
+    name of what all runs have: where `rest` lacks what refines it, that stands for what is lacking.
 
     A candidate with more parameters than the named one has more to explain it with and is no alias;
     `allowed(rest, d)` vetoes impossible signs.
@@ -55,6 +56,8 @@ def aliases_of(
     rows = set(candidates[named].rows)
     for i, c in enumerate(candidates):
         if c.place in taken or not rows & set(c.rows):
+            continue
+        if c.effect.is_change and c.place._replace(runs=()) == candidates[named].place:
             continue
         other = schur.singles[i]
         if other.dof == 0 or other.dof > own.dof or other.chi2 < 0.5 * own.chi2:

@@ -75,7 +75,14 @@ class Judgement:
     def excluded(self, candidate: int) -> list[Place]:
         """Places that must stay empty while it is in."""
         effect = self.candidates[candidate].effect
-        return [effect.place._replace(kind=kind) for kind in self._exclusive[effect.kind]]
+        if not self._exclusive[effect.kind]:
+            return []
+        return [
+            c.place
+            for c in self.candidates
+            if c.effect.kind in self._exclusive[effect.kind]
+            and (c.effect.joints, c.effect.runs) == (effect.joints, effect.runs)
+        ]
 
     def together(self, one: int, other: int) -> bool:
         """Whether both kinds may be named for one joint."""

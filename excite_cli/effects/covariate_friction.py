@@ -29,6 +29,7 @@ class CovariateFriction(OfCovariate):
     )
     refines: ClassVar = ("coulomb_friction", "viscous_friction")
     changes_of: ClassVar = refines
+    excludes: ClassVar = ("friction_change",)  # warming by the clock instead of the thermometer
 
     def columns(self, signals: Signals) -> Array:
         """δ sgn v_j and δ v_j, (T, 1, 2)."""

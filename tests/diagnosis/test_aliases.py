@@ -1,6 +1,7 @@
 """Planted candidates that are nearly collinear are aliases, others are not."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -66,6 +67,16 @@ def test_a_nearly_collinear_candidate_is_an_alias_and_others_are_not() -> None:
     aliases = found(0.1)
     assert [alias.candidate for alias in aliases] == [NEAR]
     assert aliases[0].divergence <= 0.5 * SAMPLES * 0.01 * (1.2 * SIZE) ** 2
+
+
+def test_more_of_it_in_some_runs_is_no_other_name_of_it() -> None:
+    _, candidates, white = case(0.1)
+    for kind, expected in ((CoulombFriction, []), (ViscousFriction, [NEAR])):
+        pool = list(candidates)
+        pool[NEAR] = replace(pool[NEAR], effect=kind((0,), {}, ("a",)))
+        taken = {pool[NAMED].place}
+        told = aliases_of(NAMED, [], taken, pool, white, 1.0, anything)
+        assert [alias.candidate for alias in told] == expected
 
 
 @pytest.mark.parametrize("away", [0.35, 1.0])
