@@ -10,9 +10,10 @@ what an effect of an impossible sign or size would explain. The effect is an app
 
 Of `rests`, U is what can be predicted, or if that is little, what exceeds the noise; they depend on
 two quantities mostly, so that U > 0.5 E is asked for where one of them is the effect's own. They
-say nothing of effects that inertias nearly take up, of which E is next to nothing. A constant, or a
-change in some runs, is the mean of a function of anything: there U is all that exceeds the noise,
-and U > 0.5 E is enough.
+say nothing of effects that inertias nearly take up, of which E is next to nothing. A constant,
+first-order friction, and a change in some runs are means of a function of anything: there U is all
+that exceeds the noise, and U > 0.5 E is enough. (Of maps of two positions or of one and direction,
+five of 208 campaigns were told such a mean, beside the word that 12 to 71 times the noise is left.)
 """
 
 from collections.abc import Sequence
@@ -21,6 +22,7 @@ from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.records import Approximation, LargeRest, Unexplained
 from excite_cli.diagnosis.tracing import Traced
+from excite_cli.effects.base import Effect, Tier
 
 _SAME_QUANTITY, _ONE_OF_TWO = 0.1, 0.5
 _PREDICTABLE = 0.3  # share: less may be all that exceeds the noise, or not
@@ -52,8 +54,9 @@ def approximations(
             if structure > (_SAME_QUANTITY if same else 1.0) * explained:
                 found[i] = Approximation(covariates=each.depends_on)
                 continue
-        mean = _is_mean_of_anything(traced, i)
-        if name in more and (mean or _of_its_own(traced, i)):
+        effect = traced.candidates[i].effect
+        mean = effect.is_change or effect.tier == Tier.EVERY_ROBOT or _is_constant(effect)
+        if name in more and (_is_constant(effect) or _of_its_own(traced, i)):
             same = mean or _same_quantity(traced, i, more[name].depends_on, joint_names)
             surely = _surely_left(more[name], mean)
             if surely * rest > (_ONE_OF_TWO if same else 1.0) * explained:
@@ -79,15 +82,8 @@ def _of_its_own(traced: Traced, i: int) -> bool:
     return judge.white.schur(rest).gain(i, absorbed=SHARED).left > _OF_ITS_OWN
 
 
-def _is_mean_of_anything(traced: Traced, i: int) -> bool:
-    """Whether it is the mean of a function of anything, over all runs or in some of them.
-
-    Of maps of two positions, five of 208 campaigns were told that an offset, or friction of one
-    run, is what is missing, beside the word that 12 to 58 times the noise is left.
-    """
-    effect = traced.candidates[i].effect
-    constant = not effect.function_of and len(effect.joints) == 1 and not effect.carried
-    return effect.is_change or constant
+def _is_constant(effect: Effect) -> bool:
+    return not effect.function_of and len(effect.joints) == 1 and not effect.carried
 
 
 def _surely_left(rest: LargeRest, more: bool) -> float:
