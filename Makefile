@@ -70,7 +70,7 @@ battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effec
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.diagnosis_battery --cases 130 --seed 11001
 
 campaigns: $(STAMP)      ## runs that differ, short moves, faulty packets; many runs, orders, noises
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.campaign_battery --cases 208 --seed 5001
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.campaign_battery --cases 208 --seed 5006
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.runs
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.orders
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.noises
