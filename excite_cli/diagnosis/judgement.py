@@ -26,6 +26,9 @@ _TRANSFER = 0.06  # least share of the gain on fitted runs that runs left out mu
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
 
 
+Spot = tuple[str, tuple[int, ...], tuple[str, ...]]  # kind, joints, runs
+
+
 @dataclass(frozen=True)
 class Rules:
     """α of the family, least gain (RMS) on runs left out, inflation of χ², least p that is told."""
@@ -71,17 +74,18 @@ class Judgement:
             kind.kind: [other.kind for other in kinds if kind.exclusive_with(other)]
             for kind in kinds
         }
+        self._places: dict[Spot, set[Place]] = {}
+        for c in self.candidates:
+            spot = (c.effect.kind, c.effect.joints, c.effect.runs)
+            self._places.setdefault(spot, set()).add(c.place)
 
     def excluded(self, candidate: int) -> list[Place]:
         """Places that must stay empty while it is in."""
         effect = self.candidates[candidate].effect
-        if not self._exclusive[effect.kind]:
-            return []
         return [
-            c.place
-            for c in self.candidates
-            if c.effect.kind in self._exclusive[effect.kind]
-            and (c.effect.joints, c.effect.runs) == (effect.joints, effect.runs)
+            place
+            for kind in self._exclusive[effect.kind]
+            for place in self._places.get((kind, effect.joints, effect.runs), ())
         ]
 
     def together(self, one: int, other: int) -> bool:
