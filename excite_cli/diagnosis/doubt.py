@@ -10,10 +10,11 @@ what an effect of an impossible sign or size would explain. The effect is an app
 
 Of `rests`, U is what can be predicted, or if that is little, what exceeds the noise; they depend on
 two quantities mostly, so that U > 0.5 E is asked for where one of them is the effect's own. They
-say nothing of effects that inertias nearly take up, of which E is next to nothing. A constant,
-first-order friction, and a change in some runs are means of a function of anything: there U is all
-that exceeds the noise, and U > 0.5 E is enough. (Of maps of two positions or of one and direction,
-five of 208 campaigns were told such a mean, beside the word that 12 to 71 times the noise is left.)
+say nothing of effects that inertias nearly take up, of which E is next to nothing. A change in some
+runs, and where a good part can be predicted a constant and first-order friction, are means of a
+function of anything: U is all that exceeds the noise for them, and U > 0.5 E is enough. (Of maps of
+two positions, or of one and direction, five of 208 campaigns were told such a mean, beside the word
+that 12 to 71 times the noise is left.)
 """
 
 from collections.abc import Sequence
@@ -54,9 +55,8 @@ def approximations(
             if structure > (_SAME_QUANTITY if same else 1.0) * explained:
                 found[i] = Approximation(covariates=each.depends_on)
                 continue
-        effect = traced.candidates[i].effect
-        mean = effect.is_change or effect.tier == Tier.EVERY_ROBOT or _is_constant(effect)
-        if name in more and (_is_constant(effect) or _of_its_own(traced, i)):
+        if name in more and _of_its_own(traced, i, more[name]):
+            mean = _is_mean(traced, i, more[name])
             same = mean or _same_quantity(traced, i, more[name].depends_on, joint_names)
             surely = _surely_left(more[name], mean)
             if surely * rest > (_ONE_OF_TWO if same else 1.0) * explained:
@@ -70,7 +70,7 @@ def approximations(
     return found
 
 
-def _of_its_own(traced: Traced, i: int) -> bool:
+def _of_its_own(traced: Traced, i: int, rest: LargeRest) -> bool:
     """Whether E says how much candidate i explains: the rest of the model takes little of it up.
 
     What inertias nearly take up has next to no E, however large it is.
@@ -78,8 +78,17 @@ def _of_its_own(traced: Traced, i: int) -> bool:
     effect, judge = traced.candidates[i].effect, traced.judge
     if effect.refines or effect.runs:
         return True  # what lacks a name is most easily called so
-    rest = judge.without(i, traced.chosen)
-    return judge.white.schur(rest).gain(i, absorbed=SHARED).left > _OF_ITS_OWN
+    if _is_constant(effect):
+        return rest.predictable > _PREDICTABLE  # else it is the mean of nothing
+    others = judge.without(i, traced.chosen)
+    return judge.white.schur(others).gain(i, absorbed=SHARED).left > _OF_ITS_OWN
+
+
+def _is_mean(traced: Traced, i: int, rest: LargeRest) -> bool:
+    """Whether it would be the mean of any function, and what is left is one."""
+    effect = traced.candidates[i].effect
+    everywhere = effect.tier == Tier.EVERY_ROBOT or _is_constant(effect)
+    return effect.is_change or (everywhere and rest.predictable > _PREDICTABLE)
 
 
 def _is_constant(effect: Effect) -> bool:

@@ -283,5 +283,8 @@ def test_a_mean_beside_a_large_rest_is_doubted_for_all_of_it(
     rest = LargeRest("a", 1.0, 0.1, 0.1, "band", True, 0.35, depends)
     found = approximations(traced(data, candidates, [0]), [], NAMES, [rest])
     assert set(found) == expected
+    noisy = replace(rest, predictable=0.25)  # and no map, of which a constant is the mean
+    found = approximations(traced(data, candidates, [0]), [], NAMES, [noisy])
+    assert set(found) == (expected if mean.is_change else set())
     data, candidates = planted([effect("armature")], np.array([[size, 0.0]]))
     assert approximations(traced(data, candidates, [0]), [], NAMES, [rest]) == {}
