@@ -124,6 +124,11 @@ class MeasurementSpec(Section):
         description="further columns of the files that friction or offsets may follow, as "
         "[temp_j1, ambient]; what belongs to a joint has its name at the end",
     )
+    without_torque: tuple[str, ...] = Field(
+        (),
+        description="joints that move, but whose torque was not recorded or is worth nothing: "
+        "only their motion is used",
+    )
     trust: bool = Field(
         False, description="take order and signs of the columns as they are, whatever the URDF says"
     )

@@ -85,7 +85,7 @@ def diagnose(
     check_left_to_fit(spec.effects, parts)
     refuse_sealed_copies(parts)
     processing, training = _prepared(spec, parts)
-    require_motion(training, processing, robot.joint_names)
+    require_motion(training, processing, robot.joint_names, spec.measurement.without_torque)
     kept = [prepare(run, processing) for run in parts.sealed]  # refused early where too short
     suspicious = check_recorded(robot, parts.training, training, processing, spec.measurement)
     traced = _traced(model, spec, parts, processing, progress)

@@ -81,15 +81,18 @@ def check_plausibility(
 def _check_arrangement(
     names: Sequence[str], samples: Samples, model: RoughModel, declared: MeasurementSpec
 ) -> tuple[Finding, ...]:
-    """Order of columns, and signs."""
+    """Order of columns, and signs, of all joints with a torque."""
     n = len(names)
     table = model.shares_left(samples)
     here = np.arange(n)
+    without = ~samples.known.any(axis=0)
+    table[without] = table[:, without] = 1.0
+    table[without, without] = 0.0
     straight = Verdict(Change.none(n), table[here, here, 0])
     if straight.left.max() < _GOOD:
         return ()
     settled = _settled(names, declared)
-    tried = [*torques_changed(table), *positions_changed(model, samples)]
+    tried = [*torques_changed(table), *positions_changed(model, samples, without)]
     found = [
         v for v in tried if _clearly_better(v, straight) and not (v.change.signs & settled).any()
     ]

@@ -128,13 +128,21 @@ def torques_changed(table: Array) -> Iterator[Verdict]:
         yield Verdict(Change(here, ones, order, sign), left)
 
 
-def positions_changed(model: RoughModel, samples: Samples) -> list[Verdict]:
-    """The best changes of positions, with or without their torques, found step by step."""
+def positions_changed(
+    model: RoughModel, samples: Samples, untouched: NDArray[np.bool_]
+) -> list[Verdict]:
+    """The best changes of positions, with or without their torques, found step by step.
+
+    Of joints `untouched` (n,) nothing is changed.
+    """
     few = samples.thinned(_SEARCH_SAMPLES)
     n = samples.q.shape[1]
     current = _judged(model, few, [Change.none(n)])[0]
     for step in range(n + 1):
-        tried = list(_neighbours(current.change, far=step == 0))
+        near = _neighbours(current.change, far=step == 0)
+        tried = [change for change in near if not (change.touched & untouched).any()]
+        if not tried:
+            break
         found = _judged(model, few, tried)
         best = min(found, key=lambda verdict: verdict.cost)
         if best.cost > current.cost - 1e-6:

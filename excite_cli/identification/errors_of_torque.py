@@ -75,13 +75,14 @@ def torque_errors(
     relative = np.where(enough, _ratio(wrong, size), np.nan)
     relative_moving = np.where(count_moving >= FEWEST, _ratio(wrong_moving, size_moving), np.nan)
     rms = np.sqrt(np.where(enough, wrong, np.nan) / np.maximum(count, 1))
+    rms_raw = np.where(count > 0, _raw_rms(raw, raw_predicted, len(joint_names)), np.nan)
     return Errors(
         mean_relative=_mean(relative),
         mean_relative_moving=_mean(relative_moving),
         relative=_named(joint_names, relative),
         relative_moving=_named(joint_names, relative_moving),
         rms=_named(joint_names, rms),
-        rms_raw=_named(joint_names, _raw_rms(raw, raw_predicted, len(joint_names))),
+        rms_raw=_named(joint_names, rms_raw),
         interval=_interval(sums[0] * enough, sums[1] * enough),
         samples={name: int(each) for name, each in zip(joint_names, count, strict=True)},
     )

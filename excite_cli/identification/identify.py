@@ -94,7 +94,12 @@ def identify(
     )
     tell("columns of the regression")
     training = _regression(robot, base, effects, parts.training, processing)
-    require_motion([run.prepared for run in training.runs], processing, robot.joint_names)
+    require_motion(
+        [run.prepared for run in training.runs],
+        processing,
+        robot.joint_names,
+        spec.measurement.without_torque,
+    )
     tell("fit")
     found = fit(training, spec.identification)
     tell("errors on the sealed part")

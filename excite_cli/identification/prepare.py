@@ -167,9 +167,14 @@ def _rounding(run: Run, averages: Sequence[csr_matrix], tau: Array) -> tuple:
 
 
 def require_motion(
-    runs: Sequence[PreparedRun], processing: Processing, joint_names: Sequence[str]
+    runs: Sequence[PreparedRun],
+    processing: Processing,
+    joint_names: Sequence[str],
+    without_torque: Sequence[str] = (),
 ) -> None:
     """Raise FileError unless some joint moves, and some torque changes, in what is fitted.
+
+    No torque is asked of joints `without_torque`.
 
     Where a joint stands or reverses, its torque is up to its friction and counts in no fit.
     """
@@ -179,12 +184,17 @@ def require_motion(
             "that may be used, outside of the sealed part: nothing can be fitted. Record motion, "
             "or lower diagnosis.moving_speed."
         )
-    unknown = ~np.any([run.valid.any(axis=0) for run in runs], axis=0)
-    if unknown.any():
-        names = ", ".join(name for name, none in zip(joint_names, unknown, strict=True) if none)
+    known = np.any([run.valid.any(axis=0) for run in runs], axis=0)
+    missing = [
+        name
+        for name, some in zip(joint_names, known, strict=True)
+        if not some and name not in without_torque
+    ]
+    if missing:
+        names = ", ".join(missing)
         raise FileError(
             f"torque of {names}: no sample may be used outside of the sealed part, all are masked. "
-            "Leave the joint out of robot.joints, or seal another run."
+            "Do without (measurement.without_torque), or seal another run."
         )
     if not any(np.ptp(run.tau_raw, axis=0).any() for run in runs):
         raise FileError(

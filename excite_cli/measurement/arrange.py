@@ -28,9 +28,15 @@ def check_names(names: Mapping[str, str], joints: Sequence[str]) -> None:
 
 
 def arrange(
-    raw: RawRun, joints: tuple[str, ...], names: Mapping[str, str], source: str
+    raw: RawRun,
+    joints: tuple[str, ...],
+    names: Mapping[str, str],
+    source: str,
+    without_torque: Sequence[str] = (),
 ) -> tuple[Run, list[Finding]]:
     """The run with columns in the order of `joints`; what belongs to no moved joint is `extra`.
+
+    No torque of joints `without_torque` is valid: it is 0, whether it was recorded or not.
 
     Raises
     ------
@@ -49,6 +55,8 @@ def arrange(
     matrices: dict[str, Array] = {}
     for channel, columns in raw.columns.items():
         by_joint = {names.get(column, column): values for column, values in columns.items()}
+        if channel == "tau":
+            by_joint.update({joint: np.zeros(len(raw.t)) for joint in without_torque})
         missing = [joint for joint in joints if joint not in by_joint]
         if not missing:
             matrices[channel] = np.column_stack([by_joint[joint] for joint in joints])
@@ -66,6 +74,9 @@ def arrange(
         text = f"joints that the robot does not move, kept as further channels: {listed(others)}"
         findings.append(Finding("other_joints", "note", text, raw.name))
     valid = matrices.pop("valid", None)
+    if without_torque:
+        known = np.array([joint not in without_torque for joint in joints])
+        valid = known * (np.ones_like(matrices["tau"]) if valid is None else valid)
     kept = {name: matrix for name, matrix in matrices.items() if name not in CHANNELS}
     run = Run(
         name=raw.name,
@@ -102,9 +113,10 @@ def _missing(source: str, run: str, channel: str, missing: list[str], columns: l
     joint = missing[0]
     where = f"{source}, run {run}" if run else source
     rest = f" (nor of {', '.join(missing[1:])})" if len(missing) > 1 else ""
+    moves = f", or, if it moved, measurement.without_torque: [{', '.join(missing)}]"
     return (
         f"{where}: there is no {_CHANNEL_WORDS[channel]} of joint '{joint}'{rest}."
         f"{nearest(joint, columns, 0.5)} The file names: {listed(columns)}. Say "
         f"which is which: measurement.names: {{<name in the file>: {joint}}}, or leave the joint "
-        "out of robot.joints."
+        f"out of robot.joints{moves if channel == 'tau' else ''}."
     )

@@ -74,7 +74,7 @@ def read_dataset(
         named = _named(raws, path, taken)
         arranged = []
         for raw in named:
-            run, more = arrange(raw, joint_names, spec.names, str(path))
+            run, more = arrange(raw, joint_names, spec.names, str(path), spec.without_torque)
             t, epoch = _seconds(raw, spec)
             run = replace(run, t=t, epoch=epoch, origin=Origin(str(path), raw.place))
             run = covariates.take(run, raw, spec.names)

@@ -62,7 +62,7 @@ def _of_run(
         elif not still[j]:
             text = (
                 f"torque of {joint} is constant at {level + 0.0:.6g} while it moves: the channel "
-                "is dead or too coarse for it (leave the joint out of robot.joints), or another "
+                "is dead or too coarse for it (do without: measurement.without_torque), or another "
                 "one was meant (measurement.channels, measurement.names)"
             )
             findings.append(Finding("dead_torque", "error", text, run.name, (joint,)))
@@ -97,8 +97,9 @@ def _mostly_constant(run: Run, joints: tuple[str, ...], known: Mask) -> list[Fin
             text = (
                 f"torque of {joints[j]} is exactly {levels[counts.argmax()] + 0.0:.6g} in "
                 f"{share:.0%} of the samples in which it moves: the channel says little of it, "
-                "being too coarse, cut off near zero or not this joint's. Leave the joint out of "
-                "robot.joints, or name another channel (measurement.channels, measurement.names)"
+                "being too coarse, cut off near zero or not this joint's. Do without "
+                "(measurement.without_torque), or name another (measurement.channels, "
+                "measurement.names)"
             )
             findings.append(Finding("mostly_constant", "warning", text, run.name, (joints[j],)))
     return findings

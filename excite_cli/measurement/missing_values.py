@@ -95,7 +95,7 @@ def _fill_torque(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]
         if missing == len(run.t):
             text = (
                 f"torque of {joint} is NaN or infinite throughout: the channel is dead. Leave the "
-                "run out, or the joint out of robot.joints"
+                "run out, or do without this torque: measurement.without_torque"
             )
             findings.append(Finding("dead_torque", "error", text, run.name, (joint,)))
         elif missing:

@@ -48,7 +48,7 @@ def with_torque_steps(
     text = (
         f"torques come in steps, by which they are wrong on average: {', '.join(told)}. Standard "
         "deviations contain that; friction and offsets smaller than a step stay hidden. Record the "
-        "torque with more digits, or leave these joints out of robot.joints"
+        "torque with more digits, or do without: measurement.without_torque"
     )
     named = tuple(joints[j] for j in np.flatnonzero(coarse))
     where = ", ".join(run.name for run in runs)

@@ -26,6 +26,7 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...]) -> None:
         "position_sign": list(spec.position_sign),
         "velocity_sign": list(spec.velocity_sign),
         "offset": list(spec.offset),
+        "without_torque": list(spec.without_torque),
     }
     for key in ("gear_ratio", "torque_constant"):
         value = getattr(spec, key)
@@ -44,6 +45,15 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...]) -> None:
                     f"measurement.{key}: '{name}' is not a moved joint."
                     f"{nearest(name, joints)} Moved joints: {', '.join(joints)}."
                 )
+    if set(spec.without_torque) >= set(joints):
+        raise ConfigError("measurement.without_torque names every joint: nothing is left to fit.")
+    for joint, shares in spec.coupling.items():
+        unknown = [motor for motor in shares if motor in spec.without_torque]
+        if unknown and joint not in spec.without_torque:
+            raise ConfigError(
+                f"measurement.coupling: a part of the torque of {joint} is that of {unknown[0]}, "
+                f"which measurement.without_torque leaves out. Name {joint} there, too."
+            )
     ratios = _per_joint(spec.gear_ratio, joints)
     if not ratios.all():
         raise ConfigError("measurement.gear_ratio: a ratio of 0 means nothing.")

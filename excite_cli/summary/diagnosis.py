@@ -37,6 +37,7 @@ from excite_cli.identification.fit_words import above_the_floor
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.cells import figure, percent
 from excite_cli.summary.noise_floor import floor_cells, floor_columns
 from excite_cli.summary.written import files_in_words
 
@@ -246,9 +247,9 @@ def _error_table(found: Diagnosis, verbose: bool) -> Table:
     rows = [
         (
             joint,
-            *(f"{error.relative_moving[joint]:.2%}" for error in errors),
-            *(f"{error.relative[joint]:.2%}" for error in errors if verbose),
-            *(f"{error.rms[joint]:.4g}" for error in errors),
+            *(percent(error.relative_moving[joint]) for error in errors),
+            *(percent(error.relative[joint]) for error in errors if verbose),
+            *(figure(error.rms[joint]) for error in errors),
             unit,
             *floor_cells(found.noise_floor, joint),
         )

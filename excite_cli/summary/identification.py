@@ -17,6 +17,7 @@ from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.cells import figure, percent
 from excite_cli.summary.noise_floor import floor_cells, floor_columns
 from excite_cli.summary.written import files_in_words
 
@@ -74,13 +75,13 @@ def _error_table(found: Identification | StoredFit) -> Table:
     rows = tuple(
         (
             joint,
-            f"{error.relative_moving[joint]:.2%}",
-            f"{error.relative[joint]:.2%}",
-            f"{error.rms[joint]:.4g}",
+            percent(error.relative_moving[joint]),
+            percent(error.relative[joint]),
+            figure(error.rms[joint]),
             *floor_cells(floor, joint),
-            f"{error.rms_raw[joint]:.4g}",
+            figure(error.rms_raw[joint]),
             unit,
-            f"{found.training_error.relative[joint]:.2%}",
+            percent(found.training_error.relative[joint]),
         )
         for joint, unit in zip(joints, units, strict=True)
     )

@@ -1,5 +1,9 @@
 """The noise floor in tables, for `excite identify` and `excite diagnose`."""
 
+from math import nan
+
+from excite_cli.summary.cells import figure
+
 COLUMN = "noise floor"
 
 
@@ -12,4 +16,4 @@ def floor_cells(floor: dict[str, float] | None, joint: str) -> list[str]:
     """What stands in the column, if there is one."""
     if floor is None:
         return []
-    return [f"{floor[joint]:.4g}" if joint in floor else "-"]
+    return [figure(floor.get(joint, nan))]

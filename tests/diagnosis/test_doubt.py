@@ -270,7 +270,7 @@ def test_what_can_be_predicted_and_is_more_makes_a_name_doubtful(
 
 
 @pytest.mark.parametrize(("size", "expected"), [(1.3, {0}), (1.5, set())])
-@pytest.mark.parametrize("kind", ["torque_offset", "coulomb_friction"])
+@pytest.mark.parametrize("kind", ["torque_offset", "coulomb_friction", "friction_change"])
 def test_a_mean_beside_a_large_rest_is_doubted_for_all_of_it(
     kind: str, size: float, expected: set[int]
 ) -> None:
@@ -278,13 +278,16 @@ def test_a_mean_beside_a_large_rest_is_doubted_for_all_of_it(
     mean = effect(kind)
     if kind == "coulomb_friction":
         mean = replace(mean, runs=("a",))
-    data, candidates = planted([mean], np.array([[size, 0.0]]))
+    torque = np.zeros((len(mean.parameters), 2))
+    torque[0, 0] = size
+    data, candidates = planted([mean], torque)
     depends = (Covariate("position", "b"), Covariate("speed", "b"))
     rest = LargeRest("a", 1.0, 0.1, 0.1, "band", True, 0.35, depends)
     found = approximations(traced(data, candidates, [0]), [], NAMES, [rest])
     assert set(found) == expected
     noisy = replace(rest, predictable=0.25)  # and no map, of which a constant is the mean
     found = approximations(traced(data, candidates, [0]), [], NAMES, [noisy])
-    assert set(found) == (expected if mean.is_change else set())
+    changes = mean.is_change or mean.of_campaign
+    assert set(found) == (expected if changes else set())
     data, candidates = planted([effect("armature")], np.array([[size, 0.0]]))
     assert approximations(traced(data, candidates, [0]), [], NAMES, [rest]) == {}

@@ -157,6 +157,22 @@ def test_torques_in_another_order(robot: Robot, rubbing: Dataset, name: str) -> 
     assert "has the opposite sign" not in message.split("As they are")[0]
 
 
+def test_torques_in_another_order_beside_joints_without_any(robot: Robot, rubbing: Dataset) -> None:
+    """What is not known is neither exchanged nor blamed."""
+
+    def without_wrist(data: Dataset) -> Dataset:
+        known = np.array([True] * 4 + [False] * 2)
+        runs = [replace(r, tau=r.tau * known, valid=r.usable() & known) for r in data.runs]
+        return replace(data, runs=tuple(runs))
+
+    assert told(robot, without_wrist(rubbing)) == ""
+    message = told(robot, without_wrist(changed(rubbing, order=np.array(ORDERS["swap"]))))
+    said = message.split("As they are")[0]
+    names = robot.joint_names
+    assert "torques" in said
+    assert [name in said for name in names] == [False, True, True, False, False, False]
+
+
 @pytest.mark.parametrize("name", ["swap", "shift", "reversal"])
 def test_whole_joints_in_another_order(robot: Robot, rubbing: Dataset, name: str) -> None:
     order = np.array(ORDERS[name])

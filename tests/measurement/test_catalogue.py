@@ -55,6 +55,24 @@ def test_where_a_run_came_from_and_its_absolute_time_stay_with_it(tmp_path: Path
     assert counted.origin == Origin(str(tmp_path / "late.csv"))
 
 
+@pytest.mark.parametrize("recorded_too", [True, False])
+def test_a_joint_without_torque_needs_no_column_and_none_of_it_counts(
+    tmp_path: Path, recorded_too: bool
+) -> None:
+    run = recorded()
+    stuck = replace(run, tau=run.tau * [1.0, 1.0, 0.0])
+    path = write_csv(tmp_path / "log.csv", stuck)
+    if not recorded_too:
+        rows = [line.rsplit(",", 1)[0] for line in path.read_text().splitlines()]
+        path.write_text("\n".join(rows) + "\n")
+        with pytest.raises(FileError, match=r"no torque of joint 'wrist'.*without_torque: \[wrist"):
+            read(path)
+    data = read(path, without_torque=["wrist"])
+    assert data.findings == ()
+    np.testing.assert_allclose(data.runs[0].q, run.q)
+    assert data.runs[0].usable().mean(axis=0).tolist() == [1.0, 1.0, 0.0]
+
+
 def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "data.npy").write_bytes(b"x")
     (tmp_path / "folder").mkdir()

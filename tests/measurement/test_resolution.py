@@ -44,4 +44,4 @@ def test_a_torque_that_is_mostly_one_number() -> None:
     assert (found.kind, found.severity) == ("mostly_constant", "warning")
     assert found.joints == ("elbow",)
     assert "exactly 0 in 80% of the samples" in found.text
-    assert "robot.joints" in found.text
+    assert "measurement.without_torque" in found.text

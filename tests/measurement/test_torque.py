@@ -78,6 +78,12 @@ def test_missing_values_stay_with_their_joint() -> None:
         ({"coupling": {"elbow": {"x": 1.0}}}, ("measurement.coupling", "'x'")),
         ({"coupling": {"elbow": {"elbow": -1.0}}}, ("cannot be inverted",)),
         ({"gear_ratio": 0.0}, ("ratio of 0",)),
+        ({"without_torque": ["elbo"]}, ("measurement.without_torque", "Did you mean 'elbow'")),
+        ({"without_torque": JOINTS}, ("names every joint",)),
+        (
+            {"without_torque": ["wrist"], "coupling": {"elbow": {"wrist": 1.0}}},
+            ("torque of elbow is that of wrist", "Name elbow there, too"),
+        ),
     ],
 )
 def test_declarations_that_do_not_fit(spec: dict[str, Any], parts: tuple[str, ...]) -> None:
