@@ -132,8 +132,12 @@ def test_noise_is_measured_with_all_usual_effects_in() -> None:
 
 @pytest.mark.parametrize("kind", list(STATED))
 def test_it_waits_for_what_it_refines(kind: str) -> None:
-    """Everything that is worth its price is there: only what it refines is in its way."""
-    others = [name for name, one in catalogue().items() if len(one.parameters) == 1]
+    """Everything exact that is worth its price is there: only what it refines is in its way."""
+    others = [
+        name
+        for name, one in catalogue().items()
+        if len(one.parameters) == 1 and one.leftover is Effect.leftover
+    ]
     effects = [of(kind), *(of(name) for name in others if name != kind)]
     width = len(effects[0].parameters) + len(effects) - 1
     search = a_search(effects, np.eye(width), np.ones(width))
