@@ -43,7 +43,8 @@ class Rules:
 class Judgement:
     """Judges sets of candidates on whitened evidence; `plain` takes samples as independent.
 
-    `allowed(parameters, chosen, added)` may veto a set, for instance for negative friction.
+    `allowed(parameters, chosen, added)` may veto a set, for instance for negative friction. `found`:
+    candidates that are in the torque of the model at which columns were taken.
     """
 
     white: Evidence
@@ -51,6 +52,7 @@ class Judgement:
     candidates: Sequence[Candidate]
     rules: Rules
     allowed: Callable[[Array, Sequence[int], Sequence[int]], bool]
+    found: Sequence[int] = ()
     _thresholds: dict[tuple[int, int], float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -69,6 +71,7 @@ class Judgement:
             )
             for c in self.candidates
         ]
+        self._within = [self._in_columns(c) for c in self.candidates]
         kinds = {type(c.effect) for c in self.candidates}
         self._exclusive = {
             kind.kind: [other.kind for other in kinds if kind.exclusive_with(other)]
@@ -78,6 +81,17 @@ class Judgement:
         for c in self.candidates:
             spot = (c.effect.kind, c.effect.joints, c.effect.runs)
             self._places.setdefault(spot, set()).add(c.place)
+
+    def _in_columns(self, of: Candidate) -> tuple[int, ...]:
+        """Candidates whose torque is in its columns: it would stand for them."""
+        if not of.effect.of_whole_torque:
+            return ()
+        return tuple(
+            i
+            for i in self.found
+            if not self.candidates[i].effect.data_defect
+            and set(self.candidates[i].rows) & set(of.rows)
+        )
 
     def excluded(self, candidate: int) -> list[Place]:
         """Places that must stay empty while it is in."""
@@ -112,9 +126,12 @@ class Judgement:
         return sum(self.price_beside(i, chosen, self.candidates[i].width) for i in chosen)
 
     def bound(self, candidate: int, chosen: Sequence[int]) -> bool:
-        """Whether it must stay, since what refines it would take its place."""
+        """Whether it must stay, since what refines it, or holds it, would take its place."""
+        place = self.candidates[candidate].place
         return any(
-            candidate in self.parents[k] and self.candidates[k].effect.imitates for k in chosen
+            (candidate in self.parents[k] and self.candidates[k].effect.imitates)
+            or any(self.candidates[i].place == place for i in self._within[k])
+            for k in chosen
         )
 
     def cost(self, chosen: Sequence[int]) -> float:
@@ -122,10 +139,11 @@ class Judgement:
         return self.white.energy(chosen) + self._prices(chosen)
 
     def in_order(self, schur: Schur, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        """Whether the first-order friction that `added` refines is in, or would not be accepted."""
+        """Whether what `added` refines, or has in its columns, is in, or would not be accepted."""
+        there = {self.candidates[k].place for k in (*chosen, *added)}
         for i in added:
-            for parent in self.parents[i]:
-                if parent in chosen or parent in added:
+            for parent in (*self.parents[i], *self._within[i]):
+                if self.candidates[parent].place in there:
                     continue
                 gain = schur.singles[parent]
                 if (

@@ -181,17 +181,17 @@ def _one_pass(
         )
         steady = [body.signals(fit.phi, effects, fit.values * plain_kinds) for body in bodies]
         raw = [body.run.tau_raw - s.torque for body, s in zip(bodies, steady, strict=True)]
-        found = {effect.place: effect for effect in fit.effects}
         shapes = {
-            place: shapes_around(effect, signals) if effect.shape else [{}]
-            for place, effect in found.items()
+            effect.place: shapes_around(effect, signals) if effect.shape else [{}]
+            for effect in fit.effects
             if effect.shape or effect.runs
         }
         seen = SeenRuns(model.robot, signals, raw, run_names, model.states)
         possible = possible_effects(spec, model.declared, seen, shapes)
         candidates = with_columns(possible, signals, data.runs)
     plain = data.evidence(candidates, NoiseModel.white(fit.levels))
-    usual = _usual(candidates, _carried_over(fit.effects, candidates))
+    found = _carried_over(fit.effects, candidates)
+    usual = _usual(candidates, found)
     usual = _of_best_shapes(plain, candidates, usual)
     usual = _with_the_obvious(plain, candidates, usual)
     left = data.residuals(candidates, usual, plain.solve(usual))
@@ -203,7 +203,7 @@ def _one_pass(
     sizes = PossibleSizes(
         candidates, attempt < 2, spread_of(white.covariance, inflation), _seen(data, signals)
     )
-    judge = Judgement(white, plain, candidates, rules, sizes)
+    judge = Judgement(white, plain, candidates, rules, sizes, found)
     chosen = Search(judge, spec.rounds).run()
     return Traced(
         data, tuple(candidates), noise, judge, tuple(chosen), fit.phi, tuple(signals),

@@ -79,6 +79,8 @@ class Effect(ABC):
     follows_covariate: ClassVar[bool] = False
     changes_of: ClassVar[tuple[str, ...]] = ()  # kinds whose size its parameters change, in order
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
+    # Its columns are the whole torque of the model: other effects of its joints are in them.
+    of_whole_torque: ClassVar[bool] = False
     # A body that one joint carries: part of the load of joints, and named by its link if one likes.
     carried: ClassVar[bool] = False
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`

@@ -21,10 +21,11 @@ larger width, lest noise around a standstill wear the memory off: of 10 s with a
 2^16 counts, 4 % at d = 10 mrad (with the sign's width 28 %; where positions are filtered at 40
 instead of 10 Hz, 89 %). A record that begins in motion is taken to have slid before (z = s), one
 that begins at rest to be relaxed (z = 0), and fits leave out what comes before either is forgotten.
+A block of a record begins with what was before it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -89,11 +90,15 @@ class DahlFriction(Effect):
     def columns(self, signals: Signals) -> Array:
         """z − sgn v_j, (T, 1, 1)."""
         j = self.joints[0]
-        state = _Path.of(signals, j, self.shape["distance"]).state[::2]
+        state = _Path.of(signals, j, self.shape["distance"]).state[::2][-len(signals.q) :]
         return (state - smooth_sign(signals.v[:, j]))[:, None, None]
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
-        """The recursion backwards, λ_k = weight_k + ∂z_{k+1}/∂z_k λ_{k+1}, and the sign's slope."""
+        """The recursion backwards, λ_k = weight_k + ∂z_{k+1}/∂z_k λ_{k+1}, and the sign's slope.
+
+        Of what was `before`, nothing is asked.
+        """
+        signals = replace(signals, before=None)
         j = self.joints[0]
         path = _Path.of(signals, j, self.shape["distance"])
         by_q, by_v = path.pull_back(weights[:, 0, 0])
@@ -148,6 +153,10 @@ class _Path:
     @classmethod
     def of(cls, signals: Signals, j: int, distance: float) -> "_Path":
         q, v = signals.q[:, j], signals.v[:, j]
+        if signals.before is not None and len(signals.before) > 1:
+            past = signals.before[:, j]
+            step = float(signals.t[-1] - signals.t[-2])
+            q, v = np.concatenate([past, q]), np.concatenate([np.gradient(past, step), v])
         # The last time step: a controller's clock stands before a run begins.
         step = float(signals.t[-1] - signals.t[-2]) if len(q) > 1 else 1.0
         points, turning = _with_turning_points(q, v, step)

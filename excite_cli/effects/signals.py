@@ -18,6 +18,7 @@ class Signals:
     the model so far, `torque` (T, n) all of it with the effects found; `body` gives the derivatives
     of the rigid-body torque. `start` is the campaign's time at t = 0 [s]. `covariates` (T,) by name
     are further columns of the log that effects may follow, in whatever unit they were recorded.
+    `before` (L, n): positions of the same time step before the first, where they are known.
     """
 
     t: Array
@@ -30,6 +31,7 @@ class Signals:
     run: RunId = field(default_factory=RunId)
     start: float = 0.0
     covariates: Mapping[str, Array] = field(default_factory=dict)
+    before: Array | None = None
 
     @property
     def clock(self) -> Array:
@@ -42,7 +44,8 @@ class Signals:
         thin = RigidBody(body.robot, body.phi, body.q[at], body.v[at], body.a[at])
         series = {name: getattr(self, name)[at] for name in ("t", "q", "v", "a", "load", "torque")}
         others = {name: values[at] for name, values in self.covariates.items()}
-        return replace(self, **series, body=thin, covariates=others)
+        before = None if self.before is None else self.before[::-1][step - 1 :: step][::-1]
+        return replace(self, **series, body=thin, covariates=others, before=before)
 
     def with_covariate(self, name: str) -> "Signals":
         """The same with that column of the log alone."""

@@ -31,13 +31,14 @@ class LeftOut:
             tuple(sorted(way for effect in effects for way in effect.forgets_over())),
         )
 
-    def on_the_way(self, q: Array) -> NDArray[np.bool_]:
-        """Samples (T, n) of positions in which every joint has gone its way.
+    def on_the_way(self, q: Array, past: Array) -> NDArray[np.bool_]:
+        """Samples (T, n) of positions in which every joint has gone its way, the `past` (L, n) too.
 
         Of a run that hardly goes further, a third of its way is enough.
         """
         there = np.ones(q.shape, dtype=bool)
         for j, way in self.ways:
-            gone = np.cumsum(np.abs(np.diff(q[:, j], prepend=q[:1, j])))
-            there[:, j] &= gone >= min(way, _MOST * gone[-1])
+            whole = np.concatenate([past[:, j], q[:, j]])
+            gone = np.cumsum(np.abs(np.diff(whole, prepend=whole[:1])))[len(past) :]
+            there[:, j] &= gone >= min(way, gone[0] + _MOST * (gone[-1] - gone[0]))
         return there

@@ -45,7 +45,7 @@ class PreparedRun:
     For fits every joint has averages of its own, which leave out invalid samples and those in
     which it stands or reverses; `tau_fit` (M, n) are those of the torque, `usable` (M, n) where
     enough is left. `rounding`: what is uncertain in them where torques are recorded in steps, per
-    joint (`rounding_of`).
+    joint (`rounding_of`). `before` (L, n): positions at the working rate until `t` begins.
     """
 
     run: RunId
@@ -66,6 +66,7 @@ class PreparedRun:
     start: float = 0.0
     covariates: Mapping[str, Array] = field(default_factory=dict)
     rounding: tuple[csr_matrix | None, ...] = ()
+    before: Array | None = None
 
     def averaged(self, columns: Array) -> Array:
         """A applied along the first axis of (T, …)."""
@@ -121,7 +122,13 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     recorded = run.usable()[inside]
     speed = np.abs(np.asarray(averages @ v[keep]))
     counted = recorded & _sliding(v, run.step, processing, left_out.coupled)[inside]
-    counted &= left_out.on_the_way(q[inside])
+    past = q[:border]
+    if run.before is not None and len(run.before):
+        earlier = run.before
+        if processing.position_cutoff is not None:
+            earlier = _smooth(earlier, processing.position_cutoff, fs, run.label)
+        past = np.concatenate([earlier, past])
+    counted &= left_out.on_the_way(q[inside], past)
     joints = range(run.q.shape[1])
     for_fit = [without(of_torque, counted[:, j]) for j in joints]
     # The very same weights for the columns: left out at the working rate, other stretches of time
@@ -151,6 +158,7 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
         step=float((centers[1] - centers[0]) * h),
         start=run.start,
         covariates={name: values[keep] for name, values in run.covariates.items()},
+        before=past[len(past) % stride :: stride],
         rounding=_rounding(run, for_fit, tau),
     )
 

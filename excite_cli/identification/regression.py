@@ -48,7 +48,7 @@ def signals_of(prepared: PreparedRun, robot: Robot, phi: Array | None = None) ->
     body = RigidBody(robot, phi, prepared.q, prepared.v, prepared.a)
     return Signals(
         prepared.t, prepared.q, prepared.v, prepared.a, body.load, body.load, body,
-        prepared.run, prepared.start, prepared.covariates,
+        prepared.run, prepared.start, prepared.covariates, prepared.before,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from excite_cli.measurement.run_identity import Origin, Part, RunId
 from excite_cli.shown.record import Shown
 
+_BEFORE = 20.0  # s: longer ago is forgotten
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Severity = Literal["note", "warning", "error"]
@@ -43,7 +44,8 @@ class Run(Shown):
     effects to follow. `epoch`: seconds from 1970 (UTC) to t = 0, where the data know;
     `start`: the campaign's time at t = 0 [s], once it is known (`campaign_clock`). `recorded` (T,):
     where samples were interpolated, the hash of the nearest one in the file. `torque_step` (n,):
-    what torques are multiples of, 0 where they are not.
+    what torques are multiples of, 0 where they are not. `before` (L, n): of a block, the positions
+    right before it, from which joints with a memory come.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Run(Shown):
     recorded: NDArray[np.uint64] | None = None
     covariates: dict[str, Array] = field(default_factory=dict)
     torque_step: Array | None = None
+    before: Array | None = None
 
     @property
     def id(self) -> RunId:
@@ -90,6 +93,9 @@ class Run(Shown):
     def cut(self, first: int, last: int, part: Part | None = None) -> "Run":
         """Samples [first, last); they are another `part` of the recording if that is given."""
         cut = slice(first, last)
+        before = self.q[:first]
+        if self.before is not None:
+            before = np.concatenate([self.before, before])
         return replace(
             self,
             part=part or self.part,
@@ -101,6 +107,7 @@ class Run(Shown):
             extra={key: value[cut] for key, value in self.extra.items()},
             covariates={name: value[cut] for name, value in self.covariates.items()},
             recorded=None if self.recorded is None else self.recorded[cut],
+            before=before[-round(_BEFORE / self.step) :],
         )
 
 
