@@ -12,15 +12,17 @@ from excite_cli.measurement.dataset import Run
 
 def test_a_joint_counts_once_it_has_gone_its_way() -> None:
     q = np.stack([np.linspace(0.0, 1.0, 101), np.linspace(0.0, -2.0, 101)], axis=1)
-    there = LeftOut(ways=((1, 0.5),)).on_the_way(q)
+    there = LeftOut(ways=((1, 0.5),)).on_the_way(q, q[:0])
     assert there[:, 0].all()
     assert np.flatnonzero(there[:, 1])[0] == 25
-    assert LeftOut().on_the_way(q).all()
+    assert LeftOut().on_the_way(q, q[:0]).all()
+    behind = LeftOut(ways=((1, 0.5),)).on_the_way(q[60:], q[50:60])  # 0.2 rad before
+    assert np.flatnonzero(behind[:, 1])[0] == 15
 
 
 def test_of_a_run_that_hardly_goes_further_a_third_of_the_way_is_enough() -> None:
     swinging = 0.1 * np.sin(np.linspace(0.0, 4 * np.pi, 801))[:, None]  # 0.8 rad altogether
-    first = np.flatnonzero(LeftOut(ways=((0, 5.0),)).on_the_way(swinging)[:, 0])[0]
+    first = np.flatnonzero(LeftOut(ways=((0, 5.0),)).on_the_way(swinging, swinging[:0])[:, 0])[0]
     assert np.abs(np.diff(swinging[: first + 1, 0])).sum() > 0.8 / 3 - 1e-3
     assert 200 < first < 300
 
