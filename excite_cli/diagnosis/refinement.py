@@ -20,5 +20,7 @@ def shapes_around(effect: Effect, signals: Sequence[Signals]) -> list[dict]:
         ]
     if len(found) > 1:
         return found
+    if effect.covariate:
+        signals = [each.with_covariate(effect.covariate) for each in signals]
     grid = effect.grid(signals[0].body.robot, effect.joints, signals)
     return found + [shape for shape in grid if shape != found[0]]

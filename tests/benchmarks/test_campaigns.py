@@ -181,7 +181,8 @@ def outcome(index: int, group: str, **changes: object) -> Outcome:
 def test_rates_count_what_went_wrong() -> None:
     size = {"kind": "payload", "parameter": "mass", "true": 1.0, "value": 2.0, "std": 0.1,
             "within": False, "first_order": False}  # fmt: skip
-    false_name = {"kind": "spring", "joints": ["j1"], "runs": [], "judged": "wrong"}
+    false_name = {"kind": "spring", "joints": ["j1"], "runs": [], "covariate": "",
+                  "judged": "wrong"}  # fmt: skip
     outcomes = [
         outcome(0, "payload"),
         outcome(1, "payload", right=False, wrong=True, named=[false_name], sizes=[size]),

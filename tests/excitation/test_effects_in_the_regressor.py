@@ -184,7 +184,8 @@ def test_effects_of_single_runs_and_without_columns_are_left_out() -> None:
     )
     for name, kind in catalogue().items():
         if not kind.excitable:
-            (reason, *_) = _problem(f"[{{kind: {name}}}]").extension.left_out
+            column = ", covariate: temp" if kind.follows_covariate else ""
+            (reason, *_) = _problem(f"[{{kind: {name}{column}}}]").extension.left_out
             assert kind.why_not_excitable in reason
 
 

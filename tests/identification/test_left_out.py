@@ -16,7 +16,7 @@ def test_a_joint_counts_once_it_has_gone_its_way() -> None:
     assert there[:, 0].all()
     assert np.flatnonzero(there[:, 1])[0] == 25
     assert LeftOut().on_the_way(q, q[:0]).all()
-    behind = LeftOut(ways=((1, 0.5),)).on_the_way(q[60:], q[50:60])  # 0.2 rad before
+    behind = LeftOut(ways=((1, 0.5),)).on_the_way(q[40:], q[30:40])  # 0.2 rad before
     assert np.flatnonzero(behind[:, 1])[0] == 15
 
 
