@@ -115,9 +115,12 @@ def _take(target: Path, path: Path) -> bool:
 
 
 def _leave(target: Path) -> None:
-    """Undo one `_take`; the last one removes the lock file, and folders that stayed empty."""
+    """Undo one `_take`; the last one removes the lock file, and folders that stayed empty.
+
+    Ctrl-C may come anywhere in it: what is held stays known until its file is gone.
+    """
     with _guard:
-        held = _held.pop(target, None)
+        held = _held.get(target)
         if held is None:  # in a child that was forked meanwhile
             return
         if held.count > 1:
@@ -125,6 +128,7 @@ def _leave(target: Path) -> None:
             return
         with suppress(OSError):
             _lock_file(target).unlink(missing_ok=True)
+        del _held[target]
         os.close(held.handle)
         with suppress(OSError):
             for folder in held.folders:
