@@ -23,8 +23,6 @@ from excite_cli.robot.model import Array
 _PARENT_PRICE = 4.5
 _FAR_MORE = 0.15  # of the error on runs left out: more than noise makes of it
 _TRANSFER = 0.06  # least share of the gain on fitted runs that runs left out must have
-# Friction that says nothing of runs left out yet may do so once others are in.
-_TO_COME = (Verdict.ACCEPTED, Verdict.NO_GAIN)
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
 
 
@@ -141,7 +139,7 @@ class Judgement:
         return self.white.energy(chosen) + self._prices(chosen)
 
     def in_order(self, schur: Schur, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        """Whether what `added` refines, or has in its columns, is in, or is none."""
+        """Whether what `added` refines, or has in its columns, is in, or would not be accepted."""
         there = {self.candidates[k].place for k in (*chosen, *added)}
         for i in added:
             for parent in (*self.parents[i], *self._within[i]):
@@ -150,7 +148,7 @@ class Judgement:
                 gain = schur.singles[parent]
                 if (
                     gain.chi2 > self.price(parent, gain.dof)
-                    and self.verdict(chosen, [parent]) in _TO_COME
+                    and self.verdict(chosen, [parent]) is Verdict.ACCEPTED
                 ):
                     return False
         return True
