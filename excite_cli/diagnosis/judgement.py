@@ -43,8 +43,8 @@ class Rules:
 class Judgement:
     """Judges sets of candidates on whitened evidence; `plain` takes samples as independent.
 
-    `allowed(parameters, chosen, added)` may veto a set, for instance for negative friction. `found`:
-    candidates that are in the torque of the model at which columns were taken.
+    `allowed(parameters, chosen, added)` may veto a set, for instance for negative friction.
+    `found`: candidates that are in the torque of the model at which columns were taken.
     """
 
     white: Evidence

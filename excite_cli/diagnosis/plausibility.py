@@ -85,7 +85,7 @@ def _check_arrangement(
     n = len(names)
     table = model.shares_left(samples)
     here = np.arange(n)
-    without = ~samples.known.any(axis=0)
+    without = np.asarray(~samples.known.any(axis=0))
     table[without] = table[:, without] = 1.0
     table[without, without] = 0.0
     straight = Verdict(Change.none(n), table[here, here, 0])
