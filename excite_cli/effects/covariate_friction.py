@@ -1,11 +1,16 @@
-"""Friction that follows a column of the log: τ_j = (c − c₀) (k_c sgn v_j + k_b v_j).
+"""Friction that follows a column of the log: τ_j = δ (k_c sgn v_j + k_b v_j),
+
+    δ = (1 − exp(−κ (c − c₀))) / κ,    c − c₀ for κ = 0.
 
 Temperature is the usual one: viscous friction halves within some 20 K, dry friction changes too.
+Oil thins as exp(−κ c), so that a straight line is found first and κ, the `curvature`, after it: of
+friction that falls to a half the line leaves a tenth of what it explains, in RMS.
 Coulomb and viscous friction beside it are those at the reference c₀. What changes with time alone
 is `friction_change` or `friction_drift`; which of them it is, the data say: a robot that pauses
 cools down.
 """
 
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -13,11 +18,15 @@ import numpy as np
 from excite_cli.effects.base import Abscissa, Parameter, Signals
 from excite_cli.effects.of_covariate import PER_UNIT, OfCovariate
 from excite_cli.effects.sign import smooth_sign
-from excite_cli.robot.model import Array
+from excite_cli.robot.model import Array, Robot
+
+_STEPS = (1.5, 0.7, 0.3, 0.12, 0.05)  # κ times what the column varies by
+_MOST = 4.0  # κ times what it varies by: a cold start, and nothing after it
+_STRAIGHT = 1e-9
 
 
 class CovariateFriction(OfCovariate):
-    """τ_j = (c − c₀) (coulomb_slope · sgn v_j + viscous_slope · v_j), of either sign."""
+    """τ_j = δ (coulomb_slope · sgn v_j + viscous_slope · v_j), of either sign."""
 
     kind: ClassVar = "covariate_friction"
     title: ClassVar = "friction that follows a column of the log"
@@ -27,9 +36,32 @@ class CovariateFriction(OfCovariate):
         Parameter("coulomb_slope", f"N·m{PER_UNIT}", 1e-3, 10.0),
         Parameter("viscous_slope", f"N·m·s/rad{PER_UNIT}", 1e-3, 10.0),
     )
+    shapes: ClassVar = (*OfCovariate.shapes, Parameter("curvature", f"1{PER_UNIT}", 1e-3, 0.1))
+    defaults: ClassVar[Mapping[str, float]] = {**OfCovariate.defaults, "curvature": 0.0}
     refines: ClassVar = ("coulomb_friction", "viscous_friction")
     changes_of: ClassVar = refines
     excludes: ClassVar = ("friction_change",)  # warming by the clock instead of the thermometer
+
+    @classmethod
+    def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
+        """A straight line about the mean."""
+        return [{**shape, "curvature": 0.0} for shape in super().grid(robot, joints, signals)]
+
+    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
+        """Curvatures by what the column varies by."""
+        if name != "curvature":
+            return ()
+        columns = [seen.covariates[self.covariate] for seen in signals]
+        range_ = max(float(c.max()) for c in columns) - min(float(c.min()) for c in columns)
+        own = self.shape.get(name, 0.0)
+        return [s / range_ for s in _STEPS if abs(own) * range_ + s <= _MOST]
+
+    def deviation_of(self, signals: Signals) -> Array:
+        """δ (T,)."""
+        straight, curvature = super().deviation_of(signals), self.shape.get("curvature", 0.0)
+        if abs(curvature) * np.abs(straight).max(initial=0.0) < _STRAIGHT:
+            return straight
+        return np.asarray(-np.expm1(-curvature * straight) / curvature)
 
     def columns(self, signals: Signals) -> Array:
         """δ sgn v_j and δ v_j, (T, 1, 2)."""

@@ -1,9 +1,9 @@
 """What effects have in common that follow a further column of the log, such as a temperature.
 
-With c the column and c₀ its reference, an effect is linear in δ = c − c₀: what it changes keeps its
-meaning at the reference. A diagnosis takes the mean of c over the training data for c₀. Nobody says
-in which unit the column is: sizes are per unit of it. A straight line is an approximation (oil gets
-thinner as exp(−c)): what another curve would leave of it is no effect of its own.
+With c the column and c₀ its reference, an effect is linear in a deviation δ from the reference,
+c − c₀ or a curve that begins like it: what it changes keeps its meaning there. A diagnosis takes
+the mean of c over the training data for c₀. Nobody says in which unit the column is: sizes are per
+unit of it. Any curve is an approximation: what another would leave of it is no effect of its own.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,9 +22,9 @@ _SAME = 1e-9  # of its size: a column that changes by less stands still
 
 
 class OfCovariate(Effect):
-    """Proportional to δ = c − c₀."""
+    """Proportional to δ, by default c − c₀."""
 
-    shapes: ClassVar = (Parameter("reference", "unit", 1.0, 100.0),)
+    shapes: ClassVar[tuple[Parameter, ...]] = (Parameter("reference", "unit", 1.0, 100.0),)
     defaults: ClassVar[Mapping[str, float]] = {"reference": 0.0}
     follows_covariate: ClassVar = True
     excitable: ClassVar = False

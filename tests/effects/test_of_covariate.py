@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import EffectSpec
+from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.effects.covariate_friction import CovariateFriction
 from excite_cli.effects.covariate_offset import CovariateOffset
@@ -37,6 +38,30 @@ def test_friction_changes_with_the_column_and_is_nothing_at_the_reference(signal
     fast = np.abs(v) > 0.01
     assert tau[fast] == pytest.approx((warmer * (-0.2 * np.sign(v) + 0.05 * v))[fast])
     assert tau[0] == 0.0
+
+
+def test_friction_that_thins_exponentially_is_of_its_form(signals: Signals) -> None:
+    """f (exp(−κ (c − c₀)) − 1) sgn v = −f κ δ sgn v, with δ for this κ and no other."""
+    v, warmer = signals.v[:, 1], signals.covariates["temp"] - 20.0
+    thins = 4.0 * np.expm1(-0.07 * warmer)
+    effect = CovariateFriction((1,), {**AT_20, "curvature": 0.07}, (), "temp")
+    tau = effect.torque(signals, np.array([-4.0 * 0.07, 0.0]))[:, 1]
+    fast = np.abs(v) > 0.01
+    assert tau[fast] == pytest.approx((thins * np.sign(v))[fast])
+    nearly = replace(effect, shape={**AT_20, "curvature": 1e-8})
+    straight = CovariateFriction((1,), AT_20, (), "temp")
+    assert nearly.columns(signals) == pytest.approx(straight.columns(signals), rel=1e-6, abs=1e-9)
+
+
+def test_a_line_is_found_first_and_bent_then(robot: Robot, signals: Signals) -> None:
+    own = [signals.with_covariate("temp")]  # ten degrees
+    (straight,) = CovariateFriction.grid(robot, (0,), own)
+    assert straight["curvature"] == 0.0
+    effect = CovariateFriction((0,), straight, (), "temp")
+    tried = {round(shape["curvature"], 6) for shape in shapes_around(effect, own)}
+    assert {0.0, 0.15, -0.15, 0.005, -0.005} <= tried
+    bent = CovariateFriction((0,), {**straight, "curvature": 0.35}, (), "temp")
+    assert max(shape["curvature"] for shape in shapes_around(bent, own)) <= 0.4
 
 
 def test_an_offset_changes_with_the_column_however_the_joint_moves(signals: Signals) -> None:
@@ -78,7 +103,10 @@ def test_two_columns_on_a_joint_are_two_places() -> None:
 def test_a_declared_effect_names_its_column(robot: Robot) -> None:
     spec = EffectSpec(kind="covariate_friction", joints=("joint_2",), covariate="temp")
     (effect,) = declared_effects((spec,), robot)
-    assert (effect.covariate, effect.shape) == ("temp", {"reference": 0.0})
+    assert (effect.covariate, effect.shape) == (
+        "temp",
+        {"reference": 0.0, "curvature": 0.0},
+    )
     with pytest.raises(ConfigError, match=r"effects\[0\].covariate: covariate_friction follows"):
         declared_effects((EffectSpec(kind="covariate_friction"),), robot)
     with pytest.raises(ConfigError, match=r"coulomb_friction follows no column.*'temp'"):

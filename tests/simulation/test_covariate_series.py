@@ -56,7 +56,7 @@ def test_an_effect_names_the_column_that_it_follows(robot: Robot) -> None:
     text = "covariate_friction@elbow_joint=-0.1,viscous_slope:-0.02,reference:25;covariate:temp"
     (planted,) = parse_planted(text, robot, {})
     assert planted.effect.covariate == "temp"
-    assert planted.effect.shape == {"reference": 25.0}
+    assert planted.effect.shape == {"reference": 25.0, "curvature": 0.0}
     assert planted.values.tolist() == [-0.1, -0.02]
     assert planted.record(robot.joint_names)["covariate"] == "temp"
     with pytest.raises(ConfigError, match="covariate_friction follows a column"):
