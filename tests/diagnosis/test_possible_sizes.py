@@ -100,11 +100,13 @@ def test_absurd_sizes_are_told_with_their_reason() -> None:
         ("stribeck_friction", np.array([243.0]), "more than the largest torque"),
         ("base_tilt", np.array([0.3, 0.0]), "nobody overlooks"),
         ("viscous_friction", np.array([-3.0]), "cannot be negative"),
+        ("torque_delay", np.array([-2e-4]), "-0.2 ms is less than time stamps are true to"),
     ):
         spread = 1e-20 * np.eye(len(values))
         judge = PossibleSizes([candidate(kind)], False, lambda _, s=spread: s, robot)
         assert words in judge.why_not(values, [0], [0])
     assert possible("elasticity", 1e-3, seen=robot)
+    assert possible("torque_delay", 4e-4, seen=robot, joints=(0, 1))
     assert possible("contact", 3.0, 0.0, 0.0, seen=robot)
 
 
