@@ -154,7 +154,8 @@ def test_one_joint_alone_is_late_by_more_than_a_moment() -> None:
     assert not possible("torque_delay", 1.49e-3)
     assert not possible("torque_delay", -5e-3)
     assert possible("torque_delay", 1.51e-3)
-    assert possible("torque_delay", 1e-4, joints=(0, 1))
+    assert possible("torque_delay", 4e-4, joints=(0, 1))
+    assert not possible("torque_delay", 2e-4, joints=(0, 1))
 
 
 @pytest.mark.parametrize("kind", WHOLE)
