@@ -24,13 +24,18 @@ def runs_of_their_own(effects: Sequence[Effect]) -> set[str]:
 
 
 def assumptions(effects: Sequence[Effect], parts: Split, model: Model) -> tuple[Assumption, ...]:
-    """What was assumed of the sealed run, where the states of runs do not say it."""
+    """What was assumed of the sealed run, where the states of runs do not say it.
+
+    Of sealed blocks of the very recording that carries an effect there is nothing to assume.
+    """
     names = model.robot.joint_names
     sealed = tuple(dict.fromkeys(run.id.key for run in parts.sealed))
     return tuple(
         Assumption(effect.kind, effect.runs, sealed, False, tuple(names[j] for j in effect.joints))
         for effect in effects
-        if effect.runs and not _declared(effect, parts.sealed, model)
+        if effect.runs
+        and not _declared(effect, parts.sealed, model)
+        and not all(effect.active(run.id) for run in parts.sealed)
     )
 
 

@@ -15,6 +15,10 @@ from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.robot.model import Array, Robot
 
 
+# φ₁ of every body: 1 kg and 1 kg·m² at its frame.
+_BALL = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0])
+
+
 def robot_with(robot: Robot, phi: Array) -> pin.Model:
     """A copy of the model whose inertias are φ (10·n_bodies,); φ need not be consistent."""
     model = robot.model.copy()
@@ -80,7 +84,23 @@ class RigidBody:
 
     @cached_property
     def _derivatives(self) -> tuple[Array, Array, Array]:
-        return InverseDynamics(self.robot, self._model).derivatives(self.q, self.v, self.a)
+        """Of φ with negative masses, as a fit may leave them, those of φ + s φ₁ less s times φ₁'s.
+
+        They are linear in φ, and Pinocchio's recursion divides by the masses of whole subtrees.
+        """
+        lacking = -float(self.phi[::PARAMETERS_PER_BODY].min(initial=0.0))
+        if not lacking:
+            return self._derivatives_of(self._model)
+        balls = np.tile(_BALL, self.robot.n_bodies)
+        heavy, ball = (
+            self._derivatives_of(robot_with(self.robot, phi))
+            for phi in (self.phi + 2.0 * lacking * balls, balls)
+        )
+        by_q, by_v, mass = (x - 2.0 * lacking * y for x, y in zip(heavy, ball, strict=True))
+        return by_q, by_v, mass
+
+    def _derivatives_of(self, model: pin.Model) -> tuple[Array, Array, Array]:
+        return InverseDynamics(self.robot, model).derivatives(self.q, self.v, self.a)
 
     @property
     def by_position(self) -> Array:

@@ -270,6 +270,32 @@ def test_copies_of_training_data_are_refused_as_sealed(
     assert "is given twice" in run.stderr
 
 
+def test_a_joint_without_torque_is_left_out_and_the_others_are_found(
+    data: Path, excite: Program
+) -> None:
+    """Its torque is worthless and its motion counts; nothing is said of it but that."""
+    path = excite.folder / "worthless.h5"
+    shutil.copy(data, path)
+    with h5py.File(path, "r+") as file:
+        for run in file["runs"].values():
+            run["tau"][:, 3] = 0.0
+    refused = excite("diagnose", SMOKE, path, *QUICK)
+    assert refused.returncode == 2
+    assert "measurement.without_torque" in refused.stderr
+    without = ("--set", "measurement.without_torque=[wrist_roll]")
+    answer = excite.answer("diagnose", SMOKE, path, *QUICK, *without)
+    named = {(each["kind"], *each["joints"]) for each in answer["effects"]}
+    assert named == PLANTED
+    after = answer["error"]["after"]
+    assert after["relative"].pop("wrist_roll") is None
+    assert max(after["relative"].values()) < 0.03
+    fitted = excite.answer("identify", SMOKE, path, *without)
+    assert fitted["error"]["rms_raw"]["wrist_roll"] is None
+    table = excite("identify", SMOKE, path, *without).stdout
+    (row,) = [line.split() for line in table.splitlines() if line.startswith("wrist_roll ")]
+    assert set(row[1:-2]) == {"-"}
+
+
 def test_help_has_an_example(excite: Program) -> None:
     run = excite("diagnose", "--help")
     assert run.returncode == 0
