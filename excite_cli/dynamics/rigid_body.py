@@ -14,7 +14,6 @@ from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.robot.model import Array, Robot
 
-
 # φ₁ of every body: 1 kg and 1 kg·m² at its frame.
 _BALL = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0])
 
