@@ -74,7 +74,8 @@ def _rms(
         {joint: second.rms[joint] for joint in joints},
         floor,
     )
-    told = ", ".join(f"{j} {first.rms[j]:.3g} → {second.rms[j]:.3g}" for j in joints)
+    known = [j for j in joints if math.isfinite(second.rms[j])]
+    told = ", ".join(f"{j} {first.rms[j]:.3g} → {second.rms[j]:.3g}" for j in known)
     what = "torque" if unit == "N·m" else "force"
     return draw_dumbbells(
         f"RMS error of the {what}, all samples",
@@ -105,9 +106,9 @@ def _table(
                 joint,
                 *(_share(e.relative_moving[joint]) for e in (first, second)),
                 *(_share(e.relative[joint]) for e in (first, second)),
-                *(f"{e.rms[joint]:.4g}" for e in (first, second)),
+                *(_figure(e.rms[joint]) for e in (first, second)),
                 *level,
-                f"{second.rms_raw[joint]:.4g}",
+                _figure(second.rms_raw[joint]),
                 units.get(joint, "N·m"),
             )
         )
@@ -127,6 +128,10 @@ def _table(
 
 def _share(x: float) -> str:
     return f"{x:.2%}" if math.isfinite(x) else "–"
+
+
+def _figure(x: float) -> str:
+    return f"{x:.4g}" if math.isfinite(x) else "–"
 
 
 def by_joint(joints: Sequence[str], units: Sequence[str]) -> dict[str, str]:

@@ -1,6 +1,7 @@
 """`excite diagnose` as a user runs it, on simulated data of the smoke arm."""
 
 import json
+import re
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -283,12 +284,15 @@ def test_a_joint_without_torque_is_left_out_and_the_others_are_found(
     assert refused.returncode == 2
     assert "measurement.without_torque" in refused.stderr
     without = ("--set", "measurement.without_torque=[wrist_roll]")
-    answer = excite.answer("diagnose", SMOKE, path, *QUICK, *without)
+    answer = excite.answer("diagnose", SMOKE, path, *QUICK, *without, "-o", "found.h5")
     named = {(each["kind"], *each["joints"]) for each in answer["effects"]}
     assert named == PLANTED
     after = answer["error"]["after"]
     assert after["relative"].pop("wrist_roll") is None
     assert max(after["relative"].values()) < 0.03
+    page = excite.folder / "page.html"
+    assert excite("report", "found.h5", "-o", page).returncode == 0
+    assert not re.search(r"\bnan\b", page.read_text(encoding="utf-8"))
     fitted = excite.answer("identify", SMOKE, path, *without)
     assert fitted["error"]["rms_raw"]["wrist_roll"] is None
     table = excite("identify", SMOKE, path, *without).stdout
