@@ -3,14 +3,14 @@
     δ = (1 − exp(−κ (c − c₀))) / κ,    c − c₀ for κ = 0.
 
 Temperature is the usual one: viscous friction halves within some 20 K, dry friction changes too.
-Oil thins as exp(−κ c), so that a straight line is found first and κ, the `curvature`, after it: of
-friction that falls to a half the line leaves a tenth of what it explains, in RMS.
+Oil thins as exp(−κ c): of friction that falls to a half, a straight line leaves a tenth of what it
+explains, in RMS, and a curve over time, which has a time constant of its own, would be named.
 Coulomb and viscous friction beside it are those at the reference c₀. What changes with time alone
 is `friction_change` or `friction_drift`; which of them it is, the data say: a robot that pauses
 cools down.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +20,7 @@ from excite_cli.effects.of_covariate import PER_UNIT, OfCovariate
 from excite_cli.effects.sign import smooth_sign
 from excite_cli.robot.model import Array, Robot
 
+_GRID = (0.0, 0.7, 1.5, -0.7)  # κ times what the column varies by; falling to a half is 0.7
 _STEPS = (1.5, 0.7, 0.3, 0.12, 0.05)  # κ times what the column varies by
 _MOST = 4.0  # κ times what it varies by: a cold start, and nothing after it
 _STRAIGHT = 1e-9
@@ -44,15 +45,18 @@ class CovariateFriction(OfCovariate):
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
-        """A straight line about the mean."""
-        return [{**shape, "curvature": 0.0} for shape in super().grid(robot, joints, signals)]
+        """A straight line about the mean, and curves."""
+        found = super().grid(robot, joints, signals)
+        if not found:
+            return []
+        range_ = _range(next(iter(each.covariates.values())) for each in signals)
+        return [{**found[0], "curvature": bent / range_} for bent in _GRID]
 
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """Curvatures by what the column varies by."""
         if name != "curvature":
             return ()
-        columns = [seen.covariates[self.covariate] for seen in signals]
-        range_ = max(float(c.max()) for c in columns) - min(float(c.min()) for c in columns)
+        range_ = _range(seen.covariates[self.covariate] for seen in signals)
         own = self.shape.get(name, 0.0)
         return [s / range_ for s in _STEPS if abs(own) * range_ + s <= _MOST]
 
@@ -74,3 +78,9 @@ class CovariateFriction(OfCovariate):
         sign = smooth_sign(signals.v[:, self.joints[0]])
         name = f"{self.covariate} less its reference, signed by the direction"
         return Abscissa(name, "unit", self.deviation_of(signals) * sign)
+
+
+def _range(columns: Iterable[Array]) -> float:
+    """Highest less lowest value of all of them."""
+    lows, highs = zip(*((float(c.min()), float(c.max())) for c in columns), strict=True)
+    return max(highs) - min(lows)

@@ -62,5 +62,6 @@ class OfCovariate(Effect):
 
     def _unit(self, unit: str) -> str:
         if unit.endswith(PER_UNIT):
-            return f"{unit.removesuffix(PER_UNIT)} per unit of {self.covariate}"
+            size = unit.removesuffix(PER_UNIT).removeprefix("1")
+            return f"{size} per unit of {self.covariate}".strip()
         return f"units of {self.covariate}"

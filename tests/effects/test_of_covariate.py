@@ -53,10 +53,11 @@ def test_friction_that_thins_exponentially_is_of_its_form(signals: Signals) -> N
     assert nearly.columns(signals) == pytest.approx(straight.columns(signals), rel=1e-6, abs=1e-9)
 
 
-def test_a_line_is_found_first_and_bent_then(robot: Robot, signals: Signals) -> None:
+def test_a_line_and_curves_are_looked_for_and_then_bent(robot: Robot, signals: Signals) -> None:
     own = [signals.with_covariate("temp")]  # ten degrees
-    (straight,) = CovariateFriction.grid(robot, (0,), own)
+    straight, *curves = CovariateFriction.grid(robot, (0,), own)
     assert straight["curvature"] == 0.0
+    assert [each["curvature"] for each in curves] == pytest.approx([0.07, 0.15, -0.07])
     effect = CovariateFriction((0,), straight, (), "temp")
     tried = {round(shape["curvature"], 6) for shape in shapes_around(effect, own)}
     assert {0.0, 0.15, -0.15, 0.005, -0.005} <= tried
@@ -73,7 +74,7 @@ def test_an_offset_changes_with_the_column_however_the_joint_moves(signals: Sign
 def test_the_reference_is_the_mean_of_what_was_seen(robot: Robot, signals: Signals) -> None:
     own = signals.with_covariate("temp")
     warm = replace(own, covariates={"temp": np.full(len(own.t), 40.0)})
-    ((shape),) = CovariateFriction.grid(robot, (0,), [own, warm])
+    shape, *_ = CovariateFriction.grid(robot, (0,), [own, warm])
     assert shape["reference"] == pytest.approx(32.5)
     assert not CovariateFriction((0,), shape).finer_steps("reference", [own])
 
@@ -93,6 +94,8 @@ def test_sizes_are_told_per_unit_of_the_column() -> None:
     assert told["coulomb_slope"].unit == "N·m per unit of temp"
     assert told["viscous_slope"].unit == "N·m·s/rad per unit of temp"
     assert (told["reference"].value, told["reference"].unit) == (20.0, "units of temp")
+    bent = replace(effect, shape={**AT_20, "curvature": 0.03}).report(np.zeros(2), np.eye(2))
+    assert (bent["curvature"].value, bent["curvature"].unit) == (0.03, "per unit of temp")
 
 
 def test_two_columns_on_a_joint_are_two_places() -> None:
