@@ -83,11 +83,17 @@ class RigidBody:
 
     @cached_property
     def _derivatives(self) -> tuple[Array, Array, Array]:
-        """Of φ with negative masses, as a fit may leave them, those of φ + s φ₁ less s times φ₁'s.
+        """Of φ with subtrees of negative mass, those of φ + s φ₁ less s times φ₁'s.
 
-        They are linear in φ, and Pinocchio's recursion divides by the masses of whole subtrees.
+        A fit may leave such φ. They are linear in φ, and Pinocchio's recursion divides by the
+        masses of subtrees.
         """
-        lacking = -float(self.phi[::PARAMETERS_PER_BODY].min(initial=0.0))
+        masses = self.phi[::PARAMETERS_PER_BODY].copy()
+        for body in range(self.robot.n_bodies, 0, -1):
+            parent = int(self.robot.model.parents[body])
+            if parent:
+                masses[parent - 1] += masses[body - 1]
+        lacking = -float(masses.min(initial=0.0))
         if not lacking:
             return self._derivatives_of(self._model)
         balls = np.tile(_BALL, self.robot.n_bodies)
