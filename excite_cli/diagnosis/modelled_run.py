@@ -10,7 +10,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns, with_effects
+from excite_cli.identification.regression import effect_columns, seen_of, with_effects
 from excite_cli.robot.model import Array
 
 
@@ -36,12 +36,7 @@ class ModelledRun:
 
     def signals(self, phi: Array, effects: Sequence[Effect], values: Array) -> Signals:
         """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
-        run, body = self.run, self._at(phi)
-        load = body.load
-        signals = Signals(
-            run.t, run.q, run.v, run.a, load, load, body, run.run, run.start, run.covariates
-        )
-        return with_effects(signals, effects, values)
+        return with_effects(seen_of(self.run, self._at(phi)), effects, values)
 
     def _at(self, phi: Array) -> RigidBody:
         """The rigid body at φ; the last one is kept, with all that was computed of it."""

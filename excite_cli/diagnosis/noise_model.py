@@ -5,7 +5,8 @@ runs at once; the order is the one with the smallest corrected Akaike criterion.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,34 +24,81 @@ _NUGGET = 0.03
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Coefficients (p_j,) and innovation σ_j [N·m] of every joint."""
+    """Coefficients (p_j,) and innovation σ_j [N·m] of every joint.
+
+    `after_gaps`: how many times larger innovations are in the rows that follow a gap within the
+    highest order. Real friction has transients at reversals that no model holds.
+    """
 
     coefficients: tuple[Array, ...]
     sigma: Array
-
-    @property
-    def order(self) -> int:
-        """Highest order: so many samples at the start of a run are lost."""
-        return max(len(c) for c in self.coefficients)
+    after_gaps: Array | None = None
 
     @classmethod
     def white(cls, sigma: Array) -> "NoiseModel":
         """Independent samples."""
         return cls(tuple(np.zeros(0) for _ in sigma), np.asarray(sigma, dtype=float))
 
-    def whitened(self, x: Array, joint: int) -> Array:
-        """Rows (M − order, …) of x (M, …), a run's rows of one joint, with unit innovations."""
-        x, order = np.asarray(x, dtype=float), self.order
-        rest = x[order:].copy()
-        for k, c in enumerate(self.coefficients[joint], 1):  # lfilter goes column by column
-            rest -= c * x[order - k : max(len(x) - k, 0)]
-        rest /= self.sigma[joint]
+    def whitened(self, x: Array, joint: int, usable: NDArray[np.bool_]) -> Array:
+        """The usable rows (K, …) of x (M, …), a run's rows of one joint, with unit innovations.
+
+        Of each what those of the p rows before it that are usable do not predict. Where a joint
+        stands there are gaps; without the rows after them a motion that often turns round would
+        keep a third of its samples, and nothing of what happens at reversals.
+        """
+        x, coefficients = np.asarray(x, dtype=float), self.coefficients[joint]
+        order, at = len(coefficients), np.flatnonzero(usable)
+        rest = x.copy()
+        for k, c in enumerate(coefficients, 1):  # lfilter goes column by column
+            rest[k:] -= c * x[: max(len(x) - k, 0)]
+        before = np.zeros((len(x), order), dtype=bool)
+        for k in range(1, order + 1):
+            before[k:, k - 1] = usable[:-k]
+        rest, before = rest[at], before[at]
+        spread = np.full(len(at), self.sigma[joint])
+        broken = np.flatnonzero(~before.all(axis=1))
+        patterns, which = np.unique(before[broken], axis=0, return_inverse=True)
+        for pattern, rows in zip(
+            patterns, (broken[which == k] for k in range(len(patterns))), strict=True
+        ):
+            lags = np.flatnonzero(pattern) + 1
+            by, spread[rows] = self._predictor(joint, lags)
+            rest[rows] = x[at[rows]] - sum(c * x[at[rows] - k] for k, c in zip(lags, by, strict=True))
+        if self.after_gaps is not None:
+            spread[self.follow_gaps(usable)] *= self.after_gaps[joint]
+        rest /= spread.reshape(-1, *np.ones(x.ndim - 1, dtype=int))
         return rest
 
-    def clean(self, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Whitened rows (M − order,) that no unusable sample has touched."""
-        touched = np.convolve(~usable, np.ones(self.order + 1))[: len(usable)] > 0.5
-        return ~touched[self.order :]
+    def follow_gaps(self, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which of the usable rows (K,) follow a gap, or the beginning, within the highest order."""
+        order = max(len(c) for c in self.coefficients)
+        touched = np.convolve(~usable, np.ones(order + 1))[: len(usable)] > 0.5
+        touched[:order] = True
+        return touched[usable]
+
+    def _predictor(self, joint: int, lags: NDArray[np.intp]) -> tuple[Array, float]:
+        """Coefficients of the samples at these lags, and the standard deviation of what is left."""
+        covariances = self._autocovariances[joint]
+        if not len(lags):
+            return np.zeros(0), float(np.sqrt(covariances[0]))
+        among = covariances[np.abs(lags[:, None] - lags)]
+        cross = covariances[lags]
+        coefficients = np.linalg.lstsq(among, cross, rcond=1e-12)[0]
+        left = max(float(covariances[0] - coefficients @ cross), float(self.sigma[joint]) ** 2)
+        return np.asarray(coefficients), float(np.sqrt(left))
+
+    @cached_property
+    def _autocovariances(self) -> tuple[Array, ...]:
+        """Of every joint at lags 0 to p (Yule and Walker): r_k = Σ c_i r_|k−i| + s² δ_k0."""
+        found = []
+        for coefficients, sigma in zip(self.coefficients, self.sigma, strict=True):
+            order = len(coefficients)
+            equations = np.eye(order + 1)
+            for k in range(order + 1):
+                for i, c in enumerate(coefficients, 1):
+                    equations[k, abs(k - i)] -= c
+            found.append(np.linalg.solve(equations, sigma**2 * np.eye(order + 1)[0]))
+        return tuple(found)
 
     def levels(self) -> Array:
         """Standard deviation (n,) of the noise itself, from its response to an impulse."""
@@ -63,13 +111,27 @@ class NoiseModel:
 
 
 def fit_noise(residuals: Sequence[Array], usable: Sequence[NDArray[np.bool_]]) -> NoiseModel:
-    """Autoregressions for residuals (M, n) of several runs."""
-    joints = residuals[0].shape[1]
+    """Autoregressions for residuals (M, n) of several runs, and what is more after gaps."""
+    joints = range(residuals[0].shape[1])
     found = [
-        _autoregression([r[:, j] for r in residuals], [u[:, j] for u in usable])
-        for j in range(joints)
+        _autoregression([r[:, j] for r in residuals], [u[:, j] for u in usable]) for j in joints
     ]
-    return NoiseModel(tuple(c for c, _ in found), np.array([s for _, s in found]))
+    model = NoiseModel(tuple(c for c, _ in found), np.array([s for _, s in found]))
+    return replace(
+        model, after_gaps=np.array([_after_gaps(model, residuals, usable, j) for j in joints])
+    )
+
+
+def _after_gaps(
+    model: NoiseModel, residuals: Sequence[Array], usable: Sequence[NDArray[np.bool_]], joint: int
+) -> float:
+    """Innovations after gaps over all others, root mean squares; 1 at least."""
+    pairs = list(zip(residuals, usable, strict=True))
+    rows = np.concatenate([model.whitened(r[:, joint], joint, u[:, joint]) for r, u in pairs])
+    near = np.concatenate([model.follow_gaps(u[:, joint]) for _, u in pairs])
+    if not near.any() or near.all():
+        return 1.0
+    return float(max(1.0, np.sqrt(np.mean(rows[near] ** 2) / np.mean(rows[~near] ** 2))))
 
 
 def _autoregression(series: list[Array], usable: list[NDArray[np.bool_]]) -> tuple[Array, float]:

@@ -70,17 +70,17 @@ def placebo_gains(
             continue
         parts = []
         for part, run in enumerate(data.runs):
-            clean = noise.clean(run.usable[:, joint])
-            own = noise.whitened(data.columns(candidates, chosen, part, joint), joint)[clean]
-            rest = noise.whitened(residuals[part][:, joint, None], joint)[clean, 0]
+            usable = run.usable[:, joint]
+            own = noise.whitened(data.columns(candidates, chosen, part, joint), joint, usable)
+            rest = noise.whitened(residuals[part][:, joint], joint, usable)
             columns = np.stack([c.columns[part][:, 0, 0] for c in local], axis=1)
-            parts.append((columns, own, rest, clean))
+            parts.append((columns, own, rest, usable))
         for _ in range(_SHIFTS):
             cross = np.zeros((len(at), len(local)))
             square, product = np.zeros(len(local)), np.zeros(len(local))
-            for columns, own, rest, clean in parts:
+            for columns, own, rest, usable in parts:
                 shift = int(rng.integers(len(columns) // 4, max(3 * len(columns) // 4, 2)))
-                moved = noise.whitened(np.roll(columns, shift, axis=0), joint)[clean]
+                moved = noise.whitened(np.roll(columns, shift, axis=0), joint, usable)
                 cross += own.T @ moved
                 square += np.sum(moved**2, axis=0)
                 product += rest @ moved

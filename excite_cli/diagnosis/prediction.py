@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.base import Effect
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns, with_effects
+from excite_cli.identification.regression import effect_columns, seen_of, with_effects
 from excite_cli.robot.model import Array, Robot
 
 
@@ -29,10 +29,7 @@ def predicted(
     Effects that look at the torque see the model's own.
     """
     load = body.load
-    signals = Signals(
-        run.t, run.q, run.v, run.a, load, load, body, run.run, run.start, run.covariates
-    )
-    columns = effect_columns(effects, with_effects(signals, effects, values))
+    columns = effect_columns(effects, with_effects(seen_of(run, body), effects, values))
     return Prediction(load, np.asarray(load + columns @ values))
 
 

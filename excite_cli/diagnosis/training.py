@@ -111,10 +111,10 @@ class TrainingData:
         for part, fold in enumerate(self.folds):
             columns = self.columns(candidates, touching, part, joint)
             x = np.hstack([columns, self.tau[part][:, joint, None]])
-            clean = noise.clean(self.runs[part].usable[:, joint])
-            white = noise.whitened(x, joint)
-            second = self.sides[part][noise.order :]
-            for side, there in enumerate((clean & ~second, clean & second)):
+            usable = self.runs[part].usable[:, joint]
+            white = noise.whitened(x, joint, usable)
+            second = self.sides[part][usable]
+            for side, there in enumerate((~second, second)):
                 rows = white[there]
                 own[fold, side] += rows.T @ rows
         return JointGram(active, own)

@@ -45,7 +45,11 @@ class Regression:
 def signals_of(prepared: PreparedRun, robot: Robot, phi: Array | None = None) -> Signals:
     """What effects may look at in a run, with the rigid-body torque at `phi` (default: URDF)."""
     phi = standard_parameters(robot) if phi is None else phi
-    body = RigidBody(robot, phi, prepared.q, prepared.v, prepared.a)
+    return seen_of(prepared, RigidBody(robot, phi, prepared.q, prepared.v, prepared.a))
+
+
+def seen_of(prepared: PreparedRun, body: RigidBody) -> Signals:
+    """What effects may look at in a run whose rigid body is known, moving as the run does."""
     return Signals(
         prepared.t, prepared.q, prepared.v, prepared.a, body.load, body.load, body,
         prepared.run, prepared.start, prepared.covariates, prepared.before,

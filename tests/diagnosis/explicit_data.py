@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
 from scipy.sparse import identity
 
 from excite_cli.diagnosis.candidates import Candidate
@@ -175,9 +177,15 @@ class Rows:
         return changed.energy(chosen, with_prior=True) / whole
 
 
+def covariance_in_time(taps: Array, sigma: float, count: int) -> Array:
+    """Of `count` samples of an autoregression, from its response to an impulse."""
+    response = lfilter([1.0], np.concatenate([[1.0], -taps]), np.eye(1, 4000)[0])
+    lags = [response[: 4000 - k] @ response[k:] for k in range(count)]
+    return sigma**2 * np.asarray(toeplitz(lags))
+
+
 def rows_of(data: TrainingData, candidates: Sequence[Candidate], noise: NoiseModel) -> Rows:
-    """Whitened row by row: (x_t − Σ c_k x_{t−k}) / σ, where all samples it needs are usable."""
-    order = max(len(c) for c in noise.coefficients)
+    """Whitened row by row: what those of the p rows before that are usable do not predict."""
     starts = FIXED + np.cumsum([0, *(c.width for c in candidates)])
     blocks = [np.arange(starts[i], starts[i + 1]) for i in range(len(candidates))]
     x, y, folds, joints, sides = [], [], [], [], []
@@ -189,16 +197,15 @@ def rows_of(data: TrainingData, candidates: Sequence[Candidate], noise: NoiseMod
             for k, joint in enumerate(c.rows):
                 full[:, joint, block] = c.columns[part][:, k]
         for joint in range(data.n):
-            taps = noise.coefficients[joint]
-            for t in range(order, samples):
-                if not data.runs[part].usable[t - order : t + 1, joint].all():
-                    continue
-                row, torque = full[t, joint].copy(), data.tau[part][t, joint]
-                for k, tap in enumerate(taps):
-                    row -= tap * full[t - 1 - k, joint]
-                    torque -= tap * data.tau[part][t - 1 - k, joint]
-                x.append(row / noise.sigma[joint])
-                y.append(torque / noise.sigma[joint])
+            taps, usable = noise.coefficients[joint], data.runs[part].usable[:, joint]
+            whole = covariance_in_time(taps, float(noise.sigma[joint]), len(taps) + 1)
+            for t in np.flatnonzero(usable):
+                past = [s for s in range(max(t - len(taps), 0), t) if usable[s]]
+                lags = t - np.array(past, dtype=int)
+                by = np.linalg.solve(whole[np.ix_(lags, lags)], whole[lags, 0])
+                left = np.sqrt(whole[0, 0] - by @ whole[lags, 0])
+                x.append((full[t, joint] - by @ full[past, joint]) / left)
+                y.append((data.tau[part][t, joint] - by @ data.tau[part][past, joint]) / left)
                 folds.append(fold)
                 joints.append(joint)
                 sides.append(data.sides[part][t])

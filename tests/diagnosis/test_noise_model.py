@@ -8,6 +8,7 @@ from scipy.stats import chi2
 from excite_cli.diagnosis import noise_model
 from excite_cli.diagnosis.noise_model import HIGHEST_ORDER, NoiseModel, fit_noise
 from excite_cli.robot.model import Array
+from tests.diagnosis.explicit_data import covariance_in_time
 
 TAPS = np.array([1.2, -0.5])
 SIGMA = 0.3
@@ -57,7 +58,7 @@ def test_whitened_noise_is_white_and_of_unit_size(monkeypatch: pytest.MonkeyPatc
     found = fit_noise(runs[:3], all_usable(runs[:3]))
     for fresh in runs[3:]:  # not those it was fitted to
         assert ljung_box(fresh[:, 0]) < 1e-12
-        white = found.whitened(fresh[:, 0], 0)
+        white = found.whitened(fresh[:, 0], 0, np.ones(len(fresh), bool))
         assert ljung_box(white) > 1e-3
         assert white.std() == pytest.approx(1.0, abs=0.04)
 
@@ -119,7 +120,7 @@ def test_a_joint_without_a_usable_sample_has_finite_noise() -> None:
     found = fit_noise(runs, [np.zeros(runs[0].shape, bool)])
     assert np.isfinite(found.sigma).all()
     assert found.sigma[0] > 0
-    assert not found.clean(np.zeros(300, bool)).any()
+    assert found.whitened(runs[0][:, 0], 0, np.zeros(300, bool)).shape == (0,)
 
 
 def test_drifting_noise_gives_a_stable_model() -> None:
@@ -131,17 +132,54 @@ def test_drifting_noise_gives_a_stable_model() -> None:
         assert np.abs(roots).max(initial=0.0) < 1.0
 
 
-def test_clean_rows_are_those_whose_taps_are_all_usable() -> None:
-    model = NoiseModel((np.array([0.5, 0.1, -0.2]), np.zeros(1)), np.ones(2))
-    usable = np.random.default_rng(1).random(200) > 0.05
-    usable[0] = False
-    expected = [usable[t - 3 : t + 1].all() for t in range(3, 200)]
-    assert np.array_equal(model.clean(usable), expected)
-    x = np.random.default_rng(2).normal(size=(200, 4))
-    wild = np.where(usable[:, None], x, 1e9)
-    for joint in range(2):
-        clean = model.clean(usable)
-        assert np.array_equal(model.whitened(wild, joint)[clean], model.whitened(x, joint)[clean])
+LONG = np.array([0.5, 0.1, -0.2])
+
+
+@pytest.mark.parametrize("taps", [TAPS, LONG, np.array([0.97]), np.zeros(0)])
+def test_without_gaps_whitening_is_that_of_the_covariance_in_time(taps: Array) -> None:
+    """The inverse of its Cholesky factor, of the first rows too."""
+    model = NoiseModel((np.zeros(1), taps), np.array([1.0, SIGMA]))
+    x = np.random.default_rng(4).normal(size=(40, 3))
+    factor = np.linalg.cholesky(covariance_in_time(taps, SIGMA, 40))
+    white = model.whitened(x, 1, np.ones(40, bool))
+    assert white == pytest.approx(np.linalg.solve(factor, x), rel=1e-6, abs=1e-9)
+
+
+def test_rows_after_gaps_are_predicted_from_what_is_left() -> None:
+    """Of the p rows before each, those that are usable, by conditional expectation."""
+    model = NoiseModel((LONG,), np.array([SIGMA]))
+    rng = np.random.default_rng(1)
+    usable = rng.random(120) > 0.3
+    x = rng.normal(size=120)
+    whole = covariance_in_time(LONG, SIGMA, 120)
+    expected = []
+    for t in np.flatnonzero(usable):
+        past = [s for s in range(max(0, t - 3), t) if usable[s]]
+        by = np.linalg.solve(whole[np.ix_(past, past)], whole[past, t])
+        left = whole[t, t] - by @ whole[past, t]
+        expected.append((x[t] - by @ x[past]) / np.sqrt(left))
+    assert model.whitened(x, 0, usable) == pytest.approx(np.array(expected), rel=1e-6)
+    wild = np.where(usable, x, np.nan)
+    assert np.array_equal(model.whitened(wild, 0, usable), model.whitened(x, 0, usable))
+
+
+@pytest.mark.parametrize("larger", [1.0, 3.0])
+def test_more_noise_after_gaps_is_measured(larger: float) -> None:
+    """Transients at reversals: innovations as large there as elsewhere, or three times that."""
+    usable = np.ones((6000, 1), bool)
+    usable[::25] = usable[1::25] = False
+    shocks = SIGMA * np.random.default_rng(5).normal(size=6000)
+    shocks[2::25] *= larger
+    shocks[3::25] *= larger
+    runs = [lfilter([1.0], np.concatenate([[1.0], -TAPS]), shocks)[:, None]]
+    found = fit_noise(runs, [usable])
+    assert found.after_gaps is not None
+    if larger > 1.0:
+        assert 1.8 < found.after_gaps[0] < larger
+    else:
+        assert found.after_gaps[0] < 1.1
+    white = found.whitened(runs[0][:, 0], 0, usable[:, 0])
+    assert white[found.follow_gaps(usable[:, 0])].std() == pytest.approx(1.0, abs=0.15)
 
 
 @pytest.mark.parametrize("memory", [-0.9, 0.0, 0.5, 0.98])
