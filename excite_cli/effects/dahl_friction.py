@@ -65,7 +65,7 @@ class DahlFriction(Effect):
     shapes: ClassVar = (Parameter("distance", "rad", *_DISTANCES),)
     defaults: ClassVar = {"distance": 0.03}
     surprise: ClassVar = 2.0
-    refines: ClassVar = ("viscous_friction", "coulomb_friction")
+    refines: ClassVar = ("coulomb_friction",)
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
