@@ -6,7 +6,8 @@ the part that depends on some quantity (`unexplained`) or can be predicted from 
 what an effect of an impossible sign or size would explain. The effect is an approximation
 
 * if what is left is a function of the same quantity as the effect (friction: speed), and U > 0.1 E,
-* or if U > E, whatever it depends on.
+* or if U > E, whatever it depends on,
+* or if a curve without a name does as well (`curves`).
 
 Of `rests`, U is what can be predicted, or if that is little, what exceeds the noise; they depend on
 two quantities mostly, so that U > 0.5 E is asked for where one of them is the effect's own. They
@@ -20,6 +21,7 @@ told such a mean, beside the word that 12 to 71 times the noise is left.)
 from collections.abc import Sequence
 
 from excite_cli.diagnosis.covariate import Covariate
+from excite_cli.diagnosis.curves import curves_in_place
 from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.records import Approximation, LargeRest, Unexplained
 from excite_cli.diagnosis.tracing import Traced
@@ -42,9 +44,11 @@ def approximations(
     left = {each.joint: each for each in unexplained}
     more = {each.joint: each for each in rests if each.certain}
     impossible: dict[int, tuple[float, str]] = {}
-    found: dict[int, Approximation] = {}
+    found = {
+        i: Approximation(covariates=(of,)) for i, of in curves_in_place(traced, joint_names).items()
+    }
     plain = traced.judge.plain
-    for i in traced.chosen:
+    for i in (each for each in traced.chosen if each not in found):
         joint, explained = _strongest(traced, i)
         name = joint_names[joint]
         rest = plain.energy_on(traced.chosen, [joint])

@@ -63,7 +63,9 @@ class NoiseModel:
         ):
             lags = np.flatnonzero(pattern) + 1
             by, spread[rows] = self._predictor(joint, lags)
-            rest[rows] = x[at[rows]] - sum(c * x[at[rows] - k] for k, c in zip(lags, by, strict=True))
+            rest[rows] = x[at[rows]] - sum(
+                c * x[at[rows] - k] for k, c in zip(lags, by, strict=True)
+            )
         if self.after_gaps is not None:
             spread[self.follow_gaps(usable)] *= self.after_gaps[joint]
         rest /= spread.reshape(-1, *np.ones(x.ndim - 1, dtype=int))

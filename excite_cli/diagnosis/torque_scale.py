@@ -143,6 +143,8 @@ def _another_unit(
         )
     else:
         text += "Check measurement.torque_constant and gear_ratio. "
+    if not every:
+        text += f"Do without: measurement.without_torque: [{', '.join(joints)}]. "
     text += "If the data are right as they are, say so: measurement.trust: true"
     return Finding("torque_scale", "warning", text, "", joints)
 

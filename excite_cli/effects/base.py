@@ -304,6 +304,13 @@ class Effect(ABC):
         """Joints and ways [rad] that they must have gone in a run before columns are right."""
         return ()
 
+    def curve(self, signals: Signals, every: Sequence[Signals]) -> Array | None:
+        """Columns (T, r, k) in one part of `every` of a curve without a name that it comes near.
+
+        None: its form is its own. An effect that leaves no less than the curve is doubted.
+        """
+        return None
+
     def abscissa(self, signals: Signals) -> Abscissa | None:
         """The quantity over which a person sees the effect; None: the torque it predicts.
 

@@ -30,12 +30,14 @@ from excite_cli.effects.base import (
 )
 from excite_cli.robot.model import Array, Robot
 
-_CYCLES = 2.0  # least number of periods within the travelled range
+_CYCLES = 1.0  # least number of periods within the travelled range
+_SLOW = 3.0  # cycles below which a cubic in q would take the ripple away
 _SAMPLES = 4.0  # least number of samples per period at the typical speed
 _MOST = 1000.0  # periods per turn
 _OVERSAMPLING = 4
 _FINER = (0.35, 0.15, 0.06, 0.02, 0.006)  # cycles
 _FOUND = 3  # candidates that a search returns
+_TRIED, _ENOUGH = 17, 2000  # slow N, and samples that are enough for them
 
 
 class Ripple(Effect):
@@ -67,7 +69,7 @@ class Ripple(Effect):
         signals: Sequence[Signals],
         residuals: Sequence[Array],
     ) -> list[dict]:
-        """Up to three N: the highest peak, and those that stand out most from their surroundings.
+        """Up to four N: the highest peak, those that stand out most around it, and a slow one.
 
         The second rule finds a line on a residual that is large at low N for other reasons.
         """
@@ -88,7 +90,10 @@ class Ripple(Effect):
             n = float(periods[peak])
             if len(chosen) < _FOUND and all(abs(n - other) > step for other in chosen):
                 chosen.append(n)
-        return [{"periods": _refined(q, r, n, step)} for n in chosen]
+        found = [_refined(q, r, n, step) for n in chosen]
+        whole = np.concatenate([np.asarray(x)[:, j] for x in residuals])
+        found.append(_slow(q, v, whole, low, min(_SLOW * step, high)))
+        return [{"periods": n} for n in found]
 
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """Parts of a cycle more or less over the travelled range."""
@@ -101,6 +106,16 @@ class Ripple(Effect):
         """cos(N q_j) and sin(N q_j), (T, 1, 2)."""
         angle = self.shape["periods"] * signals.q[:, self.joints[0]]
         return np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None]
+
+    def curve(self, signals: Signals, every: Sequence[Signals]) -> Array | None:
+        """Powers of the angle up to the fourth, where less than three periods are seen."""
+        j = self.joints[0]
+        low = min(float(s.q[:, j].min()) for s in every)
+        high = max(float(s.q[:, j].max()) for s in every)
+        if self.shape["periods"] * (high - low) > 2 * np.pi * _SLOW:
+            return None
+        x = (2 * signals.q[:, j] - low - high) / max(high - low, 1e-12)
+        return np.stack([x**k for k in range(5)], axis=-1)[:, None]
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """The angle, folded into one period."""
@@ -162,6 +177,19 @@ def _without_slow(q: Array, v: Array, residual: Array) -> Array:
     slow = np.stack([np.ones_like(x), x, x**2, x**3, v, np.sign(v), x * v], axis=-1)
     found: Array = residual - slow @ np.linalg.lstsq(slow, residual, rcond=None)[0]
     return found
+
+
+def _slow(q: Array, v: Array, residual: Array, low: float, high: float) -> float:
+    """The N of the least squares beside gravity of one link and friction."""
+    every = max(len(q) // _ENOUGH, 1)
+    q, v, residual = q[::every], v[::every], residual[::every]
+    beside = np.stack([np.ones_like(q), np.cos(q), np.sin(q), v, np.sign(v)], axis=-1)
+    left, periods = [], np.linspace(low, high, _TRIED)
+    for n in periods:
+        columns = np.column_stack([beside, np.cos(n * q), np.sin(n * q)])
+        rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=1e-9)[0]
+        left.append(float(rest @ rest))
+    return float(periods[int(np.argmin(left))])
 
 
 def _refined(q: Array, residual: Array, near: float, step: float) -> float:
