@@ -1,7 +1,7 @@
 """Curves without a name that a flexible effect comes near.
 
 A wave of one period over the travelled range, beside a straight line, follows almost any smooth
-curve of the angle: a spring that hardens is one. So an effect may say what curve it must beat
+curve of the angle: a stiffness that grows gives one. So an effect may say what curve it must beat
 (`Effect.curve`): in place of it, and of all other effects of its joint that are functions of the
 same quantity, the curve is fitted. Where that leaves no more, the form of the effect is not shown.
 """
@@ -12,6 +12,7 @@ from scipy.stats import chi2
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.training import Columns
 from excite_cli.diagnosis.unexplained import Feature
 
 _SURE = 1e-3  # chance that a curve as good as the effect leaves so much more
@@ -43,7 +44,7 @@ def curves_in_place(traced: Traced, joint_names: Sequence[str]) -> dict[int, Cov
 
 
 def _does_as_well(traced: Traced, like: Sequence[int], curve: Feature) -> bool:
-    pool = [*(traced.candidates[i] for i in traced.chosen), curve]
+    pool: list[Columns] = [*(traced.candidates[i] for i in traced.chosen), curve]
     white = traced.data.evidence(pool, traced.noise)
     every = range(len(traced.chosen))
     others = [k for k in every if traced.chosen[k] not in like]

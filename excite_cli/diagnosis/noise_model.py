@@ -72,7 +72,7 @@ class NoiseModel:
         return rest
 
     def follow_gaps(self, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which of the usable rows (K,) follow a gap, or the beginning, within the highest order."""
+        """Which of the usable rows (K,) follow a gap, or the start, within the highest order."""
         order = max(len(c) for c in self.coefficients)
         touched = np.convolve(~usable, np.ones(order + 1))[: len(usable)] > 0.5
         touched[:order] = True
