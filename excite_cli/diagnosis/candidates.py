@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class Candidate:
     columns: tuple[Array, ...]
     tests: int = 1
 
-    @property
+    @cached_property
     def place(self) -> Place:
         """What candidates that differ in shape only share."""
         return self.effect.place
