@@ -12,8 +12,8 @@ what an effect of an impossible sign or size would explain. The effect is an app
 Of `rests`, U is what can be predicted, or if that is little, what exceeds the noise; they depend on
 two quantities mostly, so that U > 0.5 E is asked for where one of them is the effect's own. They
 say nothing of effects that inertias nearly take up, of which E is next to nothing. A change in some
-runs or over the campaign, and where a good part can be predicted a constant and first-order
-friction, are means of a function of anything: U is all that exceeds the noise for them, and
+runs or over time, and where a good part can be predicted a constant and first-order friction, are
+means of a function of anything: U is all that exceeds the noise for them, and
 U > 0.5 E is enough. (Of maps of two positions, or of one and direction, six of 208 campaigns were
 told such a mean, beside the word that 12 to 71 times the noise is left.)
 """
@@ -92,7 +92,7 @@ def _is_mean(traced: Traced, i: int, rest: LargeRest) -> bool:
     """Whether it would be the mean of any function, and what is left is one."""
     effect = traced.candidates[i].effect
     everywhere = effect.tier == Tier.EVERY_ROBOT or _is_constant(effect)
-    changes = effect.is_change or effect.of_campaign
+    changes = effect.is_change or "time" in effect.function_of
     return changes or (everywhere and rest.predictable > _PREDICTABLE)
 
 

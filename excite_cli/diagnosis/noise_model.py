@@ -157,12 +157,25 @@ def _autoregression(series: list[Array], usable: list[NDArray[np.bool_]]) -> tup
     best, variance = np.inf, energy / count
     coefficients: Array = np.zeros(0)
     for p in range(most + 1):
-        c = np.linalg.lstsq(gram[:p, :p], cross[:p], rcond=1e-12)[0] if p else np.zeros(0)
+        c = _not_quiet_at_zero(gram[:p, :p], cross[:p])
         left = max(float(energy - 2 * c @ cross[:p] + c @ gram[:p, :p] @ c), 1e-300)
         criterion = count * np.log(left / count) + 2 * (p + 1) * count / (count - p - 2)
         if criterion < best - 1e-9:
             best, coefficients, variance = criterion, np.asarray(c), left / (count - p)
     return _stable(coefficients), float(np.sqrt(variance) + 1e-12)
+
+
+def _not_quiet_at_zero(gram: Array, cross: Array) -> Array:
+    """Least squares with Σ c ≥ 0: slow noise is no less than white noise of the innovation.
+
+    The many columns that are in the model while noise is measured take slow noise up, and a
+    constant would be judged by what they leave.
+    """
+    c = np.linalg.lstsq(gram, cross, rcond=1e-12)[0]
+    if c.sum() < 0.0:
+        along = np.linalg.lstsq(gram, np.ones(len(c)), rcond=1e-12)[0]
+        c -= along * c.sum() / along.sum()
+    return np.asarray(c)
 
 
 def _stable(coefficients: Array) -> Array:

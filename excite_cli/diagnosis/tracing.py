@@ -25,7 +25,7 @@ from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
-from excite_cli.effects.base import Effect, Signals, Tier
+from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.seen import Seen
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.prepare import PreparedRun
@@ -174,7 +174,8 @@ def _one_pass(
         # Likewise the runs of what is in some of them only, or changes with time or a column.
         plain_kinds = np.repeat(
             [
-                effect.tier != Tier.LAST and not (effect.runs or effect.changes_of)
+                not (effect.is_searched or effect.runs or effect.changes_of)
+                and "time" not in effect.function_of
                 for effect in effects
             ],
             [len(effect.parameters) for effect in effects],

@@ -169,6 +169,11 @@ class Effect(ABC):
         return (*self.refines, self.kind) if every else self.refines
 
     @property
+    def is_searched(self) -> bool:
+        """Whether its shapes are searched on what is left of a torque (`tuned`)."""
+        return type(self).tuned.__func__ is not Effect.tuned.__func__  # type: ignore[attr-defined]
+
+    @property
     def asked_for(self) -> Tier:
         """Its tier; a change in some runs waits for what sets runs apart on many robots."""
         return max(self.tier, Tier.MANY_ROBOTS) if self.is_change else self.tier
