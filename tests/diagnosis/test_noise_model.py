@@ -92,6 +92,16 @@ def test_a_band_without_noise_is_not_trusted_without_end() -> None:
     assert modelled.min() > 0.01 * np.var(runs[0])
 
 
+def test_slow_noise_is_no_less_than_white_noise() -> None:
+    """Of differentiated white noise next to nothing is slow; a model takes slow noise up as well."""
+    runs = [np.diff(series(seed, taps=np.zeros(0)), axis=0) for seed in range(3)]
+    found = fit_noise(runs, all_usable(runs))
+    assert found.coefficients[0].sum() == pytest.approx(0.0, abs=1e-6)
+    assert found.sigma[0] <= runs[0].std() * 1.02
+    kept = fit_noise([series(1)], all_usable([series(1)]))
+    assert kept.coefficients[0].sum() > 0.5  # as it is
+
+
 def test_samples_that_are_not_usable_are_not_seen() -> None:
     runs = [series(seed, 1500) for seed in range(2)]
     usable = all_usable(runs)
