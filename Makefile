@@ -27,7 +27,7 @@ loop: $(STAMP)           ## a UR10 with an effect its config does not know, foun
 	  -o results/report.html --overwrite
 
 test: $(STAMP) lint      ## lint, types, import directions, all tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -q
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -q --durations 15
 
 sanitize: $(STAMP)       ## the kernels' tests on a build with the address and UB sanitizers (gcc)
 	$(BIN)/python -m pytest -q -rs tests/kernels/test_sanitized.py

@@ -24,7 +24,7 @@ def curves_in_place(traced: Traced, joint_names: Sequence[str]) -> dict[int, Cov
     for i in traced.chosen:
         own = traced.candidates[i]
         parts = [own.effect.curve(signals, traced.signals) for signals in traced.signals]
-        if i in found or any(part is None for part in parts):
+        if i in found or not parts or any(part is None for part in parts):
             continue
         like = [
             k

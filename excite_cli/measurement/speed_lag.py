@@ -7,8 +7,6 @@ looks like a delay of T, at faster motion it is less, so both are tried.
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter
 
 from excite_cli.measurement.dataset import Array, Finding, Run
 
@@ -92,6 +90,8 @@ def _shifted(run: Run, lag: float) -> tuple[Array, Array]:
 
 def _behind_filter(run: Run, seconds: float) -> tuple[Array, Array]:
     """The change of position filtered, from the recorded speed on, and what was recorded."""
+    from scipy.signal import lfilter  # takes a second to import
+
     v, dq = _scaled(run)
     keep = np.exp(-run.step / seconds)
     return lfilter([1 - keep], [1, -keep], v[1:], axis=0, zi=keep * dq[:1])[0], dq[1:]
@@ -105,6 +105,8 @@ def _left(pairs: Sequence[tuple[Array, Array]]) -> float:
 
 def _time_constant(runs: Sequence[Run]) -> float:
     """Of the first-order filter that leaves least of the recorded speeds [s]."""
+    from scipy.optimize import minimize_scalar  # slow to import
+
     low, high = np.log(0.3 * _LAG), np.log(2 * _LONGEST)
     found = minimize_scalar(
         lambda x: _left([_behind_filter(run, float(np.exp(x))) for run in runs]),

