@@ -76,8 +76,7 @@ def trace(
     bodies = [ModelledRun(model, run) for run in runs]
     fit = _first_fit(model, folds, bodies)
     traced: Traced | None = None
-    left: list[float] = []
-    for attempt in range(_PASSES + 1):
+    for attempt in range(_PASSES):
         traced = None  # its columns are gigabytes, of large data: not beside the next ones
         traced = _one_pass(model, spec, folds, run_names, bodies, fit, attempt)
         now = _fit_of(model, traced)
@@ -89,10 +88,7 @@ def trace(
         )
         settled = attempt and now.places == fit.places and now.close_to(fit)
         fit = now
-        left.append(_left(traced))
-        # Passes may go round in twos: what is found asks for other samples, with which it is lost.
-        # Then the one that leaves less is the answer, and comes last.
-        if settled or (attempt >= _PASSES - 1 and left[-1] <= left[-2]):
+        if settled:
             break
         before, left_out = left_out, LeftOut.by((*model.declared, *fit.effects))
         if left_out != before:
@@ -153,18 +149,6 @@ def _fit_of(model: Model, traced: Traced) -> _Fit:
         traced.noise.levels(),
         plain.energy(traced.chosen),
     )
-
-
-def _left(traced: Traced) -> float:
-    """How much of the torques is left: logarithm of the residual's RMS, mean over the joints."""
-    chosen = traced.chosen
-    residuals = traced.data.residuals(traced.candidates, chosen, traced.judge.plain.solve(chosen))
-    usable = [run.usable for run in traced.data.runs]
-    squares = sum(
-        np.where(u, r**2, 0.0).sum(axis=0) for r, u in zip(residuals, usable, strict=True)
-    )
-    counts = sum(u.sum(axis=0) for u in usable)
-    return float(np.mean(np.log(squares + 1e-300) - np.log(np.maximum(counts, 1)))) / 2
 
 
 def _values(model: Model, data: TrainingData, parameters: Array) -> Array:
