@@ -59,7 +59,7 @@ class NoiseModel:
         broken = np.flatnonzero(~before.all(axis=1))
         patterns, which = np.unique(before[broken], axis=0, return_inverse=True)
         for pattern, rows in zip(
-            patterns, (broken[which == k] for k in range(len(patterns))), strict=True
+            patterns, (broken[which.ravel() == k] for k in range(len(patterns))), strict=True
         ):
             lags = np.flatnonzero(pattern) + 1
             by, spread[rows] = self._predictor(joint, lags)
