@@ -78,6 +78,7 @@ def test_one_torque_in_another_unit(robot: Robot, sound: Dataset) -> None:
     (found,) = told(robot, with_torque(sound, lambda run: scale * run.tau))
     assert found.joints == (ELBOW,)
     assert "shoulder_lift_joint: 1, elbow_joint: 0.001, wrist_1_joint: 1" in found.text
+    assert "Do without: measurement.without_torque: [elbow_joint]. " in found.text
 
 
 def test_gravity_that_is_subtracted_is_told_and_its_key_adds_it(
