@@ -149,6 +149,11 @@ class Evidence:
         """Normalised Gram matrices of the folds (F, K, K)."""
         return self.grams.by_fold() / np.outer(self.norms, self.norms)
 
+    @cached_property
+    def _first_sides(self) -> Array:
+        """The same of their first sides (F, K, K)."""
+        return self.grams.first_sides() / np.outer(self.norms, self.norms)
+
     def _part(
         self,
         folds: Sequence[int],
@@ -159,8 +164,12 @@ class Evidence:
         """Gram matrix (k + 1, k + 1) of some folds' rows of some joints, the torque last."""
         both = np.append(at, self.torque)
         everywhere = joints is None or len(joints) == len(self.grams.joints)
-        if everywhere and len(folds) == 1 and sides == slice(None):
-            return np.asarray(self._folds[folds[0]][both[:, None], both])
+        if everywhere and len(folds) == 1:
+            index = (folds[0], both[:, None], both)
+            if sides == slice(None):
+                return np.asarray(self._folds[index])
+            first = self._first_sides[index]
+            return np.asarray(first if sides == slice(0, 1) else self._folds[index] - first)
         rows = range(len(self.grams.joints)) if joints is None else joints
         norms = self.norms[both]
         return self.grams.on(folds, rows, both, sides) / (norms[:, None] * norms)

@@ -7,6 +7,7 @@ a run alone is fitted on one side of it and judged on the other.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,13 +81,36 @@ class Grams:
             position = position[there]
             places.append((j, (position[:, None], position), (there[:, None], there)))
         found = np.zeros((len(at), len(at)))
-        for fold in folds:
-            for j, own, to in places:
-                part = self.joints[j].own[fold, sides][:, *own].sum(axis=0)
+        for j, own, to in places:
+            for grams in self._summed(j, folds, sides):
+                part = grams[own]
                 if len(part) == len(at):
                     found += part
                 else:
                     found[to] += part
+        return found
+
+    def _summed(self, joint: int, folds: Sequence[int], sides: slice) -> list[Array]:
+        """Gram matrices (k, k) of a joint, to be summed; sums that are asked for often are kept."""
+        if sides != slice(None):
+            return [side for fold in folds for side in self.joints[joint].own[fold, sides]]
+        if len(folds) == self.folds:
+            return [self._whole[joint]]
+        return [self._by_fold[joint][fold] for fold in folds]
+
+    @cached_property
+    def _by_fold(self) -> list[Array]:
+        return [joint.own.sum(axis=1) for joint in self.joints]
+
+    @cached_property
+    def _whole(self) -> list[Array]:
+        return [joint.own.sum(axis=(0, 1)) for joint in self.joints]
+
+    def first_sides(self) -> Array:
+        """Sums (F, K, K) over joints of the first side of every fold."""
+        found = np.zeros((self.folds, self.size, self.size))
+        for joint, active in zip(self.joints, self._active, strict=True):
+            found[:, active[:, None], active] += joint.own[:, 0]
         return found
 
     def torque_energy(self, joint: int) -> float:

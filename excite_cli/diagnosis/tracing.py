@@ -33,6 +33,7 @@ from excite_cli.robot.model import Array
 
 _PASSES = 6
 _SETTLED = 1e-3  # change of the residual energy from pass to pass
+_WORSE = 0.05  # of what is left, relative: passes that differ by less are as good as each other
 _SAME_SHAPE = 0.02  # half of the relative changes of its numbers: energies say little of them
 _OBVIOUS, _PLAIN_TO_SEE = 8, 0.2
 Progress = Callable[[str, int], None]
@@ -76,7 +77,9 @@ def trace(
     bodies = [ModelledRun(model, run) for run in runs]
     fit = _first_fit(model, folds, bodies)
     traced: Traced | None = None
-    for attempt in range(_PASSES):
+    left: list[float] = []
+    found: list[set] = []
+    for attempt in range(_PASSES + 1):
         traced = None  # its columns are gigabytes, of large data: not beside the next ones
         traced = _one_pass(model, spec, folds, run_names, bodies, fit, attempt)
         now = _fit_of(model, traced)
@@ -88,7 +91,12 @@ def trace(
         )
         settled = attempt and now.places == fit.places and now.close_to(fit)
         fit = now
-        if settled:
+        left.append(_left(traced))
+        found.append(now.places)
+        # Passes may go round in twos: what is found asks for other samples, with which it is lost.
+        # Then the one that leaves less is the answer, and comes last.
+        in_twos = len(found) > 2 and found[-1] == found[-3] != found[-2]
+        if settled or (attempt >= _PASSES - 1 and not (in_twos and left[-1] > left[-2] + _WORSE)):
             break
         before, left_out = left_out, LeftOut.by((*model.declared, *fit.effects))
         if left_out != before:
@@ -149,6 +157,18 @@ def _fit_of(model: Model, traced: Traced) -> _Fit:
         traced.noise.levels(),
         plain.energy(traced.chosen),
     )
+
+
+def _left(traced: Traced) -> float:
+    """How much of the torques is left: logarithm of the residual's RMS, mean over the joints."""
+    chosen = traced.chosen
+    residuals = traced.data.residuals(traced.candidates, chosen, traced.judge.plain.solve(chosen))
+    usable = [run.usable for run in traced.data.runs]
+    squares = sum(
+        np.where(u, r**2, 0.0).sum(axis=0) for r, u in zip(residuals, usable, strict=True)
+    )
+    counts = sum(u.sum(axis=0) for u in usable)
+    return float(np.mean(np.log(squares + 1e-300) - np.log(np.maximum(counts, 1)))) / 2
 
 
 def _values(model: Model, data: TrainingData, parameters: Array) -> Array:

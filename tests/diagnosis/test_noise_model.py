@@ -174,8 +174,10 @@ def test_rows_after_gaps_are_predicted_from_what_is_left() -> None:
 
 
 @pytest.mark.parametrize("larger", [1.0, 3.0])
-def test_more_noise_after_gaps_is_measured(larger: float) -> None:
+def test_more_noise_after_gaps_is_measured(larger: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Transients at reversals: innovations as large there as elsewhere, or three times that."""
+    careful = noise_model._AFTER_GAPS
+    monkeypatch.setattr(noise_model, "_AFTER_GAPS", 1.0)
     usable = np.ones((6000, 1), bool)
     usable[::25] = usable[1::25] = False
     shocks = SIGMA * np.random.default_rng(5).normal(size=6000)
@@ -189,6 +191,10 @@ def test_more_noise_after_gaps_is_measured(larger: float) -> None:
     else:
         assert found.after_gaps[0] < 1.1
     white = found.whitened(runs[0][:, 0], 0, usable[:, 0])
+    monkeypatch.setattr(noise_model, "_AFTER_GAPS", careful)
+    assert fit_noise(runs, [usable]).after_gaps == pytest.approx(
+        [max(careful, found.after_gaps[0])]
+    )
     assert white[found.follow_gaps(usable[:, 0])].std() == pytest.approx(1.0, abs=0.15)
 
 
