@@ -43,7 +43,7 @@ def approximations(
     """Which chosen candidates are approximations, and of what."""
     left = {each.joint: each for each in unexplained}
     more = {each.joint: each for each in rests if each.certain}
-    impossible: dict[int, tuple[float, str]] = {}
+    impossible: dict[tuple[int, tuple[str, ...]], tuple[float, str]] = {}
     found = {
         i: Approximation(covariates=(of,)) for i, of in curves_in_place(traced, joint_names).items()
     }
@@ -66,9 +66,10 @@ def approximations(
             if surely * rest > (_ONE_OF_TWO if same else 1.0) * explained:
                 found[i] = Approximation(covariates=more[name].depends_on)
                 continue
-        if joint not in impossible:
-            impossible[joint] = _impossible(traced, joint, rest)
-        energy, what = impossible[joint]
+        key = (joint, traced.candidates[i].effect.function_of)
+        if key not in impossible:
+            impossible[key] = _impossible(traced, *key, rest)
+        energy, what = impossible[key]
         if energy > explained:
             found[i] = Approximation(kind=what)
     return found
@@ -128,8 +129,13 @@ def _same_quantity(
     return any(each.like in effect.function_of and each.joint in own for each in depends_on)
 
 
-def _impossible(traced: Traced, joint: int, rest: float) -> tuple[float, str]:
-    """The most that a candidate which cannot be so would explain, and its kind."""
+def _impossible(
+    traced: Traced, joint: int, quantities: Sequence[str], rest: float
+) -> tuple[float, str]:
+    """The most that a candidate which cannot be so would explain, and its kind.
+
+    Of those that depend on one of the `quantities`: what others explain is something else's.
+    """
     judge, chosen = traced.judge, traced.chosen
     taken = {traced.candidates[i].place for i in chosen}
     singles = judge.plain.schur(chosen).singles
@@ -137,6 +143,7 @@ def _impossible(traced: Traced, joint: int, rest: float) -> tuple[float, str]:
         k
         for k, c in enumerate(traced.candidates)
         if joint in c.rows and c.place not in taken and singles[k].dof
+        if not quantities or not c.effect.function_of or {*quantities} & {*c.effect.function_of}
     ]
     best = (0.0, "")
     for k in sorted(near, key=lambda k: -singles[k].chi2)[:_TRIED]:

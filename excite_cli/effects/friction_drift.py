@@ -1,20 +1,23 @@
 """Friction that changes during a run, as oil and grease warm up: τ_j = t (ċ sgn v_j + ḃ v_j).
 
 t counts from the start of the run, so every run drifts anew: `friction_change` goes on from one
-recording to the next. Warming up makes both rates negative.
+recording to the next. Warming up makes both rates negative. Rates of opposite signs are no drift:
+they are what a curve over speed becomes where a run is faster at its end than at its start.
 """
 
 from typing import ClassVar
 
 import numpy as np
 
+from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals, Tier
+from excite_cli.effects.rare_sizes import nearest_of_sign
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 
 
 class FrictionDrift(Effect):
-    """τ_j = t (coulomb_rate · sgn v_j + viscous_rate · v_j), of either sign."""
+    """τ_j = t (coulomb_rate · sgn v_j + viscous_rate · v_j), both of either sign, but the same."""
 
     kind: ClassVar = "friction_drift"
     title: ClassVar = "friction that drifts during a run"
@@ -33,6 +36,23 @@ class FrictionDrift(Effect):
         """t sgn v_j and t v_j, (T, 1, 2)."""
         v = signals.v[:, self.joints[0]]
         return (signals.t[:, None] * np.stack([smooth_sign(v), v], axis=-1))[:, None]
+
+    def possible(self, values: Array, early: bool) -> bool:
+        """Whether both rates have the same sign: friction falls, or rises, as a whole."""
+        return bool(values[0] * values[1] >= 0.0)
+
+    def nearest(self, values: Array, covariance: Array) -> Array:
+        """The nearest rates of the same sign, in units of their error."""
+        if self.possible(values, early=False):
+            return values
+        both = np.ones(2, dtype=bool)
+        found = [s * nearest_of_sign(s * values, covariance, both) for s in (1.0, -1.0)]
+        whiten = np.linalg.inv(half_of(covariance))
+        return min(found, key=lambda near: float(np.linalg.norm(whiten @ (values - near))))
+
+    def why_not(self, values: Array) -> str:
+        """Why rates are not `possible`."""
+        return "dry and viscous friction do not drift in opposite directions"
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """Time with the sign of the speed."""

@@ -206,20 +206,35 @@ def test_straight_friction_is_measured_without_what_refines_it() -> None:
 
 @pytest.mark.parametrize("rival", [2.9, 3.1])
 def test_what_cannot_be_and_explains_more_makes_a_name_doubtful(rival: float) -> None:
-    effects = [effect("viscous_friction"), effect("armature"), effect("torque_offset")]
+    other = "stribeck_friction"
+    effects = [effect("viscous_friction"), effect(other), effect("torque_offset")]
     data, candidates = planted(effects, np.array([[3.0, 0.0], [rival, 0.0], [2.0, 0.0]]))
-    expected = {0: Approximation(kind="armature")}
+    expected = {0: Approximation(kind=other)}
     found = approximations(traced(data, candidates, [0], all_but(1)), [], NAMES)
     assert found == (expected if rival > 3.0 else {})
     assert approximations(traced(data, candidates, [0]), [], NAMES) == {}
-    # The offset that cannot be explains less, whatever the inertia would.
+    # The offset that cannot be explains less, whatever the other friction would.
     assert approximations(traced(data, candidates, [0], all_but(2)), [], NAMES) == {}
-    # Once the inertia is in, it stands for nothing else.
+    # Once the other is in, it stands for nothing else.
     assert approximations(traced(data, candidates, [0, 1], all_but(1)), [], NAMES) == {}
 
 
+@pytest.mark.parametrize(
+    ("kind", "doubted"), [("stribeck_friction", True), ("elasticity", True), ("armature", False)]
+)
+def test_what_cannot_be_and_depends_on_something_else_is_no_matter(
+    kind: str, doubted: bool
+) -> None:
+    """An inertia says nothing of a function of speed; a function of several quantities might."""
+    effects = [effect("viscous_friction"), effect(kind)]
+    data, candidates = planted(effects, np.array([[1.0, 0.0], [9.0, 0.0]]))
+    found = approximations(traced(data, candidates, [0], all_but(1)), [], NAMES)
+    assert set(found) == ({0} if doubted else set())
+
+
 def test_what_cannot_be_on_another_joint_is_no_matter() -> None:
-    effects = [effect("viscous_friction", 0), effect("armature", 1), effect("viscous_friction", 1)]
+    kinds = (("viscous_friction", 0), ("stribeck_friction", 1), ("viscous_friction", 1))
+    effects = [effect(kind, joint) for kind, joint in kinds]
     data, candidates = planted(effects, np.array([[1.0, 0.0], [0.0, 9.0], [0.0, 2.0]]))
     found = approximations(traced(data, candidates, [0, 2], all_but(1)), [], NAMES)
     assert set(found) == {2}

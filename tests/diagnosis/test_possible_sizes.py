@@ -21,7 +21,7 @@ NONNEGATIVE = (
 # Of those with several parameters, which cannot be negative.
 SOME_NONNEGATIVE = {
     "asymmetric_friction": (0, 1), "coupled_friction": (1,), "spring": (0,),
-    "ripple": (), "cable_force": (), "friction_drift": (), "contact": (),
+    "ripple": (), "cable_force": (), "contact": (),
 }  # fmt: skip
 WHOLE = ("torque_saturation", "backlash")
 # Candidates of 1, 2, 10, 1 and 3 columns, and values with which each is possible.
@@ -126,6 +126,16 @@ def test_one_negative_parameter_of_several_is_enough() -> None:
     assert not possible("coupled_friction", 1.0, -2.0, joints=(0, 1))
     assert possible("spring", 1.0, -2.0)  # a preload pulls either way
     assert not possible("spring", -1.0, 2.0)
+
+
+def test_friction_drifts_as_a_whole() -> None:
+    """Of opposite signs, rates are possible as far as one of them is zero within its error."""
+    for sign in (-1.0, 1.0):
+        assert possible("friction_drift", sign * 2.0, 0.0)
+        assert possible("friction_drift", 0.0, sign * 2.0)
+        assert not possible("friction_drift", sign * 2.0, -sign * 1e-9)
+        assert possible("friction_drift", sign * 2.0, -sign * 0.3, error=0.15)
+        assert not possible("friction_drift", sign * 2.0, -sign * 0.6, error=0.15)
 
 
 @pytest.mark.parametrize("kind", ["torque_offset", "ripple", "cable_force", "friction_drift"])

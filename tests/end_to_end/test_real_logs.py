@@ -109,7 +109,5 @@ class TestKr300:
         stiffness = named(answer, "spring")[("axis_2",)]["stiffness"]["value"]
         assert stiffness == pytest.approx(7000, rel=0.1)
         armature = named(answer, "armature")
-        for axis, sheet in (("axis_2", 844), ("axis_3", 751)):
-            found = armature[(axis,)]["inertia"]
-            # Of axis_2 a drift of friction takes a part in runs B and C: 929 ± 40.
-            assert found["value"] == pytest.approx(sheet, abs=max(0.1 * sheet, 2.2 * found["std"]))
+        assert armature[("axis_2",)]["inertia"]["value"] == pytest.approx(844, rel=0.1)
+        assert armature[("axis_3",)]["inertia"]["value"] == pytest.approx(751, rel=0.1)
