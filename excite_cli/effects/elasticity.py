@@ -49,8 +49,11 @@ class Elasticity(Effect):
         return _MISSED * values
 
     def leftover(self, values: Array) -> float:
-        """Of a compliance the columns are the first order only."""
-        return 2e-2
+        """Columns are of first order, and nothing in them turns with friction at a reversal.
+
+        Where dry friction winds the gear up, 4 % of a Panda's elasticity looked like a memory.
+        """
+        return 5e-2
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
