@@ -262,6 +262,13 @@ class Evidence:
             self._without[chosen] = np.linalg.solve(normal, rhs[:, :, None])[:, :, 0]
         return self._without[chosen]
 
+    def energies(self, chosen: Sequence[int]) -> Array:
+        """Residual energies (n,) on the rows of every joint of the model fitted to everything."""
+        at, every = self.columns(chosen), range(self.grams.folds)
+        x = self.solve(chosen) * self.norms[at]
+        parts = [self._part(every, [j], at) for j in range(len(self.grams.joints))]
+        return np.array([max(_energy(part, x), 0.0) for part in parts])
+
     def energy_on(self, chosen: Sequence[int], joints: Sequence[int] | None) -> float:
         """Residual energy on the rows of `joints` of the model fitted to everything."""
         at = self.columns(chosen)

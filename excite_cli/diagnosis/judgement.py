@@ -192,14 +192,14 @@ class Judgement:
         return best
 
     def size(self, chosen: Sequence[int], added: Sequence[int]) -> float:
-        """What `added` explains, as a share of the torque's RMS on the joint where it is most."""
-        largest = 0.0
-        for joint in sorted({j for i in added for j in self.white.rows_of[i]}):
-            before = self.plain.energy_on(chosen, [joint])
-            after = self.plain.energy_on([*chosen, *added], [joint])
-            whole = self.plain.grams.torque_energy(joint)
-            largest = max(largest, (before - after) / max(whole, 1e-300))
-        return float(np.sqrt(largest))
+        """What `added` explains, as a share of the torque's RMS on the joint where it is most.
+
+        Any joint: through the inertias that all share, it may be another than its own.
+        """
+        before, after = (self.plain.energies(each) for each in (chosen, [*chosen, *added]))
+        joints = range(len(self.plain.grams.joints))
+        whole = np.array([self.plain.grams.torque_energy(j) for j in joints])
+        return float(np.sqrt(max(((before - after) / np.maximum(whole, 1e-300)).max(), 0.0)))
 
     def too_small(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
         """Whether it may go without loss."""

@@ -3,7 +3,8 @@
 Noise is estimated with the effects in that are found so far (a residual that still holds a strong
 slow effect looks like noise with a long memory and hides it); columns that look at the torque of
 the model follow the fit. Every pass searches from the declared model anew, until a pass finds what
-the pass before it found.
+the pass before it found. Passes may also go round (what is found asks for other samples to be left
+out, with which it is lost): then the answer is the pass with the least error on runs left out.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -32,8 +33,9 @@ from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
 _PASSES = 6
+_LENIENT = 2  # passes that do not know the torque well
 _SETTLED = 1e-3  # change of the residual energy from pass to pass
-_WORSE = 0.05  # of what is left, relative: passes that differ by less are as good as each other
+_BETTER = 0.02  # relative: passes that differ by less are as good as each other
 _SAME_SHAPE = 0.02  # half of the relative changes of its numbers: energies say little of them
 _OBVIOUS, _PLAIN_TO_SEE = 8, 0.2
 Progress = Callable[[str, int], None]
@@ -73,13 +75,19 @@ def trace(
     `prepared` gives the training parts, without samples that effects which were found ask to leave.
     """
     left_out = LeftOut.by(model.declared)
-    runs = prepared(left_out)
-    bodies = [ModelledRun(model, run) for run in runs]
+    bodies = [ModelledRun(model, run) for run in prepared(left_out)]
     fit = _first_fit(model, folds, bodies)
+    passes: list[_Pass] = []
+
+    def take(wanted: LeftOut) -> None:
+        nonlocal left_out
+        if wanted != left_out:
+            for body, run in zip(bodies, prepared(wanted), strict=True):
+                body.take(run)
+            left_out = wanted
+
     traced: Traced | None = None
-    left: list[float] = []
-    found: list[set] = []
-    for attempt in range(_PASSES + 1):
+    for attempt in range(_PASSES):
         traced = None  # its columns are gigabytes, of large data: not beside the next ones
         traced = _one_pass(model, spec, folds, run_names, bodies, fit, attempt)
         now = _fit_of(model, traced)
@@ -89,21 +97,29 @@ def trace(
             f"{len(traced.candidates)} candidates",
             attempt + 1,
         )
-        settled = attempt and now.places == fit.places and now.close_to(fit)
+        if attempt and now.places == fit.places and now.close_to(fit):
+            return traced
+        passes.append(_Pass(fit, left_out, attempt, _left_out(traced)))
         fit = now
-        left.append(_left(traced))
-        found.append(now.places)
-        # Passes may go round in twos: what is found asks for other samples, with which it is lost.
-        # Then the one that leaves less is the answer, and comes last.
-        in_twos = len(found) > 2 and found[-1] == found[-3] != found[-2]
-        if settled or (attempt >= _PASSES - 1 and not (in_twos and left[-1] > left[-2] + _WORSE)):
-            break
-        before, left_out = left_out, LeftOut.by((*model.declared, *fit.effects))
-        if left_out != before:
-            for body, run in zip(bodies, prepared(left_out), strict=True):
-                body.take(run)
+        if attempt < _PASSES - 1:
+            take(LeftOut.by((*model.declared, *fit.effects)))
     assert traced is not None
-    return traced
+    best = min(passes[_LENIENT:], key=lambda each: each.error)
+    if best.error > passes[-1].error - _BETTER:
+        return traced
+    traced = None
+    take(best.left_out)
+    return _one_pass(model, spec, folds, run_names, bodies, best.fit, best.attempt)
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """What a pass began from, and the error of what it found on runs left out."""
+
+    fit: "_Fit"
+    left_out: LeftOut
+    attempt: int
+    error: float
 
 
 @dataclass(frozen=True)
@@ -159,16 +175,12 @@ def _fit_of(model: Model, traced: Traced) -> _Fit:
     )
 
 
-def _left(traced: Traced) -> float:
-    """How much of the torques is left: logarithm of the residual's RMS, mean over the joints."""
-    chosen = traced.chosen
-    residuals = traced.data.residuals(traced.candidates, chosen, traced.judge.plain.solve(chosen))
-    usable = [run.usable for run in traced.data.runs]
-    squares = sum(
-        np.where(u, r**2, 0.0).sum(axis=0) for r, u in zip(residuals, usable, strict=True)
-    )
-    counts = sum(u.sum(axis=0) for u in usable)
-    return float(np.mean(np.log(squares + 1e-300) - np.log(np.maximum(counts, 1)))) / 2
+def _left_out(traced: Traced) -> float:
+    """Logarithm of the RMS that is left of runs left out, mean over the joints."""
+    plain, joints = traced.judge.plain, range(len(traced.levels))
+    squares = np.array([plain.left_out(traced.chosen, [j]).sum() for j in joints])
+    counts = sum(run.usable.sum(axis=0) for run in traced.data.runs)
+    return float(np.mean(np.log(squares / np.maximum(counts, 1) * traced.levels**2 + 1e-300))) / 2
 
 
 def _values(model: Model, data: TrainingData, parameters: Array) -> Array:
@@ -222,7 +234,7 @@ def _one_pass(
     inflation = placebos.inflation
     rules = Rules(spec.significance, spec.gain, inflation, placebos.least_p)
     sizes = PossibleSizes(
-        candidates, attempt < 2, spread_of(white.covariance, inflation), _seen(data, signals)
+        candidates, attempt < _LENIENT, spread_of(white.covariance, inflation), _seen(data, signals)
     )
     judge = Judgement(white, plain, candidates, rules, sizes, found)
     chosen = Search(judge, spec.rounds).run()

@@ -22,7 +22,7 @@ from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.effects.simulated_robot import Coupling, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
-_USUAL_SPEED = 1.0  # rad/s, at which a shaft's two parts are weighed
+_USUAL_SPEED = 0.25  # rad/s, at which a shaft's two parts are weighed: joints are slow at reversals
 
 
 class CoupledFriction(Effect):

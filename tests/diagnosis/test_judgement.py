@@ -204,15 +204,15 @@ def test_an_effect_of_some_runs_is_judged_where_it_is(
         assert judge.left_out_gain(chosen, [4]) == pytest.approx(expected, rel=1e-3)
 
 
-def test_size_is_the_share_of_the_torque_where_it_is_most(
+def test_size_is_the_share_of_the_torque_of_any_joint_where_it_is_most(
     random_judge: tuple[Judgement, Rows, Rows],
 ) -> None:
     judge, _, rows = random_judge
-    for chosen, added, joints in (([], [0], (0,)), ([1], [3], (0, 1)), ([3], [1, 2], (0, 1))):
+    for chosen, added in (([], [0]), ([], [2]), ([1], [3]), ([3], [1, 2])):
         shares = [
             (rows.energy(chosen, [j]) - rows.energy([*chosen, *added], [j]))
             / np.sum(rows.y[rows.joint == j] ** 2)
-            for j in joints
+            for j in (0, 1)
         ]
         assert judge.size(chosen, added) == pytest.approx(np.sqrt(max(shares)), rel=1e-6)
 
@@ -242,7 +242,7 @@ def test_verdicts(kind: str, size: float, noise: float, declared: float, expecte
         ("encoder_offset", 0.1, 0.0225),  # (1.5 · 0.1)²
         ("encoder_offset", -0.1, 0.0225),
         ("encoder_offset", 0.01, 2e-3),
-        ("elasticity", 0.1, 2e-2),
+        ("elasticity", 0.1, 5e-2),
         ("torque_gain", 0.1, 0.0),
     ],
 )
@@ -264,8 +264,8 @@ def test_no_effect_is_what_another_leaves(kind: str, angle: float, left: float) 
 
 def test_what_two_effects_leave_is_not_added_up() -> None:
     effects = [effect("elasticity"), effect("torque_delay"), effect("torque_offset")]
-    mix = np.diag([1e5, 1e4, 1.0])  # 2 % and 1 % of 100² are 200 and 100
-    for energy, expected in ((150.0, Verdict.LEFTOVER), (250.0, Verdict.ACCEPTED)):
+    mix = np.diag([1e5, 1e4, 1.0])  # 5 % and 1 % of 100² are 500 and 100
+    for energy, expected in ((450.0, Verdict.LEFTOVER), (550.0, Verdict.ACCEPTED)):
         torque = on_joint_0([100.0, 100.0, np.sqrt(energy)])
         judge = judge_of(*planted(effects, mix, torque, noise=0.1))
         assert judge.verdict([0, 1], [2]) == expected
@@ -293,7 +293,7 @@ def test_inertias_bent_on_one_joint_leave_nothing_to_effects_of_another() -> Non
     for tau, declared in zip(data.tau, data.declared, strict=True):
         tau[:, 0] += 100.0 * declared[:, 0, 0]
     judge = judge_of(data, [replace(first, columns=bent), second])
-    assert 0.02 * judge.plain.energy_on([1], [1]) > TOTAL
+    assert 0.05 * judge.plain.energy_on([1], [1]) > TOTAL
     assert judge.verdict([0], [1]) == Verdict.ACCEPTED
 
 

@@ -364,3 +364,42 @@ def test_what_does_not_hold_in_the_end_leaves_its_place_to_another() -> None:
     found = Dropping(judge)
     assert set(found.run()) == {1}
     assert set(Search(judge).run()) == {0}
+
+
+def judged_twins() -> tuple[Judgement, list[Candidate]]:
+    effects = [effect("viscous_friction"), effect("armature"), effect("torque_offset")]
+    data, candidates = planted(effects, [5.0, 3.0, 2.0])
+    evidence = data.evidence(candidates, ONE)
+    return Judgement(evidence, evidence, candidates, NO_VETO, anything), candidates
+
+
+def test_steps_that_go_round_end_with_the_cheapest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is added is dropped again, and passes again: once round is enough."""
+    judge, _ = judged_twins()
+    turns = {(): [2], (2,): [0], (0,): [1], (1,): [0]}  # 2, then 0 and 1 in turn
+    asked: list[tuple[int, ...]] = []
+
+    def polish(_: Search, chosen: list[int]) -> list[int]:
+        asked.append(tuple(chosen))
+        return turns[tuple(chosen)]
+
+    monkeypatch.setattr(Search, "_forward", lambda _, chosen, latest: chosen)
+    monkeypatch.setattr(Search, "_polish", polish)
+    assert judge.cost([0]) < judge.cost([1]) < judge.cost([2])
+    assert Search(judge)._settled([]) == [0]
+    assert asked == [(), (2,), (0,), (1,)]
+
+
+@pytest.mark.parametrize(("second", "expected"), [([1, 2], [1]), ([1, 2, 0], [0])])
+def test_more_names_in_place_of_those_that_do_not_hold_are_no_answer(
+    monkeypatch: pytest.MonkeyPatch, second: list[int], expected: list[int]
+) -> None:
+    """Of [0, 1] only 0 holds; then 1.5 times as many names may be tried, of which one holds."""
+    judge, _ = judged_twins()
+    sets = iter([[0, 1], second])
+    holds = iter([[0], [1]])
+    monkeypatch.setattr(Search, "_settled", lambda *_: next(sets, [1]))
+    monkeypatch.setattr(Search, "_pruned", lambda *_: next(holds, [1]))
+    monkeypatch.setattr(judge, "cost", lambda chosen: -float(len(chosen)))
+    monkeypatch.setattr("excite_cli.diagnosis.search._GROWN", 1.0)
+    assert Search(judge).run() == expected

@@ -1,0 +1,78 @@
+"""Which pass of a diagnosis is the answer, with passes that find what they are told to find."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from excite_cli.diagnosis import tracing
+from excite_cli.identification.left_out import LeftOut
+
+
+class Fit(SimpleNamespace):
+    """After a pass: what was found; fits of the same effects are alike."""
+
+    def close_to(self, other: Any) -> bool:
+        return bool(self.places == other.places)
+
+
+def answer_of(
+    monkeypatch: pytest.MonkeyPatch, found: list[str], errors: list[float]
+) -> tuple[str, list[str]]:
+    """What the traced answer found, and what the passes began from, in order."""
+    began: list[str] = []
+    taken: list[Any] = []
+
+    def one_pass(*arguments: Any) -> Any:
+        fit, attempt = arguments[-2:]
+        began.append(fit.name)
+        return SimpleNamespace(
+            name=found[attempt], chosen=(), candidates=(), attempt=attempt, taken=taken[-1:]
+        )
+
+    def fit_of(_: Any, traced: Any) -> Fit:
+        return Fit(name=traced.name, places={traced.name}, effects=(traced.name,))
+
+    def by(effects: Any) -> tuple[str, ...]:
+        return tuple(effects)
+
+    def prepared(left_out: Any) -> list[str]:
+        taken.append(left_out)
+        return ["run"]
+
+    monkeypatch.setattr(LeftOut, "by", by)
+    monkeypatch.setattr(tracing, "ModelledRun", lambda *_: SimpleNamespace(take=lambda run: None))
+    start = Fit(name="declared", places=set(), effects=())
+    monkeypatch.setattr(tracing, "_first_fit", lambda *_: start)
+    monkeypatch.setattr(tracing, "_fit_of", fit_of)
+    monkeypatch.setattr(tracing, "_one_pass", one_pass)
+    monkeypatch.setattr(tracing, "_left_out", lambda traced: errors[traced.attempt])
+    model: Any = SimpleNamespace(declared=())
+    nothing: Any = None
+    traced: Any = tracing.trace(model, nothing, prepared, (), (), lambda *_: None)
+    before = found[traced.attempt - 1] if traced.attempt else "declared"
+    # The answer's own samples: those that the pass before it left.
+    assert traced.taken == [(before,) if before != "declared" else ()]
+    return traced.name, began
+
+
+def test_a_pass_that_finds_the_same_again_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    name, began = answer_of(monkeypatch, ["a", "b", "b"], [0.0, 1.0, 2.0])
+    assert (name, began) == ("b", ["declared", "a", "b"])
+
+
+def test_of_passes_that_go_round_the_best_is_made_once_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = ["a", "b", "c", "d", "e", "f"]
+    name, began = answer_of(monkeypatch, found, [0.0, 0.0, 5.0, 4.0, 4.5, 5.0])
+    assert name == "d"  # the first two know little of the torque
+    assert began == ["declared", "a", "b", "c", "d", "e", "c"]
+
+
+@pytest.mark.parametrize(("error", "name"), [(4.99, "f"), (4.97, "d")])
+def test_the_last_pass_stays_where_none_is_clearly_better(
+    monkeypatch: pytest.MonkeyPatch, error: float, name: str
+) -> None:
+    errors = [0.0, 0.0, 5.1, error, 5.1, 5.0]
+    assert answer_of(monkeypatch, ["a", "b", "c", "d", "e", "f"], errors)[0] == name
