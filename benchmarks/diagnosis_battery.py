@@ -11,10 +11,9 @@ joint where it is strongest, some near the noise; what the declared model absorb
 cases about that only. Other decks: `history` has friction with memory, Dahl's, integrated in
 another way than in the catalogue, and another form; `hard` what a search gets wrong, by topic.
 
-Development used seeds below 1000. The first judgements led to changes, so they count as development
-since: 26 cases of seed 5001, all 66 of 7001 and of 9001. The figures that are quoted are those of
-seed 11001, 130 cases, run once, after the last change of what a diagnosis finds. The next ones need
-another seed from 5000 on.
+Seeds below 1000 are for development, and so is every seed that led to a change since it was run.
+The figures that are quoted are those of seed 5305, run once; the next ones need another seed from
+5000 on.
 """
 
 import argparse
