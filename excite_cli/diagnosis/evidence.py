@@ -74,6 +74,7 @@ class Evidence:
         self._left_out: dict[tuple, Array] = {}
         self._without: dict[tuple[int, ...], Array] = {}
         self._solved: dict[tuple[int, ...], Array] = {}
+        self._on: dict[tuple, float] = {}
         self._schurs: dict[tuple[int, ...], Schur] = {}
         self._candidates = _Candidates(self.total, fixed, self.blocks)
         self._seen = grams.seen()[:, :-1] > 0.0
@@ -262,18 +263,14 @@ class Evidence:
             self._without[chosen] = np.linalg.solve(normal, rhs[:, :, None])[:, :, 0]
         return self._without[chosen]
 
-    def energies(self, chosen: Sequence[int]) -> Array:
-        """Residual energies (n,) on the rows of every joint of the model fitted to everything."""
-        at, every = self.columns(chosen), range(self.grams.folds)
-        x = self.solve(chosen) * self.norms[at]
-        parts = [self._part(every, [j], at) for j in range(len(self.grams.joints))]
-        return np.array([max(_energy(part, x), 0.0) for part in parts])
-
     def energy_on(self, chosen: Sequence[int], joints: Sequence[int] | None) -> float:
         """Residual energy on the rows of `joints` of the model fitted to everything."""
-        at = self.columns(chosen)
-        part = self._part(range(self.grams.folds), joints, at)
-        return max(_energy(part, self.solve(chosen) * self.norms[at]), 0.0)
+        key = (tuple(chosen), None if joints is None else tuple(joints))
+        if key not in self._on:
+            at = self.columns(chosen)
+            part = self._part(range(self.grams.folds), joints, at)
+            self._on[key] = max(_energy(part, self.solve(chosen) * self.norms[at]), 0.0)
+        return self._on[key]
 
 
 def _energy(gram: Array, x: Array) -> float:

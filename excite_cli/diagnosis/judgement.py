@@ -191,19 +191,24 @@ class Judgement:
             best = max(best, 1.0 - float(np.sqrt(after / max(before, 1e-300))))
         return best
 
-    def size(self, chosen: Sequence[int], added: Sequence[int]) -> float:
-        """What `added` explains, as a share of the torque's RMS on the joint where it is most.
-
-        Any joint: through the inertias that all share, it may be another than its own.
-        """
-        before, after = (self.plain.energies(each) for each in (chosen, [*chosen, *added]))
-        joints = range(len(self.plain.grams.joints))
-        whole = np.array([self.plain.grams.torque_energy(j) for j in joints])
-        return float(np.sqrt(max(((before - after) / np.maximum(whole, 1e-300)).max(), 0.0)))
+    def size(self, chosen: Sequence[int], added: Sequence[int], joints: Sequence[int]) -> float:
+        """What `added` explains, as a share of the torque's RMS on the joint where it is most."""
+        largest = 0.0
+        for joint in joints:
+            before = self.plain.energy_on(chosen, [joint])
+            after = self.plain.energy_on([*chosen, *added], [joint])
+            whole = self.plain.grams.torque_energy(joint)
+            largest = max(largest, (before - after) / max(whole, 1e-300))
+        return float(np.sqrt(largest))
 
     def too_small(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        """Whether it may go without loss."""
-        return self.size(chosen, added) < _SMALLEST
+        """Whether it may go without loss.
+
+        Through the inertias that all joints share, what it explains may be on others than its own.
+        """
+        own = sorted({j for i in added for j in self.white.rows_of[i]})
+        others = [j for j in range(len(self.plain.grams.joints)) if j not in own]
+        return all(self.size(chosen, added, joints) < _SMALLEST for joints in (own, others))
 
     def _leftover(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
         """Whether `added` is no more than what the form of other effects leaves of them."""

@@ -71,7 +71,7 @@ REFINED: Mapping[str, tuple[str, ...]] = {
 }
 # Share of its energy for values of 0.1, and whether its twin is another kind.
 LEAVES = {
-    "base_tilt": 0.045, "encoder_offset": 0.0225, "torque_saturation": 4e-3, "elasticity": 2e-2,
+    "base_tilt": 0.045, "encoder_offset": 0.0225, "torque_saturation": 4e-3, "elasticity": 5e-2,
     "backlash": 1e-2, "torque_delay": 1e-2, "stribeck_friction": 2e-2, "friction_change": 3e-2,
     "dahl_friction": 2e-2,
     "covariate_friction": 0.1, "covariate_offset": 0.1,

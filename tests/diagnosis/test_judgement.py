@@ -214,7 +214,21 @@ def test_size_is_the_share_of_the_torque_of_any_joint_where_it_is_most(
             / np.sum(rows.y[rows.joint == j] ** 2)
             for j in (0, 1)
         ]
-        assert judge.size(chosen, added) == pytest.approx(np.sqrt(max(shares)), rel=1e-6)
+        assert judge.size(chosen, added, [0, 1]) == pytest.approx(np.sqrt(max(shares)), rel=1e-6)
+
+
+def test_what_spoils_the_inertias_of_another_joint_is_not_small() -> None:
+    """A gain of joint 0 goes into a parameter that both joints have; joint 1 has the error."""
+    data, (gain,) = planted([effect("torque_gain", 0)], np.eye(1), np.zeros((1, 2)), noise=0.01)
+    weak = 0.01  # of what the parameter does on joint 0, so that joint 0 decides its value
+    for declared, columns, tau in zip(data.declared, gain.columns, data.tau, strict=True):
+        declared[:, 1] *= weak
+        columns[:, 0, 0] = 1000.0 * declared[:, 0, 0]
+        tau += 1000.0 * declared[:, :, 0] * [1.02, 1.0]
+    judge = judge_of(data, [gain])
+    assert judge.size([], [0], [0]) < 1e-3
+    assert judge.size([], [0], [1]) == pytest.approx(0.02, rel=0.05)
+    assert not judge.too_small([], [0])
 
 
 @pytest.mark.parametrize(
