@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
-.PHONY: install run plan loop test sanitize lint lock floors audit docs bench peers trust battery
+.PHONY: install run plan loop test suite sanitize lint lock floors audit docs bench peers trust battery
 .PHONY: campaigns robots real clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
@@ -26,7 +26,10 @@ loop: $(STAMP)           ## a UR10 with an effect its config does not know, foun
 	$(BIN)/excite report results/motions.h5 results/diagnosis.h5 results/next.h5 \
 	  -o results/report.html --overwrite
 
-test: $(STAMP) lint      ## lint, types, import directions, all tests
+test: $(STAMP)           ## lint, types, import directions, all tests
+	$(MAKE) -j 2 lint suite
+
+suite: $(STAMP)          ## all tests alone
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -q --durations 15
 
 sanitize: $(STAMP)       ## the kernels' tests on a build with the address and UB sanitizers (gcc)

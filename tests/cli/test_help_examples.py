@@ -72,7 +72,10 @@ def examples() -> dict[str, list[list[str]]]:
 
 
 def playable(words: list[str]) -> list[str]:
-    """An example as it can be tried here: pictures are small, and none is served for ever."""
+    """An example as it can be tried here: less is repeated, pictures are small and not served."""
+    if "--repeat" in words:
+        at = words.index("--repeat") + 1
+        return [*words[:at], "2", *words[at + 1 :]]
     if words[1] != "view":
         return [*words, "--overwrite"] if words[1] == "init" else words
     small = ["--size", "160x120"]
