@@ -26,7 +26,7 @@ PART = MarkedPart("real robots", "benchmarks.real_robots")
 HEADS = ("log", "before", "after", "what was found")
 _PROGRAM = "from excite_cli.cli.app import main; main()"
 _CAD = ("--set", "identification.inertias=cad")
-_FRICTION = ("viscous_friction", "coulomb_friction")
+_FRICTION = ("viscous_friction", "coulomb_friction", "asymmetric_friction")
 _USELESS = ("torso_lift_joint", "arm_5_joint", "arm_6_joint", "arm_7_joint")
 _SAID = {
     "lag": "speeds that lag",
@@ -204,11 +204,12 @@ LOGS = (
 
 
 def friction(answer: Answer) -> str:
-    """Where viscous and Coulomb friction were found."""
+    """Where viscous and dry friction were found, and where this differs by direction."""
     everywhere = list(answer.content["error"]["after"]["relative_moving"])
-    both = [joint for joint in everywhere
-            if all(joint in answer.joints(kind) for kind in _FRICTION)]  # fmt: skip
-    return f"friction on {'all joints' if both == everywhere else told(both)}"
+    viscous, dry, one_sided = (answer.joints(kind) for kind in _FRICTION)
+    both = [j for j in everywhere if j in viscous and (j in dry or j in one_sided)]
+    where = "all joints" if both == everywhere else told(both)
+    return f"friction on {where}" + f" (asymmetric on {told(one_sided)})" * bool(one_sided)
 
 
 def told(names: Sequence[str]) -> str:
