@@ -30,7 +30,7 @@ test: $(STAMP)           ## lint, types, import directions, all tests
 	$(MAKE) -j 2 lint suite
 
 suite: $(STAMP)          ## all tests alone
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist worksteal -q --durations 15
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -q --durations 15
 
 sanitize: $(STAMP)       ## the kernels' tests on a build with the address and UB sanitizers (gcc)
 	$(BIN)/python -m pytest -q -rs tests/kernels/test_sanitized.py
