@@ -366,16 +366,16 @@ def test_what_does_not_hold_in_the_end_leaves_its_place_to_another() -> None:
     assert set(Search(judge).run()) == {0}
 
 
-def judged_twins() -> tuple[Judgement, list[Candidate]]:
+def judge_of_three() -> Judgement:
     effects = [effect("viscous_friction"), effect("armature"), effect("torque_offset")]
     data, candidates = planted(effects, [5.0, 3.0, 2.0])
     evidence = data.evidence(candidates, ONE)
-    return Judgement(evidence, evidence, candidates, NO_VETO, anything), candidates
+    return Judgement(evidence, evidence, candidates, NO_VETO, anything)
 
 
 def test_steps_that_go_round_end_with_the_cheapest(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is added is dropped again, and passes again: once round is enough."""
-    judge, _ = judged_twins()
+    judge = judge_of_three()
     turns = {(): [2], (2,): [0], (0,): [1], (1,): [0]}  # 2, then 0 and 1 in turn
     asked: list[tuple[int, ...]] = []
 
@@ -394,8 +394,8 @@ def test_steps_that_go_round_end_with_the_cheapest(monkeypatch: pytest.MonkeyPat
 def test_more_names_in_place_of_those_that_do_not_hold_are_no_answer(
     monkeypatch: pytest.MonkeyPatch, second: list[int], expected: list[int]
 ) -> None:
-    """Of [0, 1] only 0 holds; then 1.5 times as many names may be tried, of which one holds."""
-    judge, _ = judged_twins()
+    """Of [0, 1] only 0 holds; as many names may be tried in its place, but no more."""
+    judge = judge_of_three()
     sets = iter([[0, 1], second])
     holds = iter([[0], [1]])
     monkeypatch.setattr(Search, "_settled", lambda *_: next(sets, [1]))
