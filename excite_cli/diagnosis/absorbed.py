@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import cho_solve
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import ABSORBED, Evidence
@@ -41,12 +40,12 @@ def absorbed_effects(
         own = float(evidence.total[main, main])
         if own <= 0.0:
             continue
-        x = cho_solve(factor, shared)
+        x = factor.solve(shared)
         left = own - shared @ x
         if len(others):
             cross = evidence.total[np.ix_(others, [main])][:, 0]
             mixed = evidence.total[np.ix_(at, others)]
-            solved = cho_solve(factor, mixed)
+            solved = factor.solve(mixed)
             rest = evidence.total[np.ix_(others, others)] - mixed.T @ solved
             bridge = cross - solved.T @ shared
             left -= bridge @ np.linalg.lstsq(rest, bridge, rcond=1e-9)[0]

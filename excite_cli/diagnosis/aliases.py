@@ -123,7 +123,8 @@ def _instead_of(
         free = [k for k in free if judge.candidates[k].width == 1]
         free = [k for k in free if schur.singles[k].chi2 < enough]
         free.sort(key=lambda k: -schur.singles[k].chi2)
-        pairs = [pair for pair in combinations(free[:_TRIED], 2) if judge.together(*pair)]
+        few = sorted(free[:_TRIED])
+        pairs = [pair for pair in combinations(few, 2) if judge.together(*pair)]
         chi2s = schur.pair_chi2(*np.array(pairs).T) if pairs else np.zeros(0)
         tried = list(zip(pairs, map(float, chi2s), strict=True))
     for others, chi2 in tried:

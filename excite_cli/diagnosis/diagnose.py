@@ -36,7 +36,7 @@ from excite_cli.diagnosis.rounds import rounds_of
 from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
 from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
 from excite_cli.diagnosis.traces import Dependence, Traces
-from excite_cli.diagnosis.tracing import Traced, trace
+from excite_cli.diagnosis.tracing import Fit, Traced, fit_of, trace
 from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
@@ -92,9 +92,10 @@ def diagnose(
     with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
     if with_ends.ends:
         parts = with_ends
+        start = fit_of(model, traced)
         del traced  # gigabytes, of large data: not beside the next one
         processing, training = _prepared(spec, parts)
-        traced = _traced(model, spec, parts, processing, progress)
+        traced = _traced(model, spec, parts, processing, progress, start)
         kept = [prepare(run, processing) for run in parts.sealed]
     progress("naming", 8)
     final = final_fit(traced)
@@ -174,15 +175,20 @@ def _prepared(spec: Spec, parts: Split) -> tuple[Processing, list[PreparedRun]]:
 
 
 def _traced(
-    model: Model, spec: Spec, parts: Split, processing: Processing, progress: Progress
+    model: Model,
+    spec: Spec,
+    parts: Split,
+    processing: Processing,
+    progress: Progress,
+    start: Fit | None = None,
 ) -> Traced:
-    """What is found in the training parts."""
+    """What is found in the training parts; `start` was found in more of them."""
     progress("filtering", 0)
 
     def prepared(left_out: LeftOut) -> list[PreparedRun]:
         return [prepare(run, processing, left_out) for run in parts.training]
 
-    return trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress)
+    return trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress, start)
 
 
 def _noticed(

@@ -19,8 +19,9 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.linalg import eigh
 
+from excite_cli.diagnosis.cholesky import Cholesky
 from excite_cli.diagnosis.grams import Grams
 from excite_cli.robot.model import Array
 
@@ -75,6 +76,9 @@ class Evidence:
         self._without: dict[tuple[int, ...], Array] = {}
         self._solved: dict[tuple[int, ...], Array] = {}
         self._on: dict[tuple, float] = {}
+        self._energies: dict[tuple[int, ...], float] = {}
+        self._factors: dict[tuple[int, ...], Cholesky] = {}
+        self._inverses: dict[tuple[int, ...], Array] = {}  # of the last model
         self._schurs: dict[tuple[int, ...], Schur] = {}
         self._candidates = _Candidates(self.total, fixed, self.blocks)
         self._seen = grams.seen()[:, :-1] > 0.0
@@ -101,31 +105,37 @@ class Evidence:
         ridge[: self.fixed] += self.prior / self.norms[: self.fixed] ** 2
         return ridge
 
-    def factor(self, chosen: Sequence[int]) -> tuple[Array, bool]:
+    def factor(self, chosen: Sequence[int]) -> Cholesky:
         """Cholesky factor of the normal matrix (normalised columns) of a model."""
-        return cho_factor(self._normal(self.total, self.columns(chosen)))
+        key = tuple(chosen)
+        if key not in self._factors:
+            if len(self._factors) == _KEPT:
+                self._factors.pop(next(iter(self._factors)))
+            self._factors[key] = Cholesky(self._normal(self.total, self.columns(key)))
+        return self._factors[key]
 
     def solve(self, chosen: Sequence[int]) -> Array:
         """Parameters (raw units) of the model with the chosen candidates."""
         key = tuple(chosen)
         if key not in self._solved:
             at = self.columns(key)
-            x = cho_solve(self.factor(key), self.total[at, self.torque])
-            self._solved[key] = np.asarray(x / self.norms[at])
+            self._solved[key] = self.factor(key).solve(self.total[at, self.torque]) / self.norms[at]
         return self._solved[key]
 
     def covariance(self, chosen: Sequence[int]) -> Array:
         """Covariance of `solve`'s parameters for unit noise."""
         at = self.columns(chosen)
-        inverse = cho_solve(self.factor(chosen), np.eye(len(at)))
+        inverse = self.factor(chosen).solve(np.eye(len(at)))
         return np.asarray(inverse / np.outer(self.norms[at], self.norms[at]))
 
     def energy(self, chosen: Sequence[int]) -> float:
         """Residual energy (with the prior's, if any) of the model with the chosen candidates."""
-        at = self.columns(chosen)
-        rhs = self.total[at, self.torque]
-        x = cho_solve(self.factor(chosen), rhs)
-        return float(self.total[self.torque, self.torque] - x @ rhs)
+        key = tuple(chosen)
+        if key not in self._energies:
+            rhs = self.total[self.columns(key), self.torque]
+            explained = rhs @ self.factor(key).solve(rhs)
+            self._energies[key] = float(self.total[self.torque, self.torque] - explained)
+        return self._energies[key]
 
     def schur(self, chosen: Sequence[int]) -> "Schur":
         """What is left of every candidate once the chosen model has taken its part."""
@@ -136,10 +146,26 @@ class Evidence:
             self._schurs[key] = self._schur(key)
         return self._schurs[key]
 
+    def gain_of(self, member: int, chosen: Sequence[int]) -> Gain:
+        """What one of the chosen candidates adds to the others, from the inverse of them all.
+
+        Its block of the inverse is the inverse of what the others leave of it.
+        """
+        key = tuple(chosen)
+        if key not in self._inverses:
+            self._inverses.clear()
+            self._inverses[key] = self.factor(key).solve(np.eye(len(self.columns(key))))
+        widths = [len(self.blocks[i]) for i in key]
+        start = self.fixed + sum(widths[: key.index(member)])
+        own = slice(start, start + len(self.blocks[member]))
+        left = np.linalg.inv(self._inverses[key][own, own])
+        values = (self.solve(key) * self.norms[self.columns(key)])[own]
+        return _gain(self._candidates, left, left @ values, (member,), SHARED)
+
     def _schur(self, chosen: Sequence[int]) -> "Schur":
         at = self.columns(chosen)
         shared = self.total[at, self.fixed : self.torque]
-        solved = cho_solve(self.factor(chosen), shared)
+        solved = self.factor(chosen).solve(shared)
         rest = slice(self.fixed, self.torque)
         left = self.total[rest, rest] - shared.T @ solved
         cross = self.total[rest, self.torque] - solved.T @ self.total[at, self.torque]
@@ -150,30 +176,28 @@ class Evidence:
         """Normalised Gram matrices of the folds (F, K, K)."""
         return self.grams.by_fold() / np.outer(self.norms, self.norms)
 
-    @cached_property
-    def _first_sides(self) -> Array:
-        """The same of their first sides (F, K, K)."""
-        return self.grams.first_sides() / np.outer(self.norms, self.norms)
-
     def _part(
         self,
         folds: Sequence[int],
         joints: Sequence[int] | None,
         at: NDArray[np.intp],
-        sides: slice = slice(None),
+        first_side: bool = False,
     ) -> Array:
         """Gram matrix (k + 1, k + 1) of some folds' rows of some joints, the torque last."""
         both = np.append(at, self.torque)
         everywhere = joints is None or len(joints) == len(self.grams.joints)
-        if everywhere and len(folds) == 1:
-            index = (folds[0], both[:, None], both)
-            if sides == slice(None):
-                return np.asarray(self._folds[index])
-            first = self._first_sides[index]
-            return np.asarray(first if sides == slice(0, 1) else self._folds[index] - first)
+        if everywhere and len(folds) == 1 and not first_side:
+            return np.asarray(self._folds[folds[0], both[:, None], both])
         rows = range(len(self.grams.joints)) if joints is None else joints
         norms = self.norms[both]
-        return self.grams.on(folds, rows, both, sides) / (norms[:, None] * norms)
+        return self.grams.on(folds, rows, both, first_side) / (norms[:, None] * norms)
+
+    def _sides(
+        self, fold: int, joints: Sequence[int] | None, at: NDArray[np.intp]
+    ) -> tuple[Array, Array]:
+        """The same of the two sides of a fold."""
+        first = self._part([fold], joints, at, first_side=True)
+        return first, self._part([fold], joints, at) - first
 
     def folds_of(self, candidates: Sequence[int]) -> NDArray[np.bool_]:
         """Folds (F,) in which one of some candidates is there."""
@@ -221,7 +245,7 @@ class Evidence:
             return open_
         others = self._normal(self.total - self._folds[fold], at)
         own, rest = np.flatnonzero(lacking), np.flatnonzero(~(lacking | alone))
-        taken = cho_solve(cho_factor(others[np.ix_(rest, rest)]), others[np.ix_(rest, own)])
+        taken = Cholesky(others[np.ix_(rest, rest)]).solve(others[np.ix_(rest, own)])
         left = others[np.ix_(own, own)] - others[np.ix_(own, rest)] @ taken
         shares, directions = eigh(left, others[np.ix_(own, own)])
         unknown = directions[:, shares < _UNKNOWN]
@@ -238,7 +262,8 @@ class Evidence:
     ) -> float:
         """Energy of a fold's two sides, with some directions fitted to the other side."""
         common, open_ = fitted
-        parts = [self._part([fold], None, at, slice(side, side + 1)) for side in (0, 1)]
+        parts = self._sides(fold, None, at)
+        judged = parts if joints is None else self._sides(fold, joints, at)
         energies = np.array([np.sum((part[:-1, :-1] @ open_) * open_) for part in parts])
         energy = 0.0
         for side in (0, 1):
@@ -249,7 +274,7 @@ class Evidence:
             normal = open_.T @ other[:-1, :-1] @ open_
             normal[np.diag_indices(len(normal))] += _RIDGE_ALONE * np.diag(normal) + _RIDGE
             x = common + open_ @ np.linalg.solve(normal, rhs)
-            energy += _energy(self._part([fold], joints, at, slice(side, side + 1)), x)
+            energy += _energy(judged[side], x)
         return energy
 
     def _without_folds(self, at: NDArray[np.intp], chosen: tuple[int, ...]) -> Array:
@@ -314,7 +339,9 @@ class Schur:
 
         Directions of which less than `absorbed` is left do not count.
         """
-        return _gain(self._candidates, self.matrix, self.cross, candidates, absorbed)
+        e = self._candidates
+        at = np.concatenate([e.blocks[i] for i in candidates]) - e.fixed
+        return _gain(e, self.matrix[at[:, None], at], self.cross[at], candidates, absorbed)
 
     @cached_property
     def singles(self) -> "Singles":
@@ -334,23 +361,22 @@ class Schur:
 
 
 def _gain(
-    e: _Candidates, matrix: Array, cross: Array, candidates: Sequence[int], absorbed: float
+    e: _Candidates, left: Array, cross: Array, candidates: Sequence[int], absorbed: float
 ) -> Gain:
-    columns = np.concatenate([e.blocks[i] for i in candidates])
-    at = columns - e.fixed
-    if len(at) == 1:
-        k = int(at[0])
-        left, product = float(matrix[k, k]), float(cross[k])
-        share = left / max(float(e.total[columns[0], columns[0]]), 1e-300)
+    """Of candidates of which (p, p) is `left`, with the products (p,) with the residual."""
+    if len(cross) == 1:
+        column = int(e.blocks[candidates[0]][0])
+        own, product = float(left[0, 0]), float(cross[0])
+        share = own / max(float(e.total[column, column]), 1e-300)
         if share < absorbed:
             return Gain(0.0, 0, share)
-        return Gain(product * product / left, 1, share)
+        return Gain(product * product / own, 1, share)
     basis = e.basis(candidates)
-    shares, turned = np.linalg.eigh(basis.T @ matrix[at[:, None], at] @ basis)
+    shares, turned = np.linalg.eigh(basis.T @ left @ basis)
     alive = shares > absorbed
     if not alive.any():
         return Gain(0.0, 0, float(shares.max(initial=0.0)))
-    z = turned[:, alive].T @ (basis.T @ cross[at])
+    z = turned[:, alive].T @ (basis.T @ cross)
     return Gain(float(np.sum(z**2 / shares[alive])), int(alive.sum()), float(shares[-1]))
 
 
@@ -375,5 +401,7 @@ class Singles:
             share = float(self._share[i])
             return Gain(float(self._chi2[i]), int(share > ABSORBED), share)
         if i not in self._others:
-            self._others[i] = _gain(*self._given, (i,), ABSORBED)
+            e, matrix, cross = self._given
+            at = e.blocks[i] - e.fixed
+            self._others[i] = _gain(e, matrix[at[:, None], at], cross[at], (i,), ABSORBED)
         return self._others[i]

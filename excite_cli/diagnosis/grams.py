@@ -2,7 +2,8 @@
 
 Most candidates act on one joint: of all columns, a joint's rows hold a third or less, and what is
 zero is neither stored nor added. Every fold has two sides, blocks of time in turn: what belongs to
-a run alone is fitted on one side of it and judged on the other.
+a run alone is fitted on one side of it and judged on the other. The second is what the whole has
+more than the first.
 """
 
 from collections.abc import Sequence
@@ -17,13 +18,15 @@ from excite_cli.robot.model import Array
 
 @dataclass(frozen=True)
 class JointGram:
-    """Of the rows of one joint: `active` (A,) its columns in all, `own` (F, 2, A + 1, A + 1).
+    """Of the rows of one joint: `active` (A,) its columns in all.
 
-    The torque is the last column of `own`, and not among the `active`.
+    `whole` and `first` (F, A + 1, A + 1) are of folds and of their first sides. The torque is their
+    last column, and not among the `active`.
     """
 
     active: NDArray[np.intp]
-    own: Array
+    whole: Array
+    first: Array
 
 
 class Grams:
@@ -39,7 +42,7 @@ class Grams:
     @property
     def folds(self) -> int:
         """F."""
-        return len(self.joints[0].own)
+        return len(self.joints[0].whole)
 
     def total(self) -> Array:
         """Sum (K, K) over folds and joints."""
@@ -57,13 +60,13 @@ class Grams:
 
     def _add(self, to: Array, fold: int) -> None:
         for joint, active in zip(self.joints, self._active, strict=True):
-            to[np.ix_(active, active)] += joint.own[fold].sum(axis=0)
+            to[np.ix_(active, active)] += joint.whole[fold]
 
     def seen(self) -> Array:
         """Energy (F, K) of every column in every fold."""
         found = np.zeros((self.folds, self.size))
         for joint, active in zip(self.joints, self._active, strict=True):
-            found[:, active] += np.einsum("fskk->fk", joint.own)
+            found[:, active] += np.einsum("fkk->fk", joint.whole)
         return found
 
     def on(
@@ -71,9 +74,12 @@ class Grams:
         folds: Sequence[int],
         joints: Sequence[int],
         at: NDArray[np.intp],
-        sides: slice = slice(None),
+        first_side: bool = False,
     ) -> Array:
-        """Sum (k, k) over some folds' `sides` and rows of `joints`, of the columns `at` (k,)."""
+        """Sum (k, k) over some folds' rows of `joints`, of the columns `at` (k,).
+
+        Of the rows on the `first_side` of the folds only, if it is asked for.
+        """
         places = []
         for j in joints:
             position = self._position[j, at]
@@ -82,37 +88,26 @@ class Grams:
             places.append((j, (position[:, None], position), (there[:, None], there)))
         found = np.zeros((len(at), len(at)))
         for j, own, to in places:
-            for grams in self._summed(j, folds, sides):
-                part = grams[own]
+            for gram in self._summed(j, folds, first_side):
+                part = gram[own]
                 if len(part) == len(at):
                     found += part
                 else:
                     found[to] += part
         return found
 
-    def _summed(self, joint: int, folds: Sequence[int], sides: slice) -> list[Array]:
-        """Gram matrices (k, k) of a joint, to be summed; sums that are asked for often are kept."""
-        if sides != slice(None):
-            return [side for fold in folds for side in self.joints[joint].own[fold, sides]]
+    def _summed(self, joint: int, folds: Sequence[int], first_side: bool) -> list[Array]:
+        """Gram matrices of a joint, to be summed; the sum over all folds is kept."""
+        if first_side:
+            return [self.joints[joint].first[fold] for fold in folds]
         if len(folds) == self.folds:
-            return [self._whole[joint]]
-        return [self._by_fold[joint][fold] for fold in folds]
+            return [self._of_all[joint]]
+        return [self.joints[joint].whole[fold] for fold in folds]
 
     @cached_property
-    def _by_fold(self) -> list[Array]:
-        return [joint.own.sum(axis=1) for joint in self.joints]
-
-    @cached_property
-    def _whole(self) -> list[Array]:
-        return [joint.own.sum(axis=(0, 1)) for joint in self.joints]
-
-    def first_sides(self) -> Array:
-        """Sums (F, K, K) over joints of the first side of every fold."""
-        found = np.zeros((self.folds, self.size, self.size))
-        for joint, active in zip(self.joints, self._active, strict=True):
-            found[:, active[:, None], active] += joint.own[:, 0]
-        return found
+    def _of_all(self) -> list[Array]:
+        return [joint.whole.sum(axis=0) for joint in self.joints]
 
     def torque_energy(self, joint: int) -> float:
         """Energy of the torque itself on a joint's rows."""
-        return float(self.joints[joint].own[:, :, -1, -1].sum())
+        return float(self.joints[joint].whole[:, -1, -1].sum())

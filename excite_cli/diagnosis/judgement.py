@@ -289,6 +289,17 @@ class Judgement:
             return Verdict.NO_GAIN
         return Verdict.ACCEPTED
 
+    def adds(self, candidate: int, chosen: Sequence[int]) -> bool:
+        """Whether it says more than what it refines, which is among the chosen.
+
+        What has the columns of that and more must be worth its price for the more alone: friction
+        that differs by direction replaced dry friction wherever there was the least of an offset.
+        """
+        gain = self.white.schur(chosen).gain(candidate)
+        holds_it = gain.dof < self.candidates[candidate].width
+        paid = not holds_it or gain.chi2 > self.price(candidate, gain.dof)
+        return paid and not self.too_small(chosen, [candidate])
+
     def _generalises(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
         """Whether runs left out gain, and not far less than those fitted."""
         gain = self.left_out_gain(chosen, added)
@@ -311,7 +322,7 @@ class Judgement:
         right_sign = self.allowed(self.plain.solve(chosen), chosen, [i])
         if any(i in self.parents[k] for k in rest):
             return not right_sign
-        gain = self.white.schur(rest).gain(i, absorbed=SHARED)
+        gain = self.white.gain_of(i, chosen)
         return (
             self.p_value(i, gain) > self.rules.significance
             or not right_sign

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_solve
 from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
@@ -85,7 +84,7 @@ def placebo_gains(
                 square += np.sum(moved**2, axis=0)
                 product += rest @ moved
             cross /= white.norms[at][:, None]
-            left = square - np.einsum("ik,ik->k", cross, cho_solve(factor, cross))
+            left = square - np.einsum("ik,ik->k", cross, factor.solve(cross))
             good = left > 1e-2 * square
             gains += list(product[good] ** 2 / left[good])
     return np.array(gains)

@@ -8,9 +8,9 @@ at reversals and blows do not pull friction and inertias.
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.cholesky import Cholesky
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.robot.model import Array
 
@@ -66,4 +66,4 @@ def _solve(
     scale[scale < 1e-100] = 1.0
     unit = normal / np.outer(scale, scale)
     unit[np.diag_indices(size)] += 1e-11
-    return np.asarray(cho_solve(cho_factor(unit), rhs / scale) / scale)
+    return Cholesky(unit).solve(rhs / scale) / scale

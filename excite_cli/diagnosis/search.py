@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.evidence import SHARED, Schur
+from excite_cli.diagnosis.evidence import Schur
 from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Tier
@@ -203,7 +203,7 @@ class Search:
                     continue
                 cost = self.judge.cost(trial)  # parents are cheaper than `saved` says
                 refined = len(move) == 1 and i in self.judge.parents[move[0]]
-                if refined and self.judge.too_small([*rest, i], move):
+                if refined and not self.judge.adds(move[0], [*rest, i]):
                     continue
                 if (
                     cost < best
@@ -223,7 +223,7 @@ class Search:
             weakest: tuple[float, list[int]] | None = None
             for i in chosen:
                 rest = [k for k in chosen if k != i]
-                chi2_i = self.white.schur(rest).gain(i, absorbed=SHARED).chi2
+                chi2_i = self.white.gain_of(i, chosen).chi2
                 if self.judge.fails(i, rest, chosen) and (weakest is None or chi2_i < weakest[0]):
                     weakest = (chi2_i, rest)
             if weakest is None:

@@ -69,14 +69,17 @@ def trace(
     folds: Sequence[int],
     run_names: Sequence[str],
     progress: Progress,
+    start: "Fit | None" = None,
 ) -> Traced:
     """Find the effects that `model` lacks.
 
     `prepared` gives the training parts, without samples that effects which were found ask to leave.
+    `start`: what was found in more of the same data, to begin from.
     """
-    left_out = LeftOut.by(model.declared)
+    left_out = LeftOut.by((*model.declared, *(start.effects if start else ())))
     bodies = [ModelledRun(model, run) for run in prepared(left_out)]
-    fit = _first_fit(model, folds, bodies)
+    fit = start or _first_fit(model, folds, bodies)
+    first = _LENIENT if start else 0
     passes: list[_Pass] = []
 
     def take(wanted: LeftOut) -> None:
@@ -87,24 +90,24 @@ def trace(
             left_out = wanted
 
     traced: Traced | None = None
-    for attempt in range(_PASSES):
+    for attempt in range(first, _PASSES):
         traced = None  # its columns are gigabytes, of large data: not beside the next ones
         traced = _one_pass(model, spec, folds, run_names, bodies, fit, attempt)
-        now = _fit_of(model, traced)
+        now = fit_of(model, traced)
         count = len(traced.chosen)
         progress(
             f"pass {attempt + 1}: {count} effect{'s' * (count != 1)} of "
             f"{len(traced.candidates)} candidates",
             attempt + 1,
         )
-        if attempt and now.places == fit.places and now.close_to(fit):
+        if attempt > first and now.places == fit.places and now.close_to(fit):
             return traced
         passes.append(_Pass(fit, left_out, attempt, _left_out(traced)))
         fit = now
         if attempt < _PASSES - 1:
             take(LeftOut.by((*model.declared, *fit.effects)))
     assert traced is not None
-    best = min(passes[_LENIENT:], key=lambda each: each.error)
+    best = min(passes[_LENIENT - first :], key=lambda each: each.error)
     if best.error > passes[-1].error - _BETTER:
         return traced
     traced = None
@@ -116,14 +119,14 @@ def trace(
 class _Pass:
     """What a pass began from, and the error of what it found on runs left out."""
 
-    fit: "_Fit"
+    fit: "Fit"
     left_out: LeftOut
     attempt: int
     error: float
 
 
 @dataclass(frozen=True)
-class _Fit:
+class Fit:
     """The model after a pass: φ, effects found, values of declared and found ones, noise."""
 
     phi: Array
@@ -134,9 +137,10 @@ class _Fit:
 
     @property
     def places(self) -> set:
+        """Where its effects are."""
         return {effect.place for effect in self.effects}
 
-    def close_to(self, other: "_Fit") -> bool:
+    def close_to(self, other: "Fit") -> bool:
         """Whether another fit of the same effects is about the same."""
         shapes = {(e.kind, e.joints, e.runs): e.shape for e in other.effects}
         moved = [_distance(e.shape, shapes[e.kind, e.joints, e.runs]) for e in self.effects]
@@ -145,7 +149,7 @@ class _Fit:
         return alike and max(moved, default=0.0) < _SAME_SHAPE
 
 
-def _first_fit(model: Model, folds: Sequence[int], bodies: Sequence["ModelledRun"]) -> _Fit:
+def _first_fit(model: Model, folds: Sequence[int], bodies: Sequence["ModelledRun"]) -> Fit:
     """The declared model alone, rows weighted by what it leaves."""
     phi, values = standard_parameters(model.robot), np.zeros(0)
     levels = np.ones(model.robot.n)
@@ -160,13 +164,14 @@ def _first_fit(model: Model, folds: Sequence[int], bodies: Sequence["ModelledRun
         levels = np.sqrt(squares / np.maximum(usable.sum(axis=0), 1)) + 1e-9
         phi = model.full_inertias(parameters)
         values = _values(model, data, parameters)
-    return _Fit(phi, (), values, levels, evidence.energy(()))
+    return Fit(phi, (), values, levels, evidence.energy(()))
 
 
-def _fit_of(model: Model, traced: Traced) -> _Fit:
+def fit_of(model: Model, traced: Traced) -> Fit:
+    """What a search found, to begin the next one from."""
     plain = traced.judge.plain
     parameters = plain.solve(traced.chosen)
-    return _Fit(
+    return Fit(
         model.full_inertias(parameters),
         traced.effects,
         _values(model, traced.data, parameters),
@@ -193,7 +198,7 @@ def _one_pass(
     folds: Sequence[int],
     run_names: Sequence[str],
     bodies: Sequence["ModelledRun"],
-    fit: _Fit,
+    fit: Fit,
     attempt: int,
 ) -> Traced:
     """Columns and noise as the last fit says, then a search from the declared model."""

@@ -107,17 +107,17 @@ class TrainingData:
         active = np.concatenate(
             [np.arange(fixed), *(np.arange(starts[i], starts[i + 1]) for i in touching)]
         ).astype(np.intp)
-        own = np.zeros((max(self.folds) + 1, 2, len(active) + 1, len(active) + 1))
+        whole = np.zeros((max(self.folds) + 1, len(active) + 1, len(active) + 1))
+        first = np.zeros_like(whole)
         for part, fold in enumerate(self.folds):
             columns = self.columns(candidates, touching, part, joint)
             x = np.hstack([columns, self.tau[part][:, joint, None]])
             usable = self.runs[part].usable[:, joint]
             white = noise.whitened(x, joint, usable)
-            second = self.sides[part][usable]
-            for side, there in enumerate((~second, second)):
-                rows = white[there]
-                own[fold, side] += rows.T @ rows
-        return JointGram(active, own)
+            whole[fold] += white.T @ white
+            rows = white[~self.sides[part][usable]]
+            first[fold] += rows.T @ rows
+        return JointGram(active, whole, first)
 
     def residuals(
         self, candidates: Sequence[Columns], chosen: Sequence[int], parameters: Array

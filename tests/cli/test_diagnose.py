@@ -288,8 +288,12 @@ def test_a_joint_without_torque_is_left_out_and_the_others_are_found(
     named = {(each["kind"], *each["joints"]) for each in answer["effects"]}
     assert named == PLANTED
     after = answer["error"]["after"]
-    assert after["relative"].pop("wrist_roll") is None
-    assert max(after["relative"].values()) < 0.03
+    assert after["relative"]["wrist_roll"] is None
+    # At rest, dry friction is whatever holds the joint; how long the elbow rests depends on the
+    # motion, which is planned anew on every machine.
+    assert after["relative_moving"].pop("wrist_roll") is None
+    assert max(after["relative_moving"].values()) < 0.05
+    assert after["mean_relative_moving"] < 0.02
     page = excite.folder / "page.html"
     assert excite("report", "found.h5", "-o", page).returncode == 0
     assert not re.search(r"\bnan\b", page.read_text(encoding="utf-8"))

@@ -98,6 +98,19 @@ def test_gains_are_what_the_residual_loses(
             assert single.left == pytest.approx(gain.left)
 
 
+@pytest.mark.parametrize("chosen", [(0,), (1, 3), (3, 0, 2), (0, 1, 2, 3, 4)])
+def test_what_a_member_adds_is_what_the_others_lose_with_it(
+    both: tuple[Evidence, Rows], chosen: tuple[int, ...]
+) -> None:
+    evidence, rows = both
+    for i in chosen:
+        rest = [k for k in chosen if k != i]
+        lost = rows.energy(rest, with_prior=True) - rows.energy(chosen, with_prior=True)
+        gain, explicit = evidence.gain_of(i, chosen), evidence.schur(rest).gain(i)
+        assert gain.chi2 == pytest.approx(lost, rel=1e-6)
+        assert (gain.dof, gain.left) == (explicit.dof, pytest.approx(explicit.left, rel=1e-6))
+
+
 def test_gains_of_several_and_of_pairs(both: tuple[Evidence, Rows]) -> None:
     evidence, rows = both
     schur = evidence.schur((2,))

@@ -290,6 +290,21 @@ def test_root_friction_replaces_no_straight_friction_and_keeps_both_terms(
     assert search(data, candidates) == found
 
 
+@pytest.mark.parametrize(("offset", "found"), [(0.0, {0}), (0.2, {0}), (1.0, {1})])
+def test_friction_that_differs_by_direction_must_be_worth_it_beside_dry_friction(
+    offset: float, found: set[int]
+) -> None:
+    """It holds the column of dry friction: in its place it would cost next to nothing more."""
+    effects = [effect("coulomb_friction"), effect("asymmetric_friction")]
+    mix = np.array([[1.0, 0.5, 0.5], [0.0, 0.5, -0.5], [0.0, 0.0, 0.0]])
+    data, candidates = planted(effects, [2.0, offset, -offset], mix, seed=3)
+    schur = data.evidence(candidates, ONE).schur([0])
+    assert schur.singles[1].dof == 1
+    if offset == 0.2:
+        assert 7.0 < schur.singles[1].chi2 < 11.5  # it is there, and is no more than chance
+    assert search(data, candidates) == found
+
+
 def test_root_friction_alone_waits_for_nothing() -> None:
     effects = [effect("viscous_friction"), effect("nonlinear_viscous_friction", power=0.5)]
     assert search(*planted(effects, [0.0, 1.0])) == {1}

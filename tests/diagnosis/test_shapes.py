@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.tracing import _Fit, _of_best_shapes
+from excite_cli.diagnosis.tracing import Fit, _of_best_shapes
 from excite_cli.effects.base import Effect
 from tests.diagnosis.explicit_data import effect
 from tests.diagnosis.test_judgement import on_joint_0, planted
 
 
-def fit_of(*effects: Effect) -> _Fit:
-    return _Fit(np.zeros(10), effects, np.zeros(len(effects)), np.ones(2), 100.0)
+def fit_of(*effects: Effect) -> Fit:
+    return Fit(np.zeros(10), effects, np.zeros(len(effects)), np.ones(2), 100.0)
 
 
 def test_a_fit_is_settled_once_its_shapes_are() -> None:

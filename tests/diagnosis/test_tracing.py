@@ -17,9 +17,12 @@ class Fit(SimpleNamespace):
 
 
 def answer_of(
-    monkeypatch: pytest.MonkeyPatch, found: list[str], errors: list[float]
+    monkeypatch: pytest.MonkeyPatch, found: list[str], errors: list[float], known: str = ""
 ) -> tuple[str, list[str]]:
-    """What the traced answer found, and what the passes began from, in order."""
+    """What the traced answer found, and what the passes began from, in order.
+
+    `known`: what was found in more of the same data, to begin from.
+    """
     began: list[str] = []
     taken: list[Any] = []
 
@@ -44,13 +47,15 @@ def answer_of(
     monkeypatch.setattr(tracing, "ModelledRun", lambda *_: SimpleNamespace(take=lambda run: None))
     start = Fit(name="declared", places=set(), effects=())
     monkeypatch.setattr(tracing, "_first_fit", lambda *_: start)
-    monkeypatch.setattr(tracing, "_fit_of", fit_of)
+    monkeypatch.setattr(tracing, "fit_of", fit_of)
     monkeypatch.setattr(tracing, "_one_pass", one_pass)
     monkeypatch.setattr(tracing, "_left_out", lambda traced: errors[traced.attempt])
     model: Any = SimpleNamespace(declared=())
     nothing: Any = None
-    traced: Any = tracing.trace(model, nothing, prepared, (), (), lambda *_: None)
-    before = found[traced.attempt - 1] if traced.attempt else "declared"
+    begin: Any = fit_of(None, SimpleNamespace(name=known)) if known else None
+    traced: Any = tracing.trace(model, nothing, prepared, (), (), lambda *_: None, begin)
+    first = 2 if known else 0
+    before = found[traced.attempt - 1] if traced.attempt > first else known or "declared"
     # The answer's own samples: those that the pass before it left.
     assert traced.taken == [(before,) if before != "declared" else ()]
     return traced.name, began
@@ -76,3 +81,14 @@ def test_the_last_pass_stays_where_none_is_clearly_better(
 ) -> None:
     errors = [0.0, 0.0, 5.1, error, 5.1, 5.0]
     assert answer_of(monkeypatch, ["a", "b", "c", "d", "e", "f"], errors)[0] == name
+
+
+def test_what_was_found_in_more_of_the_data_is_known_well_but_is_found_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No lenient passes; and what that found does not end the search, for it is of other data."""
+    found = ["", "", "a", "a", "", ""]
+    assert answer_of(monkeypatch, found, [9.0] * 6, known="a") == ("a", ["a", "a"])
+    found = ["", "", "b", "c", "d", "e"]
+    answer = answer_of(monkeypatch, found, [9.0, 9.0, 4.0, 5.0, 5.0, 5.0], known="a")
+    assert answer == ("b", ["a", "b", "c", "d", "a"])

@@ -101,9 +101,7 @@ class TestKr300:
         answer = diagnosed("kr300", "kr300.h5")
         assert not named(answer, "torque_offset")
         assert len(named(answer, "viscous_friction")) == 6
-        # Dry friction of axis 1 differs from one direction to the other: 376 ± 8, 328 ± 7 N·m.
-        dry = {*named(answer, "coulomb_friction"), *named(answer, "asymmetric_friction")}
-        assert len(dry) == 6
+        assert len(named(answer, "coulomb_friction")) == 6
         assert ("axis_3",) in named(answer, "armature")
         absorbed = {(a["kind"], tuple(a["joints"])): a["by"] for a in answer["absorbed"]}
         assert any("axis_2" in name for name in absorbed["spring", ("axis_2",)])
