@@ -158,7 +158,7 @@ class Evidence:
         widths = [len(self.blocks[i]) for i in key]
         start = self.fixed + sum(widths[: key.index(member)])
         own = slice(start, start + len(self.blocks[member]))
-        left = np.linalg.inv(self._inverses[key][own, own])
+        left = np.asarray(np.linalg.inv(self._inverses[key][own, own]))
         values = (self.solve(key) * self.norms[self.columns(key)])[own]
         return _gain(self._candidates, left, left @ values, (member,), SHARED)
 
