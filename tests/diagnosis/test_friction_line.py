@@ -55,7 +55,7 @@ def outcome(effects: Sequence[Effect], seed: int = 0) -> tuple[Outcome, np.ndarr
 ROOT = {"power": 0.5}
 
 
-def test_the_line_is_thefit_of_a_line_to_all_friction() -> None:
+def test_the_line_is_the_fit_of_a_line_to_all_friction() -> None:
     effects = [ViscousFriction((0,)), NonlinearViscousFriction((0,), ROOT), CoulombFriction((0,))]
     traced, speeds = outcome(effects)
     v = speeds[:, 0]
