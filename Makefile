@@ -29,8 +29,9 @@ loop: $(STAMP)           ## a UR10 with an effect its config does not know, foun
 test: $(STAMP)           ## lint, types, import directions, all tests
 	$(MAKE) -j 2 lint suite
 
+# Every test that starts the program would compile all of it again where nothing is kept of that.
 suite: $(STAMP)          ## all tests alone
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -q --durations 15
+	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal -q --durations 15
 
 sanitize: $(STAMP)       ## the kernels' tests on a build with the address and UB sanitizers (gcc)
 	$(BIN)/python -m pytest -q -rs tests/kernels/test_sanitized.py
