@@ -272,7 +272,7 @@ def test_copies_of_training_data_are_refused_as_sealed(
 
 
 def test_a_joint_without_torque_is_left_out_and_the_others_are_found(
-    data: Path, excite: Program
+    data: Path, excite: Program, outcome: Outcome
 ) -> None:
     """Its torque is worthless and its motion counts; nothing is said of it but that."""
     path = excite.folder / "worthless.h5"
@@ -289,10 +289,13 @@ def test_a_joint_without_torque_is_left_out_and_the_others_are_found(
     assert named == PLANTED
     after = answer["error"]["after"]
     assert after["relative"]["wrist_roll"] is None
-    # At rest, dry friction is whatever holds the joint; how long the elbow rests depends on the
-    # motion, which is planned anew on every machine.
     assert after["relative_moving"].pop("wrist_roll") is None
-    assert max(after["relative_moving"].values()) < 0.05
+    # At rest, dry friction is whatever holds the joint; how long the elbow rests depends on the
+    # motion, which is planned anew on every machine: so by the same runs with all torques.
+    whole = outcome.answer["error"]["after"]
+    for measure in ("relative", "relative_moving"):
+        for joint in after["relative_moving"]:
+            assert after[measure][joint] < 1.1 * whole[measure][joint], (measure, joint)
     assert after["mean_relative_moving"] < 0.02
     page = excite.folder / "page.html"
     assert excite("report", "found.h5", "-o", page).returncode == 0
