@@ -36,11 +36,12 @@ from excite_cli.diagnosis.rounds import rounds_of
 from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
 from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
 from excite_cli.diagnosis.traces import Dependence, Traces
-from excite_cli.diagnosis.tracing import Fit, Traced, fit_of, trace
+from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.effects.placing import told_on
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
@@ -92,7 +93,7 @@ def diagnose(
     with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
     if with_ends.ends:
         parts = with_ends
-        start = fit_of(model, traced)
+        start = traced.effects
         del traced  # gigabytes, of large data: not beside the next one
         processing, training = _prepared(spec, parts)
         traced = _traced(model, spec, parts, processing, progress, start)
@@ -180,9 +181,9 @@ def _traced(
     parts: Split,
     processing: Processing,
     progress: Progress,
-    start: Fit | None = None,
+    start: Sequence[Effect] = (),
 ) -> Traced:
-    """What is found in the training parts; `start` was found in more of them."""
+    """What is found in the training parts; the effects `start` were found in more of them."""
     progress("filtering", 0)
 
     def prepared(left_out: LeftOut) -> list[PreparedRun]:

@@ -69,16 +69,16 @@ def trace(
     folds: Sequence[int],
     run_names: Sequence[str],
     progress: Progress,
-    start: "Fit | None" = None,
+    start: Sequence[Effect] = (),
 ) -> Traced:
     """Find the effects that `model` lacks.
 
     `prepared` gives the training parts, without samples that effects which were found ask to leave.
-    `start`: what was found in more of the same data, to begin from.
+    `start`: effects found in more of the same data; all numbers are fitted to these data alone.
     """
-    left_out = LeftOut.by((*model.declared, *(start.effects if start else ())))
+    left_out = LeftOut.by((*model.declared, *start))
     bodies = [ModelledRun(model, run) for run in prepared(left_out)]
-    fit = start or _first_fit(model, folds, bodies)
+    fit = _first_fit(model, folds, bodies, start)
     first = _LENIENT if start else 0
     passes: list[_Pass] = []
 
@@ -149,22 +149,33 @@ class Fit:
         return alike and max(moved, default=0.0) < _SAME_SHAPE
 
 
-def _first_fit(model: Model, folds: Sequence[int], bodies: Sequence["ModelledRun"]) -> Fit:
-    """The declared model alone, rows weighted by what it leaves."""
-    phi, values = standard_parameters(model.robot), np.zeros(0)
+def _first_fit(
+    model: Model,
+    folds: Sequence[int],
+    bodies: Sequence["ModelledRun"],
+    effects: Sequence[Effect],
+) -> Fit:
+    """The declared model with these effects, rows weighted by what it leaves."""
+    known = (*model.declared, *effects)
+    phi = standard_parameters(model.robot)
+    values = np.zeros(sum(len(effect.parameters) for effect in known))
     levels = np.ones(model.robot.n)
     for _ in range(3):
-        signals = [body.signals(phi, model.declared, values) for body in bodies]
+        signals = [body.signals(phi, known, values) for body in bodies]
         data = training_data(model, folds, bodies, signals)
-        evidence = data.evidence([], NoiseModel.white(levels))
-        parameters = evidence.solve(())
-        left = np.concatenate(data.residuals([], (), parameters))
+        found = with_columns([(effect, 1) for effect in effects], signals, data.runs)
+        chosen = range(len(found))
+        evidence = data.evidence(found, NoiseModel.white(levels))
+        parameters = evidence.solve(chosen)
+        left = np.concatenate(data.residuals(found, chosen, parameters))
         usable = np.concatenate([run.usable for run in data.runs])
         squares = np.where(usable, left**2, 0.0).sum(axis=0)
         levels = np.sqrt(squares / np.maximum(usable.sum(axis=0), 1)) + 1e-9
         phi = model.full_inertias(parameters)
+        effects = [each.effect for each in found]
+        known = (*model.declared, *effects)
         values = _values(model, data, parameters)
-    return Fit(phi, (), values, levels, evidence.energy(()))
+    return Fit(phi, tuple(effects), values, levels, evidence.energy(chosen))
 
 
 def fit_of(model: Model, traced: Traced) -> Fit:

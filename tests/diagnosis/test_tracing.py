@@ -46,13 +46,17 @@ def answer_of(
     monkeypatch.setattr(LeftOut, "by", by)
     monkeypatch.setattr(tracing, "ModelledRun", lambda *_: SimpleNamespace(take=lambda run: None))
     start = Fit(name="declared", places=set(), effects=())
-    monkeypatch.setattr(tracing, "_first_fit", lambda *_: start)
+    monkeypatch.setattr(
+        tracing,
+        "_first_fit",
+        lambda *given: fit_of(None, SimpleNamespace(name=known)) if given[-1] else start,
+    )
     monkeypatch.setattr(tracing, "fit_of", fit_of)
     monkeypatch.setattr(tracing, "_one_pass", one_pass)
     monkeypatch.setattr(tracing, "_left_out", lambda traced: errors[traced.attempt])
     model: Any = SimpleNamespace(declared=())
     nothing: Any = None
-    begin: Any = fit_of(None, SimpleNamespace(name=known)) if known else None
+    begin: Any = (known,) if known else ()
     traced: Any = tracing.trace(model, nothing, prepared, (), (), lambda *_: None, begin)
     first = 2 if known else 0
     before = found[traced.attempt - 1] if traced.attempt > first else known or "declared"
