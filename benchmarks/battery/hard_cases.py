@@ -20,7 +20,7 @@ from benchmarks.battery.cases import (
     weighted_columns,
 )
 from benchmarks.battery.motions import Arm, arm, four_motions
-from benchmarks.battery.outside import PositionFriction
+from benchmarks.battery.outside import UnevenViscousFriction
 from benchmarks.battery.sizes import Ground, Sized, sized_as
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.base import Effect
@@ -114,9 +114,10 @@ def _gears(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
 
 
 def _constant(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
-    """A constant, in noise with a long memory, or beside dry friction that changes with the angle.
+    """A constant, in noise with a long memory, or beside friction that changes with the angle.
 
-    The friction has no name, and is taken for noise with a longer memory still.
+    The friction is dry, or it is viscous and has no name: then it is taken for noise with a longer
+    memory still.
     """
     j = int(rng.integers(of.robot.n))
     sign = rng.choice([-1.0, 1.0])
@@ -124,9 +125,17 @@ def _constant(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
     if found is None or rng.uniform() < 0.5:
         return _all([found])
     share = rng.uniform(0.3, 0.6) * found.ratio
-    uneven = PositionFriction((j,), {"phase": float(rng.uniform(0.0, np.pi))})
-    beside = sized_as(uneven, np.ones(1), share, ground)
-    return [] if beside is None else [replace(found, companions=(beside.planted,))]
+    turn = 2.0 * float(rng.uniform(0.0, np.pi))
+    # f sin²(q + φ) = f/2 (1 − cos(2q + 2φ)): what changes, and its mean over a turn
+    uneven = kind_named("position_friction")((j,), {"periods": 2.0})
+    beside = sized_as(uneven, np.array([-np.cos(turn), np.sin(turn)]), share / 2**0.5, ground)
+    if beside is None:
+        return []
+    if rng.uniform() < 0.5:
+        return [found, beside]
+    viscous = UnevenViscousFriction((j,), {"phase": turn / 2})
+    other = sized_as(viscous, np.ones(1), share, ground)
+    return [] if other is None else [replace(found, companions=(other.planted,))]
 
 
 def _slow_ripple(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:

@@ -9,23 +9,22 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Effect, Parameter, Scope, Signals
-from excite_cli.effects.sign import smooth_sign
 from excite_cli.robot.model import Array, Robot
 
 
-class PositionFriction(Effect):
-    """τ_j = f sin²(q_j + φ) sgn v_j: dry friction that depends on the angle."""
+class UnevenViscousFriction(Effect):
+    """τ_j = f sin²(q_j + φ) v_j: viscous friction that depends on the angle."""
 
-    kind: ClassVar = "outside:position_friction"
-    title: ClassVar = "friction that depends on the angle"
+    kind: ClassVar = "outside:uneven_viscous_friction"
+    title: ClassVar = "viscous friction that depends on the angle"
     signature: ClassVar = ""
-    parameters: ClassVar = (Parameter("friction", "N·m", 0.05, 300.0, nonnegative=True),)
+    parameters: ClassVar = (Parameter("friction", "N·m·s/rad", 0.05, 300.0, nonnegative=True),)
     shapes: ClassVar = (Parameter("phase", "rad", 0.1, 3.0),)
 
     def columns(self, signals: Signals) -> Array:
         j = list(self.joints)
         shape = np.sin(signals.q[:, j, None] + self.shape["phase"]) ** 2
-        return shape * smooth_sign(signals.v[:, j, None])
+        return shape * signals.v[:, j, None]
 
 
 class DistantCoupling(Effect):
@@ -83,7 +82,7 @@ class TorqueHysteresis(Effect):
 
 
 OUTSIDE: tuple[type[Effect], ...] = (
-    PositionFriction,
+    UnevenViscousFriction,
     DistantCoupling,
     HardeningSpring,
     TorqueHysteresis,

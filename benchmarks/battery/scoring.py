@@ -22,6 +22,7 @@ REFINEMENTS = (
     "nonlinear_viscous_friction",
     "stribeck_friction",
     "load_dependent_friction",
+    "position_friction",
     "dahl_friction",
     "friction_drift",
     "coupled_friction",

@@ -175,6 +175,12 @@ def _draw(
         shape = {"stribeck_speed": float(np.exp(rng.uniform(*np.log(_STRIBECK_SPEEDS))))}
     elif name == "dahl_friction":
         shape = {"distance": float(np.exp(rng.uniform(*np.log(_DAHL_DISTANCES))))}
+    elif name == "position_friction":
+        turn = rng.uniform(0.0, 2 * np.pi)
+        shape, direction = (
+            {"periods": float(rng.integers(1, 3))},
+            np.array([np.cos(turn), np.sin(turn)]),
+        )
     elif name == "coupled_friction":
         shape = {"direction": float(rng.choice([-1.0, 1.0]))}
     elif name == "torque_saturation":
@@ -193,7 +199,7 @@ def _draw(
         direction = rng.normal(size=3)
         start = float(rng.uniform(1.0, 8.0))
         shape = {"start": start, "end": start + float(rng.uniform(0.3, 1.0))}
-    elif name == "outside:position_friction":
+    elif name == "outside:uneven_viscous_friction":
         shape = {"phase": float(rng.uniform(0.0, np.pi))}
     elif name == "outside:hardening_spring":
         shape = {"rest": float(0.5 * (q.min() + q.max()) + 0.2 * rng.normal())}
@@ -237,8 +243,12 @@ def _warming(values: Array, effect: Effect, ground: Ground) -> Array:
 def _companions(effect: Effect, values: Array) -> tuple[Planted, ...]:
     """Plain friction without which it would give energy.
 
-    The joints' own viscous shares of a coupled shaft; the dry friction that has a memory.
+    The joints' own viscous shares of a coupled shaft; the dry friction that has a memory, or that
+    changes over a turn.
     """
+    if effect.kind == "position_friction":
+        mean = np.array([float(np.linalg.norm(values))])
+        return (Planted(kind_named("coulomb_friction")(effect.joints), mean),)
     if effect.kind == "dahl_friction":
         return (Planted(kind_named("coulomb_friction")(effect.joints), np.array(values)),)
     coupled = effect.kind in ("coupled_friction", "outside:distant_coupling")

@@ -2,10 +2,15 @@
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.effects.base import Effect
+from excite_cli.effects.parameter import deviation
 from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array
 
+_ERRORS = 2.0  # deviations by which what is there may be less than what is taken
 Spread = Callable[[Sequence[int]], Array]
 
 
@@ -15,14 +20,19 @@ class PossibleSizes:
     `spread(chosen)` is the covariance of the parameters of a model with these candidates; it is
     asked for only where a value is impossible: what is so by the error of the fit only is allowed
     (`Effect.why_impossible`). `early_pass`: of a diagnosis, which does not know the
-    torque well yet.
+    torque well yet. `declared`: effects whose parameters come before those of the chosen.
     """
 
     def __init__(
-        self, candidates: Sequence[Candidate], early_pass: bool, spread: Spread, seen: Seen
+        self,
+        candidates: Sequence[Candidate],
+        early_pass: bool,
+        spread: Spread,
+        seen: Seen,
+        declared: Sequence[Effect] = (),
     ) -> None:
         self._candidates, self._early, self._seen = candidates, early_pass, seen
-        self._spread = spread
+        self._spread, self._declared = spread, declared
 
     def __call__(self, parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
         """Whether all that is `added` can be so; `parameters` end with those of the `chosen`."""
@@ -41,9 +51,39 @@ class PossibleSizes:
             if not reason and not effect.possible(values, self._early):
                 covariance = self._spread(chosen)[own, own]
                 reason = effect.why_impossible(values, covariance, self._early)
+            if effect.varies and not reason:
+                reason = self._too_much_taken(effect, own, parameters, chosen)
             if reason:
                 return reason
         return ""
+
+    def _too_much_taken(
+        self, effect: Effect, own: slice, parameters: Array, chosen: Sequence[int]
+    ) -> str:
+        """Why it takes more, beyond the error of the fit, than there is of what it varies."""
+        taken, slope = effect.taken(parameters[own])
+        slopes = np.zeros(len(parameters))
+        slopes[own] = -slope
+        slopes[self._at(effect.varies, effect.joints, len(parameters), chosen)] = 1.0
+        there = float(slopes @ parameters) + float(slope @ parameters[own])
+        if taken <= there:
+            return ""
+        if there > 0.0 and taken - there <= _ERRORS * deviation(slopes, self._spread(chosen)):
+            return ""
+        return f"{taken:.3g} of {effect.kind} is more than the {effect.varies} that it varies"
+
+    def _at(
+        self, kind: str, joints: tuple[int, ...], count: int, chosen: Sequence[int]
+    ) -> list[int]:
+        """Parameters, of `count`, that are the size of a kind on these joints in all runs."""
+        effects = [*self._declared, *(self._candidates[i].effect for i in chosen)]
+        at = count - sum(len(each.parameters) for each in effects)
+        found = []
+        for each in effects:
+            if each.kind == kind and each.joints == joints and not each.runs:
+                found.append(at)
+            at += len(each.parameters)
+        return found
 
 
 def spread_of(covariance: Callable[[Sequence[int]], Array], inflation: float) -> Spread:

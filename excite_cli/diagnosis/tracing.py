@@ -250,7 +250,11 @@ def _one_pass(
     inflation = placebos.inflation
     rules = Rules(spec.significance, spec.gain, inflation, placebos.least_p)
     sizes = PossibleSizes(
-        candidates, attempt < _LENIENT, spread_of(white.covariance, inflation), _seen(data, signals)
+        candidates,
+        attempt < _LENIENT,
+        spread_of(white.covariance, inflation),
+        _seen(data, signals),
+        model.declared,
     )
     judge = Judgement(white, plain, candidates, rules, sizes, found)
     chosen = Search(judge, spec.rounds).run()

@@ -95,6 +95,8 @@ class Effect(ABC):
     same_as: ClassVar[tuple[str, ...]] = ()  # kinds that together are the same columns
     # Kinds of which the straight line through both is reported, and of this one what deviates.
     deviates_from: ClassVar[tuple[str, ...]] = ()
+    # A kind of the same joint that it is the change of over the angle: never more than is there.
+    varies: ClassVar[str] = ""
     # Many robots have it: it is in the model while the noise is measured, lest it be taken for it.
     usual: ClassVar[bool] = False
 
@@ -254,6 +256,10 @@ class Effect(ABC):
         if far > max(unlikely_distance(len(values)), self.forgiven * whole):
             return self.why_not(values)
         return "" if self.over_error(near, covariance) > 1.0 else self.why_not(values)
+
+    def taken(self, values: Array) -> tuple[float, Array]:
+        """How much it takes at most of what it `varies`, and the derivative (p,) of that."""
+        return 0.0, np.zeros(len(values))
 
     def absurd(self, values: Array, seen: Seen) -> str:
         """Why values that could be are absurd on the robot that was `seen`; empty if they are not.

@@ -32,6 +32,7 @@ from excite_cli.effects.load_dependent_friction import LoadDependentFriction
 from excite_cli.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from excite_cli.effects.payload import Payload
 from excite_cli.effects.placing import ALL, places_named
+from excite_cli.effects.position_friction import PositionFriction
 from excite_cli.effects.ripple import Ripple
 from excite_cli.effects.spring import Spring
 from excite_cli.effects.stribeck_friction import StribeckFriction
@@ -51,6 +52,7 @@ _OURS: tuple[type[Effect], ...] = (
     AsymmetricFriction,
     StribeckFriction,
     LoadDependentFriction,
+    PositionFriction,
     DahlFriction,
     FrictionDrift,
     FrictionChange,

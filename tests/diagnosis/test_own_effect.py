@@ -57,7 +57,7 @@ def robot() -> Robot:
 @pytest.fixture(scope="module")
 def planted(own: type[Effect]) -> tuple[Planted, ...]:
     """An eccentric gear beside viscous and Coulomb friction."""
-    friction = {"viscous_friction": 1.0, "coulomb_friction": 2.0}
+    friction = {"viscous_friction": 4.0, "coulomb_friction": 2.0}
     plain = (plant(kind_named(kind), (ELBOW,), size) for kind, size in friction.items())
     return (*plain, plant(own, (ELBOW,), 3.0, {"sin": -1.5}))
 
@@ -118,19 +118,19 @@ def test_what_its_parameters_may_be_keeps_it_out(
     own: type[Effect], named: Callable[..., Named], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second = own.parameters
-    assert OWN in named("coulomb_friction", OWN)
+    assert OWN in named("viscous_friction", OWN)
     monkeypatch.setattr(own, "parameters", (replace(first, believed=(-1.0, 1.0)), second))
-    assert OWN not in named("coulomb_friction", OWN)
+    assert OWN not in named("viscous_friction", OWN)
     monkeypatch.setattr(own, "parameters", (first, replace(second, nonnegative=True)))
-    assert OWN not in named("coulomb_friction", OWN)
+    assert OWN not in named("viscous_friction", OWN)
 
 
 def test_what_it_excludes_is_not_named_beside_it(
     own: type[Effect], named: Callable[..., Named], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert set(named(*RIVALS, OWN)) >= {OWN, "coulomb_friction"}
-    monkeypatch.setattr(own, "excludes", ("coulomb_friction",))
-    assert len(set(named(*RIVALS, OWN)) & {OWN, "coulomb_friction"}) == 1
+    assert set(named(*RIVALS, OWN)) >= {OWN, "viscous_friction"}
+    monkeypatch.setattr(own, "excludes", ("viscous_friction",))
+    assert len(set(named(*RIVALS, OWN)) & {OWN, "viscous_friction"}) == 1
 
 
 def test_its_mechanism_is_in_the_simulated_robot(

@@ -11,6 +11,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.payload import Payload
 from excite_cli.effects.seen import Seen
+from excite_cli.robot.model import Array
 
 # A robot on which no size is absurd.
 LARGE = Seen(np.full(2, 1e12), np.zeros(2), 40.0)
@@ -56,6 +57,26 @@ def test_friction_and_inertia_are_never_negative(kind: str) -> None:
     assert possible(kind, 0.0)
     assert possible(kind, 1e9)  # how large depends on the robot
     assert not possible(kind, -1e-9)
+
+
+def test_friction_that_depends_on_the_angle_takes_no_more_than_there_is() -> None:
+    """Of Coulomb friction of its joint, declared or found: friction is nowhere negative."""
+    kinds = [("coulomb_friction", (0,)), ("coulomb_friction", (1,)), ("position_friction", (1,))]
+    candidates = [candidate(kind, joints) for kind, joints in kinds]
+    for error, most in ((1e-15, 5.0), (0.5, 6.0)):  # 6: within two deviations of both
+        spread = error**2 * np.eye(6)
+
+        def allowed(values: list[float], chosen: list[int], declared: int = 0, s: Array = spread):
+            known = [each.effect for each in candidates[:declared]]
+            sizes = PossibleSizes(candidates, False, lambda _: s, LARGE, known)
+            return sizes(np.array(values), chosen, [2])
+
+        for times, there in ((0.99, True), (1.01, False)):
+            at = [0.6 * times * most, -0.8 * times * most]
+            assert allowed([-1.0, 1.0, 99.0, 5.0, *at], [0, 1, 2]) == (there or most > 5.0)
+            assert allowed([-1.0, 1.0, 99.0, 5.0, *at], [2], declared=2) == (there or most > 5.0)
+            assert not allowed([-1.0, 1.0, 7.0, 99.0, *at], [0, 2])  # of another joint
+            assert not allowed([-1.0, 1.0, 99.0, 5.0, *at], [2])
 
 
 @pytest.mark.parametrize("kind", NONNEGATIVE)

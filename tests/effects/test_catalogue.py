@@ -19,6 +19,7 @@ KINDS = [
     "asymmetric_friction",
     "stribeck_friction",
     "load_dependent_friction",
+    "position_friction",
     "dahl_friction",
     "friction_drift",
     "friction_change",

@@ -90,7 +90,7 @@ def test_example_is_a_kind_of_the_catalogue_once_installed(
     planted = effect.torque(signals, np.array([1.2, -0.5]))[:, 1] + noise
     found = np.linalg.lstsq(effect.columns(signals)[:, 0], planted, rcond=None)[0]
     assert found == pytest.approx([1.2, -0.5], abs=0.01)
-    assert effect.report(found, np.eye(2))["cos"].unit == "N·m"
+    assert effect.report(found, np.eye(2))["cos"].unit == "N·m·s/rad"
     _, *state = states(robot, 4, 0.1)
     weights = np.random.default_rng(1).normal(size=(4, 1, 2))
 
