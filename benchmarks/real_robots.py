@@ -55,6 +55,11 @@ class Answer:
                 return float(effect["parameters"][parameter]["value"])
         return float("nan")
 
+    def line(self, name: str, joint: str) -> float:
+        """`viscous` or `coulomb` of a joint, as on a data sheet."""
+        lines = {each["joint"]: each for each in self.content["friction_lines"]}
+        return float(lines[joint][name]["value"]) if joint in lines else float("nan")
+
     def error(self, when: str) -> float:
         """Mean over the joints, `before` or `after`."""
         return float(self.content["error"][when]["mean_relative_moving"])
@@ -115,21 +120,20 @@ def row(log: Log, answers: Sequence[Answer]) -> tuple[str, ...]:
 def tx40(answers: Sequence[Answer]) -> str:
     """Beside the published friction of every joint and of the wrist's coupled motors."""
     (answer,) = answers
-    published = [
-        *(("viscous_friction", "viscous", f"joint_{j}", value)
-          for j, value in enumerate((8.05, 5.53, 1.97, 1.11, 1.86, 0.65), 1)),
-        *(("coulomb_friction", "coulomb", f"joint_{j}", value)
-          for j, value in enumerate((7.14, 8.26, 6.34, 2.48, 3.03, 0.28), 1)),
-        *(("coupled_friction", name, "joint_5 joint_6", value)
-          for name, value in (("viscous", 0.616), ("coulomb", 1.95))),
-    ]  # fmt: skip
-    deviations = {
-        (kind, name, joints): abs(answer.value(kind, name, *joints.split()) / value - 1)
-        for kind, name, joints, value in published
-    }
-    far = [f"{name} of {joints}: {percent(deviation)} off"
-           for (_, name, joints), deviation in deviations.items()
-           if not deviation <= 0.1]  # fmt: skip
+    sheets = {"viscous": (8.05, 5.53, 1.97, 1.11, 1.86, 0.65),
+              "coulomb": (7.14, 8.26, 6.34, 2.48, 3.03, 0.28)}  # fmt: skip
+    published = {
+        f"{name} of joint_{j}": answer.line(name, f"joint_{j}") / value
+        for name, values in sheets.items()
+        for j, value in enumerate(values, 1)
+    } | {
+        f"{name} of the coupled wrist": answer.value(
+            "coupled_friction", name, "joint_5", "joint_6"
+        ) / value
+        for name, value in (("viscous", 0.616), ("coulomb", 1.95))
+    }  # fmt: skip
+    far = [f"{what}: {percent(abs(ratio - 1))} off"
+           for what, ratio in published.items() if not abs(ratio - 1) <= 0.1]  # fmt: skip
     rest = f" ({', '.join(far)})" if far else ""
     return (
         f"{friction(answer)}; coupled friction of {told(answer.joints('coupled_friction'))}; "

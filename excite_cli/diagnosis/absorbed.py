@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.evidence import ABSORBED, Evidence
+from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.records import Absorbed
+from excite_cli.diagnosis.schur import ABSORBED
 
 _NAMED = 4
 _WORTH_NAMING = 0.15

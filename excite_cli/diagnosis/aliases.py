@@ -17,8 +17,9 @@ from itertools import combinations
 import numpy as np
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.evidence import SHARED, Evidence, Schur
+from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.judgement import Judgement
+from excite_cli.diagnosis.schur import SHARED, Schur
 from excite_cli.robot.model import Array
 
 UNDECIDED = 3.0  # KL divergence [nats]

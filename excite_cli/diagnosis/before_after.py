@@ -55,11 +55,15 @@ class Played:
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """Models on sealed runs: errors of both and of the untouched URDF, and torque over time."""
+    """Models on sealed runs: errors of both and of the untouched URDF, and torque over time.
+
+    `by_urdf`: what the URDF predicts, for every run; empty (and `untouched` None) without masses.
+    """
 
     before: Errors
     after: Errors
     untouched: Errors | None
+    by_urdf: Sequence[Prediction]
     traces: tuple[TorqueTrace, ...]
 
 
@@ -80,23 +84,26 @@ def _fitted(model: Model, traced: Traced, chosen: Sequence[int], parameters: Arr
     return FittedModel(model.full_inertias(parameters), effects, values)
 
 
-def on_sealed(played: Played, models: tuple[FittedModel, FittedModel]) -> BeforeAfter:
+def on_sealed(
+    played: Played, before: Sequence[Prediction], after: Sequence[Prediction]
+) -> BeforeAfter:
     """Errors and torque over time of the sealed part, used once."""
-    before, after = map(played.predictions, models)
+    by_urdf = _by_urdf(played)
     return BeforeAfter(
         played.errors(before),
         played.errors(after),
-        _untouched(played),
+        played.errors(by_urdf) if by_urdf else None,
+        by_urdf,
         played.traces(before, after, sealed=True),
     )
 
 
-def _untouched(played: Played) -> Errors | None:
-    """Errors of the URDF as given, with the friction of its <dynamics>; None if it has no mass."""
+def _by_urdf(played: Played) -> Sequence[Prediction]:
+    """What the URDF says as given, with the friction of its <dynamics>; none if it has no mass."""
     phi = standard_parameters(played.robot)
     if not phi.any():
-        return None
-    return played.errors(played.predictions(FittedModel(phi, *urdf_friction(played.robot))))
+        return ()
+    return played.predictions(FittedModel(phi, *urdf_friction(played.robot)))
 
 
 def _predicted(robot: Robot, fitted: FittedModel, run: PreparedRun) -> Prediction:

@@ -2,38 +2,35 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cholesky
 
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
-from excite_cli.diagnosis.aliases import Alias, aliases_of, joint_aliases
+from excite_cli.diagnosis.aliases import joint_aliases
 from excite_cli.diagnosis.before_after import Played, both_models, on_sealed
 from excite_cli.diagnosis.candidates import record_of
+from excite_cli.diagnosis.data_sheet_line import data_sheet_lines
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
-from excite_cli.diagnosis.evidence import SHARED
+from excite_cli.diagnosis.error_parts import INERTIAS, error_parts
 from excite_cli.diagnosis.final_fit import final_fit
-from excite_cli.diagnosis.friction_line import friction_lines
+from excite_cli.diagnosis.information import information_of
 from excite_cli.diagnosis.large_rest import large_rests
+from excite_cli.diagnosis.naming import named_effects
 from excite_cli.diagnosis.plausibility import check_recorded
 from excite_cli.diagnosis.records import (
     Absorbed,
     Approximation,
     Assumption,
     Diagnosis,
-    EffectRecord,
-    Information,
     JointAlias,
-    NamedEffect,
     Unexplained,
 )
 from excite_cli.diagnosis.rounds import rounds_of
-from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
+from excite_cli.diagnosis.sealed_verdict import worth_on_sealed
 from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
@@ -43,7 +40,6 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
-from excite_cli.effects.placing import told_on
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
@@ -118,10 +114,21 @@ def diagnose(
     )
     doubts = approximations(traced, unexplained, robot.joint_names, rests)
     ends = [prepare(run, processing) for run in parts.ends]
-    sealed_part = on_sealed(Played(robot, kept), models)
+    played = Played(robot, kept)
+    told = played.predictions(models[0]), played.predictions(models[1])
+    sealed_part = on_sealed(played, *told)
+    from_urdf = model.prior is not None and bool(sealed_part.by_urdf)
+    begin = sealed_part.by_urdf if from_urdf else told[0]
+    taken_off = error_parts(played, model, traced, models[1], begin, told[1], from_urdf)
     worth = worth_on_sealed(Played(robot, [*kept, *ends]), model, traced, models[1])
-    named, rivals = _named(
-        model, traced, (parameters, covariance), doubts, worth, spec.diagnosis.carrying_links
+    named, rivals = named_effects(
+        model,
+        traced,
+        (parameters, covariance),
+        doubts,
+        worth,
+        taken_off,
+        spec.diagnosis.carrying_links,
     )
     base_values, base_std = _base_parameters(model, parameters, covariance)
     assumed = assumptions(traced.effects, parts, model)
@@ -148,7 +155,7 @@ def diagnose(
         phi=model.full_inertias(parameters),
         base_values=base_values,
         base_std=base_std,
-        information=_information(model, traced, rivals),
+        information=information_of(model, traced, rivals),
         versions={},
         seconds=time.monotonic() - started,
         noise_floor=floor.named(robot.joint_names) if floor else None,
@@ -164,7 +171,13 @@ def diagnose(
         untouched=sealed_part.untouched,
         large_rests=rests,
         joint_aliases=_joint_aliases(traced, doubts, robot),
+        inertia_parts=_by_joint(robot, taken_off[INERTIAS]) if from_urdf else {},
+        friction_lines=data_sheet_lines(model, traced, parameters, covariance),
     )
+
+
+def _by_joint(robot: Robot, values: Array) -> dict[str, float]:
+    return dict(zip(robot.joint_names, map(float, values), strict=True))
 
 
 def _prepared(spec: Spec, parts: Split) -> tuple[Processing, list[PreparedRun]]:
@@ -264,79 +277,6 @@ def _column_names(model: Model) -> list[str]:
     return names
 
 
-def _named(
-    model: Model,
-    traced: Traced,
-    fitted: tuple[Array, Array],
-    doubts: Mapping[int, Approximation],
-    worth: Mapping[int, Worth],
-    links: Sequence[str],
-) -> tuple[tuple[NamedEffect, ...], list[tuple[Alias, Array]]]:
-    """Named effects with values, evidence and aliases; and the aliases with their own values.
-
-    `fitted`: parameters and their covariance.
-    """
-    (parameters, covariance), judge, names = fitted, traced.judge, model.robot.joint_names
-    start = len(parameters) - sum(traced.candidates[i].width for i in traced.chosen)
-    transform = friction_lines(traced, start)
-    shown, spread = transform @ parameters, transform @ covariance @ transform.T
-    found: list[NamedEffect] = []
-    strength: list[float] = []
-    taken = {traced.candidates[i].place for i in traced.chosen}
-    rivals: list[tuple[Alias, Array]] = []
-    at = start
-    for i in traced.chosen:
-        c = traced.candidates[i]
-        own = slice(at, at + c.width)
-        at += c.width
-        rest = judge.without(i, traced.chosen)
-        gain = judge.white.schur(rest).gain(i, absorbed=SHARED)
-        joints = list(c.rows)
-        whole = judge.plain.energy_on((), joints)
-        share = (
-            judge.plain.energy_on(rest, joints) - judge.plain.energy_on([*rest, i], joints)
-        ) / max(whole, 1e-300)
-
-        def possible(others: Sequence[int], d: int) -> bool:
-            together = [*others, d]
-            return judge.allowed(judge.plain.solve(together), together, [d])
-
-        aliases = []
-        if i not in doubts:
-            aliases = aliases_of(
-                i, rest, taken, traced.candidates, judge.white, traced.inflation, possible
-            )
-        records = []
-        for alias in aliases:
-            values = judge.plain.solve([*rest, alias.candidate])
-            width = traced.candidates[alias.candidate].width
-            rivals.append((alias, values[-width:]))
-            records.append(
-                record_of(traced.candidates[alias.candidate].effect, names, values[-width:])
-            )
-        strength.append(gain.chi2)
-        link = told_on(c.effect, model.robot, links)
-        seen = c.effect.seen_from(link) if link else np.eye(c.width)
-        found.append(
-            NamedEffect(
-                effect=replace(
-                    record_of(c.effect, names, parameters[own]), link=link.name if link else ""
-                ),
-                parameters=c.effect.report(seen @ shown[own], seen @ spread[own, own] @ seen.T),
-                p_value=judge.told_p_value(i, gain),
-                share_of_residual=float(np.clip(share, 0.0, 1.0)),
-                gain=float(judge.left_out_gain(rest, [i])),
-                aliases=tuple(records),
-                approximates=doubts.get(i),
-                least_p=judge.rules.least_p,
-                verdict=worth[i].verdict,
-                removes=worth[i].removes,
-            )
-        )
-    order = np.argsort([-each for each in strength], kind="stable")
-    return tuple(found[k] for k in order), rivals
-
-
 def _base_parameters(model: Model, parameters: Array, covariance: Array) -> tuple[Array, Array]:
     rank = model.base.rank
     if model.prior is None:
@@ -346,45 +286,6 @@ def _base_parameters(model: Model, parameters: Array, covariance: Array) -> tupl
     spread = mapping @ covariance[:count, :count] @ mapping.T
     phi = model.full_inertias(parameters)
     return mapping @ phi, np.sqrt(np.maximum(np.diag(spread), 0.0))
-
-
-def _information(model: Model, traced: Traced, rivals: list[tuple[Alias, Array]]) -> Information:
-    """Triangular factor of the training data's columns, whitened, for the next motion."""
-    data = traced.data
-    if model.prior is not None:
-        selection = model.base.selection
-        count = model.base.mapping.shape[1]
-        keep = np.concatenate([selection, np.arange(count, data.declared[0].shape[2])])
-        data = replace(
-            data, declared=tuple(d[:, :, keep] for d in data.declared), prior_precision=None
-        )
-    unique: dict[tuple, tuple[Alias, Array]] = {}
-    for alias, values in rivals:
-        unique.setdefault(traced.candidates[alias.candidate].place, (alias, values))
-    pool = [traced.candidates[i] for i in traced.chosen]
-    pool += [traced.candidates[alias.candidate] for alias, _ in unique.values()]
-    evidence = data.evidence(pool, traced.noise)
-    gram = evidence.grams.total()[:-1, :-1]
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    unit = gram / np.outer(scale, scale)
-    unit[np.diag_indices(len(unit))] += 1e-12
-    parameters = traced.judge.plain.solve(traced.chosen)
-    at = len(parameters) - sum(c.width for c in pool[: len(traced.chosen)]) - model.declared_width
-    records: list[EffectRecord] = []
-    for effect in (*model.declared, *traced.effects):
-        width = len(effect.parameters)
-        records.append(record_of(effect, model.robot.joint_names, parameters[at : at + width]))
-        at += width
-    return Information(
-        factor=cholesky(unit) * scale,
-        rank=model.base.rank,
-        model=tuple(records),
-        rivals=tuple(
-            record_of(traced.candidates[alias.candidate].effect, model.robot.joint_names, values)
-            for alias, values in unique.values()
-        ),
-        noise=traced.levels,
-    )
 
 
 def _choices(

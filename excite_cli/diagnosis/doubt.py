@@ -22,8 +22,8 @@ from collections.abc import Sequence
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.curves import curves_in_place
-from excite_cli.diagnosis.evidence import SHARED
 from excite_cli.diagnosis.records import Approximation, LargeRest, Unexplained
+from excite_cli.diagnosis.schur import SHARED
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect, Tier
 

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.traces import EffectTrace
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect
@@ -32,27 +31,12 @@ def effect_traces(
 
 
 def _own_torque(traced: Traced, parameters: Array, start: int) -> dict[int, list[Array]]:
-    """Torque (M, rows) of every effect and part, with the parameters that are reported.
-
-    Friction beside its refinement is the straight line through both, and the refinement what
-    deviates from it (`friction_lines`); the sum is the same.
-    """
-    ends = start + np.cumsum([traced.candidates[i].width for i in traced.chosen])
-    places = {
-        i: slice(end - traced.candidates[i].width, end)
-        for i, end in zip(traced.chosen, ends, strict=True)
-    }
-    lines = friction_lines(traced, start)
-    shown = lines @ parameters
-    own = {}
+    """Torque (M, rows) of every effect and part: its columns times its own parameters."""
+    own, at = {}, start
     for i in traced.chosen:
-        torque = [block @ shown[places[i]] for block in traced.candidates[i].columns]
-        for k in traced.chosen:
-            given = lines[places[k], places[i]] @ parameters[places[i]]
-            if k != i and given.any():
-                blocks = traced.candidates[k].columns
-                torque = [x - block @ given for x, block in zip(torque, blocks, strict=True)]
-        own[i] = torque
+        values = parameters[at : at + traced.candidates[i].width]
+        own[i] = [block @ values for block in traced.candidates[i].columns]
+        at += len(values)
     return own
 
 

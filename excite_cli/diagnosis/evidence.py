@@ -6,15 +6,9 @@ error on any fold left out, each by solves of the size of the model. What is the
 (what one run carries) cannot be known from the others: it is fitted on one side of that fold, the
 rest of the model held, and judged on the other. So are the directions that no other fold knows if
 an effect is in all folds but that one.
-
-With N = G_SS + Λ (Λ the precision of a prior on the inertial columns, if there is one) and a
-candidate c, the Schur complement Z = G_cc − G_cS N⁻¹ G_Sc is what is left of the candidate once the
-model has taken its part, z = G_cy − G_cS N⁻¹ G_Sy its product with the residual, and zᵀ Z⁻¹ z the
-energy that it explains: χ² distributed for unit noise if the candidate is not there.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -23,28 +17,15 @@ from scipy.linalg import eigh
 
 from excite_cli.diagnosis.cholesky import Cholesky
 from excite_cli.diagnosis.grams import Grams
+from excite_cli.diagnosis.schur import SHARED, CandidateBases, Gain, Schur, gain_of_columns
 from excite_cli.robot.model import Array
 
-# A direction of a candidate of which less than this share is left is absorbed by the model.
-ABSORBED = 1e-3
-# Members of a model are judged beside each other: friction terms share nearly all they have.
-SHARED = 1e-7
-_COLLINEAR = 1e-9
 _RIDGE = 1e-11
 _UNKNOWN = 1e-4  # of what all folds know
 _RIDGE_ALONE = 1e-6  # of its own energy: half a run may not determine all that a run does
 # Where the other side of a fold has less of such a column than this share, both sides fit it.
 _LEAST_SIDE = 0.1
 _KEPT = 6  # projections that are kept: a step of a search asks for the same few again
-
-
-@dataclass(frozen=True)
-class Gain:
-    """What one candidate adds to a model: χ², degrees of freedom, share of it that is left."""
-
-    chi2: float
-    dof: int
-    left: float
 
 
 class Evidence:
@@ -80,7 +61,7 @@ class Evidence:
         self._factors: dict[tuple[int, ...], Cholesky] = {}
         self._inverses: dict[tuple[int, ...], Array] = {}  # of the last model
         self._schurs: dict[tuple[int, ...], Schur] = {}
-        self._candidates = _Candidates(self.total, fixed, self.blocks)
+        self._candidates = CandidateBases(self.total, fixed, self.blocks)
         self._seen = grams.seen()[:, :-1] > 0.0
 
     @property
@@ -122,6 +103,14 @@ class Evidence:
             self._solved[key] = self.factor(key).solve(self.total[at, self.torque]) / self.norms[at]
         return self._solved[key]
 
+    def solve_beside(self, chosen: Sequence[int], held: int) -> Array:
+        """As `solve`, with the first `held` parameters at zero and left out."""
+        at = self.columns(chosen)[held:]
+        if not len(at):
+            return np.zeros(0)
+        normal = self.total[np.ix_(at, at)] + _RIDGE * np.eye(len(at))
+        return Cholesky(normal).solve(self.total[at, self.torque]) / self.norms[at]
+
     def covariance(self, chosen: Sequence[int]) -> Array:
         """Covariance of `solve`'s parameters for unit noise."""
         at = self.columns(chosen)
@@ -137,7 +126,7 @@ class Evidence:
             self._energies[key] = float(self.total[self.torque, self.torque] - explained)
         return self._energies[key]
 
-    def schur(self, chosen: Sequence[int]) -> "Schur":
+    def schur(self, chosen: Sequence[int]) -> Schur:
         """What is left of every candidate once the chosen model has taken its part."""
         key = tuple(chosen)
         if key not in self._schurs:
@@ -160,9 +149,9 @@ class Evidence:
         own = slice(start, start + len(self.blocks[member]))
         left = np.asarray(np.linalg.inv(self._inverses[key][own, own]))
         values = (self.solve(key) * self.norms[self.columns(key)])[own]
-        return _gain(self._candidates, left, left @ values, (member,), SHARED)
+        return gain_of_columns(self._candidates, left, left @ values, (member,), SHARED)
 
-    def _schur(self, chosen: Sequence[int]) -> "Schur":
+    def _schur(self, chosen: Sequence[int]) -> Schur:
         at = self.columns(chosen)
         shared = self.total[at, self.fixed : self.torque]
         solved = self.factor(chosen).solve(shared)
@@ -301,107 +290,3 @@ class Evidence:
 def _energy(gram: Array, x: Array) -> float:
     """‖y − C x‖² from the Gram matrix of [C y]."""
     return float(gram[-1, -1] - 2 * x @ gram[:-1, -1] + x @ gram[:-1, :-1] @ x)
-
-
-class _Candidates:
-    """Columns of candidates in the normalised Gram matrix of all."""
-
-    def __init__(self, total: Array, fixed: int, blocks: list[NDArray[np.intp]]) -> None:
-        self.total, self.fixed, self.blocks = total, fixed, blocks
-        self._bases: dict[int, Array] = {}
-
-    def basis(self, candidates: Sequence[int]) -> Array:
-        """Orthonormal directions (p, d) of candidates' columns, without collinear ones."""
-        if len(candidates) > 1:
-            return self._basis(np.concatenate([self.blocks[i] for i in candidates]))
-        if candidates[0] not in self._bases:
-            self._bases[candidates[0]] = self._basis(self.blocks[candidates[0]])
-        return self._bases[candidates[0]]
-
-    def _basis(self, at: NDArray[np.intp]) -> Array:
-        values, vectors = np.linalg.eigh(self.total[np.ix_(at, at)])
-        kept = values > _COLLINEAR * values[-1]
-        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
-
-
-class Schur:
-    """Candidates after projection off a model.
-
-    It knows the candidates and not the evidence, which keeps it: in a circle, all the matrices of a
-    pass would outlive it.
-    """
-
-    def __init__(self, candidates: _Candidates, left: Array, cross: Array) -> None:
-        self._candidates, self.matrix, self.cross = candidates, left, cross
-
-    def gain(self, *candidates: int, absorbed: float = ABSORBED) -> Gain:
-        """χ², degrees of freedom and the largest share left of candidates taken together.
-
-        Directions of which less than `absorbed` is left do not count.
-        """
-        e = self._candidates
-        at = np.concatenate([e.blocks[i] for i in candidates]) - e.fixed
-        return _gain(e, self.matrix[at[:, None], at], self.cross[at], candidates, absorbed)
-
-    @cached_property
-    def singles(self) -> "Singles":
-        """Gain of every candidate alone."""
-        return Singles(self._candidates, self.matrix, self.cross)
-
-    def pair_chi2(self, first: Array, second: Array) -> Array:
-        """χ² of pairs of candidates of one column each, without those that are collinear."""
-        e = self._candidates
-        i = np.array([e.blocks[k][0] for k in first]) - e.fixed
-        j = np.array([e.blocks[k][0] for k in second]) - e.fixed
-        ii, jj, ij = self.matrix[i, i], self.matrix[j, j], self.matrix[i, j]
-        zi, zj = self.cross[i], self.cross[j]
-        determinant = ii * jj - ij**2
-        found = (zi**2 * jj - 2 * zi * zj * ij + zj**2 * ii) / np.maximum(determinant, 1e-300)
-        return np.where(determinant > 1e-3 * ii * jj, found, 0.0)
-
-
-def _gain(
-    e: _Candidates, left: Array, cross: Array, candidates: Sequence[int], absorbed: float
-) -> Gain:
-    """Of candidates of which (p, p) is `left`, with the products (p,) with the residual."""
-    if len(cross) == 1:
-        column = int(e.blocks[candidates[0]][0])
-        own, product = float(left[0, 0]), float(cross[0])
-        share = own / max(float(e.total[column, column]), 1e-300)
-        if share < absorbed:
-            return Gain(0.0, 0, share)
-        return Gain(product * product / own, 1, share)
-    basis = e.basis(candidates)
-    shares, turned = np.linalg.eigh(basis.T @ left @ basis)
-    alive = shares > absorbed
-    if not alive.any():
-        return Gain(0.0, 0, float(shares.max(initial=0.0)))
-    z = turned[:, alive].T @ (basis.T @ cross)
-    return Gain(float(np.sum(z**2 / shares[alive])), int(alive.sum()), float(shares[-1]))
-
-
-class Singles:
-    """Gains of single candidates: those with one column all at once, the others when asked for."""
-
-    def __init__(self, candidates: _Candidates, matrix: Array, cross: Array) -> None:
-        e = candidates
-        self._given = candidates, matrix, cross
-        self._first = np.array([b[0] for b in e.blocks], dtype=int) - e.fixed
-        self._single = np.array([len(b) == 1 for b in e.blocks])
-        own = np.diag(e.total)[e.fixed : -1][self._first]
-        left = np.diag(matrix)[self._first]
-        self._share = left / np.maximum(own, 1e-300)
-        alive = self._share > ABSORBED
-        products = cross[self._first]
-        self._chi2 = np.where(alive, products**2 / np.where(alive, left, 1.0), 0.0)
-        self._others: dict[int, Gain] = {}
-
-    def __getitem__(self, i: int) -> Gain:
-        if self._single[i]:
-            share = float(self._share[i])
-            return Gain(float(self._chi2[i]), int(share > ABSORBED), share)
-        if i not in self._others:
-            e, matrix, cross = self._given
-            at = e.blocks[i] - e.fixed
-            self._others[i] = _gain(e, matrix[at[:, None], at], cross[at], (i,), ABSORBED)
-        return self._others[i]

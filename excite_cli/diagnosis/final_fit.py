@@ -64,7 +64,7 @@ def _fitted(traced: Traced) -> FinalFit:
     lines = _lines(traced, len(parameters))
     for i, own in _places(traced, len(parameters)):
         effect, values = traced.candidates[i].effect, parameters[own]
-        beside = np.delete(lines[own], own, axis=1).any()  # it is told with what refines it
+        beside = np.delete(lines[own], own, axis=1).any()  # it is judged with what refines it
         if not beside and not effect.possible(values, early=False):
             whiten = np.linalg.inv(half_of(covariance[own, own]))
             shift = whiten.T @ (whiten @ (effect.nearest(values, covariance[own, own]) - values))
@@ -103,7 +103,7 @@ def _by_shape(traced: Traced, i: int) -> Array:
 
 
 def _over_error(found: FinalFit) -> dict[int, float]:
-    """Size over error of every effect that was found, as it is told."""
+    """Size over error of every effect that was found; of plain friction, that of the line."""
     traced, count = found.traced, len(found.parameters)
     lines = _lines(traced, count)
     shown, spread = lines @ found.parameters, lines @ found.covariance @ lines.T
@@ -114,7 +114,7 @@ def _over_error(found: FinalFit) -> dict[int, float]:
 
 
 def _lines(traced: Traced, count: int) -> Array:
-    """Parameters as they are told, times all `count` of them."""
+    """Parameters as they are judged, times all `count` of them."""
     return friction_lines(traced, count - sum(traced.candidates[i].width for i in traced.chosen))
 
 

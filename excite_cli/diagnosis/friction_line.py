@@ -1,10 +1,9 @@
-"""First-order friction beside its refinement, as people know it.
+"""First-order friction beside its refinement: by what it is judged to be there.
 
 With f_v v + f_c sgn v + c sgn v·|v|^p in a model (or a part that grows with load or time), both
-f_v and f_c are what that term leaves: for a concave curve even negative. What data
-sheets and other fits call viscous and Coulomb friction is the straight line through all of it. So
-with the line α v + β sgn v nearest to the curve over the speeds in the data, f_v + c α and
-f_c + c β are reported, and the curved term stands for the deviation from the line.
+f_v and f_c are what that term leaves: for a concave curve even negative, or nothing. Whether there
+is viscous and Coulomb friction is a question of the straight line through all of it: with the line
+α v + β sgn v nearest to the curve over the speeds in the data, of f_v + c α and f_c + c β.
 """
 
 from collections.abc import Sequence
@@ -16,7 +15,7 @@ from excite_cli.robot.model import Array
 
 
 def friction_lines(traced: Traced, start: int) -> Array:
-    """T (k, k): parameters as reported = T @ parameters as fitted; effects begin at `start`."""
+    """T (k, k): parameters as judged = T @ parameters as fitted; effects begin at `start`."""
     starts, at = {}, start
     for i in traced.chosen:
         starts[i] = at

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.evidence import SHARED, Evidence, Gain, Schur
+from excite_cli.diagnosis.evidence import Evidence
+from excite_cli.diagnosis.schur import SHARED, Gain, Schur
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.place import Place
 from excite_cli.robot.model import Array

@@ -57,7 +57,10 @@ class NamedEffect(Shown):
     `share_of_residual` of the energy of the residual before, on the rows it touches;
     `gain` by which the error on runs left out fell; `aliases` what the data cannot tell it from.
     If it is only an approximation, `approximates` says of what. `verdict` and `removes` (by joint)
-    tell the error on sealed data without it from that with it; files of earlier versions have none.
+    tell the error on sealed data without it from that with it, all others in; `parts` (by joint) of
+    all effects add up to `before.relative_moving` − `after.relative_moving` (`error_parts`), with
+    kept inertias to `untouched` − `after` together with `inertia_parts`. Files of earlier versions
+    have none.
     """
 
     effect: EffectRecord
@@ -70,6 +73,21 @@ class NamedEffect(Shown):
     least_p: float = 0.0
     verdict: SealedVerdict | None = None
     removes: dict[str, Removed] = field(default_factory=dict)
+    parts: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class FrictionLine:
+    """Viscous and Coulomb friction of a joint as data sheets give it.
+
+    The straight line f_v v + f_c sgn v nearest to all friction of the joint over the speeds in the
+    training data; `curved` where that is more than the two terms themselves.
+    """
+
+    joint: str
+    viscous: Value
+    coulomb: Value
+    curved: bool
 
 
 @dataclass(frozen=True)
@@ -201,7 +219,8 @@ class Diagnosis(Shown):
     motion was repeated. `parts`: errors on what is sealed beside the sealed run. `traces` of the
     training data, `sealed_traces` of the sealed ones; files of earlier versions have none.
     `untouched`: errors on the sealed data of the URDF as given, with the friction of its
-    <dynamics>; None where it has no mass, or in earlier files.
+    <dynamics>; None where it has no mass, or in earlier files. `inertia_parts` (by joint): what the
+    fit of kept inertias takes off, from that on; empty where they are free.
     """
 
     config: str
@@ -233,6 +252,13 @@ class Diagnosis(Shown):
     untouched: Errors | None = None
     large_rests: tuple[LargeRest, ...] = ()
     joint_aliases: tuple[JointAlias, ...] = ()
+    friction_lines: tuple[FrictionLine, ...] = ()
+    inertia_parts: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def begins(self) -> Errors:
+        """Errors where the way begins along which effects take their parts off."""
+        return self.untouched if self.inertia_parts and self.untouched else self.before
 
     @property
     def good(self) -> bool:

@@ -10,8 +10,8 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.evidence import Schur
 from excite_cli.diagnosis.judgement import Judgement
+from excite_cli.diagnosis.schur import Schur
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Tier
 from excite_cli.effects.place import Place

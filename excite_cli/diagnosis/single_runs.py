@@ -59,7 +59,8 @@ def on_sealed_ends(
     found = []
     for active, runs in alike.items():
         own = [effect for effect, here in zip(single, active, strict=True) if here]
-        errors = on_sealed(Played(model.robot, [prepare(run, processing) for run in runs]), models)
+        played = Played(model.robot, [prepare(run, processing) for run in runs])
+        errors = on_sealed(played, *map(played.predictions, models))
         found.append(
             SealedEnds(
                 tuple(dict.fromkeys(run.id.key for run in runs)),

@@ -15,6 +15,7 @@ from excite_cli.diagnosis.records import (
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.identification.fit_words import with_deviation
 
 # Effects that explain less of the residual, and without which runs left out are hardly worse, are
 # told with few words.
@@ -71,11 +72,9 @@ def p_in_words(p: float, least: float) -> str:
 
 
 def value_in_words(name: str, value: Value) -> str:
-    """A parameter with two standard deviations; those chosen from a grid have none."""
+    """A parameter with one standard deviation; those chosen from a grid have none."""
     unit = "" if value.unit == "1" else f" {value.unit}"
-    if value.std != value.std:
-        return f"{name} {value.value:.3g}{unit}"
-    return f"{name} {value.value:.4g} ± {2 * value.std:.2g}{unit}"
+    return f"{name} {with_deviation(value.value, value.std)}{unit}"
 
 
 def covariate_in_symbols(covariate: Covariate) -> str:

@@ -20,6 +20,7 @@ class AsymmetricFriction(Effect):
     title: ClassVar = "asymmetric friction (differs between the directions)"
     signature: ClassVar = "the residual jumps when the joint reverses, to levels of unequal height"
     function_of: ClassVar = ("speed",)
+    friction: ClassVar = True
     parameters: ClassVar = (
         Parameter("forward", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),
         Parameter("backward", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),

@@ -20,10 +20,11 @@ from enum import IntEnum
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.effects.abscissa import Abscissa, Quantity, of_one_joint
-from excite_cli.effects.parameter import Parameter, Value, deviation
+from excite_cli.effects.parameter import Parameter, Value, deviation, unit_of_slider
 from excite_cli.effects.place import Place
 from excite_cli.effects.rare_sizes import nearest_of_sign, two_deviations, unlikely_distance
 from excite_cli.effects.seen import Seen
@@ -93,10 +94,12 @@ class Effect(ABC):
     refines: ClassVar[tuple[str, ...]] = ()  # kinds of one joint that must be in before it
     excludes: ClassVar[tuple[str, ...]] = ()  # other forms of its cause: a place has one of them
     same_as: ClassVar[tuple[str, ...]] = ()  # kinds that together are the same columns
-    # Kinds of which the straight line through both is reported, and of this one what deviates.
+    # Kinds that are judged by the straight line through both: of themselves they may be nothing.
     deviates_from: ClassVar[tuple[str, ...]] = ()
     # A kind of the same joint that it is the change of over the angle: never more than is there.
     varies: ClassVar[str] = ""
+    # Dry or viscous friction of its one joint: part of the straight line that data sheets give.
+    friction: ClassVar[bool] = False
     # Many robots have it: it is in the model while the noise is measured, lest it be taken for it.
     usual: ClassVar[bool] = False
 
@@ -345,6 +348,11 @@ class Effect(ABC):
             if shape.name in self.shape:
                 found[shape.name] = Value(float(self.shape[shape.name]), float("nan"), shape.unit)
         return found
+
+    def unit_on(self, unit: str, sliding: NDArray[np.bool_]) -> str:
+        """A unit of its parameters on a robot whose moved joints slide, or do not (n,)."""
+        of_joint = self.scope == "joint" and not self.carried
+        return unit_of_slider(unit) if of_joint and sliding[self.joints[0]] else unit
 
     @classmethod
     def planted(cls, value: float, others: Mapping[str, float]) -> tuple[dict[str, float], Array]:

@@ -173,6 +173,11 @@ def urdf_friction(robot: Robot) -> tuple[tuple[Effect, ...], Array]:
     return effects, np.concatenate([damping[damped], friction[dry]])
 
 
+def straight_friction(joint: int) -> tuple[Effect, ...]:
+    """Viscous and Coulomb friction of a joint: the line over speed that data sheets give."""
+    return ViscousFriction((joint,)), CoulombFriction((joint,))
+
+
 def _built(spec: EffectSpec, index: int, robot: Robot) -> list[Effect]:
     where = f"effects[{index}]"
     kind = kind_named(spec.kind, f"{where}.kind")

@@ -14,6 +14,7 @@ class CoulombFriction(Effect):
     title: ClassVar = "Coulomb friction"
     signature: ClassVar = "the residual jumps when the joint reverses and is flat in between"
     function_of: ClassVar = ("speed",)
+    friction: ClassVar = True
     parameters: ClassVar = (
         Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),
     )

@@ -33,6 +33,7 @@ class CovariateFriction(OfCovariate):
     title: ClassVar = "friction that follows a column of the log"
     signature: ClassVar = "friction is not the same where the column is high as where it is low"
     function_of: ClassVar = ("speed", "covariate")
+    friction: ClassVar = True
     parameters: ClassVar = (
         Parameter("coulomb_slope", f"N·m{PER_UNIT}", 1e-3, 10.0),
         Parameter("viscous_slope", f"N·m·s/rad{PER_UNIT}", 1e-3, 10.0),

@@ -59,6 +59,7 @@ class DahlFriction(Effect):
     title: ClassVar = "dry friction with memory (Dahl)"
     signature: ClassVar = "after a reversal friction builds up over a distance instead of jumping"
     function_of: ClassVar = ("speed",)
+    friction: ClassVar = True
     parameters: ClassVar = (
         Parameter("friction", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),
     )

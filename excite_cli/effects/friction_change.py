@@ -35,6 +35,7 @@ class FrictionChange(Effect):
     title: ClassVar = "friction that changes over the campaign"
     signature: ClassVar = "friction is not the same in later recordings as in earlier ones"
     function_of: ClassVar = ("speed", "time")
+    friction: ClassVar = True
     parameters: ClassVar = (
         Parameter("coulomb_change", "N·m", 0.02, 100.0),
         Parameter("viscous_change", "N·m·s/rad", 0.02, 100.0),

@@ -23,6 +23,7 @@ class FrictionDrift(Effect):
     title: ClassVar = "friction that drifts during a run"
     signature: ClassVar = "friction is not the same at the end of a run as at its start"
     function_of: ClassVar = ("speed", "time")
+    friction: ClassVar = True
     parameters: ClassVar = (
         Parameter("coulomb_rate", "N·m/s", 1e-3, 1.0),
         Parameter("viscous_rate", "N·m/rad", 1e-3, 1.0),

@@ -19,6 +19,7 @@ class LoadDependentFriction(Effect):
     title: ClassVar = "friction that grows with load"
     signature: ClassVar = "the jump at a reversal is the larger the more torque the joint carries"
     function_of: ClassVar = ("speed", "load")
+    friction: ClassVar = True
     parameters: ClassVar = (Parameter("ratio", "N·m/N·m", 0.005, 0.3, nonnegative=True),)
     surprise: ClassVar = 1.0
     refines: ClassVar = ("coulomb_friction",)

@@ -20,6 +20,7 @@ class NonlinearViscousFriction(Effect):
     title: ClassVar = "nonlinear viscous friction"
     signature: ClassVar = "the residual is odd in the joint's speed and bends"
     function_of: ClassVar = ("speed",)
+    friction: ClassVar = True
     parameters: ClassVar = (
         Parameter("coefficient", "N·m·(s/rad)^power", 0.05, 100.0, nonnegative=True),
     )

@@ -73,6 +73,16 @@ class Value:
     unit: str
 
 
+_OF_SLIDERS = (("(N·m)", "N"), ("N·m", "N"), ("kg·m²", "kg"), ("rad", "m"))
+
+
+def unit_of_slider(unit: str) -> str:
+    """A unit of joints that turn, on one that slides: N·m·s/rad becomes N·s/m."""
+    for turning, sliding in _OF_SLIDERS:
+        unit = unit.replace(turning, sliding)
+    return unit
+
+
 def deviation(slope: Array, covariance: Array) -> float:
     """Standard deviation of a function of the parameters with this derivative, to first order."""
     return float(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))

@@ -24,6 +24,7 @@ class PositionFriction(Effect):
     title: ClassVar = "friction that depends on the angle"
     signature: ClassVar = "the jump at a reversal depends on the angle at which the joint reverses"
     function_of: ClassVar = ("position", "speed")
+    friction: ClassVar = True
     parameters: ClassVar = (
         Parameter("cos", "N·m", 0.05, 100.0, part_of_torque=True),
         Parameter("sin", "N·m", 0.05, 100.0, part_of_torque=True),

@@ -20,6 +20,7 @@ class StribeckFriction(Effect):
     title: ClassVar = "Stribeck friction"
     signature: ClassVar = "friction is highest just after a reversal and falls with speed"
     function_of: ClassVar = ("speed",)
+    friction: ClassVar = True
     parameters: ClassVar = (
         Parameter("excess", "N·m", 0.05, 100.0, nonnegative=True, part_of_torque=True),
     )

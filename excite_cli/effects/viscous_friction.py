@@ -13,6 +13,7 @@ class ViscousFriction(Effect):
     title: ClassVar = "viscous friction"
     signature: ClassVar = "the residual is a straight line through zero over the joint's speed"
     function_of: ClassVar = ("speed",)
+    friction: ClassVar = True
     parameters: ClassVar = (Parameter("viscous", "N·m·s/rad", 0.1, 100.0, nonnegative=True),)
     surprise: ClassVar = 0.0  # every joint has it
     tier: ClassVar = Tier.EVERY_ROBOT

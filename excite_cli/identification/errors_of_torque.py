@@ -19,8 +19,10 @@ _BLOCK = 1.0  # s, longer than what noise of the filtered torque remembers
 class Errors:
     """Of the torque on the sealed data: per joint, relative (RMS/RMS) and in N·m.
 
+    `relative_moving` and `rms_moving` are of the samples in which the joint moves, all else of all.
+
     `interval` is the 95 % block-bootstrap interval of the mean relative error. `samples` per joint
-    are the filtered ones that count; files of earlier versions do not say.
+    are the filtered ones that count. Files of earlier versions do not say, nor have `rms_moving`.
     """
 
     mean_relative: float
@@ -31,6 +33,7 @@ class Errors:
     rms_raw: dict[str, float]
     interval: tuple[float, float]
     samples: dict[str, int] = field(default_factory=dict)
+    rms_moving: dict[str, float] = field(default_factory=dict)
 
     def as_data(self) -> dict[str, object]:
         """Plain values for files and JSON."""
@@ -73,8 +76,10 @@ def torque_errors(
             "are too short: record longer, or seal another run."
         )
     relative = np.where(enough, _ratio(wrong, size), np.nan)
-    relative_moving = np.where(count_moving >= FEWEST, _ratio(wrong_moving, size_moving), np.nan)
+    moves = count_moving >= FEWEST
+    relative_moving = np.where(moves, _ratio(wrong_moving, size_moving), np.nan)
     rms = np.sqrt(np.where(enough, wrong, np.nan) / np.maximum(count, 1))
+    rms_moving = np.sqrt(np.where(moves, wrong_moving, np.nan) / np.maximum(count_moving, 1))
     rms_raw = np.where(count > 0, _raw_rms(raw, raw_predicted, len(joint_names)), np.nan)
     return Errors(
         mean_relative=_mean(relative),
@@ -85,6 +90,7 @@ def torque_errors(
         rms_raw=_named(joint_names, rms_raw),
         interval=_interval(sums[0] * enough, sums[1] * enough),
         samples={name: int(each) for name, each in zip(joint_names, count, strict=True)},
+        rms_moving=_named(joint_names, rms_moving),
     )
 
 

@@ -16,6 +16,7 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.effects.base import Effect, Parameter, Signals, Value
+from excite_cli.effects.parameter import unit_of_slider
 from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
 from excite_cli.identification.covariance import Rows
 from excite_cli.identification.essential import essential_parameters
@@ -90,8 +91,11 @@ class Fit(Shown):
 
     def effect_report(self, index: int) -> dict[str, Value]:
         """Parameters of effect `index` as people know them."""
-        part = self._part(index)
-        return self.effects[index].report(self.values[part], self.covariance[part, part])
+        part, effect = self._part(index), self.effects[index]
+        found = effect.report(self.values[part], self.covariance[part, part])
+        if self.units[part] == tuple(parameter.unit for parameter in effect.parameters):
+            return found
+        return {k: replace(each, unit=unit_of_slider(each.unit)) for k, each in found.items()}
 
     def best_phi(self) -> Array:
         """φ (P,): the consistent set if there is one, else `phi`."""
@@ -232,7 +236,11 @@ def _record(
         ),
         units=(
             *(standard_parameter_unit(index) for index in base.selection),
-            *(parameter.unit for parameter in parameters),
+            *(
+                effect.unit_on(parameter.unit, robot.sliding)
+                for effect in effects
+                for parameter in effect.parameters
+            ),
         ),
         words=(*base.in_words(), *("" for _ in parameters)),
         values=linear.x,

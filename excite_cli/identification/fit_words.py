@@ -29,6 +29,24 @@ def short_number(value: float, digits: int) -> str:
     return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
 
 
+def with_deviation(value: float, std: float) -> str:
+    """`2.998 ± 0.012`: a value with one standard deviation of two digits, rounded to these.
+
+    Without a deviation that is known, three digits.
+    """
+    if not math.isfinite(std) or not math.isfinite(value):
+        return f"{value:.3g}"
+    if std <= 0.0:
+        return f"{value:.4g} ± 0"
+    last = math.floor(math.log10(float(f"{std:.1e}"))) - 1  # place of the second digit
+    largest = max(abs(value), std)
+    if not 1e-4 <= largest < 1e6:
+        digits = max(math.floor(math.log10(largest)) - last, 1)
+        return f"{value:.{digits}e} ± {std:.1e}"
+    digits = max(-last, 0)
+    return f"{round(value, -last):.{digits}f} ± {round(std, -last):.{digits}f}"
+
+
 def consistency_in_words(fit: Fit) -> str:
     """Whether a physically consistent set fits as well; empty if none was requested."""
     consistent = fit.consistent

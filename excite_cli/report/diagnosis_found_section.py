@@ -20,7 +20,7 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.report.page import Block, Section, Table, Text
 
-_COLUMNS = ("effect", "where", "size ± 2 standard deviations", "p", "share", "gain", "sealed")
+_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "share", "gain", "sealed")
 
 
 def found_section(found: Diagnosis) -> Section:

@@ -106,9 +106,6 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
     )
     if told := sealed_in_words(named):
         text += f" On sealed data: {told}."
-    if _has_a_line(found, named):
-        line = " and ".join(map(title_of, _deviates_from(named)))
-        text += f" Drawn is what deviates from the straight line of {line}."
     everything = len(found.joint_names)
     if named.aliases:
         others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]
@@ -132,20 +129,6 @@ def _jointly(named: NamedEffect, alias: JointAlias, everything: int) -> str:
         for side in (alias.others, beside)
     )
     return f" These data cannot tell it{f' with {company}' if company else ''} from: {others}."
-
-
-def _has_a_line(found: Diagnosis, named: NamedEffect) -> bool:
-    """Whether something was found on the same joint of which this is the deviation."""
-    straight = _deviates_from(named)
-    return any(
-        each.effect.kind in straight and each.effect.joints == named.effect.joints
-        for each in found.effects
-    )
-
-
-def _deviates_from(named: NamedEffect) -> tuple[str, ...]:
-    kind = catalogue().get(named.effect.kind)
-    return () if kind is None else kind.deviates_from
 
 
 def _picture(trace: EffectTrace) -> Picture:

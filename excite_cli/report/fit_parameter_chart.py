@@ -47,7 +47,7 @@ def parameter_charts(fit: Fit) -> tuple[Chart, ...]:
 
 def _chart(fit: Fit, unit: str, rows: Sequence[int], scale: Sequence[int], of: str) -> Chart:
     loose = [fit.names[i] for i in rows if not fit.identifiable[i]]
-    words = f"{len(rows)} parameters in {unit} with intervals of two standard deviations; " + (
+    words = f"{len(rows)} parameters in {unit} with one standard deviation to either side; " + (
         f"not fixed by the data: {', '.join(loose)}." if loose else "the data fix all of them."
     )
     return draw_chart(
@@ -67,7 +67,7 @@ def _draw(fit: Fit, unit: str, rows: Sequence[int], scale: Sequence[int], figure
         form = fixed_by_data(fit, i)
         marker, face, colour = _FORMS[form]
         value, std = float(fit.values[i]), float(fit.std[i])
-        ends = [value - 2 * std, value + 2 * std] if np.isfinite(std) else [low, high]
+        ends = [value - std, value + std] if np.isfinite(std) else [low, high]
         style = "solid" if fit.identifiable[i] else (0, (2, 1.5))
         axes.plot(np.clip(ends, low, high), [y, y], color=colour, lw=1.3, ls=style, zorder=1.8)
         axes.plot([value], [y], marker, color=colour, mfc=face, ms=5, mew=1.3, ls="none",
@@ -83,7 +83,7 @@ def _draw(fit: Fit, unit: str, rows: Sequence[int], scale: Sequence[int], figure
     axes.set_xlim(low, high)
     axes.grid(axis="y", color=GRID, lw=0.4)
     _stretch(axes, fit, scale)
-    axes.set_xlabel(f"value ± 2 standard deviations [{unit}]", labelpad=2)
+    axes.set_xlabel(f"value ± standard deviation [{unit}]", labelpad=2)
     legend_below(figure)
 
 
@@ -115,5 +115,5 @@ def _range(fit: Fit, rows: Sequence[int]) -> tuple[float, float]:
         value, std = float(fit.values[i]), float(fit.std[i])
         shown.append(value)
         if fit.identifiable[i] and np.isfinite(std):
-            shown += [value - 2 * std, value + 2 * std]
+            shown += [value - std, value + std]
     return limits_about(shown)

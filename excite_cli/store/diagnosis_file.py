@@ -18,6 +18,7 @@ from excite_cli.diagnosis.records import (
     Assumption,
     Diagnosis,
     EffectRecord,
+    FrictionLine,
     Information,
     JointAlias,
     LargeRest,
@@ -69,6 +70,8 @@ _LATER: dict[str, Any] = {
     "untouched": Errors | None,
     "large_rests": tuple[LargeRest, ...],
     "joint_aliases": tuple[JointAlias, ...],
+    "friction_lines": tuple[FrictionLine, ...],
+    "inertia_parts": dict[str, float],
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
@@ -184,9 +187,11 @@ def _named_joints(found: Diagnosis) -> set[str]:
     ]
     return {
         *(joint for each in records for joint in each.joints),
-        *(joint for each in found.effects for joint in each.removes),
+        *(joint for each in found.effects for joint in (*each.removes, *each.parts)),
+        *found.inertia_parts,
         *(each.joint for each in found.unexplained),
         *(each.joint for each in found.large_rests),
+        *(each.joint for each in found.friction_lines),
         *(joint for each in found.rounds for joint in each.residual),
     }
 

@@ -6,9 +6,9 @@ import pytest
 from excite_cli.config.load import load_spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.evidence import ABSORBED
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.records import Absorbed
+from excite_cli.diagnosis.schur import ABSORBED
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.armature import Armature

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.evidence import ABSORBED, Evidence
+from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.schur import ABSORBED
 from excite_cli.effects.armature import Armature
 from tests.diagnosis.explicit_data import (
     FIXED,

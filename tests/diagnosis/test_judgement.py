@@ -8,10 +8,10 @@ import pytest
 from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.evidence import Gain
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
+from excite_cli.diagnosis.schur import Gain
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect

@@ -48,13 +48,11 @@ class TestTx40:
 
     def test_friction_on_all_joints_as_published(self, diagnosed: Any) -> None:
         answer = diagnosed("tx40", "tx40.h5")
-        viscous, coulomb = named(answer, "viscous_friction"), named(answer, "coulomb_friction")
-        for k, value in enumerate(self.VISCOUS):
-            found = viscous[(f"joint_{k + 1}",)]["viscous"]["value"]
-            assert found == pytest.approx(value, rel=0.1)
-        for k, value in enumerate(self.COULOMB):
-            found = coulomb[(f"joint_{k + 1}",)]["coulomb"]["value"]
-            assert found == pytest.approx(value, rel=0.1)
+        lines = {line["joint"]: line for line in answer["friction_lines"]}
+        for name, values in (("viscous", self.VISCOUS), ("coulomb", self.COULOMB)):
+            for k, value in enumerate(values):
+                found = lines[f"joint_{k + 1}"][name]["value"]
+                assert found == pytest.approx(value, rel=0.1)
 
     def test_the_coupled_wrist(self, diagnosed: Any) -> None:
         coupled = named(diagnosed("tx40", "tx40.h5"), "coupled_friction")

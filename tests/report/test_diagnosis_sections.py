@@ -120,7 +120,7 @@ def test_every_chart_says_its_finding_in_figures_and_labels_its_axes(
 def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) -> None:
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert chart.title == "Viscous friction: elbow"
-    assert "2 ± 0.2 N·m·s/rad" in chart.caption
+    assert "2.00 ± 0.10 N·m·s/rad" in chart.caption
     assert "cannot tell it from: nonlinear viscous friction on elbow" in chart.caption
     assert "99.8%" in chart.alternative or "99.9%" in chart.alternative
     assert "speed [rad/s]" in chart.svg

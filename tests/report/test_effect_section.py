@@ -12,8 +12,6 @@ from excite_cli.report.effect_section import effect_section
 from excite_cli.report.page import Charts
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 
-DEVIATES = "what deviates from the straight line of viscous friction and Coulomb friction"
-
 
 @pytest.fixture(scope="module")
 def plain() -> Diagnosis:
@@ -48,16 +46,6 @@ def test_any_kind_may_ask_for_the_seconds_in_which_it_shows(
     monkeypatch.setattr(catalogue()["spring"], "picture", "window")
     (chart,) = charts(plain, ["spring"])
     assert "s everything else leaves torque" in chart.alternative
-
-
-@pytest.mark.parametrize(("kind", "curved"), [("stribeck_friction", True), ("spring", False)])
-def test_a_curve_beside_straight_friction_says_what_is_drawn(
-    plain: Diagnosis, kind: str, curved: bool
-) -> None:
-    assert DEVIATES not in charts(plain, [kind])[0].caption
-    own, straight = charts(plain, [kind, "coulomb_friction"])[-2:]
-    assert (DEVIATES in own.caption) == curved
-    assert DEVIATES not in straight.caption
 
 
 @pytest.mark.parametrize("quantity", ["speed", "velocity"])

@@ -1,0 +1,137 @@
+"""What a candidate adds to a model: the Schur complement of its Gram matrix.
+
+With N = G_SS + Λ (Λ the precision of a prior on the inertial columns, if there is one) and a
+candidate c, the Schur complement Z = G_cc − G_cS N⁻¹ G_Sc is what is left of the candidate once the
+model has taken its part, z = G_cy − G_cS N⁻¹ G_Sy its product with the residual, and zᵀ Z⁻¹ z the
+energy that it explains: χ² distributed for unit noise if the candidate is not there.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.robot.model import Array
+
+# A direction of a candidate of which less than this share is left is absorbed by the model.
+ABSORBED = 1e-3
+# Members of a model are judged beside each other: friction terms share nearly all they have.
+SHARED = 1e-7
+_COLLINEAR = 1e-9
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What one candidate adds to a model: χ², degrees of freedom, share of it that is left."""
+
+    chi2: float
+    dof: int
+    left: float
+
+
+class CandidateBases:
+    """Columns of candidates in the normalised Gram matrix of all."""
+
+    def __init__(self, total: Array, fixed: int, blocks: list[NDArray[np.intp]]) -> None:
+        self.total, self.fixed, self.blocks = total, fixed, blocks
+        self._bases: dict[int, Array] = {}
+
+    def basis(self, candidates: Sequence[int]) -> Array:
+        """Orthonormal directions (p, d) of candidates' columns, without collinear ones."""
+        if len(candidates) > 1:
+            return self._basis(np.concatenate([self.blocks[i] for i in candidates]))
+        if candidates[0] not in self._bases:
+            self._bases[candidates[0]] = self._basis(self.blocks[candidates[0]])
+        return self._bases[candidates[0]]
+
+    def _basis(self, at: NDArray[np.intp]) -> Array:
+        values, vectors = np.linalg.eigh(self.total[np.ix_(at, at)])
+        kept = values > _COLLINEAR * values[-1]
+        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
+
+
+class Schur:
+    """Candidates after projection off a model.
+
+    It knows the candidates and not the evidence, which keeps it: in a circle, all the matrices of a
+    pass would outlive it.
+    """
+
+    def __init__(self, candidates: CandidateBases, left: Array, cross: Array) -> None:
+        self._candidates, self.matrix, self.cross = candidates, left, cross
+
+    def gain(self, *candidates: int, absorbed: float = ABSORBED) -> Gain:
+        """χ², degrees of freedom and the largest share left of candidates taken together.
+
+        Directions of which less than `absorbed` is left do not count.
+        """
+        e = self._candidates
+        at = np.concatenate([e.blocks[i] for i in candidates]) - e.fixed
+        return gain_of_columns(
+            e, self.matrix[at[:, None], at], self.cross[at], candidates, absorbed
+        )
+
+    @cached_property
+    def singles(self) -> "Singles":
+        """Gain of every candidate alone."""
+        return Singles(self._candidates, self.matrix, self.cross)
+
+    def pair_chi2(self, first: Array, second: Array) -> Array:
+        """χ² of pairs of candidates of one column each, without those that are collinear."""
+        e = self._candidates
+        i = np.array([e.blocks[k][0] for k in first]) - e.fixed
+        j = np.array([e.blocks[k][0] for k in second]) - e.fixed
+        ii, jj, ij = self.matrix[i, i], self.matrix[j, j], self.matrix[i, j]
+        zi, zj = self.cross[i], self.cross[j]
+        determinant = ii * jj - ij**2
+        found = (zi**2 * jj - 2 * zi * zj * ij + zj**2 * ii) / np.maximum(determinant, 1e-300)
+        return np.where(determinant > 1e-3 * ii * jj, found, 0.0)
+
+
+def gain_of_columns(
+    e: CandidateBases, left: Array, cross: Array, candidates: Sequence[int], absorbed: float
+) -> Gain:
+    """Of candidates of which (p, p) is `left`, with the products (p,) with the residual."""
+    if len(cross) == 1:
+        column = int(e.blocks[candidates[0]][0])
+        own, product = float(left[0, 0]), float(cross[0])
+        share = own / max(float(e.total[column, column]), 1e-300)
+        if share < absorbed:
+            return Gain(0.0, 0, share)
+        return Gain(product * product / own, 1, share)
+    basis = e.basis(candidates)
+    shares, turned = np.linalg.eigh(basis.T @ left @ basis)
+    alive = shares > absorbed
+    if not alive.any():
+        return Gain(0.0, 0, float(shares.max(initial=0.0)))
+    z = turned[:, alive].T @ (basis.T @ cross)
+    return Gain(float(np.sum(z**2 / shares[alive])), int(alive.sum()), float(shares[-1]))
+
+
+class Singles:
+    """Gains of single candidates: those with one column all at once, the others when asked for."""
+
+    def __init__(self, candidates: CandidateBases, matrix: Array, cross: Array) -> None:
+        e = candidates
+        self._given = candidates, matrix, cross
+        self._first = np.array([b[0] for b in e.blocks], dtype=int) - e.fixed
+        self._single = np.array([len(b) == 1 for b in e.blocks])
+        own = np.diag(e.total)[e.fixed : -1][self._first]
+        left = np.diag(matrix)[self._first]
+        self._share = left / np.maximum(own, 1e-300)
+        alive = self._share > ABSORBED
+        products = cross[self._first]
+        self._chi2 = np.where(alive, products**2 / np.where(alive, left, 1.0), 0.0)
+        self._others: dict[int, Gain] = {}
+
+    def __getitem__(self, i: int) -> Gain:
+        if self._single[i]:
+            share = float(self._share[i])
+            return Gain(float(self._chi2[i]), int(share > ABSORBED), share)
+        if i not in self._others:
+            e, matrix, cross = self._given
+            at = e.blocks[i] - e.fixed
+            self._others[i] = gain_of_columns(e, matrix[at[:, None], at], cross[at], (i,), ABSORBED)
+        return self._others[i]

@@ -1,0 +1,95 @@
+"""A diagnosis as plain values, for `--json`."""
+
+from dataclasses import asdict
+from typing import Any
+
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, SealedEnds
+from excite_cli.diagnosis.words import approximation_in_words, no_gain_in_words
+
+
+def _record(record: EffectRecord) -> dict[str, Any]:
+    found: dict[str, Any] = {"kind": record.kind, "joints": list(record.joints)}
+    if record.shape:
+        found["shape"] = dict(record.shape)
+    if record.runs:
+        found["runs"] = list(record.runs)
+    if record.covariate:
+        found["covariate"] = record.covariate
+    return found
+
+
+def _named(named: NamedEffect, runs: list[str]) -> dict[str, Any]:
+    return {
+        "kind": named.effect.kind,
+        "joints": list(named.effect.joints),
+        **({"link": named.effect.link} if named.effect.link else {}),
+        **({"covariate": named.effect.covariate} if named.effect.covariate else {}),
+        "parameters": {name: asdict(value) for name, value in named.parameters.items()},
+        "p_value": named.p_value,
+        "share_of_residual": named.share_of_residual,
+        "gain": named.gain,
+        "alias_set": [_record(alias) for alias in named.aliases],
+        "runs": list(named.effect.runs) or runs,
+        "verdict": named.verdict,
+        "removes": {joint: asdict(each) for joint, each in named.removes.items()},
+        "parts": dict(named.parts),
+    }
+
+
+def _ends(part: SealedEnds) -> dict[str, Any]:
+    return {
+        "runs": list(part.runs),
+        "effects": [_record(effect) for effect in part.effects],
+        "before": part.before.as_data(),
+        "after": part.after.as_data(),
+    }
+
+
+def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
+    """The answer for `--json`."""
+    runs = [str(name) for name in found.processing.get("runs", [])]
+    return {
+        "good": found.good,
+        "reason": no_gain_in_words(found),
+        "declared_effects": [_record(record) for record in found.declared],
+        "effects": [_named(each, runs) for each in found.named],
+        "approximations": [
+            {**_named(each, runs), "stands_for": approximation_in_words(each.approximates)}
+            for each in found.effects
+            if each.approximates
+        ],
+        "joint_aliases": [
+            {name: [_record(one) for one in side] for name, side in vars(each).items()}
+            for each in found.joint_aliases
+        ],
+        "friction_lines": [asdict(each) for each in found.friction_lines],
+        "absorbed": [
+            {"kind": a.kind, "joints": list(a.joints), "by": list(a.by), "left": a.left}
+            for a in found.absorbed
+        ],
+        "unexplained": [
+            {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
+            for each in found.unexplained
+        ],
+        "large_rests": [
+            {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
+            for each in found.large_rests
+        ],
+        "error": {
+            "sealed_run": found.sealed_run,
+            "before": found.before.as_data(),
+            "after": found.after.as_data(),
+            "parts": [_ends(part) for part in found.parts],
+            "begins": "untouched" if found.inertia_parts else "before",
+            "inertia_parts": dict(found.inertia_parts),
+            "untouched": found.untouched.as_data() if found.untouched else None,
+            "samples": found.after.samples,
+        },
+        "assumed": [asdict(each) for each in found.assumed],
+        "noise_floor": found.noise_floor,
+        "next_experiment": experiment,
+        "findings": [asdict(finding) for finding in found.findings],
+        "processing": found.processing,
+        "rounds": [asdict(each) for each in found.rounds],
+        "seconds": found.seconds,
+    }

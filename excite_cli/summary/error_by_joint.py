@@ -1,0 +1,150 @@
+"""Errors of every joint on sealed data: of the URDF, refitted, with effects; who took it off."""
+
+from collections.abc import Iterator
+from math import isnan
+
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.cells import figure, percent
+from excite_cli.summary.named_effects import what_and_where
+from excite_cli.summary.noise_floor import floor_cells, floor_columns
+
+_OFF = "taken off by (pp)"
+_NAMED, _WORTH = 3, 0.1  # parts that are named in a row, and the least share of the fall
+_LINES = ("URDF untouched", "declared model, refitted", "with effects")
+
+
+def error_tables(found: Diagnosis, verbose: bool) -> Parts:
+    """Where the joints move; with `verbose` every part, and another table over all samples."""
+    if not verbose:
+        return [_moving(found)]
+    return [_moving(found), *([_parts(found)] if _has_parts(found) else []), _all_samples(found)]
+
+
+def _moving(found: Diagnosis) -> Table:
+    errors = _errors(found)
+    rows = [
+        (
+            joint,
+            *(percent(each.relative_moving[joint]) for each in errors.values()),
+            *(figure(_rms(each)[joint]) for each in (found.before, found.after)),
+            unit,
+            *floor_cells(found.noise_floor, joint),
+            *([_taken_off(found, joint)] if _has_parts(found) else []),
+        )
+        for joint, unit in _joints(found)
+    ]
+    off = [_OFF] if _has_parts(found) else []
+    floor = floor_columns(found.noise_floor)
+    mean = ("mean", *(percent(each.mean_relative_moving) for each in errors.values()))
+    mean += ("",) * (3 + len(floor) + len(off))
+    return Table(
+        f"Error of the torque on data never used ({found.sealed_run}), where joints move",
+        ("joint", *errors, "RMS before", "RMS after", "unit", *floor, *off),
+        (*rows, mean),
+        left=("joint", "unit"),
+        words=tuple(off),
+        bold=(len(rows),),
+        parted=(len(rows),),
+    )
+
+
+def _errors(found: Diagnosis) -> dict[str, Errors]:
+    """By heads of columns."""
+    known = {"URDF": found.untouched, "before": found.before, "after": found.after}
+    return {head: each for head, each in known.items() if each is not None}
+
+
+def _joints(found: Diagnosis) -> Iterator[tuple[str, str]]:
+    """And their units of torque; files of earlier versions do not say whether joints slide."""
+    units = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
+    return zip(found.joint_names, units, strict=True)
+
+
+def _rms(error: Errors) -> dict[str, float]:
+    """Where joints move; files of earlier versions know it over all samples only."""
+    return error.rms_moving or error.rms
+
+
+def _has_parts(found: Diagnosis) -> bool:
+    return any(each.parts for each in found.effects)
+
+
+def parts_of(found: Diagnosis, joint: str) -> list[tuple[str, float]]:
+    """Who takes how much off the relative error of a joint, most first; all of it, to rounding."""
+    everything = len(found.joint_names)
+    parts = [
+        (
+            each.effect.kind
+            if each.effect.joints == (joint,) and not each.effect.runs and not each.effect.covariate
+            else what_and_where(each.effect, everything),
+            each.parts.get(joint, 0.0),
+        )
+        for each in found.effects
+    ]
+    if found.inertia_parts:
+        parts.append(("fit of the inertias", found.inertia_parts[joint]))
+    return sorted(parts, key=lambda part: -abs(part[1]))
+
+
+def _taken_off(found: Diagnosis, joint: str) -> str:
+    """The largest parts in words, and the rest in one number."""
+    parts = parts_of(found, joint)
+    whole = sum(part for _, part in parts)
+    if isnan(whole):
+        return "-"
+    named = [p for p in parts if abs(p[1]) >= _WORTH * abs(whole)][:_NAMED]
+    rest = parts[len(named) :]
+    told = [f"{name} {100 * part:.1f}" for name, part in named]
+    if rest:
+        told.append(f"{len(rest)} others {100 * sum(part for _, part in rest):.1f}")
+    return ", ".join(told)
+
+
+def _parts(found: Diagnosis) -> Table:
+    """Every joint's way from the first error to the last, by all that takes a part off."""
+    begin, unit = found.begins, dict(_joints(found))
+    rows: list[tuple[str, ...]] = []
+    parted: list[int] = []
+    for joint in found.joint_names:
+        parts = parts_of(found, joint)
+        relative, rms = begin.relative_moving[joint], _rms(begin)[joint]
+        if isnan(relative):
+            continue
+        scale = rms / relative if relative else 0.0
+        parted.append(len(rows))
+        first = _LINES[0] if found.inertia_parts else _LINES[1]
+        rows.append((joint, first, f"{100 * relative:.2f}", figure(rms), unit[joint]))
+        rows += [
+            ("", name, f"{-100 * part:+.2f}", f"{-part * scale:+.3g}", unit[joint])
+            for name, part in parts
+        ]
+        after = found.after.relative_moving[joint]
+        rows.append(("", _LINES[2], f"{100 * after:.2f}", figure(after * scale), unit[joint]))
+    return Table(
+        "What each takes off (mean over orders of joining, each fitted anew), where joints move",
+        ("joint", "model", "error, %", "RMS", "unit"),
+        tuple(rows),
+        left=("joint", "unit"),
+        words=("model",),
+        parted=tuple(parted[1:]),
+    )
+
+
+def _all_samples(found: Diagnosis) -> Table:
+    errors = _errors(found)
+    rows = [
+        (joint, *(percent(each.relative[joint]) for each in errors.values()),
+         *(figure(each.rms[joint]) for each in (found.before, found.after)), unit)
+        for joint, unit in _joints(found)
+    ]  # fmt: skip
+    mean = ("mean", *(percent(each.mean_relative) for each in errors.values()), "", "", "")
+    return Table(
+        f"The same over all samples ({found.sealed_run}), standing joints too",
+        ("joint", *errors, "RMS before", "RMS after", "unit"),
+        (*rows, mean),
+        left=("joint", "unit"),
+        bold=(len(rows),),
+        parted=(len(rows),),
+    )

@@ -1,0 +1,110 @@
+"""Tables of the effects that a diagnosis named, and what each cannot be told from."""
+
+from collections.abc import Sequence
+
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord, JointAlias, NamedEffect
+from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.words import (
+    SMALL_SHARE,
+    approximation_in_words,
+    is_small,
+    other_name_of,
+    p_in_words,
+    place_in_words,
+    sealed_in_words,
+    value_in_words,
+)
+from excite_cli.shown.table import Parts, Table
+
+_SIZE = "size ± std"
+
+
+def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
+    """The named effects, small ones in one line, and what each cannot be told from."""
+    everything = len(found.joint_names)
+    ranked = sorted(found.named, key=lambda each: -each.share_of_residual)
+    small = [each for each in ranked if is_small(each)]
+    if verbose or len(small) < 2:  # a line about one is no shorter than the one
+        small = []
+    shown = [each for each in ranked if not any(each is other for other in small)]
+    parts: Parts = [effect_table(shown, everything, verbose)]
+    if small:
+        listed = ", ".join(
+            what_and_where(each.effect, everything)
+            + f" ({each.verdict})" * (each.verdict is SealedVerdict.NOT_CONFIRMED)
+            for each in small
+        )
+        parts.append(
+            f"and {len(small)} small ones (each below {SMALL_SHARE:.1%}): {listed} "
+            "(--verbose: sizes)"
+        )
+    parts += [text for named in found.named for text in other_names(named, everything)]
+    return [*parts, *(_joint_alias(each, everything) for each in found.joint_aliases)]
+
+
+def effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -> Table:
+    """Effects with their sizes and evidence; `everything`: how many joints the robot has."""
+    rows = tuple(
+        (
+            named.effect.kind,
+            place_in_words(named.effect, everything),
+            "\n".join(value_in_words(name, value) for name, value in named.parameters.items()),
+            *([p_in_words(named.p_value, named.least_p)] if verbose else []),
+            f"{named.share_of_residual:.2%}",
+            sealed_in_words(named),
+        )
+        for named in shown
+    )
+    return Table(
+        "What the declared model lacks (share: of the residual; sealed: change of error)",
+        ("effect", "where", _SIZE, *(["p"] if verbose else []), "share", "sealed"),
+        rows,
+        left=("effect",),
+        words=("where", _SIZE, "sealed"),
+    )
+
+
+def other_names(named: NamedEffect, everything: int) -> list[str]:
+    """What it cannot be told from: by these data, and by any."""
+    what, found = what_and_where(named.effect, everything), []
+    if named.aliases:
+        others = ", ".join(what_and_where(alias, everything) for alias in named.aliases)
+        found.append(f"{what} cannot be told from: {others}")
+    if same := other_name_of(named.effect.kind):
+        found.append(f"{what} is the same torque as {' and '.join(same)}")
+    return found
+
+
+def _joint_alias(alias: JointAlias, everything: int) -> str:
+    named, others = (
+        " with ".join(what_and_where(one, everything) for one in side)
+        for side in (alias.named, alias.others)
+    )
+    return f"{named} cannot be told from: {others}"
+
+
+def what_and_where(record: EffectRecord, everything: int) -> str:
+    """`spring on axis_2`."""
+    return f"{record.kind} on {place_in_words(record, everything)}"
+
+
+def approximation_table(found: Diagnosis) -> Table:
+    """Effects that lower the error but only come near what is there, and what that may be."""
+    rows = tuple(
+        (
+            each.effect.kind,
+            place_in_words(each.effect, len(found.joint_names)),
+            "\n".join(value_in_words(name, value) for name, value in each.parameters.items()),
+            f"{each.share_of_residual:.2%}",
+            sealed_in_words(each),
+            approximation_in_words(each.approximates) if each.approximates else "",
+        )
+        for each in found.approximations
+    )
+    return Table(
+        "Approximations: they come near something else that is there",
+        ("effect", "where", _SIZE, "share", "sealed", "stands for"),
+        rows,
+        left=("effect",),
+        words=("where", _SIZE, "sealed", "stands for"),
+    )
