@@ -38,6 +38,7 @@ def diagnose(
     output: str | Path | None = None,
     apply: str | Path | None = None,
     apply_unconfirmed: bool = False,
+    smallest: bool = False,
     overwrite: bool = False,
     progress: Callable[[str, int], None] = lambda text, done: None,
     tell: Tell = log_note,
@@ -46,7 +47,8 @@ def diagnose(
 
     `data` are measured data or their files. Written to `output` (HDF5) if that is given, and the
     config with what was found to `apply` (YAML); where the error on sealed data did not fall
-    (`good` is false), that is written with `apply_unconfirmed` only.
+    (`good` is false), that is written with `apply_unconfirmed` only. `smallest`: with the fewest
+    effects that are within one standard error of the best on runs left out.
 
     Returns
     -------
@@ -63,6 +65,8 @@ def diagnose(
     """
     if apply_unconfirmed and apply is None:
         raise ConfigError("--apply-unconfirmed says nothing without --apply NEW.yaml.")
+    if smallest and apply is None:
+        raise ConfigError("--smallest says nothing without --apply NEW.yaml.")
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, "apply": apply}, overwrite, inputs):
         dataset = dataset_of(problem, data, tell)
@@ -79,7 +83,7 @@ def diagnose(
         if output is not None:
             write_diagnosis(Path(output), found)
         if apply is not None and (found.good or apply_unconfirmed):
-            save_config(apply, problem, found, unconfirmed=True)
+            save_config(apply, problem, found, unconfirmed=True, smallest=smallest)
         elif apply is not None:
             tell(Note(Level.WARNING, f"{apply} is not written. {_HAVE_IT}"))
         return found
@@ -87,9 +91,16 @@ def diagnose(
 
 @checked()
 def save_config(
-    path: str | Path, problem: Problem | Case, found: Diagnosis, *, unconfirmed: bool = False
+    path: str | Path,
+    problem: Problem | Case,
+    found: Diagnosis,
+    *,
+    unconfirmed: bool = False,
+    smallest: bool = False,
 ) -> None:
     """Write the config with the effects that a diagnosis found: `excite diagnose --apply`.
+
+    `smallest`: with the fewest that are within one standard error of the best (`found.smallest`).
 
     Raises
     ------
@@ -101,5 +112,5 @@ def save_config(
     if not (found.good or unconfirmed):
         raise ConfigError(f"{path} is not written. {no_gain_in_words(found)} {_HAVE_IT}")
     refuse_inputs_as_outputs({"path": Path(path)}, inputs_of(problem))
-    text = found_config(problem.spec, problem.folder, found, Path(path))
+    text = found_config(problem.spec, problem.folder, found, Path(path), smallest)
     write_text_atomically(Path(path), text)

@@ -37,6 +37,14 @@ def diagnose(
             rich_help_panel=OUTPUT,
         ),
     ] = False,
+    smallest: Annotated[
+        bool,
+        typer.Option(
+            "--smallest",
+            help="Let --apply write the fewest effects that are about as good as the best.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = False,
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,
     as_json: options.Json = False,
@@ -70,6 +78,7 @@ def diagnose(
             output=output,
             apply=apply,
             apply_unconfirmed=apply_unconfirmed,
+            smallest=smallest,
             overwrite=overwrite,
             progress=line,
             tell=terminal.tell,

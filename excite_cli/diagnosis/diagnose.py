@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,14 @@ import numpy as np
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import joint_aliases
-from excite_cli.diagnosis.before_after import Played, both_models, on_sealed
+from excite_cli.diagnosis.before_after import FittedModel, Played, both_models, on_sealed
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
-from excite_cli.diagnosis.error_parts import INERTIAS, error_parts
+from excite_cli.diagnosis.error_parts import error_parts
+from excite_cli.diagnosis.error_path import error_path
 from excite_cli.diagnosis.final_fit import final_fit
 from excite_cli.diagnosis.information import information_of
 from excite_cli.diagnosis.large_rest import large_rests
@@ -26,10 +28,13 @@ from excite_cli.diagnosis.records import (
     Approximation,
     Assumption,
     Diagnosis,
+    EffectRecord,
+    ErrorPath,
     JointAlias,
     Unexplained,
 )
-from excite_cli.diagnosis.rounds import rounds_of
+from excite_cli.diagnosis.rounds import order_of, rounds_of
+from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors, sealed_errors
 from excite_cli.diagnosis.sealed_verdict import worth_on_sealed
 from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
 from excite_cli.diagnosis.traces import Dependence, Traces
@@ -37,7 +42,7 @@ from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.regressor import standard_parameter_names, standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
@@ -119,9 +124,10 @@ def diagnose(
     sealed_part = on_sealed(played, *told)
     from_urdf = model.prior is not None and bool(sealed_part.by_urdf)
     begin = sealed_part.by_urdf if from_urdf else told[0]
-    taken_off = error_parts(played, model, traced, models[1], begin, told[1], from_urdf)
+    errors = sealed_errors(played, model, traced, models[1], begin, told[1], from_urdf)
+    taken_off = error_parts(traced, errors)
     worth = worth_on_sealed(Played(robot, [*kept, *ends]), model, traced, models[1])
-    named, rivals = named_effects(
+    named, candidates, rivals = named_effects(
         model,
         traced,
         (parameters, covariance),
@@ -138,7 +144,7 @@ def diagnose(
         fingerprint=robot.fingerprint(),
         joint_names=robot.joint_names,
         base_names=base.in_words(),
-        declared=tuple(record_of(e, robot.joint_names) for e in model.declared),
+        declared=_declared(model, models[1], robot),
         effects=named,
         absorbed=_absorbed(model, traced),
         unexplained=tuple(unexplained),
@@ -171,9 +177,28 @@ def diagnose(
         untouched=sealed_part.untouched,
         large_rests=rests,
         joint_aliases=_joint_aliases(traced, doubts, robot),
+        inertia_names=standard_parameter_names(robot),
+        path=_path(traced, candidates, errors),
         inertia_parts=_by_joint(robot, taken_off[INERTIAS]) if from_urdf else {},
         friction_lines=data_sheet_lines(model, traced, parameters, covariance),
     )
+
+
+def _path(traced: Traced, candidates: Sequence[int], errors: SealedErrors) -> ErrorPath | None:
+    """The error against the number of effects; `candidates` in the order in which they are told."""
+    order = order_of(traced)
+    found = error_path(traced, order, errors)
+    return found and replace(found, effects=tuple(candidates.index(i) for i in order))
+
+
+def _declared(model: Model, after: FittedModel, robot: Robot) -> tuple[EffectRecord, ...]:
+    """The declared effects, with the values that they have beside those that were found."""
+    records, at = [], 0
+    for effect in model.declared:
+        values = after.values[at : at + len(effect.parameters)]
+        records.append(record_of(effect, robot.joint_names, values))
+        at += len(values)
+    return tuple(records)
 
 
 def _by_joint(robot: Robot, values: Array) -> dict[str, float]:

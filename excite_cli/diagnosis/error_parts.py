@@ -1,58 +1,29 @@
 """What each effect takes off the error on sealed data, so that the parts of a joint add up.
 
-The error of a joint where it moves is e(S) = RMS(τ − τ_S) / RMS(τ) of the model with the effects S,
-fitted anew to the training data. Joining in one order, each effect takes off e(S) − e(S ∪ i); what
-it takes off depends on who came before. So its part is the mean over many orders (Shapley 1953),
-drawn with a fixed seed, in which what an effect refines joins before it. In every order the steps
-add up to e(∅) − e(all), and so do the parts.
-
-Where the URDF's inertias are kept within their uncertainty, the way begins at the URDF untouched,
-and their fit is one of those who join: they take up much of what an effect holds.
-
-e(S) is quadratic in the fitted parameters, so it needs no samples: Gram matrices of the sealed
-columns (at the final model) and torque. What these do not hold at the ends, robust weights and
-columns that look at the model's own torque, joins in equal steps; so e(∅) and e(all) are the errors
-that are reported, to rounding.
+Joining the model in one order, each effect takes off e(S) − e(S ∪ i), e the error of a joint where
+it moves (`sealed_errors`); what it takes off depends on who came before. So its part is the mean
+over many orders (Shapley 1953), drawn with a fixed seed, in which what an effect refines joins
+before it. In every order the steps add up to e(∅) − e(all), and so do the parts.
 """
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.before_after import FittedModel, Played
-from excite_cli.diagnosis.declared_model import Model
-from excite_cli.diagnosis.prediction import Prediction
+from excite_cli.diagnosis.sealed_errors import SealedErrors
 from excite_cli.diagnosis.tracing import Traced
-from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.identification.averages import apply
-from excite_cli.identification.errors_of_torque import FEWEST
-from excite_cli.identification.regression import effect_columns, seen_of, with_effects
 from excite_cli.robot.model import Array
 
-INERTIAS = -1  # their fit, among those who join
 _ORDERS, _SEED = 100, 20251123
 
 
-def error_parts(
-    played: Played,
-    model: Model,
-    traced: Traced,
-    after: FittedModel,
-    first: Sequence[Prediction],
-    last: Sequence[Prediction],
-    from_urdf: bool,
-) -> dict[int, Array]:
-    """Per chosen candidate, what it takes off the relative error of each joint (n,), moving.
+def error_parts(traced: Traced, errors: SealedErrors) -> dict[int, Array]:
+    """Per who joins, what it takes off the relative error of each joint (n,) where it moves.
 
-    `first` are the predictions for the sealed runs `played` at the beginning of the way, `last`
-    those of the model `after`. Where they are the untouched URDF's (`from_urdf`), `INERTIAS` has a
-    part. NaN for joints that hardly move there.
+    `errors` of the sealed data. NaN for joints that hardly move there.
     """
-    fit = _Fit(model, traced, from_urdf)
-    errors = _Errors(fit, _grams(played, model, fit, after, first, last))
-    who = fit.who
-    parts = {i: np.zeros(model.robot.n) for i in who}
-    orders = list(_orders(traced, who))
+    parts = {i: np.zeros(errors.joints) for i in errors.who}
+    orders = list(_orders(traced, errors.who))
     for order in orders:
         before = errors.of(())
         for count, i in enumerate(order, start=1):
@@ -75,98 +46,3 @@ def _orders(traced: Traced, who: Sequence[int]) -> Iterator[list[int]]:
             waiting.remove(ready)
             order.append(ready)
         yield order
-
-
-class _Errors:
-    """Errors of models with any of those who join, from a Gram matrix (or none) per joint.
-
-    Its columns: those of all parameters, candidates in ascending order; what the fit lacks of the
-    reported prediction, first and last; the torque that is known without a fit; the torque.
-    """
-
-    def __init__(self, fit: "_Fit", grams: Sequence[Array | None]) -> None:
-        self._fit, self._grams = fit, grams
-        self._known: dict[tuple[int, ...], Array] = {}
-
-    def of(self, joined: tuple[int, ...]) -> Array:
-        """Relative errors (n,) where joints move, of the model with some, in ascending order."""
-        if joined not in self._known:
-            share = len(joined) / max(len(self._fit.who), 1)
-            weights = np.array([*-self._fit.parameters(joined), share - 1.0, -share, -1.0, 1.0])
-            self._known[joined] = np.array([_error(gram, weights) for gram in self._grams])
-        return self._known[joined]
-
-
-class _Fit:
-    """Fits of models with any of those `who` join, to the training data."""
-
-    def __init__(self, model: Model, traced: Traced, from_urdf: bool) -> None:
-        self._evidence = traced.judge.plain
-        held = model.prior is not None and from_urdf
-        self._held = len(model.prior.mean) if model.prior is not None and held else 0
-        chosen = sorted(traced.chosen)
-        self.who = (*([INERTIAS] if held else []), *chosen)
-        self.effects = (*model.declared, *(traced.candidates[i].effect for i in chosen))
-        fixed = traced.data.declared[0].shape[2]
-        ends = fixed + np.cumsum([0, *(traced.candidates[i].width for i in chosen)])
-        self._at = {i: np.arange(*ends[k : k + 2]) for k, i in enumerate(chosen)}
-        self._fixed, self._count = fixed, int(ends[-1])
-
-    def parameters(self, joined: tuple[int, ...]) -> Array:
-        """All parameters (k,); zero of effects that did not join, and of inertias if kept."""
-        chosen = tuple(i for i in joined if i != INERTIAS)
-        at = [np.arange(self._fixed), *(self._at[i] for i in chosen)]
-        found = np.zeros(self._count)
-        if INERTIAS in joined or not self._held:
-            found[np.concatenate(at).astype(np.intp)] = self._evidence.solve(chosen)
-        else:
-            at[0] = at[0][self._held :]
-            found[np.concatenate(at).astype(np.intp)] = self._evidence.solve_beside(
-                chosen, self._held
-            )
-        return found
-
-
-def _error(gram: Array | None, weights: Array) -> float:
-    if gram is None:
-        return float("nan")
-    return float(np.sqrt(max(float(weights @ gram @ weights), 0.0) / gram[-1, -1]))
-
-
-def _grams(
-    played: Played,
-    model: Model,
-    fit: _Fit,
-    after: FittedModel,
-    first: Sequence[Prediction],
-    last: Sequence[Prediction],
-) -> list[Array | None]:
-    """Per joint, of the sealed samples in motion; None where there are too few."""
-    n = model.robot.n
-    solved = [fit.parameters(each) for each in ((), fit.who)]
-    blocks: list[list[Array]] = [[] for _ in range(n)]
-    for run, *told in zip(played.runs, first, last, strict=True):
-        body = RigidBody(model.robot, after.phi, run.q, run.v, run.a)
-        signals = with_effects(seen_of(run, body), after.effects, after.values)
-        inertial, own = body.regressor, effect_columns(fit.effects, signals)
-        torques = [run.averaged_torque(each.torque) for each in told]
-        for j in range(n):
-            kept = run.valid[:, j] & run.moving[:, j]
-            of_inertias = apply(run.valid_averages[j], inertial[:, j])[kept]
-            known = np.zeros(len(of_inertias))
-            if model.prior is None:
-                of_inertias = of_inertias[:, model.base.selection]
-            else:
-                known = of_inertias @ model.prior.mean
-            columns = np.hstack([of_inertias, apply(run.valid_averages[j], own[:, j])[kept]])
-            lacks = [
-                torque[kept, j] - known - columns @ x
-                for torque, x in zip(torques, solved, strict=True)
-            ]
-            blocks[j].append(np.column_stack([columns, *lacks, known, run.tau[kept, j]]))
-    grams: list[Array | None] = []
-    for block in blocks:
-        rows = np.concatenate(block)
-        enough = len(rows) >= FEWEST and bool(rows[:, -1].any())
-        grams.append(rows.T @ rows if enough else None)
-    return grams

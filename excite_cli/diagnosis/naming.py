@@ -26,8 +26,8 @@ def named_effects(
     worth: Mapping[int, Worth],
     taken_off: Mapping[int, Array],
     links: Sequence[str],
-) -> tuple[tuple[NamedEffect, ...], list[Rival]]:
-    """Named effects with values, evidence and aliases; and the aliases with their own values.
+) -> tuple[tuple[NamedEffect, ...], tuple[int, ...], list[Rival]]:
+    """Named effects, the strongest first; their candidates; aliases with their own values.
 
     Sizes are the coefficients of the model that predicts: summed up, they are its torque. `fitted`:
     all parameters and their covariance; `taken_off`: what each takes off the joints' errors.
@@ -94,4 +94,4 @@ def named_effects(
             )
         )
     order = np.argsort([-each for each in strength], kind="stable")
-    return tuple(found[k] for k in order), rivals
+    return tuple(found[k] for k in order), tuple(traced.chosen[k] for k in order), rivals

@@ -1,6 +1,8 @@
 """What a diagnosis found, as frozen records."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isnan, nan
 from typing import Any
 
 from excite_cli.diagnosis.covariate import Covariate
@@ -39,6 +41,12 @@ class Approximation:
     kind: str = ""
 
 
+def mean_of_known(by_joint: Mapping[str, float]) -> float:
+    """Mean over the joints of which it is known; NaN if of none."""
+    known = [each for each in by_joint.values() if not isnan(each)]
+    return sum(known) / len(known) if known else nan
+
+
 @dataclass(frozen=True)
 class Removed:
     """By how much an effect lowers a joint's error on sealed data: relative, and RMS [N·m]."""
@@ -74,6 +82,30 @@ class NamedEffect(Shown):
     verdict: SealedVerdict | None = None
     removes: dict[str, Removed] = field(default_factory=dict)
     parts: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def takes_off(self) -> float:
+        """Its part of the fall of the mean relative error on sealed data; NaN if not known."""
+        return mean_of_known(self.parts)
+
+
+@dataclass(frozen=True)
+class ErrorPath:
+    """Errors with the first 0, 1, … K effects in the order of the rounds; `effects` in this order.
+
+    `left_out` (K + 1): on training runs left out, as a share of the declared model's; `sealed`
+    (K + 1): relative, where joints move, mean over them. `best` has the least of the former;
+    `smallest` is the first number within one `standard_error` of it. `enough`: runs left out to
+    rely on that.
+    """
+
+    left_out: tuple[float, ...]
+    sealed: tuple[float, ...]
+    standard_error: float
+    best: int
+    smallest: int
+    enough: bool
+    effects: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -220,7 +252,9 @@ class Diagnosis(Shown):
     training data, `sealed_traces` of the sealed ones; files of earlier versions have none.
     `untouched`: errors on the sealed data of the URDF as given, with the friction of its
     <dynamics>; None where it has no mass, or in earlier files. `inertia_parts` (by joint): what the
-    fit of kept inertias takes off, from that on; empty where they are free.
+    fit of kept inertias takes off, from that on; empty where they are free. `path`: the error
+    against the number of effects; None where there are none. `inertia_names`: of `phi`, as
+    `m[elbow]`; `declared` effects have the values that belong to it.
     """
 
     config: str
@@ -254,6 +288,15 @@ class Diagnosis(Shown):
     joint_aliases: tuple[JointAlias, ...] = ()
     friction_lines: tuple[FrictionLine, ...] = ()
     inertia_parts: dict[str, float] = field(default_factory=dict)
+    path: ErrorPath | None = None
+    inertia_names: tuple[str, ...] = ()
+
+    @property
+    def smallest(self) -> tuple[NamedEffect, ...]:
+        """The effects of the smallest model that is within one standard error of the best."""
+        if self.path is None:
+            return self.effects
+        return tuple(self.effects[i] for i in self.path.effects[: self.path.smallest])
 
     @property
     def begins(self) -> Errors:

@@ -15,16 +15,12 @@ _SUSPECTS = 5
 
 def rounds_of(traced: Traced, joint_names: Sequence[str]) -> tuple[Round, ...]:
     """Rounds in the order of what each effect saves; the last one finds nothing more."""
-    judge = traced.judge
-    chosen: list[int] = []
+    order = order_of(traced)
     found: list[Round] = []
-    left = set(traced.chosen)
-    while True:
+    for count in range(len(order) + 1):
+        chosen = order[:count]
+        best = order[count] if count < len(order) else None
         residual = _residual(traced, chosen)
-        schur = judge.white.schur(chosen)
-        best: int | None = None
-        if left:
-            best = max(left, key=lambda i: schur.singles[i].chi2 - judge.price(i, 1))
         suspects = _suspects(traced, chosen, best, joint_names)
         verdict = "nothing more" if best is None else _words(traced, best, joint_names)
         found.append(
@@ -35,10 +31,18 @@ def rounds_of(traced: Traced, joint_names: Sequence[str]) -> tuple[Round, ...]:
                 verdict,
             )
         )
-        if best is None:
-            return tuple(found)
-        chosen.append(best)
-        left.discard(best)
+    return tuple(found)
+
+
+def order_of(traced: Traced) -> list[int]:
+    """The chosen candidates, first what saves most, then what saves most beside it, and so on."""
+    order: list[int] = []
+    judge, left = traced.judge, set(traced.chosen)
+    while left:
+        singles = judge.white.schur(order).singles
+        order.append(max(left, key=lambda i: singles[i].chi2 - judge.price(i, 1)))
+        left.remove(order[-1])
+    return order
 
 
 def _words(traced: Traced, i: int, joint_names: Sequence[str]) -> str:

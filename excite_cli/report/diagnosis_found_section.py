@@ -1,7 +1,9 @@
 """The verdict of a diagnosis: what was found, what it only comes near, what cannot be tested."""
 
 from collections.abc import Sequence
+from math import isnan
 
+from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.change_words import changes_in_words
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import (
@@ -20,7 +22,7 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.report.page import Block, Section, Table, Text
 
-_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "share", "gain", "sealed")
+_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "takes off", "gain", "sealed")
 
 
 def found_section(found: Diagnosis) -> Section:
@@ -39,9 +41,10 @@ def found_section(found: Diagnosis) -> Section:
                 title="What the declared model lacks",
                 right=frozenset({3, 4, 5}),
                 note=(
-                    "share: of the energy of the residual before; gain: by which the error on runs "
-                    "left out falls; sealed: whether the effect lowers the error on sealed data, "
-                    "and the change there in percentage points."
+                    "takes off: its part of the fall of the mean error on sealed data, averaged "
+                    "over orders of joining, so that all rows add up to it; gain: by which the "
+                    "error on runs left out falls; sealed: whether the effect lowers the error on "
+                    "sealed data beside all others, and the change there in percentage points."
                 ),
             )
         )
@@ -89,14 +92,14 @@ def _lead(found: Diagnosis) -> str:
         ", ".join(dict.fromkeys(title_of(record.kind) for record in found.declared))
         or "no effect beside the rigid bodies"
     )
+    answer = f"{answer_in_words(found)} " if found.good else ""  # else it is said before all
     if not found.effects:
-        nothing = "Nothing is missing: " if found.complete else "More is left than noise: "
         return (
-            f"{nothing}with {declared} declared, no effect of the catalogue passes. The "
-            f"mean error of the torque on {found.sealed_run}, which took no part, is "
-            f"{found.after.mean_relative_moving:.2%} where joints move."
+            f"{answer}With {declared} declared, the mean error of the torque on "
+            f"{found.sealed_run}, which took no part, is {found.after.mean_relative_moving:.2%} "
+            "where joints move."
         )
-    return f"Declared: {declared}. {verdict(found)}"
+    return f"{answer}Declared: {declared}. {verdict(found)}"
 
 
 def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:
@@ -114,11 +117,15 @@ def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:
         place_in_words(named.effect, everything),
         "; ".join(value_in_words(name, value) for name, value in named.parameters.items()),
         p_in_words(named.p_value, named.least_p),
-        f"{named.share_of_residual:.2%}",
+        _points(named.takes_off),
         f"{named.gain:.1%}",
         sealed_in_words(named) or "–",
         others or "–",
     )
+
+
+def _points(share: float) -> str:
+    return "–" if isnan(share) else f"{100 * share:.2f} pp"
 
 
 def _absorbed(found: Diagnosis) -> Table:

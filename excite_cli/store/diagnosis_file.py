@@ -18,6 +18,7 @@ from excite_cli.diagnosis.records import (
     Assumption,
     Diagnosis,
     EffectRecord,
+    ErrorPath,
     FrictionLine,
     Information,
     JointAlias,
@@ -72,6 +73,8 @@ _LATER: dict[str, Any] = {
     "joint_aliases": tuple[JointAlias, ...],
     "friction_lines": tuple[FrictionLine, ...],
     "inertia_parts": dict[str, float],
+    "path": ErrorPath | None,
+    "inertia_names": tuple[str, ...],
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],

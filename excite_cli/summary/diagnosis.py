@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.change_words import changes_in_words
 from excite_cli.diagnosis.next_motion import next_experiment
 from excite_cli.diagnosis.records import (
@@ -17,11 +18,9 @@ from excite_cli.diagnosis.words import (
     counted,
     covariate_in_symbols,
     ends_in_words,
-    no_gain_in_words,
     p_in_words,
     place_in_words,
     rests_in_words,
-    untouched_in_words,
     value_in_words,
 )
 from excite_cli.identification.fit_words import above_the_floor
@@ -30,6 +29,7 @@ from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.diagnosis_data import diagnosis_data
 from excite_cli.summary.error_by_joint import error_tables
+from excite_cli.summary.error_path import path_parts
 from excite_cli.summary.friction_lines import friction_table
 from excite_cli.summary.named_effects import (
     approximation_table,
@@ -63,7 +63,7 @@ def diagnosis_answer(
 
 def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
     """What is missing, absorbed or unexplained, before and after."""
-    parts: Parts = [] if found.good else [no_gain_in_words(found)]
+    parts: Parts = [answer_in_words(found)]
     if verbose:
         parts.append(_data_in_words(found))
         parts += [_round_table(found, each) for each in found.rounds]
@@ -73,9 +73,6 @@ def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
         parts.append(approximation_table(found))
     parts += [friction_table(found.friction_lines)] if _has_curves(found) else []
     parts += changes_in_words(found)
-    if not found.effects:
-        whole = "Nothing is missing: no" if found.complete else "No"
-        parts.append(f"{whole} effect of the catalogue passes.")
     parts += _absorbed(found) + _unexplained(found)
     parts += [text for texts in rests_in_words(found) for text in texts]
     parts += error_tables(found, verbose)
@@ -83,6 +80,7 @@ def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
     parts += [above] if above else []
     parts += [ends_in_words(part) for part in found.parts]
     parts += [f"Assumed: {assumption_in_words(each)}" for each in found.assumed]
+    parts += path_parts(found, verbose)
     parts.append(_verdict(found))
     return parts
 
@@ -164,7 +162,7 @@ def _verdict(found: Diagnosis) -> str:
         f"{found.before.mean_relative_moving:.2%} → "
         f"{found.after.mean_relative_moving:.2%} where joints move (over all samples "
         f"{found.after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}). "
-        f"{untouched_in_words(found)} {found.seconds:.1f} s."
+        f"{found.seconds:.1f} s."
     )
 
 

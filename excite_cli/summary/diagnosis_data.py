@@ -3,6 +3,7 @@
 from dataclasses import asdict
 from typing import Any
 
+from excite_cli.diagnosis.answer_words import answer_in_words, shares
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, SealedEnds
 from excite_cli.diagnosis.words import approximation_in_words, no_gain_in_words
 
@@ -45,12 +46,24 @@ def _ends(part: SealedEnds) -> dict[str, Any]:
     }
 
 
+def _model(found: Diagnosis) -> dict[str, Any]:
+    """All numbers of the model that predicts: inertias, and every effect, declared or found."""
+    named = dict(zip(found.inertia_names, map(float, found.phi), strict=False))
+    records = [*found.declared, *(each.effect for each in found.effects)]
+    return {
+        "inertias": named,
+        "effects": [{**_record(each), "values": list(each.values)} for each in records],
+    }
+
+
 def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
     """The answer for `--json`."""
     runs = [str(name) for name in found.processing.get("runs", [])]
     return {
         "good": found.good,
         "reason": no_gain_in_words(found),
+        "answer": answer_in_words(found),
+        "shares": shares(found),
         "declared_effects": [_record(record) for record in found.declared],
         "effects": [_named(each, runs) for each in found.named],
         "approximations": [
@@ -63,6 +76,7 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             for each in found.joint_aliases
         ],
         "friction_lines": [asdict(each) for each in found.friction_lines],
+        "model": _model(found),
         "absorbed": [
             {"kind": a.kind, "joints": list(a.joints), "by": list(a.by), "left": a.left}
             for a in found.absorbed
@@ -85,6 +99,7 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             "untouched": found.untouched.as_data() if found.untouched else None,
             "samples": found.after.samples,
         },
+        "path": asdict(found.path) if found.path else None,
         "assumed": [asdict(each) for each in found.assumed],
         "noise_floor": found.noise_floor,
         "next_experiment": experiment,

@@ -12,6 +12,8 @@ from excite_cli.summary.noise_floor import floor_cells, floor_columns
 
 _OFF = "taken off by (pp)"
 _NAMED, _WORTH = 3, 0.1  # parts that are named in a row, and the least share of the fall
+_NOTHING = 5e-4
+_SEEN = 0.005  # share of the first error below which a part is one of the others
 _LINES = ("URDF untouched", "declared model, refitted", "with effects")
 
 
@@ -94,6 +96,8 @@ def _taken_off(found: Diagnosis, joint: str) -> str:
     whole = sum(part for _, part in parts)
     if isnan(whole):
         return "-"
+    if max(abs(part) for _, part in parts) < _NOTHING:
+        return ""
     named = [p for p in parts if abs(p[1]) >= _WORTH * abs(whole)][:_NAMED]
     rest = parts[len(named) :]
     told = [f"{name} {100 * part:.1f}" for name, part in named]
@@ -116,9 +120,12 @@ def _parts(found: Diagnosis) -> Table:
         parted.append(len(rows))
         first = _LINES[0] if found.inertia_parts else _LINES[1]
         rows.append((joint, first, f"{100 * relative:.2f}", figure(rms), unit[joint]))
+        worth = [p for p in parts if abs(p[1]) >= _SEEN * abs(relative)]
+        if rest := parts[len(worth) :]:
+            worth.append((f"{len(rest)} others", sum(part for _, part in rest)))
         rows += [
             ("", name, f"{-100 * part:+.2f}", f"{-part * scale:+.3g}", unit[joint])
-            for name, part in parts
+            for name, part in worth
         ]
         after = found.after.relative_moving[joint]
         rows.append(("", _LINES[2], f"{100 * after:.2f}", figure(after * scale), unit[joint]))

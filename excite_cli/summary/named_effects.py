@@ -15,6 +15,7 @@ from excite_cli.diagnosis.words import (
     value_in_words,
 )
 from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.cells import points
 
 _SIZE = "size ± std"
 
@@ -50,14 +51,14 @@ def effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -
             place_in_words(named.effect, everything),
             "\n".join(value_in_words(name, value) for name, value in named.parameters.items()),
             *([p_in_words(named.p_value, named.least_p)] if verbose else []),
-            f"{named.share_of_residual:.2%}",
+            points(named.takes_off),
             sealed_in_words(named),
         )
         for named in shown
     )
     return Table(
-        "What the declared model lacks (share: of the residual; sealed: change of error)",
-        ("effect", "where", _SIZE, *(["p"] if verbose else []), "share", "sealed"),
+        "What the declared model lacks (takes off: its part of the fall of the mean error)",
+        ("effect", "where", _SIZE, *(["p"] if verbose else []), "takes off", "sealed"),
         rows,
         left=("effect",),
         words=("where", _SIZE, "sealed"),
@@ -95,7 +96,7 @@ def approximation_table(found: Diagnosis) -> Table:
             each.effect.kind,
             place_in_words(each.effect, len(found.joint_names)),
             "\n".join(value_in_words(name, value) for name, value in each.parameters.items()),
-            f"{each.share_of_residual:.2%}",
+            points(each.takes_off),
             sealed_in_words(each),
             approximation_in_words(each.approximates) if each.approximates else "",
         )
@@ -103,7 +104,7 @@ def approximation_table(found: Diagnosis) -> Table:
     )
     return Table(
         "Approximations: they come near something else that is there",
-        ("effect", "where", _SIZE, "share", "sealed", "stands for"),
+        ("effect", "where", _SIZE, "takes off", "sealed", "stands for"),
         rows,
         left=("effect",),
         words=("where", _SIZE, "sealed", "stands for"),

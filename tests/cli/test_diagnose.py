@@ -3,7 +3,7 @@
 import json
 import re
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,8 @@ import h5py
 import pytest
 import yaml
 
+from excite_cli.api.diagnosing import save_config
+from excite_cli.api.loading import load_case
 from excite_cli.config.load import load_spec
 from excite_cli.store.diagnosis_file import read_diagnosis
 from tests.cli.conftest import Run
@@ -24,7 +26,7 @@ QUICK = ("--set", f"diagnosis.kinds={KINDS}")
 PLANTED = {("coulomb_friction", "elbow"), ("viscous_friction", "shoulder_pitch")}
 E_NAMES = {
     "mean_relative", "mean_relative_moving", "relative", "relative_moving", "rms", "rms_raw",
-    "samples",
+    "rms_moving", "samples",
 }  # fmt: skip
 
 
@@ -101,6 +103,27 @@ def test_json_is_as_promised(outcome: Outcome) -> None:
             assert list(error[when][name]) == JOINTS
 
 
+def test_parts_add_up_to_the_fall_of_the_error(outcome: Outcome) -> None:
+    answer, error = outcome.answer, outcome.answer["error"]
+    assert (error["begins"], error["inertia_parts"]) == ("before", {})
+    for joint in JOINTS:
+        parts = sum(each["parts"][joint] for each in answer["effects"])
+        before, after = (error[when]["relative_moving"][joint] for when in ("before", "after"))
+        assert parts == pytest.approx(before - after, abs=1e-9)
+    (elbow,) = (each for each in answer["effects"] if each["joints"] == ["elbow"])
+    assert max(elbow["parts"], key=lambda joint: elbow["parts"][joint]) == "elbow"
+    assert answer["shares"] == {"friction": pytest.approx(1.0)}
+    assert answer["answer"].startswith("Friction is nearly all your model misses, most on ")
+    assert answer["path"]["smallest"] == 2
+
+
+def test_lines_of_data_sheets_are_told_of_every_joint_with_friction(outcome: Outcome) -> None:
+    lines = {each["joint"]: each for each in outcome.answer["friction_lines"]}
+    assert set(lines) == {"elbow", "shoulder_pitch"}
+    assert lines["elbow"]["coulomb"]["value"] == pytest.approx(2.0, rel=0.05)
+    assert lines["shoulder_pitch"]["viscous"]["value"] == pytest.approx(3.0, rel=0.05)
+
+
 def test_what_was_planted_is_found_with_its_size(outcome: Outcome) -> None:
     answer = outcome.answer
     assert named(answer) == PLANTED
@@ -125,6 +148,35 @@ def test_the_file_holds_the_same_diagnosis(outcome: Outcome) -> None:
     assert "smoke_arm.urdf" in found.config
     assert found.versions
     assert answer["output"] == {"diagnosis": str(outcome.file), "config": str(outcome.better)}
+
+
+def test_the_smallest_model_is_written_alone(outcome: Outcome, tmp_path: Path) -> None:
+    """From a path of which one effect is enough."""
+    found = read_diagnosis(outcome.file)
+    assert found.path is not None
+    one = replace(found, path=replace(found.path, smallest=1))
+    case, path = load_case(SMOKE), tmp_path / "smallest.yaml"
+    save_config(path, case, one, smallest=True)
+    spec = load_spec(path)
+    assert spec.effects is not None
+    first = found.effects[found.path.effects[0]].effect
+    assert [(e.kind, e.joints) for e in spec.effects] == [(first.kind, first.joints)]
+    text = path.read_text()
+    assert text.startswith("# 1 of 2 effects found by `excite diagnose`")
+    assert f"{found.path.sealed[1]:.2%} after" in text
+    save_config(path, case, one)
+    whole = load_spec(path).effects
+    assert whole is not None
+    assert len(whole) == 2
+
+
+def test_the_model_is_there_in_numbers(outcome: Outcome) -> None:
+    model = outcome.answer["model"]
+    assert len(model["inertias"]) == 10 * len(JOINTS)
+    assert {"m[elbow]", "Izz[slide]"} <= set(model["inertias"])
+    values = {(each["kind"], *each["joints"]): each["values"] for each in model["effects"]}
+    assert set(values) == PLANTED
+    assert values["coulomb_friction", "elbow"] == [pytest.approx(2.0, rel=0.05)]
 
 
 def test_the_new_config_needs_nothing_more(outcome: Outcome, excite: Program) -> None:
@@ -248,9 +300,10 @@ def test_what_is_not_confirmed_is_written_where_that_is_asked_for(
     spec = load_spec(better)
     assert spec.effects is not None
     assert ("coulomb_friction", "elbow") in {(e.kind, e.joints[0]) for e in spec.effects}
-    alone = excite("diagnose", SMOKE, mended, *QUICK, "--apply-unconfirmed")
-    assert alone.returncode == 2
-    assert "says nothing without --apply" in alone.stderr
+    for option in ("--apply-unconfirmed", "--smallest"):
+        alone = excite("diagnose", SMOKE, mended, *QUICK, option)
+        assert alone.returncode == 2
+        assert f"{option} says nothing without --apply" in alone.stderr
 
 
 @pytest.mark.parametrize("command", ["diagnose", "identify"])

@@ -1,0 +1,170 @@
+"""The answer in a few sentences: what the model misses, how much stays, and what to do next.
+
+Shares are of the fall of the error on sealed data, mean over the joints that move there: the parts
+of the effects (`error_parts`) add up to it.
+"""
+
+from collections.abc import Sequence
+from math import isnan
+
+from excite_cli.diagnosis.covariate import Covariate
+from excite_cli.diagnosis.records import Diagnosis, FrictionLine, NamedEffect, mean_of_known
+from excite_cli.diagnosis.words import (
+    counted,
+    covariate_in_words,
+    no_gain_in_words,
+    place_in_words,
+    title_of,
+)
+from excite_cli.effects.catalogue import catalogue, straight_friction
+from excite_cli.effects.parameter import Value
+from excite_cli.identification.fit_words import short_number
+
+FRICTION = "friction"
+INERTIAS = "inertias"
+_WORTH_SAYING = 0.05  # share of the fall
+_NEARLY_ALL = 0.95
+_MOST = 3  # effects beside friction that get a clause of their own
+_PREFIXES = ((1e6, "M"), (1e3, "k"))
+
+
+def answer_in_words(found: Diagnosis) -> str:
+    """One to four sentences, from the records alone."""
+    if not found.good:
+        return no_gain_in_words(found)
+    said = [_missing(found), *_left(found)]
+    return " ".join(sentence for sentence in said if sentence)
+
+
+def shares(found: Diagnosis) -> dict[str, float]:
+    """Of the fall: friction, every other kind that was found, the fit of kept inertias."""
+    parts: dict[str, float] = {}
+    for each in found.effects:
+        group = FRICTION if _rubs(each) else each.effect.kind
+        parts[group] = parts.get(group, 0.0) + each.takes_off
+    if found.inertia_parts:
+        parts[INERTIAS] = mean_of_known(found.inertia_parts)
+    fall = sum(parts.values())
+    if not fall > 0.0:  # nor where parts are not known
+        return {}
+    ranked = sorted(parts.items(), key=lambda item: -item[1])
+    return {group: part / fall for group, part in ranked}
+
+
+def _rubs(named: NamedEffect) -> bool:
+    """Whether it is friction: plain, or what refines or couples that."""
+    kind = catalogue().get(named.effect.kind)
+    plain = {each.kind for each in straight_friction(0)}
+    return kind is not None and (kind.friction or bool(plain & set(kind.refines)))
+
+
+def _missing(found: Diagnosis) -> str:
+    """What the model misses, by share; of each the place where it is most."""
+    if not found.effects:
+        if found.complete:
+            return f"Nothing is missing: the declared model leaves {_percent(found)} of the torque."
+        return f"No effect of the catalogue explains what is left ({_percent(found)})."
+    of_all = shares(found)
+    said = []
+    if of_all.get(FRICTION, 0.0) >= _WORTH_SAYING:
+        whole = of_all[FRICTION] > _NEARLY_ALL
+        what = "nearly all" if whole else f"{of_all[FRICTION]:.0%} of what"
+        said.append(f"{_friction(found)} is {what} your model misses{_most_friction(found)}.")
+    others = [each for each in found.named if not _rubs(each)]
+    fall = _fall(found)
+    worth = [each for each in others if each.takes_off >= _WORTH_SAYING * fall]
+    worth.sort(key=lambda each: -each.takes_off)
+    for each in worth[:_MOST]:
+        share = each.takes_off / fall
+        said.append(f"{_place(each, found)} lacks {_sized(each)}, {share:.0%} of what it misses).")
+    if not said:
+        listed = counted(len(found.effects), "effect")
+        said.append(f"Your model misses {listed}, none of them large.")
+    elif of_all.get(INERTIAS, 0.0) >= _WORTH_SAYING:
+        said.append(f"Inertias off the URDF's are {of_all[INERTIAS]:.0%}.")
+    return " ".join(said)
+
+
+def _percent(found: Diagnosis) -> str:
+    return f"{100 * found.after.mean_relative_moving:.2g} %"
+
+
+def _fall(found: Diagnosis) -> float:
+    fall = found.begins.mean_relative_moving - found.after.mean_relative_moving
+    return fall if fall > 0.0 else float("inf")
+
+
+def _friction(found: Diagnosis) -> str:
+    """`Friction`, or the one effect that it is."""
+    rubbing = [each for each in found.effects if _rubs(each)]
+    if len(rubbing) > 1:
+        return "Friction"
+    title = title_of(rubbing[0].effect.kind)
+    size = _prefixed(next(iter(rubbing[0].parameters.values())))
+    return f"{title[:1].upper()}{title[1:]} of {_place(rubbing[0], found)} ({size})"
+
+
+def _most_friction(found: Diagnosis) -> str:
+    """`, most on joint_1 (48 N·m at 1 rad/s)`, by the line of the joint with most of it."""
+    lines = [line for line in found.friction_lines if line.joint in _joints_of(found)]
+    if not lines or sum(map(_rubs, found.effects)) < 2:
+        return ""
+    most = max(lines, key=lambda line: abs(_at_one(line)))
+    speed = "1 m/s" if "/m" in most.viscous.unit else "1 rad/s"
+    size = short_number(_at_one(most), 2)
+    return f", most on {most.joint} ({size} {most.coulomb.unit} at {speed})"
+
+
+def _joints_of(found: Diagnosis) -> set[str]:
+    return {joint for each in found.effects if _rubs(each) for joint in each.effect.joints}
+
+
+def _at_one(line: FrictionLine) -> float:
+    return line.viscous.value + line.coulomb.value
+
+
+def _place(named: NamedEffect, found: Diagnosis) -> str:
+    where = place_in_words(named.effect, len(found.joint_names))
+    return where[:1].upper() + where[1:] if where.startswith("all ") else where
+
+
+def _sized(named: NamedEffect) -> str:
+    """`a spring (6.9 kN·m/rad`: its kind with its first number; the bracket stays open."""
+    title = title_of(named.effect.kind)
+    article = "" if title[:1].isupper() else "an " if title[0] in "aeiou" else "a "
+    if title.startswith(("friction", "viscous", "backlash", "dry")):
+        article = ""
+    first = next(iter(named.parameters.values()))
+    return f"{article}{title} ({_prefixed(first)}"
+
+
+def _prefixed(value: Value) -> str:
+    """Two digits, with k and M where that is shorter."""
+    for scale, prefix in _PREFIXES:
+        if abs(value.value) >= scale and value.unit.startswith("N"):
+            return f"{short_number(value.value / scale, 2)} {prefix}{value.unit}"
+    unit = "" if value.unit == "1" else f" {value.unit}"
+    return f"{short_number(value.value, 2)}{unit}"
+
+
+def _left(found: Diagnosis) -> list[str]:
+    """What stays: on average, where most, and what it depends on."""
+    if not found.effects:
+        return []
+    after = found.after.relative_moving
+    known = {joint: each for joint, each in after.items() if not isnan(each)}
+    if not known:
+        return []
+    worst = max(known, key=lambda joint: known[joint])
+    text = f"{_percent(found)} of the torque stays"
+    if known[worst] > 1.5 * found.after.mean_relative_moving:
+        text += f", most on {worst} ({100 * known[worst]:.2g} %)"
+    said = [text + "."]
+    for each in found.unexplained[:1]:
+        said.append(f"What stays on {each.joint} depends on {_listed(each.depends_on)}.")
+    return said
+
+
+def _listed(quantities: Sequence[Covariate]) -> str:
+    words = [covariate_in_words(each) for each in quantities]
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -1,0 +1,123 @@
+"""The answer in sentences is made of the records, and says what is largest first."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from excite_cli.diagnosis.answer_words import answer_in_words, shares
+from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.records import (
+    Diagnosis,
+    EffectRecord,
+    FrictionLine,
+    NamedEffect,
+    Unexplained,
+)
+from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.effects.base import Value
+from tests.diagnosis.synthetic_diagnosis import make_diagnosis
+
+SPRING = {"stiffness": Value(6912.0, 30.0, "N·m/rad"), "preload": Value(10.0, 1.0, "N·m")}
+RUBS = {"coulomb": Value(2.0, 0.1, "N·m")}
+
+
+@pytest.fixture(scope="module")
+def plain() -> Diagnosis:
+    return make_diagnosis()
+
+
+def effect(
+    kind: str, joint: str, values: Mapping[str, Value], parts: Mapping[str, float]
+) -> NamedEffect:
+    record = EffectRecord(kind, (joint,), {}, tuple(v.value for v in values.values()))
+    return NamedEffect(
+        record, dict(values), 1e-9, 0.4, 0.2, verdict=SealedVerdict.CONFIRMED, parts=dict(parts)
+    )
+
+
+def found(plain: Diagnosis, *effects: NamedEffect, left: tuple[float, float] = (0.02, 0.1),
+          **changes: Any) -> Diagnosis:  # fmt: skip
+    """Errors fall from 50 % to those `left` on the elbow and on the slide."""
+    names = plain.joint_names
+    after = dict.fromkeys(names, left[0]) | {"slide": left[1]}
+    mean = sum(after.values()) / len(names)
+    before = replace(
+        plain.before, mean_relative=0.6, mean_relative_moving=0.5,
+        relative_moving=dict.fromkeys(names, 0.5),
+    )  # fmt: skip
+    end = replace(plain.after, mean_relative=mean, mean_relative_moving=mean, relative_moving=after)
+    return replace(
+        plain, effects=effects, before=before, after=end, unexplained=(), large_rests=(), **changes
+    )
+
+
+def everywhere(plain: Diagnosis, part: float) -> dict[str, float]:
+    return dict.fromkeys(plain.joint_names, part)
+
+
+def test_friction_is_one_share_and_the_rest_is_told_by_place(plain: Diagnosis) -> None:
+    line = FrictionLine("elbow", Value(3.0, 0.1, "N·m·s/rad"), Value(45.0, 0.1, "N·m"), curved=True)
+    answer = found(
+        plain,
+        effect("coulomb_friction", "elbow", RUBS, everywhere(plain, 0.2)),
+        effect("coupled_friction", "elbow", RUBS, everywhere(plain, 0.1)),
+        effect("spring", "shoulder_pitch", SPRING, everywhere(plain, 0.1)),
+        effect("armature", "elbow", {"inertia": Value(0.1, 0.01, "kg·m²")}, everywhere(plain, 0.0)),
+        friction_lines=(line,),
+    )
+    assert shares(answer) == pytest.approx({"friction": 0.75, "spring": 0.25, "armature": 0.0})
+    fall = 0.5 - answer.after.mean_relative_moving
+    assert answer_in_words(answer) == (
+        "Friction is 75% of what your model misses, most on elbow (48 N·m at 1 rad/s). "
+        f"shoulder_pitch lacks a spring at the joint (6.9 kN·m/rad, {0.1 / fall:.0%} of what it "
+        "misses). 3.6 % of the torque stays, most on slide (10 %)."
+    )
+
+
+def test_one_effect_is_told_by_its_name(plain: Diagnosis) -> None:
+    answer = found(plain, effect("load_dependent_friction", "elbow", RUBS, everywhere(plain, 0.4)))
+    assert answer_in_words(answer).startswith(
+        "Friction that grows with load of elbow (2 N·m) is nearly all your model misses. "
+    )
+
+
+def test_what_stays_is_told_with_what_it_depends_on(plain: Diagnosis) -> None:
+    rest = Unexplained(
+        "elbow", (Covariate("position", "elbow", Aspect.HISTORY), Covariate("time")), 0.3
+    )
+    answer = found(plain, effect("coulomb_friction", "elbow", RUBS, everywhere(plain, 0.4)),
+                   left=(0.1, 0.1))  # fmt: skip
+    told = answer_in_words(replace(answer, unexplained=(rest,)))
+    assert told.endswith(
+        "10 % of the torque stays. What stays on elbow depends on history of angle of elbow and "
+        "time."
+    )
+
+
+def test_a_fit_of_kept_inertias_has_its_share(plain: Diagnosis) -> None:
+    spring = effect("spring", "elbow", SPRING, everywhere(plain, 0.3))
+    begin = found(plain, spring)
+    answer = replace(
+        begin, untouched=begin.before, inertia_parts=everywhere(plain, 0.1)
+    )  # fmt: skip
+    assert shares(answer) == pytest.approx({"spring": 0.75, "inertias": 0.25})
+    assert "Inertias off the URDF's are 25%." in answer_in_words(answer)
+
+
+def test_nothing_and_nothing_good(plain: Diagnosis) -> None:
+    assert answer_in_words(found(plain)).startswith("Nothing is missing: ")
+    rest = Unexplained("elbow", (Covariate("time"),), 0.3)
+    some = replace(found(plain), unexplained=(rest,))
+    assert answer_in_words(some).startswith("No effect of the catalogue explains what is left")
+    worse = found(
+        plain, effect("spring", "elbow", SPRING, everywhere(plain, -0.1)), left=(0.7, 0.7)
+    )
+    assert answer_in_words(worse).startswith("The sealed error did not fall: ")
+    assert shares(worse) == {}
+
+
+def test_files_of_earlier_versions_know_no_parts(plain: Diagnosis) -> None:
+    assert shares(plain) == {}
+    assert answer_in_words(plain).startswith("Your model misses 1 effect, none of them large.")

@@ -1,0 +1,125 @@
+"""Parts of the error on sealed data: they add up, and what is refined joins first."""
+
+from itertools import combinations
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from excite_cli.diagnosis.error_parts import error_parts
+from excite_cli.diagnosis.error_path import error_path
+from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors
+from excite_cli.robot.model import Array
+
+JOINTS = 2
+
+
+class Errors(SimpleNamespace):
+    """Errors of every set of those who join, made up."""
+
+    def of(self, joined: tuple[int, ...]) -> Array:
+        assert list(joined) == sorted(joined)
+        return self.table[joined]
+
+
+def made_up(who: tuple[int, ...], seed: int = 0) -> Any:
+    rng = np.random.default_rng(seed)
+    sets = [chosen for size in range(len(who) + 1) for chosen in combinations(sorted(who), size)]
+    return Errors(who=who, joints=JOINTS, table={each: rng.uniform(0, 1, JOINTS) for each in sets})
+
+
+def traced(count: int, parents: dict[int, tuple[int, ...]] | None = None) -> Any:
+    known = parents or {}
+    return SimpleNamespace(
+        judge=SimpleNamespace(parents=[known.get(i, ()) for i in range(count)]),
+        chosen=tuple(range(count)),
+    )
+
+
+@pytest.mark.parametrize("who", [(0,), (0, 1), (0, 1, 2, 3), (INERTIAS, 0, 1, 2)])
+def test_the_parts_of_a_joint_add_up(who: tuple[int, ...]) -> None:
+    errors = made_up(who)
+    parts = error_parts(traced(4), errors)
+    assert set(parts) == set(who)
+    fall = errors.of(()) - errors.of(tuple(sorted(who)))
+    assert sum(parts.values()) == pytest.approx(fall, abs=1e-12)
+
+
+def test_a_part_is_the_mean_over_orders() -> None:
+    errors = made_up((0, 1), seed=3)
+    found = error_parts(traced(2), errors)[0]
+    alone, beside = errors.of(()) - errors.of((0,)), errors.of((1,)) - errors.of((0, 1))
+    # A hundred draws: as often first as last, within four deviations.
+    assert found == pytest.approx((alone + beside) / 2, abs=float(np.ptp([alone, beside])) * 0.2)
+    assert not np.allclose(found, alone)
+
+
+def test_what_is_refined_joins_first() -> None:
+    errors = made_up((0, 1))
+    found = error_parts(traced(2, {0: (1,)}), errors)
+    assert found[1] == pytest.approx(errors.of(()) - errors.of((1,)))
+    assert found[0] == pytest.approx(errors.of((1,)) - errors.of((0, 1)))
+    both = error_parts(traced(2, {0: (1,), 1: (0,)}), errors)  # each refines the other
+    assert sum(both.values()) == pytest.approx(errors.of(()) - errors.of((0, 1)))
+
+
+def test_errors_are_those_of_the_fitted_columns() -> None:
+    """With the reported predictions at both ends, whatever the fit says there."""
+    rng = np.random.default_rng(1)
+    rows = rng.normal(size=(50, 3))  # columns of one declared parameter and two candidates
+    known, tau = rng.normal(size=50), rng.normal(size=50)
+    first, last = rng.normal(size=50), rng.normal(size=50)
+    fits = {(): [1.0, 0, 0], (0,): [0.5, 2.0, 0], (1,): [0.3, 0, -1.0], (0, 1): [0.1, 1.5, -0.8]}
+    lacks = [
+        told - known - rows @ np.array(fits[each])
+        for told, each in ((first, ()), (last, (0, 1)))
+    ]  # fmt: skip
+    block = np.column_stack([rows, *lacks, known, tau])
+    fit: Any = SimpleNamespace(who=(0, 1), parameters=lambda joined: np.array(fits[joined]))
+    errors = SealedErrors(fit, [block.T @ block, None])
+
+    def relative(prediction: Array) -> float:
+        return float(np.linalg.norm(tau - prediction) / np.linalg.norm(tau))
+
+    assert errors.of(())[0] == pytest.approx(relative(first))
+    assert errors.of((0, 1))[0] == pytest.approx(relative(last))
+    half = known + rows @ np.array(fits[(0,)]) + (lacks[0] + lacks[1]) / 2
+    assert errors.of((0,))[0] == pytest.approx(relative(half))
+    assert np.isnan(errors.of((0,))[1])
+
+
+class Plain:
+    """Energies on runs left out (folds,) by the number of chosen candidates."""
+
+    def __init__(self, shares: list[list[float]]) -> None:
+        self.shares = np.array(shares)
+
+    def left_out(self, chosen: tuple[int, ...], joints: list[int]) -> Array:
+        return 7.0 * (1.0 + joints[0]) * np.square(self.shares[len(chosen)])
+
+
+def path_of(shares: list[list[float]]) -> Any:
+    count = len(shares) - 1
+    outcome: Any = SimpleNamespace(
+        judge=SimpleNamespace(plain=Plain(shares)), data=SimpleNamespace(n=JOINTS)
+    )
+    return error_path(outcome, tuple(range(count)), made_up(tuple(range(count))))
+
+
+def test_the_smallest_model_is_within_one_standard_error_of_the_best() -> None:
+    last = [0.10, 0.20, 0.30]
+    deviation = np.std(last, ddof=1) / np.sqrt(3)
+    far, near = 0.2 + 1.01 * deviation, 0.2 + 0.99 * deviation
+    path = path_of([[1.0] * 3, [far] * 3, [near] * 3, last, [0.21, 0.2, 0.3]])
+    assert path.left_out == pytest.approx((1.0, far, near, 0.2, 0.71 / 3))
+    assert (path.best, path.smallest, path.enough) == (3, 2, True)
+    assert path.standard_error == pytest.approx(deviation)
+    assert len(path.sealed) == 5
+
+
+def test_two_runs_left_out_are_not_enough_to_rely_on() -> None:
+    assert not path_of([[1.0, 1.0], [0.1, 0.2]]).enough
+    assert path_of([[1.0], [0.1]]).standard_error == 0.0
+    nothing: Any = None
+    assert error_path(nothing, (), nothing) is None
