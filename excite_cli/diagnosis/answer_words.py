@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from math import isnan
 
 from excite_cli.diagnosis.covariate import Covariate
+from excite_cli.diagnosis.overfit import overfit_in_words
 from excite_cli.diagnosis.records import Diagnosis, FrictionLine, NamedEffect, mean_of_known
 from excite_cli.diagnosis.words import (
     counted,
@@ -18,7 +19,7 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.effects.catalogue import catalogue, straight_friction
 from excite_cli.effects.parameter import Value
-from excite_cli.identification.fit_words import short_number
+from excite_cli.identification.fit_words import relative_in_words, short_number
 
 FRICTION = "friction"
 INERTIAS = "inertias"
@@ -32,7 +33,8 @@ def answer_in_words(found: Diagnosis) -> str:
     """One to four sentences, from the records alone."""
     if not found.good:
         return no_gain_in_words(found)
-    said = [_missing(found), *_left(found)]
+    doubt = [overfit_in_words(found.overfit)] if found.overfit else []
+    said = [*doubt, _missing(found), *_left(found)]
     return " ".join(sentence for sentence in said if sentence)
 
 
@@ -76,7 +78,8 @@ def _missing(found: Diagnosis) -> str:
     worth.sort(key=lambda each: -each.takes_off)
     for each in worth[:_MOST]:
         share = each.takes_off / fall
-        said.append(f"{_place(each, found)} lacks {_sized(each)}, {share:.0%} of what it misses).")
+        what = f"{title_of(each.effect.kind)} ({_first(each)}, {share:.0%} of what it misses)"
+        said.append(f"On {_place(each, found)}: {what}.")
     if not said:
         listed = counted(len(found.effects), "effect")
         said.append(f"Your model misses {listed}, none of them large.")
@@ -86,7 +89,7 @@ def _missing(found: Diagnosis) -> str:
 
 
 def _percent(found: Diagnosis) -> str:
-    return f"{100 * found.after.mean_relative_moving:.2g} %"
+    return relative_in_words(found.after.mean_relative_moving)
 
 
 def _fall(found: Diagnosis) -> float:
@@ -100,8 +103,7 @@ def _friction(found: Diagnosis) -> str:
     if len(rubbing) > 1:
         return "Friction"
     title = title_of(rubbing[0].effect.kind)
-    size = _prefixed(next(iter(rubbing[0].parameters.values())))
-    return f"{title[:1].upper()}{title[1:]} of {_place(rubbing[0], found)} ({size})"
+    return f"{title[:1].upper()}{title[1:]} of {_place(rubbing[0], found)} ({_first(rubbing[0])})"
 
 
 def _most_friction(found: Diagnosis) -> str:
@@ -124,18 +126,12 @@ def _at_one(line: FrictionLine) -> float:
 
 
 def _place(named: NamedEffect, found: Diagnosis) -> str:
-    where = place_in_words(named.effect, len(found.joint_names))
-    return where[:1].upper() + where[1:] if where.startswith("all ") else where
+    return place_in_words(named.effect, len(found.joint_names))
 
 
-def _sized(named: NamedEffect) -> str:
-    """`a spring (6.9 kN·m/rad`: its kind with its first number; the bracket stays open."""
-    title = title_of(named.effect.kind)
-    article = "" if title[:1].isupper() else "an " if title[0] in "aeiou" else "a "
-    if title.startswith(("friction", "viscous", "backlash", "dry")):
-        article = ""
-    first = next(iter(named.parameters.values()))
-    return f"{article}{title} ({_prefixed(first)}"
+def _first(named: NamedEffect) -> str:
+    """Its first number, which is its size."""
+    return _prefixed(next(iter(named.parameters.values())))
 
 
 def _prefixed(value: Value) -> str:
@@ -158,7 +154,7 @@ def _left(found: Diagnosis) -> list[str]:
     worst = max(known, key=lambda joint: known[joint])
     text = f"{_percent(found)} of the torque stays"
     if known[worst] > 1.5 * found.after.mean_relative_moving:
-        text += f", most on {worst} ({100 * known[worst]:.2g} %)"
+        text += f", most on {worst} ({relative_in_words(known[worst])})"
     said = [text + "."]
     for each in found.unexplained[:1]:
         said.append(f"What stays on {each.joint} depends on {_listed(each.depends_on)}.")

@@ -22,6 +22,7 @@ from excite_cli.diagnosis.final_fit import final_fit
 from excite_cli.diagnosis.information import information_of
 from excite_cli.diagnosis.large_rest import large_rests
 from excite_cli.diagnosis.naming import named_effects
+from excite_cli.diagnosis.overfit import is_overfit, overfit_of
 from excite_cli.diagnosis.plausibility import check_recorded
 from excite_cli.diagnosis.records import (
     Absorbed,
@@ -70,6 +71,9 @@ def diagnose(
 ) -> Diagnosis:
     """Find what the declared model of `spec` lacks, and measure the error before and after.
 
+    Where the fit of free inertias is worse than what it was fitted to by far, or than the untouched
+    URDF, the same is done with the URDF's inertias kept, and the error of that is told (`overfit`).
+
     Nothing of the sealed part is used but for `before` and `after`. Texts of the configuration and
     versions are left to the caller (`dataclasses.replace`).
 
@@ -80,6 +84,26 @@ def diagnose(
     FileError
         The data cannot be what the configuration says (joint order, signs), or are too short.
     """
+    found = _diagnosed(robot, base, dataset, spec, sealed, progress)
+    if not is_overfit(found, spec.identification.inertias):
+        return found
+    kept: Diagnosis | None = None
+    if found.untouched is not None:  # the URDF has inertias that may be kept
+        progress("overfit: the same with the URDF's inertias", 9)
+        identification = spec.identification.model_copy(update={"inertias": "cad"})
+        held = spec.model_copy(update={"identification": identification})
+        kept = _diagnosed(robot, base, dataset, held, sealed, lambda text, done: None)
+    return replace(found, overfit=overfit_of(found, kept))
+
+
+def _diagnosed(
+    robot: Robot,
+    base: BaseParameters,
+    dataset: Dataset,
+    spec: Spec,
+    sealed: str | None,
+    progress: Progress,
+) -> Diagnosis:
     started = time.monotonic()
     check_declared_runs(spec, dataset)
     model = _model(robot, base, spec)
@@ -177,6 +201,7 @@ def diagnose(
         untouched=sealed_part.untouched,
         large_rests=rests,
         joint_aliases=_joint_aliases(traced, doubts, robot),
+        trained=trained.errors(after),
         inertia_names=standard_parameter_names(robot),
         path=_path(traced, candidates, errors),
         inertia_parts=_by_joint(robot, taken_off[INERTIAS]) if from_urdf else {},

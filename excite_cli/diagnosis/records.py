@@ -90,6 +90,20 @@ class NamedEffect(Shown):
 
 
 @dataclass(frozen=True)
+class Overfit:
+    """Mean relative errors, where joints move, of a fit that the data do not determine.
+
+    On the data that it was fitted to, on the sealed ones, and there by the URDF untouched and by
+    what a diagnosis finds with the URDF's inertias `kept` (None where that cannot be done).
+    """
+
+    training: float
+    sealed: float
+    untouched: float | None
+    kept: float | None
+
+
+@dataclass(frozen=True)
 class ErrorPath:
     """Errors with the first 0, 1, … K effects in the order of the rounds; `effects` in this order.
 
@@ -254,7 +268,8 @@ class Diagnosis(Shown):
     <dynamics>; None where it has no mass, or in earlier files. `inertia_parts` (by joint): what the
     fit of kept inertias takes off, from that on; empty where they are free. `path`: the error
     against the number of effects; None where there are none. `inertia_names`: of `phi`, as
-    `m[elbow]`; `declared` effects have the values that belong to it.
+    `m[elbow]`; `declared` effects have the values that belong to it. `trained`: errors
+    of the model with effects on the data that it was fitted to; `overfit` if they say that it is.
     """
 
     config: str
@@ -290,6 +305,8 @@ class Diagnosis(Shown):
     inertia_parts: dict[str, float] = field(default_factory=dict)
     path: ErrorPath | None = None
     inertia_names: tuple[str, ...] = ()
+    trained: Errors | None = None
+    overfit: Overfit | None = None
 
     @property
     def smallest(self) -> tuple[NamedEffect, ...]:

@@ -24,6 +24,7 @@ from excite_cli.diagnosis.records import (
     JointAlias,
     LargeRest,
     NamedEffect,
+    Overfit,
     Round,
     SealedEnds,
     Unexplained,
@@ -75,6 +76,8 @@ _LATER: dict[str, Any] = {
     "inertia_parts": dict[str, float],
     "path": ErrorPath | None,
     "inertia_names": tuple[str, ...],
+    "trained": Errors | None,
+    "overfit": Overfit | None,
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],

@@ -71,8 +71,8 @@ def test_friction_is_one_share_and_the_rest_is_told_by_place(plain: Diagnosis) -
     fall = 0.5 - answer.after.mean_relative_moving
     assert answer_in_words(answer) == (
         "Friction is 75% of what your model misses, most on elbow (48 N·m at 1 rad/s). "
-        f"shoulder_pitch lacks a spring at the joint (6.9 kN·m/rad, {0.1 / fall:.0%} of what it "
-        "misses). 3.6 % of the torque stays, most on slide (10 %)."
+        f"On shoulder_pitch: spring at the joint (6.9 kN·m/rad, {0.1 / fall:.0%} of what it "
+        "misses). 3.6% of the torque stays, most on slide (10%)."
     )
 
 
@@ -91,7 +91,7 @@ def test_what_stays_is_told_with_what_it_depends_on(plain: Diagnosis) -> None:
                    left=(0.1, 0.1))  # fmt: skip
     told = answer_in_words(replace(answer, unexplained=(rest,)))
     assert told.endswith(
-        "10 % of the torque stays. What stays on elbow depends on history of angle of elbow and "
+        "10% of the torque stays. What stays on elbow depends on history of angle of elbow and "
         "time."
     )
 

@@ -232,7 +232,7 @@ def test_a_sealed_error_that_did_not_fall_is_told_first(diagnosis: Diagnosis) ->
 
 def test_nothing_found(diagnosis: Diagnosis) -> None:
     unnamed = replace(diagnosis, effects=())
-    assert found_section(unnamed).lead.startswith("More is left than noise")
+    assert found_section(unnamed).lead.startswith("No effect of the catalogue explains")
     nothing = replace(unnamed, unexplained=(), large_rests=())
     assert found_section(nothing).lead.startswith("Nothing is missing")
     assert effect_section(nothing) is None

@@ -174,7 +174,7 @@ def test_every_effect_shows_what_it_is_worth_on_sealed_data(
 ) -> None:
     """In percentage points where it is most; a harmful effect is never too small to be shown."""
     text = printed(bad)
-    assert "0.00% harmful +40.00 pp\n" in text
+    assert "- harmful +40.00 pp\n" in text
     assert "2 small ones" in text
     assert "viscous_friction on elbow (not confirmed)" in text
     elsewhere = replace(bad.effects[0], removes={"slide": Removed(0.01, 0.02, 0.1)})
@@ -191,7 +191,7 @@ def test_scripts_see_verdicts_and_the_untouched_urdf(bad: Diagnosis) -> None:
     assert effect["removes"]["elbow"] == {"relative": -0.3, "relative_moving": -0.4, "rms": -2.0}
     assert data["error"]["untouched"]["mean_relative"] == 0.5
     assert data["error"]["samples"]["elbow"] == 80
-    assert "The URDF as given" in printed(bad)
+    assert "joint URDF before" in printed(bad)
     assert "61.00%" in printed(bad)
     unknown = replace(bad, untouched=None)
     assert diagnosis_answer(unknown, "arm.yaml", {}).data["error"]["untouched"] is None
