@@ -20,6 +20,8 @@ from excite_cli.effects.parameter import Value, deviation
 from excite_cli.identification.regression import effect_columns
 from excite_cli.robot.model import Array
 
+_ROUNDING = 1e-9  # of a line of friction that has no such part
+
 
 def data_sheet_lines(
     model: Model, traced: Traced, parameters: Array, covariance: Array
@@ -57,6 +59,7 @@ def _line(
         lines.append(columns[:, : len(straight)])
         friction.append(columns[:, len(straight) :])
     slopes = np.linalg.lstsq(np.concatenate(lines), np.concatenate(friction), rcond=1e-9)[0]
+    slopes[np.abs(slopes) < _ROUNDING] = 0.0
     spread = covariance[np.ix_(own, own)]
     units = [each.unit_on(each.parameters[0].unit, model.robot.sliding) for each in straight]
     f_v, f_c = (

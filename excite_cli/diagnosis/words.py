@@ -1,6 +1,6 @@
 """A diagnosis in words, the same ones wherever it is reported."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate, Source
 from excite_cli.diagnosis.records import (
@@ -39,6 +39,14 @@ def is_small(named: NamedEffect) -> bool:
     if named.verdict is SealedVerdict.HARMFUL:
         return False
     return named.share_of_residual < SMALL_SHARE and named.gain < _SMALL_GAIN
+
+
+def by_worth(effects: Iterable[NamedEffect]) -> list[NamedEffect]:
+    """What takes most off the error first; of what that is not known, what explains most."""
+    return sorted(
+        effects,
+        key=lambda each: (-each.takes_off if each.parts else 0.0, -each.share_of_residual),
+    )
 
 
 def title_of(kind: str) -> str:

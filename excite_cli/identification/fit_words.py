@@ -32,12 +32,12 @@ def short_number(value: float, digits: int) -> str:
 def with_deviation(value: float, std: float) -> str:
     """`2.998 ± 0.012`: a value with one standard deviation of two digits, rounded to these.
 
-    Without a deviation that is known, three digits.
+    Without a deviation that is known, three digits; four where there is none.
     """
     if not math.isfinite(std) or not math.isfinite(value):
         return f"{value:.3g}"
     if std <= 0.0:
-        return f"{value:.4g} ± 0"
+        return f"{value:.4g}"
     last = math.floor(math.log10(float(f"{std:.1e}"))) - 1  # place of the second digit
     largest = max(abs(value), std)
     if not 1e-4 <= largest < 1e6:

@@ -9,6 +9,7 @@ from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
     approximation_in_words,
+    by_worth,
     counted,
     covariate_in_words,
     is_small,
@@ -27,7 +28,7 @@ _COLUMNS = ("effect", "where", "size ± standard deviation", "p", "takes off", "
 
 def found_section(found: Diagnosis) -> Section:
     """Tables of what was found, absorbed and approximated, and the sentences about them."""
-    ranked = sorted(found.named, key=lambda each: -each.share_of_residual)
+    ranked = by_worth(found.named)
     large = [each for each in ranked if not is_small(each)]
     small = [each for each in ranked if is_small(each)]
     if len(small) < 2 or not large:

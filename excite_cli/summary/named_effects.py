@@ -7,6 +7,7 @@ from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import (
     SMALL_SHARE,
     approximation_in_words,
+    by_worth,
     is_small,
     other_name_of,
     p_in_words,
@@ -23,7 +24,7 @@ _SIZE = "size ± std"
 def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
     """The named effects, small ones in one line, and what each cannot be told from."""
     everything = len(found.joint_names)
-    ranked = sorted(found.named, key=lambda each: -each.share_of_residual)
+    ranked = by_worth(found.named)
     small = [each for each in ranked if is_small(each)]
     if verbose or len(small) < 2:  # a line about one is no shorter than the one
         small = []

@@ -21,7 +21,7 @@ from excite_cli.identification.fit_words import with_deviation
         (0.5, 12.0, "0 ± 12"),
         (1e-5, 2e-7, "1.000e-05 ± 2.0e-07"),
         (2.5e8, 1e6, "2.500e+08 ± 1.0e+06"),
-        (3.0, 0.0, "3 ± 0"),
+        (3.0, 0.0, "3"),
         (0.0625, math.nan, "0.0625"),
         (9e-15, math.inf, "9e-15"),
     ],
