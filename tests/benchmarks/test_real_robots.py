@@ -67,14 +67,13 @@ def test_published_values_that_were_missed_are_named() -> None:
     viscous = (8.05, 5.53, 1.97, 1.11, 1.86, 0.8)  # the last is 23 % off
     coulomb = (7.14, 8.26, 6.34, 2.48, 3.03)  # joint 6 has none
     joints = [f"joint_{j}" for j in range(1, 7)]
-    effects = [
-        effect("viscous_friction", j, viscous=v) for j, v in zip(joints, viscous, strict=True)
+    lines = [
+        {"joint": j, "viscous": {"value": v}, "coulomb": {"value": c}}
+        for j, v, c in zip(joints, viscous, (*coulomb, float("nan")), strict=True)
     ]
-    effects += [
-        effect("coulomb_friction", j, coulomb=v) for j, v in zip(joints, coulomb, strict=False)
-    ]
+    own = effect("viscous_friction", "joint_1", viscous=3.0)  # beside a refinement: no matter
     pair = effect("coupled_friction", "joint_5", "joint_6", viscous=0.616, coulomb=2.1)
-    words = tx40([answer(joints, *effects, pair)])
+    words = tx40([answer(joints, own, pair, friction_lines=lines)])
     assert "coupled friction of joint_5–joint_6" in words
     assert "12 of 14 published" in words
     assert "(viscous of joint_6: 23 % off, coulomb of joint_6: nan % off)" in words

@@ -37,6 +37,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
     "asymmetric_friction": (4.0, 3, False),
     "stribeck_friction": (2.0, 2, False),
     "load_dependent_friction": (1.0, 2, True),
+    "position_friction": (4.0, 2, False),
     "dahl_friction": (2.0, 2, False),
     "friction_drift": (15.0, 3, False),
     "friction_change": (4.0, 2, False),
@@ -68,6 +69,7 @@ REFINED: Mapping[str, tuple[str, ...]] = {
     "coupled_friction": STRAIGHT,
     "asymmetric_friction": ("coulomb_friction", "torque_offset"),
     "load_dependent_friction": ("coulomb_friction",),
+    "position_friction": ("coulomb_friction",),
 }
 # Share of its energy for values of 0.1, and whether its twin is another kind.
 LEAVES = {

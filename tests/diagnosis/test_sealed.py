@@ -29,7 +29,7 @@ from excite_cli.trajectory.fourier import FourierTrajectory
 
 SECONDS, RATE = 5.0, 200.0
 # What may differ: what is measured on the sealed part, and the time it took.
-FREE = {"before", "after", "untouched", "sealed_traces", "seconds"}
+FREE = {"before", "after", "untouched", "overfit", "sealed_traces", "seconds"}
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def friction() -> Planted:
 
 
 def differences(one: Diagnosis, other: Diagnosis) -> list[str]:
-    """Fields that are not the same, bit by bit; verdicts of effects are left out."""
+    """Fields that are not the same, bit by bit; what is measured on sealed data is left out."""
     one, other = unjudged(one), unjudged(other)
     return [
         field.name
@@ -87,9 +87,9 @@ def differences(one: Diagnosis, other: Diagnosis) -> list[str]:
 
 
 def unjudged(found: Diagnosis) -> Diagnosis:
-    return replace(
-        found, effects=tuple(replace(each, verdict=None, removes={}) for each in found.effects)
-    )
+    effects = tuple(replace(each, verdict=None, removes={}, parts={}) for each in found.effects)
+    path = found.path and replace(found.path, sealed=())
+    return replace(found, effects=effects, path=path)
 
 
 def same(one: Any, other: Any) -> bool:
