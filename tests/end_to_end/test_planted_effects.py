@@ -13,12 +13,13 @@ pytest.importorskip("mujoco")
 SEED = 12
 # (case, what is planted): kinds that go different ways through simulation and search.
 PLANTED = {
-    1: "armature",
-    2: "ripple",
-    6: "base_tilt",
     10: "load_dependent_friction",
-    12: "elasticity",
-    19: "contact",
+    11: "base_tilt",
+    15: "ripple",
+    22: "contact",
+    23: "position_friction",
+    27: "elasticity",
+    58: "armature",
 }
 CLEAN = (7, 8)
 
@@ -45,17 +46,17 @@ def test_nothing_is_named_where_nothing_is_missing(index: int) -> None:
 
 
 def test_what_has_no_name_gets_none() -> None:
-    found = outcome(3, seed=13)  # gears that rub on a sum of speeds, two joints apart
+    found = outcome(2, seed=13)  # gears that rub on a sum of speeds, three joints apart
     assert not found.wrong, found.found
     told = {each["joint"]: each["depends_on"] for each in found.unexplained}
-    assert set(told) <= {"panda_joint1", "panda_joint3"}
-    assert "v[panda_joint3]" in told["panda_joint1"]
+    assert set(told) == {"shoulder_pan_joint", "wrist_1_joint"}
+    assert "v[wrist_1_joint]" in told["shoulder_pan_joint"]
 
 
 def test_what_only_comes_near_is_told_as_an_approximation() -> None:
-    found = outcome(40, seed=33)  # a spring that hardens
+    found = outcome(40, seed=13)  # a spring that hardens
     assert [p["kind"] for p in found.planted] == ["outside:hardening_spring"]
     assert "spring" in {each["kind"] for each in found.found}
     for each in found.found:  # a wave beside the line comes nearer still, and is no better a name
         assert each["verdict"] == "approximation"
-        assert each["approximates"] == "a function of q[panda_joint5]"
+        assert each["approximates"] == "a function of q[panda_joint4]"
