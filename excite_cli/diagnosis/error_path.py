@@ -24,24 +24,35 @@ def error_path(traced: Traced, order: Sequence[int], sealed: SealedErrors) -> Er
         return None
     steps = [tuple(order[:count]) for count in range(len(order) + 1)]
     left_out = _left_out(traced, steps)  # (steps, folds)
+    if not left_out.shape[1]:
+        return None
     mean = left_out.mean(axis=1)
     best = int(np.argmin(mean))
     folds = left_out.shape[1]
     error = float(left_out[best].std(ddof=1) / np.sqrt(folds)) if folds > 1 else 0.0
     smallest = int(np.flatnonzero(mean <= mean[best] + error)[0])
     kept = (INERTIAS,) if INERTIAS in sealed.who else ()
-    on_sealed = [float(np.nanmean(sealed.of((*kept, *sorted(step))))) for step in steps]
+    on_sealed = [_mean(sealed.of((*kept, *sorted(step)))) for step in steps]
     return ErrorPath(
         tuple(map(float, mean)), tuple(on_sealed), error, best, smallest, folds >= _FEWEST
     )
 
 
 def _left_out(traced: Traced, steps: Sequence[tuple[int, ...]]) -> Array:
-    """Share (steps, runs left out) of the declared model's RMS that remains, mean over joints."""
-    plain = traced.judge.plain
-    joints = [j for j in range(traced.data.n) if plain.left_out((), [j]).all()]
-    first = np.stack([plain.left_out((), [j]) for j in joints])
-    return np.array([
-        np.sqrt(np.stack([plain.left_out(step, [j]) for j in joints]) / first).mean(axis=0)
-        for step in steps
-    ])  # fmt: skip
+    """Share (steps, runs left out) of the declared model's RMS that remains.
+
+    Mean over the joints of which a run says something; runs that say nothing are left away.
+    """
+    plain, joints = traced.judge.plain, range(traced.data.n)
+    energies = np.array([[plain.left_out(step, [j]) for j in joints] for step in steps])
+    first = energies[0]  # (joints, folds)
+    seen = first > 0.0
+    shares = np.sqrt(np.where(seen, energies / np.where(seen, first, 1.0), 0.0)).sum(axis=1)
+    known = seen.any(axis=0)
+    return np.asarray(shares[:, known] / seen.sum(axis=0)[known])
+
+
+def _mean(errors: Array) -> float:
+    """Over the joints that move."""
+    known = errors[np.isfinite(errors)]
+    return float(known.mean()) if len(known) else float("nan")

@@ -118,6 +118,25 @@ def test_the_smallest_model_is_within_one_standard_error_of_the_best() -> None:
     assert len(path.sealed) == 5
 
 
+def test_runs_that_move_some_joints_only_count_for_those() -> None:
+    """As short moves do; nothing is known where no run says anything."""
+
+    class Short(Plain):
+        def left_out(self, chosen: tuple[int, ...], joints: list[int]) -> Array:
+            moves = np.array([joints == [0], joints == [1], False])
+            return np.where(moves, super().left_out(chosen, joints), 0.0)
+
+    outcome: Any = SimpleNamespace(
+        judge=SimpleNamespace(plain=Short([[1.0] * 3, [0.5, 0.1, 0.7]])), data=SimpleNamespace(n=2)
+    )
+    path = error_path(outcome, (0,), made_up((0,)))
+    assert path is not None
+    assert path.left_out == pytest.approx((1.0, 0.3))
+    assert not path.enough
+    outcome.judge.plain = Short([[0.0] * 3, [0.0] * 3])
+    assert error_path(outcome, (0,), made_up((0,))) is None
+
+
 def test_two_runs_left_out_are_not_enough_to_rely_on() -> None:
     assert not path_of([[1.0, 1.0], [0.1, 0.2]]).enough
     assert path_of([[1.0], [0.1]]).standard_error == 0.0
