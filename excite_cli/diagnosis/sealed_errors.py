@@ -114,7 +114,8 @@ def _grams(
     """Per joint, of the sealed samples in motion; None where there are too few."""
     n = model.robot.n
     solved = [fit.parameters(each) for each in ((), fit.who)]
-    blocks: list[list[Array]] = [[] for _ in range(n)]
+    sums: list[Array | None] = [None] * n
+    counts = np.zeros(n, dtype=int)
     for run, *told in zip(played.runs, first, last, strict=True):
         body = RigidBody(model.robot, after.phi, run.q, run.v, run.a)
         signals = with_effects(seen_of(run, body), after.effects, after.values)
@@ -133,10 +134,10 @@ def _grams(
                 torque[kept, j] - known - columns @ x
                 for torque, x in zip(torques, solved, strict=True)
             ]
-            blocks[j].append(np.column_stack([columns, *lacks, known, run.tau[kept, j]]))
-    grams: list[Array | None] = []
-    for block in blocks:
-        rows = np.concatenate(block)
-        enough = len(rows) >= FEWEST and bool(rows[:, -1].any())
-        grams.append(rows.T @ rows if enough else None)
-    return grams
+            rows = np.column_stack([columns, *lacks, known, run.tau[kept, j]])
+            own_sum, counts[j] = sums[j], counts[j] + len(rows)
+            sums[j] = rows.T @ rows if own_sum is None else own_sum + rows.T @ rows
+    return [
+        gram if gram is not None and count >= FEWEST and gram[-1, -1] > 0.0 else None
+        for gram, count in zip(sums, counts, strict=True)
+    ]
