@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from excite_cli.api.files import write_diagnosis as write_diagnosis
     from excite_cli.api.files import write_result as write_result
     from excite_cli.api.identifying import identify as identify
+    from excite_cli.api.identifying import identify_load as identify_load
     from excite_cli.api.identifying import save_fit as save_fit
+    from excite_cli.api.load_planning import LoadProblem as LoadProblem
+    from excite_cli.api.load_planning import plan_load as plan_load
     from excite_cli.api.loading import Case as Case
     from excite_cli.api.loading import load_case as load_case
     from excite_cli.api.loading import load_data as load_data
@@ -61,6 +64,7 @@ if TYPE_CHECKING:
     from excite_cli.excitation.result import Result as Result
     from excite_cli.identification.fit import Fit as Fit
     from excite_cli.identification.identify import Identification as Identification
+    from excite_cli.identification.load import LoadIdentification as LoadIdentification
     from excite_cli.measurement.dataset import Dataset as Dataset
     from excite_cli.measurement.dataset import Run as Run
     from excite_cli.proposal.propose import Proposal as Proposal
@@ -87,7 +91,8 @@ _HOMES = {
         "write_diagnosis",
         "write_result",
     ),
-    "api.identifying": ("identify", "save_fit"),
+    "api.identifying": ("identify", "identify_load", "save_fit"),
+    "api.load_planning": ("LoadProblem", "plan_load"),
     "api.loading": ("Case", "load_case", "load_data", "load_problem"),
     "api.motions": ("load_motions", "motions_of"),
     "api.planning": ("plan", "plan_after"),
@@ -117,6 +122,7 @@ _HOMES = {
     "excitation.result": ("Result",),
     "identification.fit": ("Fit",),
     "identification.identify": ("Identification",),
+    "identification.load": ("LoadIdentification",),
     "measurement.dataset": ("Dataset", "Run"),
     "proposal.propose": ("Proposal",),
     "shown.note": ("Level", "Note"),

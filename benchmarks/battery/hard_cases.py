@@ -20,7 +20,7 @@ from benchmarks.battery.cases import (
     weighted_columns,
 )
 from benchmarks.battery.motions import Arm, arm, four_motions
-from benchmarks.battery.outside import UnevenViscousFriction
+from benchmarks.battery.outside import RubbingSector
 from benchmarks.battery.sizes import Ground, Sized, sized_as
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.base import Effect
@@ -116,8 +116,8 @@ def _gears(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
 def _constant(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
     """A constant, in noise with a long memory, or beside friction that changes with the angle.
 
-    The friction is dry, or it is viscous and has no name: then it is taken for noise with a longer
-    memory still.
+    The friction is dry, viscous, or in one sector and without a name: then it is taken for noise
+    with a longer memory still.
     """
     j = int(rng.integers(of.robot.n))
     sign = rng.choice([-1.0, 1.0])
@@ -125,17 +125,20 @@ def _constant(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:
     if found is None or rng.uniform() < 0.5:
         return _all([found])
     share = rng.uniform(0.3, 0.6) * found.ratio
-    turn = 2.0 * float(rng.uniform(0.0, np.pi))
+    if rng.uniform() < 0.4:
+        q = np.concatenate([s.q[:, j] for s in ground.signals])
+        sector = {
+            "centre": float(rng.uniform(*np.quantile(q, [0.2, 0.8]))),
+            "width": float(rng.uniform(0.1, 0.3) * np.ptp(q)),
+        }
+        other = sized_as(RubbingSector((j,), sector), np.ones(1), share, ground)
+        return [] if other is None else [replace(found, companions=(other.planted,))]
+    turn = float(rng.uniform(0.0, 2 * np.pi))
     # f sin²(q + φ) = f/2 (1 − cos(2q + 2φ)): what changes, and its mean over a turn
-    uneven = kind_named("position_friction")((j,), {"periods": 2.0})
+    shape = {"periods": 2.0, "power": float(rng.integers(2))}
+    uneven = kind_named("position_friction")((j,), shape)
     beside = sized_as(uneven, np.array([-np.cos(turn), np.sin(turn)]), share / 2**0.5, ground)
-    if beside is None:
-        return []
-    if rng.uniform() < 0.5:
-        return [found, beside]
-    viscous = UnevenViscousFriction((j,), {"phase": turn / 2})
-    other = sized_as(viscous, np.ones(1), share, ground)
-    return [] if other is None else [replace(found, companions=(other.planted,))]
+    return [] if beside is None else [found, beside]
 
 
 def _slow_ripple(of: Arm, ground: Ground, rng: np.random.Generator) -> list[Sized]:

@@ -9,22 +9,23 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Effect, Parameter, Scope, Signals
+from excite_cli.effects.sign import smooth_sign
 from excite_cli.robot.model import Array, Robot
 
 
-class UnevenViscousFriction(Effect):
-    """τ_j = f sin²(q_j + φ) v_j: viscous friction that depends on the angle."""
+class RubbingSector(Effect):
+    """τ_j = f exp(−(q_j − c)²/2w²) sgn v_j: a seal or a cable that rubs in one sector."""
 
-    kind: ClassVar = "outside:uneven_viscous_friction"
-    title: ClassVar = "viscous friction that depends on the angle"
+    kind: ClassVar = "outside:rubbing_sector"
+    title: ClassVar = "friction in one sector"
     signature: ClassVar = ""
-    parameters: ClassVar = (Parameter("friction", "N·m·s/rad", 0.05, 300.0, nonnegative=True),)
-    shapes: ClassVar = (Parameter("phase", "rad", 0.1, 3.0),)
+    parameters: ClassVar = (Parameter("friction", "N·m", 0.05, 300.0, nonnegative=True),)
+    shapes: ClassVar = (Parameter("centre", "rad", 0.1, 3.0), Parameter("width", "rad", 0.1, 1.0))
 
     def columns(self, signals: Signals) -> Array:
         j = list(self.joints)
-        shape = np.sin(signals.q[:, j, None] + self.shape["phase"]) ** 2
-        return shape * signals.v[:, j, None]
+        away = (signals.q[:, j, None] - self.shape["centre"]) / self.shape["width"]
+        return np.exp(-0.5 * away**2) * smooth_sign(signals.v[:, j, None])
 
 
 class DistantCoupling(Effect):
@@ -82,7 +83,7 @@ class TorqueHysteresis(Effect):
 
 
 OUTSIDE: tuple[type[Effect], ...] = (
-    UnevenViscousFriction,
+    RubbingSector,
     DistantCoupling,
     HardeningSpring,
     TorqueHysteresis,

@@ -178,7 +178,7 @@ def _draw(
     elif name == "position_friction":
         turn = rng.uniform(0.0, 2 * np.pi)
         shape, direction = (
-            {"periods": float(rng.integers(1, 3))},
+            {"periods": float(rng.integers(1, 3)), "power": float(rng.integers(2))},
             np.array([np.cos(turn), np.sin(turn)]),
         )
     elif name == "coupled_friction":
@@ -199,8 +199,11 @@ def _draw(
         direction = rng.normal(size=3)
         start = float(rng.uniform(1.0, 8.0))
         shape = {"start": start, "end": start + float(rng.uniform(0.3, 1.0))}
-    elif name == "outside:uneven_viscous_friction":
-        shape = {"phase": float(rng.uniform(0.0, np.pi))}
+    elif name == "outside:rubbing_sector":
+        shape = {
+            "centre": float(rng.uniform(*np.quantile(q, [0.2, 0.8]))),
+            "width": float(rng.uniform(0.1, 0.3) * np.ptp(q)),
+        }
     elif name == "outside:hardening_spring":
         shape = {"rest": float(0.5 * (q.min() + q.max()) + 0.2 * rng.normal())}
     elif name == "outside:torque_hysteresis":
@@ -248,7 +251,7 @@ def _companions(effect: Effect, values: Array) -> tuple[Planted, ...]:
     """
     if effect.kind == "position_friction":
         mean = np.array([float(np.linalg.norm(values))])
-        return (Planted(kind_named("coulomb_friction")(effect.joints), mean),)
+        return (Planted(kind_named(effect.varied)(effect.joints), mean),)
     if effect.kind == "dahl_friction":
         return (Planted(kind_named("coulomb_friction")(effect.joints), np.array(values)),)
     coupled = effect.kind in ("coupled_friction", "outside:distant_coupling")

@@ -76,7 +76,8 @@ class Rate:
 
     @property
     def kept(self) -> bool:
-        return self.value >= self.bound if self.least else self.value <= self.bound
+        met = self.value >= self.bound if self.least else self.value <= self.bound
+        return met or not self.out_of
 
     def text(self) -> str:
         sign = "≥" if self.least else "≤"

@@ -5,7 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.loading import Case, dataset_of, inputs_of, sources_of, tell_findings
+from excite_cli.api.loading import (
+    Case,
+    dataset_of,
+    inputs_of,
+    robot_base,
+    sources_of,
+    tell_findings,
+)
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
 from excite_cli.config.load import spec_as_yaml
@@ -71,7 +78,7 @@ def diagnose(
     with held({"output": output, "apply": apply}, overwrite, inputs):
         dataset = dataset_of(problem, data, tell)
         found = diagnose_dataset(
-            problem.robot, problem.base, dataset, problem.spec, sealed, progress
+            problem.robot, robot_base(problem), dataset, problem.spec, sealed, progress
         )
         found = replace(
             found,

@@ -5,7 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.loading import Case, dataset_of, inputs_of, sources_of, tell_findings
+from excite_cli.api.loading import (
+    Case,
+    dataset_of,
+    inputs_of,
+    robot_base,
+    sources_of,
+    tell_findings,
+)
 from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
 from excite_cli.config.load import spec_as_yaml
@@ -14,10 +21,14 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.identify import Identification
 from excite_cli.identification.identify import identify as identify_dataset
+from excite_cli.identification.load import LoadIdentification
+from excite_cli.identification.load import identify_load as load_on
+from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note
-from excite_cli.store.fit_file import write_fit
+from excite_cli.store.fit_file import read_fit, write_fit
 from excite_cli.summary.identification import identification_answer as identification_answer
+from excite_cli.summary.load import load_answer as load_answer
 
 
 @checked()
@@ -60,7 +71,7 @@ def identify(
         tell_findings(suspicious, tell)
         found = identify_dataset(
             problem.robot,
-            problem.base,
+            robot_base(problem),
             dataset,
             problem.spec,
             sealed,
@@ -73,6 +84,39 @@ def identify(
             save_fit(output, problem, found, dataset.sources)
         write_models(problem.robot, found.fit, models, tell)
         return found
+
+
+@checked()
+def identify_load(
+    problem: Problem | Case,
+    data: Dataset | str | Path | Sequence[str | Path],
+    fit: StoredFit | str | Path,
+    link: str | None = None,
+    *,
+    tell: Tell = log_note,
+) -> LoadIdentification:
+    """What the robot carries, on top of a fit without it: `excite identify --only payload`.
+
+    `fit` is the fit of the robot alone (`read_fit`), or its file; `link` carries the load, by
+    default the last one.
+
+    Returns
+    -------
+    LoadIdentification
+        `parameters` has mass, centre (in the link's frame) and inertia about it, with one standard
+        deviation that holds the fit's; `values` (10,) and `covariance` (10, 10).
+
+    Raises
+    ------
+    ConfigError, FileError
+        The link is unknown or must be named; the fit belongs to another robot; a run is too short.
+    """
+    dataset = dataset_of(problem, data, tell)
+    # Signs and order of columns are not judged: beside the URDF, a load looks like other columns.
+    stored = fit if isinstance(fit, StoredFit) else read_fit(Path(fit))
+    found = load_on(problem.robot, robot_base(problem), dataset, problem.spec, stored, link)
+    tell_findings(found.findings[len(dataset.findings) :], tell)
+    return found
 
 
 @checked()

@@ -55,6 +55,13 @@ class Case(Shown):
         return find_base_parameters(self.robot)
 
 
+def robot_base(problem: Problem | Case) -> BaseParameters:
+    """Base parameters of the robot, also of a problem that is planned for its load alone."""
+    if isinstance(problem, Case) or problem.spec.criterion.of == "robot":
+        return problem.base
+    return find_base_parameters(problem.robot)
+
+
 show(
     Case,
     lambda case: f"{case.robot.name}: {case.robot.n} joints",

@@ -14,6 +14,7 @@ from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import no_gain_in_words
+from excite_cli.errors import ConfigError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Progress as Progress
 from excite_cli.excitation.result import Result
@@ -137,8 +138,15 @@ def plan_after(
     ------
     FileError
         The file cannot be read; the diagnosis belongs to another robot.
+    ConfigError
+        The criterion is that of a load: such a config was written by `--for payload`.
     """
     spec, folder = problem.spec, problem.folder
+    if spec.criterion.of == "load":
+        raise ConfigError(
+            f"{problem.file or 'This config'}: criterion.of: load is for the motion of --for "
+            "payload. --after plans for the robot: give the config that was diagnosed."
+        )
     read = found if isinstance(found, Diagnosis) else read_diagnosis(Path(found))
     following = after_diagnosis(read, spec, folder, fit_knowledge(spec, folder))
     following = replace(following, model=replace(following.model, file=problem.file))

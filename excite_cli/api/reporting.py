@@ -5,21 +5,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.motions import motions_of
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import paths_in
 from excite_cli.api.rebuilt import rebuilt_problem
 from excite_cli.api.report_figures import write_figures
 from excite_cli.api.report_files import Told, read_files
 from excite_cli.atomic import write_text_atomically
-from excite_cli.errors import ConfigError, FileError, MissingExtraError
+from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.report.assembly import Source, page_of
-from excite_cli.report.page import Picture, render
+from excite_cli.report.page import render
 from excite_cli.report.style import matplotlib_part
 from excite_cli.shown.answer import Answer
-from excite_cli.shown.note import Level, Note, Tell, log_note
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
 Progress = Callable[[str, int, int], None]
@@ -44,7 +42,6 @@ def write_report(
     picture: bool = True,
     overwrite: bool = False,
     progress: Progress = lambda text, done, total: None,
-    tell: Tell = log_note,
 ) -> Report:
     """A page (HTML, one file) about motions, what was identified and diagnosed: `excite report`.
 
@@ -68,7 +65,8 @@ def write_report(
     ConfigError, MissingExtraError
         There is no such format of figures; matplotlib is not installed.
     """
-    matplotlib_part("")
+    if figures is not None:
+        matplotlib_part("")
     if format is not None and format not in FIGURE_FORMATS:
         raise ConfigError(f"--format {format}: unknown. Known: {', '.join(FIGURE_FORMATS)}.")
     if format is not None and figures is None:
@@ -93,7 +91,7 @@ def write_report(
         if figures is not None:
             drawn = write_figures(told, problems, (Path(figures), format, overwrite), progress)
         if page is not None:
-            write_text_atomically(page, _page_text(told, problems, picture, progress, tell))
+            write_text_atomically(page, _page_text(told, problems, picture, progress))
     return Report(page, drawn)
 
 
@@ -106,37 +104,10 @@ def report_answer(found: Report) -> Answer:
 
 
 def _page_text(
-    told: Sequence[Told],
-    problems: Mapping[Path, Problem],
-    picture: bool,
-    progress: Progress,
-    tell: Tell,
+    told: Sequence[Told], problems: Mapping[Path, Problem], picture: bool, progress: Progress
 ) -> str:
-    sources = []
-    for each in told:
-        problem, taken = problems.get(each.path), None
-        if picture and problem is not None and isinstance(each.content, Result):
-            progress(f"{each.name}: the robot", 0, len(told))
-            taken = _picture(each, each.content, problem, tell)
-        sources.append(Source(each.name, each.path.name, each.content, problem, taken))
+    sources = [
+        Source(each.name, each.path.name, each.content, problems.get(each.path), picture)
+        for each in told
+    ]
     return render(page_of(sources, lambda name, done: progress(name, done, len(told))))
-
-
-def _picture(each: Told, result: Result, problem: Problem, tell: Tell) -> Picture | None:
-    """The robot where it comes nearest to something in its first motion, if that can be drawn."""
-    segment = motions_of(result, [result.motions[0].index], str(each.path))[0]
-    try:
-        from excite_cli.view.pictures import View, still_png
-
-        png = still_png(problem, segment, View(size=(600, 441), ghosts=3, caption=False))
-    except (MissingExtraError, ImportError) as error:
-        tell(Note(Level.DETAIL, f"no picture of the robot: {error}"))
-        return None
-    name = problem.robot.name
-    return Picture(
-        f"{name} in its first motion",
-        png,
-        f"{name} at the instant of its first motion at which it comes nearest to itself or to "
-        "something around it, with three other instants faintly behind.",
-        f"Where it comes nearest to something. `excite view {each.path.name}` plays all motions.",
-    )

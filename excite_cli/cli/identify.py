@@ -1,5 +1,6 @@
 """`excite identify`: parameters of the declared model from measured data."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +9,12 @@ import typer
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
+
+
+class Load(StrEnum):
+    """What --only finds."""
+
+    PAYLOAD = "payload"
 
 
 def identify(
@@ -32,6 +39,18 @@ def identify(
         typer.Option("--parameters", help="Write all parameters (YAML).", rich_help_panel=OUTPUT),
     ] = None,
     sealed: options.Sealed = None,
+    only: Annotated[
+        Load | None,
+        typer.Option("--only", help="Find what the robot carries, on top of --fit."),
+    ] = None,
+    fit: Annotated[
+        Path | None,
+        typer.Option("--fit", help="Fit of the robot alone, for --only payload."),
+    ] = None,
+    link: Annotated[
+        str | None,
+        typer.Option("--link", help="Link that carries the payload. Default: the last one."),
+    ] = None,
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,
     as_json: options.Json = False,
@@ -45,17 +64,36 @@ def identify(
     (sealed) one, on which the errors are measured. A single run is cut into blocks, of which every
     third is sealed.
 
+    With --only payload, mass, centre and inertia of what the robot carries are found from all runs,
+    while a fit of the robot alone is known as well as it says. Exit status 1: no body has them.
+
     Examples:
       excite identify ur10.yaml measured.h5 -o fit.h5
       excite identify ur10.yaml measured.h5 --sealed motion_1 --urdf identified.urdf
+      excite identify ur10.yaml loaded.h5 --only payload --fit fit.h5
     """
-    from excite_cli.api.identifying import identification_answer
+    from excite_cli.api.identifying import identification_answer, identify_load, load_answer
     from excite_cli.api.identifying import identify as identify_data
     from excite_cli.api.loading import load_case
     from excite_cli.api.threads import single_threaded
+    from excite_cli.errors import ConfigError
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
+    if only is not None:
+        given = {"-o": output, "--sealed": sealed, **{f"--{k}": each for k, each in models.items()}}
+        others = [name for name, each in given.items() if each is not None]
+        if others:
+            raise ConfigError(f"--only payload takes no {', '.join(others)}: leave it out.")
+        if fit is None:
+            raise ConfigError("--only payload needs --fit: a fit of the robot without it.")
+        with single_threaded(), terminal.live("identify"):
+            case = load_case(config, overrides or ())
+            load = identify_load(case, data, fit, link, tell=terminal.tell)
+        terminal.show(load_answer(load))
+        return
+    if fit is not None or link is not None:
+        raise ConfigError("--fit and --link belong to --only payload.")
     with single_threaded(), terminal.live("identify") as line:
         found = identify_data(
             load_case(config, overrides or ()),

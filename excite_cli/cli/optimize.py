@@ -1,5 +1,6 @@
 """`excite optimize`: motions one after the other, each with all earlier ones stacked."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -7,6 +8,13 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.errors import ConfigError
+
+
+class Purpose(StrEnum):
+    """What --for plans for."""
+
+    PAYLOAD = "payload"
 
 
 def optimize(
@@ -33,6 +41,18 @@ def optimize(
         Path | None,
         typer.Option("--after", help="Plan the next motion after this diagnosis."),
     ] = None,
+    purpose: Annotated[
+        Purpose | None,
+        typer.Option("--for", help="payload: the shortest motion that tells a load, on --fit."),
+    ] = None,
+    fit: Annotated[
+        Path | None,
+        typer.Option("--fit", help="Fit of the robot alone, for --for payload."),
+    ] = None,
+    link: Annotated[
+        str | None,
+        typer.Option("--link", help="Link that carries the payload. Default: the last one."),
+    ] = None,
     restarts: Annotated[
         int | None,
         typer.Option(
@@ -58,6 +78,9 @@ def optimize(
     of the measured data. Exit status 1: no admissible motion exists or was found, and the message
     names the constraint that prevents it.
 
+    With --for payload the motion is the shortest that tells mass, centre and inertia of what the
+    robot carries, beside a fit of the robot alone; its config is written beside the result (.yaml).
+
     With --starts each motion is the best of many starts, which --workers processes or a dask
     cluster share; the result is the same to the last digit whoever does them.
 
@@ -68,19 +91,25 @@ def optimize(
       excite optimize ur10.yaml -o best.h5 --starts 4 --workers 2
       excite optimize ur10.yaml -o more.h5 --prior ur10.h5
       excite optimize ur10.yaml -o next.h5 --after diagnosis.h5
+      excite optimize ur10.yaml -o load.h5 --for payload --fit fit.h5
     """
+    from excite_cli.api.load_planning import plan_load, problem_beside, save_problem
     from excite_cli.api.loading import load_case, load_problem
     from excite_cli.api.outputs import held_result, result_path
     from excite_cli.api.planning import Planned, plan, plan_after, plan_answer
     from excite_cli.api.threads import single_threaded
     from excite_cli.api.working import working
     from excite_cli.cli.start_line import iterations_of, start_line
-    from excite_cli.errors import ConfigError
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     if after is not None and prior:
         raise ConfigError("--after brings the measured data with it: leave --prior out.")
-    inputs = [each for each in (config, *(prior or ()), start, after) if each is not None]
+    if purpose is None:
+        if fit is not None or link is not None:
+            raise ConfigError("--fit and --link belong to --for payload.")
+    else:
+        _refuse_beside_payload(fit, after or prior or start or resume, motions)
+    inputs = [each for each in (config, *(prior or ()), start, after, fit) if each is not None]
     path = result_path(output, config)
     changes = options.changes(overrides, seed=seed, motions=motions, restarts=restarts)
     with (
@@ -89,7 +118,13 @@ def optimize(
         working(workers, scheduler, threads, terminal.tell) as place,
     ):
         planned: Planned
-        if after is None:
+        if purpose is not None and fit is not None:
+            case = load_case(config, changes)
+            with problem_beside(path, overwrite, inputs) as beside:
+                load = plan_load(case, fit, link, tell=terminal.tell)
+                save_problem(beside, load.problem)
+            planned = load.problem
+        elif after is None:
             planned = load_problem(config, changes, terminal.tell)
         else:
             planned = plan_after(load_case(config, changes), after, terminal.tell)
@@ -106,3 +141,13 @@ def optimize(
                 tell=terminal.tell,
             )
     terminal.show(plan_answer(planned, result, str(path)))
+
+
+def _refuse_beside_payload(fit: Path | None, other: object, motions: int | None) -> None:
+    """See that --for payload has its fit and nothing that belongs to motions for the robot."""
+    if fit is None:
+        raise ConfigError("--for payload needs --fit: a fit of the robot without it.")
+    if other:
+        raise ConfigError("--for payload takes no --after, --prior, --start, --resume.")
+    if motions is not None:
+        raise ConfigError("--for payload plans one motion, the shortest: leave --motions out.")

@@ -91,6 +91,5 @@ def report(
             picture=picture,
             overwrite=overwrite,
             progress=line,
-            tell=terminal.tell,
         )
     terminal.show(report_answer(found))

@@ -136,6 +136,28 @@ class MeasurementSpec(Section):
     filter: FilterSpec = FilterSpec()
 
 
+class KnownPayloadSpec(Section):
+    """A payload that was weighed, on some runs: it tells the true scale of the torques."""
+
+    runs: tuple[str, ...] = Field(min_length=1, description="runs in which the robot carries it")
+    mass: Positive = Field(description="[kg]")
+    std: NonNegative = Field(0.0, description="one standard deviation of the mass [kg]")
+    center: tuple[Finite, Finite, Finite] = Field(
+        description="centre of mass in the frame of `link` [m]"
+    )
+    center_std: NonNegative = Field(
+        0.003, description="one standard deviation of each of its coordinates [m]"
+    )
+    inertia: tuple[Finite, Finite, Finite, Finite, Finite, Finite] | None = Field(
+        None,
+        description="Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the centre, along the axes of `link` "
+        "[kg·m²], taken to 10 % of the largest; default: a compact body, to a factor of some two",
+    )
+    link: str | None = Field(
+        None, description="link that carries it; default: that of the last moved joint"
+    )
+
+
 class IdentificationSpec(Section):
     """How parameters are found."""
 
@@ -149,6 +171,21 @@ class IdentificationSpec(Section):
         0.1, description="one standard deviation of the URDF's inertial parameters, as a share"
     )
     consistent: bool = Field(True, description="also a physically consistent full set (SDP)")
+    gain_std: Positive | None = Field(
+        None,
+        description="one standard deviation of the gains of the measured torques (torque "
+        "constants, gear ratios), as a share: all together, and each beside the others; their "
+        "gains are identified, and every uncertainty holds theirs",
+    )
+    known_payload: KnownPayloadSpec | None = Field(
+        None,
+        description="a payload of known mass and centre on some runs, which determines the gains",
+    )
+
+    @property
+    def needed_runs(self) -> tuple[str, ...]:
+        """Runs without which the fit lacks what is known: they are not sealed if others are."""
+        return self.known_payload.runs if self.known_payload else ()
 
 
 class DiagnosisSpec(Section):

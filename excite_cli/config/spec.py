@@ -48,6 +48,14 @@ class CriterionSpec(Section):
         description="unit_norm: columns of a fixed random stack get length 1; a_priori: columns "
         "times the URDF's parameters",
     )
+    of: Literal["robot", "load"] = Field(
+        "robot",
+        description="load: the ten parameters of what the robot carries, itself being known; see "
+        "`excite optimize --for payload`",
+    )
+    load_link: str | None = Field(
+        None, description="link that carries the load, of: load; default: the last one"
+    )
 
 
 class OptimizerSpec(Section):

@@ -30,11 +30,11 @@ _PREFIXES = ((1e6, "M"), (1e3, "k"))
 
 
 def answer_in_words(found: Diagnosis) -> str:
-    """One to four sentences, from the records alone."""
+    """One to five sentences, from the records alone."""
     if not found.good:
         return no_gain_in_words(found)
     doubt = [overfit_in_words(found.overfit)] if found.overfit else []
-    said = [*doubt, _missing(found), *_left(found)]
+    said = [*doubt, _missing(found), *_left(found), _next(found)]
     return " ".join(sentence for sentence in said if sentence)
 
 
@@ -66,6 +66,11 @@ def _missing(found: Diagnosis) -> str:
         if found.complete:
             return f"Nothing is missing: the declared model leaves {_percent(found)} of the torque."
         return f"No effect of the catalogue explains what is left ({_percent(found)})."
+    if _in_vain(found):
+        return (
+            f"What was found ({counted(len(found.effects), 'effect')}) does not lower the error "
+            f"where joints move ({relative_in_words(found.begins.mean_relative_moving)} before)."
+        )
     of_all = shares(found)
     said = []
     if of_all.get(FRICTION, 0.0) >= _WORTH_SAYING:
@@ -73,7 +78,7 @@ def _missing(found: Diagnosis) -> str:
         what = "nearly all" if whole else f"{of_all[FRICTION]:.0%} of what"
         said.append(f"{_friction(found)} is {what} your model misses{_most_friction(found)}.")
     others = [each for each in found.named if not _rubs(each)]
-    fall = _fall(found)
+    fall = found.fall if found.fall > 0.0 else float("inf")
     worth = [each for each in others if each.takes_off >= _WORTH_SAYING * fall]
     worth.sort(key=lambda each: -each.takes_off)
     for each in worth[:_MOST]:
@@ -88,13 +93,13 @@ def _missing(found: Diagnosis) -> str:
     return " ".join(said)
 
 
+def _in_vain(found: Diagnosis) -> bool:
+    """Whether effects that should be in the sealed data, too, lower nothing where joints move."""
+    return found.fall < 0.0 and not any(each.effect.runs for each in found.effects)
+
+
 def _percent(found: Diagnosis) -> str:
     return relative_in_words(found.after.mean_relative_moving)
-
-
-def _fall(found: Diagnosis) -> float:
-    fall = found.begins.mean_relative_moving - found.after.mean_relative_moving
-    return fall if fall > 0.0 else float("inf")
 
 
 def _friction(found: Diagnosis) -> str:
@@ -159,6 +164,25 @@ def _left(found: Diagnosis) -> list[str]:
     for each in found.unexplained[:1]:
         said.append(f"What stays on {each.joint} depends on {_listed(each.depends_on)}.")
     return said
+
+
+def _next(found: Diagnosis) -> str:
+    """What to do: tell apart what fits as well, by a motion, or go on with what was found."""
+    if not found.effects or found.overfit:  # that says itself what to do
+        return ""
+    if _in_vain(found):
+        warned = sum(each.severity == "warning" for each in found.findings)
+        told = f"what is warned of the data ({counted(warned, 'warning')}) comes first"
+        return f"Next: {told if warned else 'another motion, or longer'}."
+    open_names = [each for each in found.effects if each.aliases]
+    if not open_names:
+        return "Next: go on with the model and its effects (--apply NEW.yaml)."
+    first = max(open_names, key=lambda each: 0.0 if isnan(each.takes_off) else each.takes_off)
+    other = first.aliases[0]
+    names = f"{title_of(first.effect.kind)} of {_place(first, found)} from {title_of(other.kind)}"
+    if other.joints != first.effect.joints:
+        names += f" of {place_in_words(other, len(found.joint_names))}"
+    return f"Next: a motion that tells {names} (excite optimize … --after)."
 
 
 def _listed(quantities: Sequence[Covariate]) -> str:

@@ -54,9 +54,11 @@ from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split, with_ends_sealed
+from excite_cli.identification.torque_scale import assumed_scale, with_known_load
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.skeleton import skeleton_of
 
 Progress = Callable[[str, int], None]
 
@@ -107,8 +109,8 @@ def _diagnosed(
     started = time.monotonic()
     check_declared_runs(spec, dataset)
     model = _model(robot, base, spec)
-    parts = split(dataset, sealed, spec.diagnosis.block)
-    check_left_to_fit(spec.effects, parts)
+    parts = split(dataset, sealed, spec.diagnosis.block, spec.identification.needed_runs)
+    check_left_to_fit(spec, parts)
     refuse_sealed_copies(parts)
     processing, training = _prepared(spec, parts)
     require_motion(training, processing, robot.joint_names, spec.measurement.without_torque)
@@ -178,6 +180,7 @@ def _diagnosed(
         rounds=rounds_of(traced, robot.joint_names),
         findings=(
             *dataset.findings,
+            *assumed_scale(spec.measurement, spec.identification),
             *suspicious,
             *_noticed(assumed, floor, robot, parts.training),
         ),
@@ -199,6 +202,7 @@ def _diagnosed(
         assumed=assumed,
         parts=on_sealed_ends(model, models, parts.ends, processing),
         untouched=sealed_part.untouched,
+        skeleton=skeleton_of(robot),
         large_rests=rests,
         joint_aliases=_joint_aliases(traced, doubts, robot),
         trained=trained.errors(after),
@@ -314,7 +318,9 @@ def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:
     if spec.identification.inertias == "cad":
         cad = standard_parameters(robot)
         prior = KeptInertias(cad, prior_rows(robot, cad, spec.identification.uncertainty))
-    return Model(robot, base, declared_effects(spec.effects, robot), prior, spec.runs)
+    declared = declared_effects(spec.effects, robot)
+    declared = with_known_load(spec.identification, declared, robot)
+    return Model(robot, base, declared, prior, spec.runs)
 
 
 def _column_names(model: Model) -> list[str]:

@@ -7,27 +7,36 @@ what an effect of an impossible sign or size would explain. The effect is an app
 
 * if what is left is a function of the same quantity as the effect (friction: speed), and U > 0.1 E,
 * or if U > E, whatever it depends on,
-* or if a curve without a name does as well (`curves`).
+* or if a curve without a name does as well (`curves`), or more than noise is left for sure of a
+  form that was not seen to repeat (a wave of less than three periods),
+* or if it is a change in some runs that explains less than is left in these, noise included,
+* or if it is the mean of a curve that is one (`_means_of_curves`).
 
-Of `rests`, U is what can be predicted, or if that is little, what exceeds the noise; they depend on
+Of `rests`, U is what can be predicted or, if that is more, what exceeds the noise; they depend on
 two quantities mostly, so that U > 0.5 E is asked for where one of them is the effect's own. They
 say nothing of effects that inertias nearly take up, of which E is next to nothing. A change in some
-runs or over time, and where a good part can be predicted a constant and first-order friction, are
-means of a function of anything: U is all that exceeds the noise for them, and
-U > 0.5 E is enough. (Of maps of two positions, or of one and direction, six of 208 campaigns were
-told such a mean, beside the word that 12 to 71 times the noise is left.)
+runs or over time, first-order friction and, where a good part can be predicted, a constant are
+means of a function of anything: U > 0.25 E is enough for changes, U > 0.3 E for friction and
+U > 0.5 E for constants. (Of maps of two quantities eleven of 416 campaigns were told such a mean or
+wave, beside the word that 3 to 71 times the noise is left; U / E of friction on three real robots,
+not taken up by inertias, is at most 0.09, and 0.14 of true friction beside a map.)
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.curves import curves_in_place
+from excite_cli.diagnosis.curves import curves_in_place, functions_alike
 from excite_cli.diagnosis.records import Approximation, LargeRest, Unexplained
 from excite_cli.diagnosis.schur import SHARED
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect, Tier
 
 _SAME_QUANTITY, _ONE_OF_TWO = 0.1, 0.5
+_OF_FRICTION, _OF_CHANGE = 0.3, 0.25
+# 0.6 of friction in one sector, taken for Coulomb friction that varies; at most 0.03 of real ones.
+_OF_VARIED = 0.3
 _PREDICTABLE = 0.3  # share: less may be all that exceeds the noise, or not
 # Of an effect's columns: 0.03 and 0.23 of what a data sheet vouches for, 0.9 of wrong names.
 _OF_ITS_OWN = 0.5
@@ -47,11 +56,18 @@ def approximations(
     found = {
         i: Approximation(covariates=(of,)) for i, of in curves_in_place(traced, joint_names).items()
     }
+    unproved = [each for each in traced.chosen if _may_not_repeat(traced, each, joint_names, more)]
+    for i in unproved:
+        of = more[joint_names[traced.candidates[i].effect.joints[0]]].depends_on
+        found |= {k: Approximation(covariates=of) for k in functions_alike(traced, i)}
     plain = traced.judge.plain
     for i in (each for each in traced.chosen if each not in found):
         joint, explained = _strongest(traced, i)
         name = joint_names[joint]
         rest = plain.energy_on(traced.chosen, [joint])
+        if _weaker_than_its_runs(traced, i, joint, explained):
+            found[i] = Approximation()
+            continue
         if name in left:
             each = left[name]
             structure = each.share_of_residual * rest
@@ -60,10 +76,11 @@ def approximations(
                 found[i] = Approximation(covariates=each.depends_on)
                 continue
         if name in more and _of_its_own(traced, i, more[name]):
-            mean = _is_mean(traced, i, more[name])
-            same = mean or _same_quantity(traced, i, more[name].depends_on, joint_names)
-            surely = _surely_left(more[name], mean)
-            if surely * rest > (_ONE_OF_TWO if same else 1.0) * explained:
+            limit = _limit_of_mean(traced, i, more[name])
+            if limit is None:
+                same = _same_quantity(traced, i, more[name].depends_on, joint_names)
+                limit = _ONE_OF_TWO if same else 1.0
+            if _surely_left(more[name]) * rest > limit * explained:
                 found[i] = Approximation(covariates=more[name].depends_on)
                 continue
         key = (joint, traced.candidates[i].effect.function_of)
@@ -72,7 +89,60 @@ def approximations(
         energy, what = impossible[key]
         if energy > explained:
             found[i] = Approximation(kind=what)
-    return found
+    return found | _means_of_curves(traced, found)
+
+
+def _weaker_than_its_runs(traced: Traced, i: int, joint: int, explained: float) -> bool:
+    """Whether a change explains less than what is left in its runs, noise included.
+
+    Noise that differs from run to run, as a load makes it, is judged by one deviation.
+    """
+    own = traced.candidates[i]
+    if not own.effect.is_change:
+        return False
+    there = [bool(np.any(part)) for part in own.columns]
+    folds = {fold for fold, here in zip(traced.data.folds, there, strict=True) if here}
+    others = {fold for fold, here in zip(traced.data.folds, there, strict=True) if not here}
+    if folds & others:  # of many runs several are one fold, and what is left is known by fold
+        return False
+    return traced.judge.plain.energy_on(traced.chosen, [joint], sorted(folds)) > explained
+
+
+def _may_not_repeat(
+    traced: Traced, i: int, joint_names: Sequence[str], rests: Mapping[str, LargeRest]
+) -> bool:
+    """Whether its form is a curve's as far as one sees, and more than noise is left for sure."""
+    effect = traced.candidates[i].effect
+    if effect.holds_until_beaten or len(effect.joints) != 1:
+        return False
+    curves = [effect.curve(signals, traced.signals) for signals in traced.signals[:1]]
+    return any(curve is not None for curve in curves) and joint_names[effect.joints[0]] in rests
+
+
+def _means_of_curves(
+    traced: Traced, found: Mapping[int, Approximation]
+) -> dict[int, Approximation]:
+    """What is the mean of an approximation: a constant, or the friction that it varies.
+
+    A constant of a joint where a function of its angle explains more than it; friction of which
+    what varies it explains a good part.
+    """
+    means = {}
+    for i in (each for each in traced.chosen if each not in found):
+        effect, rows = traced.candidates[i].effect, traced.candidates[i].rows
+        for k, approximation in found.items():
+            own = traced.candidates[k].effect
+            if traced.candidates[k].rows != rows:
+                continue
+            if _is_constant(effect) and not effect.runs and own.function_of == ("position",):
+                least = 1.0
+            elif effect.kind == own.varied and not effect.runs:
+                least = _OF_VARIED
+            else:
+                continue
+            if _strongest(traced, k)[1] > least * _strongest(traced, i)[1]:
+                means[i] = approximation
+    return means
 
 
 def _of_its_own(traced: Traced, i: int, rest: LargeRest) -> bool:
@@ -89,21 +159,23 @@ def _of_its_own(traced: Traced, i: int, rest: LargeRest) -> bool:
     return judge.white.schur(others).gain(i, absorbed=SHARED).left > _OF_ITS_OWN
 
 
-def _is_mean(traced: Traced, i: int, rest: LargeRest) -> bool:
-    """Whether it would be the mean of any function, and what is left is one."""
+def _limit_of_mean(traced: Traced, i: int, rest: LargeRest) -> float | None:
+    """U/E from which it is the mean of something; None if it would not be that of any function."""
     effect = traced.candidates[i].effect
-    everywhere = effect.tier == Tier.EVERY_ROBOT or _is_constant(effect)
-    changes = effect.is_change or "time" in effect.function_of
-    return changes or (everywhere and rest.predictable > _PREDICTABLE)
+    if effect.is_change or "time" in effect.function_of:
+        return _OF_CHANGE
+    if _is_constant(effect):
+        return _ONE_OF_TWO if rest.predictable > _PREDICTABLE else None
+    return _OF_FRICTION if effect.tier == Tier.EVERY_ROBOT else None
 
 
 def _is_constant(effect: Effect) -> bool:
     return not effect.function_of and len(effect.joints) == 1 and not effect.carried
 
 
-def _surely_left(rest: LargeRest, more: bool) -> float:
-    """Share of a residual's energy that is predictable, or else, or if it is `more`, no noise."""
-    if rest.noise is None or (rest.predictable > _PREDICTABLE and not more):
+def _surely_left(rest: LargeRest) -> float:
+    """Share of a residual's energy that is predictable, or no noise if that is more."""
+    if rest.noise is None:
         return rest.predictable
     return max(1.0 - (rest.noise / rest.rms) ** 2, rest.predictable)
 

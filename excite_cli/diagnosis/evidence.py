@@ -277,12 +277,18 @@ class Evidence:
             self._without[chosen] = np.linalg.solve(normal, rhs[:, :, None])[:, :, 0]
         return self._without[chosen]
 
-    def energy_on(self, chosen: Sequence[int], joints: Sequence[int] | None) -> float:
-        """Residual energy on the rows of `joints` of the model fitted to everything."""
-        key = (tuple(chosen), None if joints is None else tuple(joints))
+    def energy_on(
+        self,
+        chosen: Sequence[int],
+        joints: Sequence[int] | None,
+        folds: Sequence[int] | None = None,
+    ) -> float:
+        """Residual energy on the rows of `joints` in `folds`, of the model fitted to everything."""
+        every = tuple(range(self.grams.folds) if folds is None else folds)
+        key = (tuple(chosen), None if joints is None else tuple(joints), every)
         if key not in self._on:
             at = self.columns(chosen)
-            part = self._part(range(self.grams.folds), joints, at)
+            part = self._part(every, joints, at)
             self._on[key] = max(_energy(part, self.solve(chosen) * self.norms[at]), 0.0)
         return self._on[key]
 

@@ -76,13 +76,15 @@ def _by_shape(traced: Traced, i: int) -> Array:
     """Standard deviation (w,) of the sizes of candidate i that its uncertain shape brings.
 
     The sizes that it has in other shapes, weighted by exp(−Δχ²/2): so likely are these shapes, if
-    physics allows the sizes.
+    physics allows the sizes, and they mean the same.
     """
     judge, own = traced.judge, traced.candidates[i]
     sets = {
         k: [k if c == i else c for c in traced.chosen]
         for k, c in enumerate(traced.candidates)
-        if c.place == own.place and c.width == own.width
+        if c.place == own.place
+        and c.width == own.width
+        and (k == i or own.effect.compares_with(c.effect))
     }
     sets = {
         k: each

@@ -121,7 +121,8 @@ def check_dataset(
     FileError
         As `check_plausibility`; or a run is too short for the filters.
     """
-    runs = split(dataset, sealed, spec.diagnosis.block).training
+    needed = spec.identification.needed_runs
+    runs = split(dataset, sealed, spec.diagnosis.block, needed).training
     processing = choose_processing(runs, spec.measurement.filter, spec.diagnosis.moving_speed)
     prepared = [prepare(run, processing) for run in runs]
     return check_recorded(robot, runs, prepared, processing, spec.measurement)

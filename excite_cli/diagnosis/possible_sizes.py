@@ -51,7 +51,7 @@ class PossibleSizes:
             if not reason and not effect.possible(values, self._early):
                 covariance = self._spread(chosen)[own, own]
                 reason = effect.why_impossible(values, covariance, self._early)
-            if effect.varies and not reason:
+            if effect.varied and not reason:
                 reason = self._too_much_taken(effect, own, parameters, chosen)
             if reason:
                 return reason
@@ -64,13 +64,13 @@ class PossibleSizes:
         taken, slope = effect.taken(parameters[own])
         slopes = np.zeros(len(parameters))
         slopes[own] = -slope
-        slopes[self._at(effect.varies, effect.joints, len(parameters), chosen)] = 1.0
+        slopes[self._at(effect.varied, effect.joints, len(parameters), chosen)] = 1.0
         there = float(slopes @ parameters) + float(slope @ parameters[own])
         if taken <= there:
             return ""
         if there > 0.0 and taken - there <= _ERRORS * deviation(slopes, self._spread(chosen)):
             return ""
-        return f"{taken:.3g} of {effect.kind} is more than the {effect.varies} that it varies"
+        return f"{taken:.3g} of {effect.kind} is more than the {effect.varied} that it varies"
 
     def _at(
         self, kind: str, joints: tuple[int, ...], count: int, chosen: Sequence[int]

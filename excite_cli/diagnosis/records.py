@@ -13,6 +13,7 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
+from excite_cli.robot.skeleton import Skeleton
 from excite_cli.shown.record import Shown
 
 
@@ -270,6 +271,7 @@ class Diagnosis(Shown):
     against the number of effects; None where there are none. `inertia_names`: of `phi`, as
     `m[elbow]`; `declared` effects have the values that belong to it. `trained`: errors
     of the model with effects on the data that it was fitted to; `overfit` if they say that it is.
+    `skeleton`: where the joints are, to draw the robot; None in earlier files.
     """
 
     config: str
@@ -307,6 +309,7 @@ class Diagnosis(Shown):
     inertia_names: tuple[str, ...] = ()
     trained: Errors | None = None
     overfit: Overfit | None = None
+    skeleton: Skeleton | None = None
 
     @property
     def smallest(self) -> tuple[NamedEffect, ...]:
@@ -319,6 +322,11 @@ class Diagnosis(Shown):
     def begins(self) -> Errors:
         """Errors where the way begins along which effects take their parts off."""
         return self.untouched if self.inertia_parts and self.untouched else self.before
+
+    @property
+    def fall(self) -> float:
+        """By how much the mean relative error on the sealed data fell, where joints move."""
+        return self.begins.mean_relative_moving - self.after.mean_relative_moving
 
     @property
     def good(self) -> bool:

@@ -17,10 +17,8 @@ from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.fit_words import with_deviation
 
-# Effects that explain less of the residual, and without which runs left out are hardly worse, are
-# told with few words.
-SMALL_SHARE = 0.002
-_SMALL_GAIN = 0.3
+# Effects that take off less than this part of the fall of the error are told with few words.
+SMALL_PART = 0.01
 # A smaller predictable share of what is left is not worth a word.
 _TELLING = 0.2
 _QUANTITIES: dict[Source, str] = {
@@ -34,19 +32,25 @@ _QUANTITIES: dict[Source, str] = {
 }
 
 
-def is_small(named: NamedEffect) -> bool:
-    """Whether few words will do. Beside kept inertias a large effect may explain little itself."""
-    if named.verdict is SealedVerdict.HARMFUL:
-        return False
-    return named.share_of_residual < SMALL_SHARE and named.gain < _SMALL_GAIN
+def by_worth(
+    effects: Iterable[NamedEffect], found: Diagnosis
+) -> tuple[list[NamedEffect], list[NamedEffect]]:
+    """Those that carry at least `SMALL_PART` of the fall of the error, and the small ones.
 
-
-def by_worth(effects: Iterable[NamedEffect]) -> list[NamedEffect]:
-    """What takes most off the error first; of what that is not known, what explains most."""
-    return sorted(
+    In each list what takes most off first; of what that is not known, what explains most. What is
+    harmful, or of unknown part, is never small.
+    """
+    ranked = sorted(
         effects,
         key=lambda each: (-each.takes_off if each.parts else 0.0, -each.share_of_residual),
     )
+    least = SMALL_PART * max(found.fall, 0.0)
+    small = [
+        each
+        for each in ranked
+        if each.verdict is not SealedVerdict.HARMFUL and abs(each.takes_off) < least
+    ]
+    return [each for each in ranked if not any(each is other for other in small)], small
 
 
 def title_of(kind: str) -> str:
@@ -111,7 +115,7 @@ def approximation_in_words(
     if found.covariates:
         return f"a function of {', '.join(map(say, found.covariates))}"
     if not found.kind:
-        return "a function of several quantities, of which more is left than this explains"
+        return "something of which more is left than this explains"
     return f"something that also looks like {title_of(found.kind)}"
 
 

@@ -96,10 +96,13 @@ class Effect(ABC):
     same_as: ClassVar[tuple[str, ...]] = ()  # kinds that together are the same columns
     # Kinds that are judged by the straight line through both: of themselves they may be nothing.
     deviates_from: ClassVar[tuple[str, ...]] = ()
-    # A kind of the same joint that it is the change of over the angle: never more than is there.
-    varies: ClassVar[str] = ""
+    # Kinds of the same joint that it may be the change of over the angle: never more than is there.
+    varies: ClassVar[tuple[str, ...]] = ()
     # Dry or viscous friction of its one joint: part of the straight line that data sheets give.
     friction: ClassVar[bool] = False
+    # A `curve` takes its place only where that leaves less on its joints by this share; 0: where
+    # it leaves no more.
+    holds_until_beaten: ClassVar[float] = 0.0
     # Many robots have it: it is in the model while the noise is measured, lest it be taken for it.
     usual: ClassVar[bool] = False
 
@@ -260,8 +263,13 @@ class Effect(ABC):
             return self.why_not(values)
         return "" if self.over_error(near, covariance) > 1.0 else self.why_not(values)
 
+    @property
+    def varied(self) -> str:
+        """Which of the kinds that it may vary it does; empty if none."""
+        return next(iter(self.varies), "")
+
     def taken(self, values: Array) -> tuple[float, Array]:
-        """How much it takes at most of what it `varies`, and the derivative (p,) of that."""
+        """How much it takes at most of what is `varied`, and the derivative (p,) of that."""
         return 0.0, np.zeros(len(values))
 
     def absurd(self, values: Array, seen: Seen) -> str:
@@ -306,6 +314,10 @@ class Effect(ABC):
         """
         return steps_by_ratio(self.shape[name], _FINER)
 
+    def compares_with(self, other: "Effect") -> bool:
+        """Whether sizes in the shape of `other` say how uncertain its own are."""
+        return True
+
     def shows_above(self, speed: float) -> bool:
         """Whether it shows at speeds above `speed`: slower samples are left out."""
         return True
@@ -321,7 +333,8 @@ class Effect(ABC):
     def curve(self, signals: Signals, every: Sequence[Signals]) -> Array | None:
         """Columns (T, r, k) in one part of `every` of a curve without a name that it comes near.
 
-        None: its form is its own. An effect that leaves no less than the curve is doubted.
+        None: its form is its own. An effect that leaves no less than the curve is doubted; one that
+        `holds_until_beaten` by a share, only where the curve leaves less by it.
         """
         return None
 

@@ -178,6 +178,16 @@ def straight_friction(joint: int) -> tuple[Effect, ...]:
     return ViscousFriction((joint,)), CoulombFriction((joint,))
 
 
+def carried_body(joint: int, runs: tuple[str, ...] = ()) -> Effect:
+    """A body on the link that `joint` moves, in these runs (empty: all), by its ten parameters."""
+    return Payload((joint,), {}, runs)
+
+
+def drives_gain(joint: int) -> Effect:
+    """What the torque of a joint is measured in, beside what is taken for it."""
+    return TorqueGain((joint,))
+
+
 def _built(spec: EffectSpec, index: int, robot: Robot) -> list[Effect]:
     where = f"effects[{index}]"
     kind = kind_named(spec.kind, f"{where}.kind")

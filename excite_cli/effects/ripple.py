@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from excite_cli.effects.angle_curve import powers_of_angle, way_travelled
 from excite_cli.effects.base import (
     Abscissa,
     Cotangents,
@@ -97,9 +98,7 @@ class Ripple(Effect):
 
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """Parts of a cycle more or less over the travelled range."""
-        j = self.joints[0]
-        low = min(float(s.q[:, j].min()) for s in signals)
-        high = max(float(s.q[:, j].max()) for s in signals)
+        low, high = way_travelled(self.joints[0], signals)
         return [2 * np.pi * cycles / max(high - low, 1e-6) for cycles in _FINER]
 
     def columns(self, signals: Signals) -> Array:
@@ -109,13 +108,10 @@ class Ripple(Effect):
 
     def curve(self, signals: Signals, every: Sequence[Signals]) -> Array | None:
         """Powers of the angle up to the fourth, where less than three periods are seen."""
-        j = self.joints[0]
-        low = min(float(s.q[:, j].min()) for s in every)
-        high = max(float(s.q[:, j].max()) for s in every)
+        low, high = way_travelled(self.joints[0], every)
         if self.shape["periods"] * (high - low) > 2 * np.pi * _SLOW:
             return None
-        x = (2 * signals.q[:, j] - low - high) / max(high - low, 1e-12)
-        return np.stack([x**k for k in range(5)], axis=-1)[:, None]
+        return powers_of_angle(self.joints[0], signals, every)[:, None]
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """The angle, folded into one period."""

@@ -12,6 +12,7 @@ from excite_cli.criteria.base import Criterion
 from excite_cli.criteria.catalogue import build_criterion
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.load_parameters import load_parameters
 from excite_cli.dynamics.states import States
 from excite_cli.dynamics.uncertain_inertias import (
     FitKnowledge,
@@ -107,6 +108,8 @@ def build_problem(
     needs time derivatives, the cost is taken on the constraint grid, its rows weighted so that the
     motion counts as much as before.
 
+    Of a load (`criterion.of`), the regressor has the ten columns of the link that carries it.
+
     Raises
     ------
     ConfigError, RobotError
@@ -116,9 +119,11 @@ def build_problem(
     trajectory = build_trajectory(spec.trajectory)
     spec = with_sampling(spec, trajectory)
     cost, grid = instants(spec.sampling.cost), instants(spec.sampling.constraints)
-    base = find_base_parameters(robot)
+    of_load = spec.criterion.of == "load"
+    own = find_base_parameters(robot)
+    base = load_parameters(robot, spec.criterion.load_link) if of_load else own
     weighting = build_weighting(spec.criterion, robot, base)
-    effects = declared_effects(spec.effects, robot) if spec.effects else ()
+    effects = declared_effects(spec.effects, robot) if spec.effects and not of_load else ()
     extension = extend(robot, base, weighting, effects, trajectory.duration)
     columns = base.rank + len(extension.names)
     if len(cost) * len(robot.rows) < columns:
@@ -142,9 +147,7 @@ def build_problem(
         boundary=build_boundary(spec.trajectory, robot, trajectory),
         criterion=criterion,
         weighting=weighting,
-        constraints=build_constraints(
-            spec.constraints, robot, _uncertainty(spec, robot, base, fit)
-        ),
+        constraints=build_constraints(spec.constraints, robot, _uncertainty(spec, robot, own, fit)),
         cost_basis=trajectory.basis(cost),
         constraint_basis=trajectory.basis(grid),
         kinematics=BatchKinematics(robot),

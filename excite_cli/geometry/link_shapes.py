@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 _RIM = 32  # corners of a rim that stands for a circle
 _BALL = 240  # corners of a polyhedron that stands for a sphere
+_latest: tuple[pin.Model, pin.GeometryModel] | None = None
 
 
 @dataclass(frozen=True)
@@ -99,13 +100,19 @@ def _outline(points: Array) -> NDArray[np.intp]:
 def collision_model(robot: Robot) -> pin.GeometryModel:
     """Collision geometry of the URDF, attached to the joints of `robot.model`.
 
+    It is shared, and not to be changed: a problem asks several times for that of one robot.
+
     Raises
     ------
     RobotError
         A mesh is missing, lies outside the robot's folders, or cannot be read.
     """
-    advice = " Repair the mesh, or drop constraints.self_collision."
-    return _geometry(robot, "collision", pin.GeometryType.COLLISION, advice)
+    global _latest
+    if _latest is None or _latest[0] is not robot.model:
+        advice = " Repair the mesh, or drop constraints.self_collision."
+        geometry = _geometry(robot, "collision", pin.GeometryType.COLLISION, advice)
+        _latest = robot.model, geometry
+    return _latest[1]
 
 
 def visual_model(robot: Robot) -> pin.GeometryModel:

@@ -30,7 +30,8 @@ class ConsistentParameters:
     """`phi` (P,) and `effects` (k,), `eigenvalues` (bodies,) [kg] of the scaled pseudo-inertias.
 
     `cost` ‖R x − z‖² beyond its minimum without constraints and prior, in units of the noise;
-    `status` of the solver, a sentence where it did not succeed.
+    `status` of the solver, a sentence where it did not succeed. `spread`: the deviations of the
+    prior as a share of what they were given as (`consistent_spread`).
     """
 
     phi: Array
@@ -39,6 +40,7 @@ class ConsistentParameters:
     cost: float
     status: str
     solved: bool
+    spread: float = 1.0
 
 
 def consistent_parameters(
@@ -56,9 +58,36 @@ def consistent_parameters(
     lengths: (bodies,) [m]
     nonnegative: (k,) effects' parameters that cannot be negative
     """
-    r, k = base.rank, len(nonnegative)
     triangle, right = factor[:-1, :-1], factor[:-1, -1]
     count = len(prior.mean)
+    start, back = without_constraints(factor, base, prior)
+    margin = _MARGIN * max(float(np.abs(prior.mean[::10]).mean()), 1e-6)
+    signs = np.flatnonzero(nonnegative) + count
+    nearest = nearest_inertias(back, start, lengths, signs, margin)
+    x = nearest.x
+    free = np.linalg.lstsq(triangle, right, rcond=None)[0]
+    at = np.concatenate([base.mapping @ x[:count], x[count:]])
+    missed = [np.square(triangle @ point - right).sum() for point in (at, free)]
+    return ConsistentParameters(
+        phi=x[:count],
+        effects=x[count:],
+        eigenvalues=smallest_eigenvalues(x[:count], lengths),
+        cost=float(missed[0] - missed[1]),
+        status=nearest.status,
+        solved=nearest.solved,
+    )
+
+
+def without_constraints(
+    factor: Array, base: BaseParameters, prior: InertialPrior
+) -> tuple[Array, Array]:
+    """The minimum [φ; θ] (P + k,) without constraints, and B (P + k, P + k).
+
+    B Bᵀ is its covariance, the inverse of the information of `factor` plus that of the prior.
+    """
+    triangle, right = factor[:-1, :-1], factor[:-1, -1]
+    r, count = base.rank, len(prior.mean)
+    k = triangle.shape[1] - r
     effect_scale = _effect_scale(triangle[:, r:])
     # Unknowns u: φ = mean + std ∘ u_φ, θ = effect_scale ∘ u_θ.
     of_phi = triangle[:, :r] @ (base.mapping * prior.std)
@@ -73,21 +102,7 @@ def consistent_parameters(
     scale = np.concatenate([prior.std, effect_scale])
     center = np.concatenate([prior.mean, np.zeros(k)])
     back = solve_triangular(turned, np.eye(len(scale))) * scale[:, None]
-    margin = _MARGIN * max(float(np.abs(center[:count:10]).mean()), 1e-6)
-    signs = np.flatnonzero(nonnegative) + count
-    nearest = nearest_inertias(back, center + back @ d, lengths, signs, margin)
-    x = nearest.x
-    free = np.linalg.lstsq(triangle, right, rcond=None)[0]
-    at = np.concatenate([base.mapping @ x[:count], x[count:]])
-    missed = [np.square(triangle @ point - right).sum() for point in (at, free)]
-    return ConsistentParameters(
-        phi=x[:count],
-        effects=x[count:],
-        eigenvalues=smallest_eigenvalues(x[:count], lengths),
-        cost=float(missed[0] - missed[1]),
-        status=nearest.status,
-        solved=nearest.solved,
-    )
+    return center + back @ d, back
 
 
 def _effect_scale(columns: Array) -> Array:

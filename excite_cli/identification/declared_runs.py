@@ -1,6 +1,5 @@
 """Runs and columns that effects of the configuration name must be in the data."""
 
-from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.identification.declared_states import check_states
@@ -33,22 +32,33 @@ def check_declared_runs(spec: Spec, dataset: Dataset) -> None:
                     f"{nearest(name, names)} Runs: {', '.join(names)}."
                 )
     check_states(spec.runs, names)
+    known = spec.identification.known_payload
+    for name in known.runs if known else ():
+        if name not in names:
+            raise ConfigError(
+                f"identification.known_payload.runs: there is no run '{name}' in the data."
+                f"{nearest(name, names)} Runs: {', '.join(names)}."
+            )
 
 
-def check_left_to_fit(specs: tuple[EffectSpec, ...] | None, parts: Split) -> None:
-    """Refuse effects that are declared for sealed runs only: nothing would be fitted of them.
+def check_left_to_fit(spec: Spec, parts: Split) -> None:
+    """Refuse effects, or a known payload, of sealed runs only: nothing would be fitted of them.
 
     Raises
     ------
     ConfigError
         There is such an effect.
     """
-    for index, spec in enumerate(specs or ()):
-        names = () if spec.runs == "all" else spec.runs
+    declared = [
+        (f"effects[{index}]", each.kind, () if each.runs == "all" else each.runs)
+        for index, each in enumerate(spec.effects or ())
+    ]
+    needed = spec.identification.needed_runs
+    for where, what, names in [*declared, ("identification.known_payload", "the payload", needed)]:
         if names and not any(run.id.is_among(names) for run in parts.training):
             others = [unit for unit in parts.units if unit not in (*names, parts.sealed_name)]
             instead = f" Seal another run: --sealed '{others[-1]}'." if others else ""
             raise ConfigError(
-                f"effects[{index}].runs: '{', '.join(names)}' is sealed, so that nothing is left "
-                f"to fit {spec.kind} on.{instead}"
+                f"{where}.runs: '{', '.join(names)}' is sealed, so that nothing is left "
+                f"to fit {what} on.{instead}"
             )

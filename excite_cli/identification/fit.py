@@ -18,10 +18,13 @@ from excite_cli.dynamics.regressor import standard_parameter_unit, standard_para
 from excite_cli.effects.base import Effect, Parameter, Signals, Value
 from excite_cli.effects.parameter import unit_of_slider
 from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
+from excite_cli.identification.consistent_spread import consistent_near_prior
 from excite_cli.identification.covariance import Rows
 from excite_cli.identification.essential import essential_parameters
-from excite_cli.identification.factors import Mask, solve
+from excite_cli.identification.factors import Mask, solve, triangle_of
+from excite_cli.identification.implausible_links import marked
 from excite_cli.identification.least_squares import LinearFit, fit_rows
+from excite_cli.identification.link_changes import LinkChange, inertial_covariance, link_changes
 from excite_cli.identification.prior import InertialPrior, inertial_prior
 from excite_cli.identification.regression import (
     Regression,
@@ -48,9 +51,9 @@ class Fit(Shown):
     the first `rank` are base parameters, the rest the effects' linear parameters in order.
     `covariance` (p, p) holds infinity on the diagonal for what the data do not show. `noise` (n,)
     [N·m] of the filtered torque. `phi` (P,) full standard parameters with these base parameters,
-    nearest to the URDF's; `consistent` those of real bodies. `samples`: independent ones that the
-    data are worth, of `count`. With the URDF's inertias kept, nothing is dropped: `essential` is
-    `identifiable`.
+    nearest to the URDF's; `consistent` those of real bodies, and `links` what these are beside the
+    URDF's (none without them). `samples`: independent ones that the data are worth, of `count`.
+    With the URDF's inertias kept, nothing is dropped: `essential` is `identifiable`.
     """
 
     method: str
@@ -72,6 +75,7 @@ class Fit(Shown):
     count: int
     samples: float
     consistent: ConsistentParameters | None = None
+    links: tuple[LinkChange, ...] = ()
 
     @property
     def base_values(self) -> Array:
@@ -124,40 +128,62 @@ def rows_of(run: RunColumns, base: BaseParameters) -> Rows:
     return Rows(columns_of(run, base), run.tau, run.usable, rounding=rounding)
 
 
-def fit(regression: Regression, spec: IdentificationSpec | None = None) -> Fit:
-    """Fit the declared model to all runs of `regression`."""
+def fit(
+    regression: Regression,
+    spec: IdentificationSpec | None = None,
+    known: tuple[Array, Array] | None = None,
+) -> Fit:
+    """Fit the declared model to all runs of `regression`.
+
+    `known` = (A (m, p), b (m,)) adds ‖A x − b‖² of all parameters, base parameters first, in units
+    of standard deviations.
+    """
     spec = spec or IdentificationSpec()
     robot, base = regression.robot, regression.base
     cad = standard_parameters(robot)
     keep = spec.inertias == "cad"
     prior = inertial_prior(robot, cad, spec.uncertainty if keep else 1.0)
-    regression, linear = _settled(regression, spec, prior if keep else None, prior)
-    consistent = None
-    if spec.consistent:
-        share = np.sqrt(np.clip(linear.samples / max(int(linear.count.sum()), 1), 0.0, 1.0))
-        consistent = consistent_parameters(
-            linear.factor * (share if share > 0 else 1.0),
-            base,
-            prior,
-            body_lengths(robot, cad),
-            np.array([p.nonnegative for p in effect_parameters(regression.effects)], bool),
-        )
-    return _record(regression, spec, linear, prior, consistent)
+    more = np.column_stack(known) if known is not None and len(known[0]) else None
+    regression, linear = _settled(regression, spec, (prior if keep else None, more), prior)
+    found = _record(regression, spec, linear, prior)
+    if not spec.consistent:
+        return found
+    share = np.sqrt(np.clip(linear.samples / max(int(linear.count.sum()), 1), 0.0, 1.0))
+    factor = linear.factor * (share if share > 0 else 1.0)
+    if more is not None:
+        factor = triangle_of(np.concatenate([factor, more]))
+    signs = np.array([p.nonnegative for p in effect_parameters(regression.effects)], bool)
+    # What `cad` is worth is the user's word; where inertias are free nobody said.
+    solve_for = consistent_parameters if keep else consistent_near_prior
+    consistent = solve_for(factor, base, prior, body_lengths(robot, cad), signs)
+    if not consistent.solved:
+        return replace(found, consistent=consistent)
+    covariance = inertial_covariance(factor, base, prior)
+    links = link_changes(robot, consistent.phi, covariance, prior)
+    links = marked(robot, links, consistent.phi, covariance, prior)
+    return replace(found, consistent=consistent, links=links)
 
 
 def _settled(
     regression: Regression,
     spec: IdentificationSpec,
-    prior: InertialPrior | None,
+    known: tuple[InertialPrior | None, Array | None],
     completion: InertialPrior,
 ) -> tuple[Regression, LinearFit]:
-    """Fit, with columns that follow the model rebuilt until their torque settles."""
-    base = regression.base
+    """Fit, with columns that follow the model rebuilt until their torque settles.
+
+    `known`: the prior on inertias, and rows [A b] on all parameters.
+    """
+    base, (prior, more) = regression.base, known
     k = sum(len(effect.parameters) for effect in regression.effects)
-    extra = None
+    given = [] if more is None else [more]
     if prior is not None:
         rows, target = prior.on_base(base)
-        extra = np.hstack([rows, np.zeros((len(rows), k))]), target
+        given.append(np.column_stack([rows, np.zeros((len(rows), k)), target]))
+    extra = None
+    if given:
+        both = np.concatenate(given)
+        extra = both[:, :-1], both[:, -1]
     usual = np.sqrt(np.square(base.mapping) @ np.square(completion.std))
     sizes = np.append(usual, [p.high for p in effect_parameters(regression.effects)])
     follow = follows_model(regression)
@@ -209,7 +235,6 @@ def _record(
     spec: IdentificationSpec,
     linear: LinearFit,
     prior: InertialPrior,
-    consistent: ConsistentParameters | None,
 ) -> Fit:
     robot, base, effects = regression.robot, regression.base, regression.effects
     parameters = effect_parameters(effects)
@@ -253,7 +278,6 @@ def _record(
         phi=prior.completed(base, linear.x[: base.rank]),
         count=int(linear.count.sum()),
         samples=linear.samples,
-        consistent=consistent,
     )
 
 

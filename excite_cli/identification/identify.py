@@ -28,6 +28,7 @@ from excite_cli.identification.hausman import (
     instrument_dataset,
     not_testable,
 )
+from excite_cli.identification.implausible_links import implausible
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import prepare, require_motion
@@ -35,6 +36,7 @@ from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import Regression, build_regression
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split
+from excite_cli.identification.torque_scale import assumed_scale, knowledge_of
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Robot
@@ -84,10 +86,11 @@ def identify(
     FileError
         A run is too short.
     """
-    effects = declared_effects(spec.effects, robot)
+    known = knowledge_of(spec.identification, declared_effects(spec.effects, robot), robot)
+    effects = known.effects
     check_declared_runs(spec, dataset)
-    parts = split(dataset, sealed, spec.diagnosis.block)
-    check_left_to_fit(spec.effects, parts)
+    parts = split(dataset, sealed, spec.diagnosis.block, spec.identification.needed_runs)
+    check_left_to_fit(spec, parts)
     refuse_sealed_copies(parts)
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
@@ -101,14 +104,16 @@ def identify(
         spec.measurement.without_torque,
     )
     tell("fit")
-    found = fit(training, spec.identification)
+    known_rows = np.hstack([np.zeros((len(known.rows), base.rank)), known.rows])
+    found = fit(training, spec.identification, (known_rows, known.target))
     tell("errors on the sealed part")
     held_out = _regression(robot, base, effects, parts.sealed, processing)
     if follows_model(training):
         values = found.values[found.rank :]
         training, held_out = (rebuilt(r, found.phi, values) for r in (training, held_out))
     tell("closed-loop bias")
-    hausman = _hausman(training, dataset, parts, processing, found, (sealed, spec.diagnosis.block))
+    cut = (sealed, spec.diagnosis.block, spec.identification.needed_runs)
+    hausman = _hausman(training, dataset, parts, processing, found, cut)
     floor = noise_floor(parts.training, processing)
     error, sealed_traces = judged(found, held_out, sealed=True)
     training_error, training_traces = judged(found, training, sealed=False)
@@ -121,8 +126,10 @@ def identify(
         processing=processing,
         findings=(
             *dataset.findings,
+            *assumed_scale(spec.measurement, spec.identification),
             *_noticed(found, hausman),
             *_much_left(error),
+            *implausible(found.links, found.inertias, found.joint_names),
             *(floor.noticed(robot.joint_names) if floor else ()),
         ),
         noise_floor=floor.named(robot.joint_names) if floor else None,
@@ -171,7 +178,7 @@ def _hausman(
     parts: Split,
     processing: Processing,
     found: Fit,
-    cut: tuple[str | None, float | None],
+    cut: tuple[str | None, float | None, tuple[str, ...]],
 ) -> Hausman:
     """The test with instruments cut and filtered as the data were."""
     instruments, source, reason = instrument_dataset(dataset)

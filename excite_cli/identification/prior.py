@@ -27,6 +27,10 @@ class InertialPrior:
     mean: Array
     std: Array
 
+    def narrowed(self, shares: Array) -> "InertialPrior":
+        """The same with deviations multiplied by `shares` (P,)."""
+        return InertialPrior(self.mean, shares * self.std)
+
     def on_base(self, base: BaseParameters) -> tuple[Array, Array]:
         """Pseudo-rows (A (r, r), b (r,)) with ‖A φ_B − b‖² the prior on base parameters."""
         covariance = (base.mapping * np.square(self.std)) @ base.mapping.T

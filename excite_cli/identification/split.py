@@ -53,10 +53,16 @@ def units_of(dataset: Dataset) -> tuple[str, ...]:
     return tuple(dict.fromkeys(run.id.key for run in dataset.runs))
 
 
-def split(dataset: Dataset, sealed: str | None = None, block: float | None = None) -> Split:
+def split(
+    dataset: Dataset,
+    sealed: str | None = None,
+    block: float | None = None,
+    needed: Collection[str] = (),
+) -> Split:
     """Seal a recording (the last, unless `sealed` names one, or a stretch of one).
 
-    A single one without gaps is cut into blocks of time. Time counts from a recording's start.
+    A single one without gaps is cut into blocks of time. Time counts from a recording's start. Of
+    those that are `needed` for the fit none is sealed, unless it is named or there is no other.
 
     Raises
     ------
@@ -73,7 +79,7 @@ def split(dataset: Dataset, sealed: str | None = None, block: float | None = Non
     if len(runs) == 1:
         return _blocks(runs[0], block)
     if sealed is None or all(run.id.is_among((sealed,)) for run in runs):
-        sealed = units[-1]
+        sealed = next((unit for unit in reversed(units) if unit not in needed), units[-1])
     training = [run for run in runs if not run.id.is_among((sealed,))]
     kept = tuple(run for run in runs if run.id.is_among((sealed,)))
     if not training:

@@ -2,13 +2,21 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.errors import FileError, nearest
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.csv_table import read_table
 from excite_cli.measurement.dataset import Array
-from excite_cli.measurement.reader import CHANNELS, RawRun, Reader, ReadOptions, times_from_rate
+from excite_cli.measurement.reader import (
+    CHANNELS,
+    FIELDS,
+    RawRun,
+    Reader,
+    ReadOptions,
+    times_from_rate,
+)
 
 _NUMBERED = re.compile(r"_?\[?(\d+)\]?$")
 
@@ -27,8 +35,8 @@ class CsvReader(Reader):
         table = read_table(path)
         columns = {_bare(name): values for name, values in table.columns.items()}
         words = listed(list(columns))
-        there = [c for c in CHANNELS if (w := wanted.called(c)) and _joints(columns, w)]
-        if not there:
+        wanted = _by_fields(columns, wanted)
+        if not any((w := wanted.called(c)) and _joints(columns, w) for c in CHANNELS):
             raise FileError(_no_columns(path, "q", wanted, words))
         time = wanted.called("t")
         stamped = time is not None and time in columns
@@ -42,6 +50,22 @@ class CsvReader(Reader):
         channels, others = _by_channel(columns, wanted)
         numbered = all(name.isdigit() for name in channels["q"])
         return [RawRun("", t, channels, others, numbered, not stamped, table.findings)]
+
+
+def _by_fields(columns: Mapping[str, Array], wanted: ReadOptions) -> ReadOptions:
+    """With the names of `JointState` for channels of which nothing is said and nothing is there.
+
+    Of joints of the robot, or numbered: a gripper's position is none.
+    """
+    robot = {*wanted.joints, *wanted.names}
+    found: dict[str, str | None] = {}
+    for channel, field in FIELDS.items():
+        if channel in wanted.channels or _joints(columns, channel):
+            continue
+        joints = _joints(columns, field).values()
+        if any(joint in robot or joint.isdigit() for joint in joints):
+            found[channel] = field
+    return replace(wanted, channels={**found, **wanted.channels}) if found else wanted
 
 
 def _no_columns(path: Path, channel: str, wanted: ReadOptions, words: str) -> str:

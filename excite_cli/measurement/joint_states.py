@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Finding
-from excite_cli.measurement.reader import SINCE_1970, RawRun, ReadOptions
-
-_FIELDS = {"q": "position", "dq": "velocity", "tau": "effort"}
+from excite_cli.measurement.reader import FIELDS, SINCE_1970, RawRun, ReadOptions
 
 
 class _Messages:
@@ -22,7 +20,7 @@ class _Messages:
         self.places: list[int] = []
         self.recorded: list[int] = []
         self.stamped: list[int] = []
-        self.values: dict[str, list[Array]] = {channel: [] for channel in _FIELDS}
+        self.values: dict[str, list[Array]] = {channel: [] for channel in FIELDS}
 
 
 class JointStates:
@@ -41,7 +39,7 @@ class JointStates:
         self._count += 1
         messages.recorded.append(recorded)
         messages.stamped.append(int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec))
-        for channel, field in _FIELDS.items():
+        for channel, field in FIELDS.items():
             messages.values[channel].append(getattr(message, field))
 
     def run(self, path: Path, wanted: ReadOptions) -> RawRun:
@@ -61,7 +59,7 @@ class JointStates:
         # As recorded: whether stamps go back is for the checks to see and to say.
         order = np.argsort([place for names in chosen for place in self._by_names[names].places])
         columns: dict[str, dict[str, Array]] = {}
-        for channel in _FIELDS:
+        for channel in FIELDS:
             if all(channel in part[1] for part in parts):
                 columns[channel] = {
                     joint: np.concatenate([part[1][channel][joint] for part in parts])[order]
@@ -124,7 +122,7 @@ class JointStates:
         unstamped = bool(np.count_nonzero(stamped <= 0) > 1)
         stamps = recorded if unstamped else stamped
         columns: dict[str, dict[str, Array]] = {}
-        for channel, field in _FIELDS.items():
+        for channel, field in FIELDS.items():
             sizes = {len(values) for values in messages.values[channel]}
             if sizes == {len(names)}:
                 matrix = np.array(messages.values[channel], dtype=float)
@@ -150,7 +148,7 @@ class JointStates:
             given = wanted.called(channel)
             if given is None:
                 columns.pop(channel, None)
-            elif given not in (channel, _FIELDS[channel]):
+            elif given not in (channel, FIELDS[channel]):
                 raise FileError(
                     f"{path}: measurement.channels: {{{channel}: {given}}} does not fit a bag; "
                     "JointState has position (q), velocity (dq) and effort (tau)."

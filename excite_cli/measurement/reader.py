@@ -19,6 +19,7 @@ MAX_BYTES = 4 * 2**30  # of a file
 MAX_VALUES = 2**28  # numbers taken from a file: 2 GiB in memory
 ALWAYS, PACKED = 2**27, 50  # bytes that any file may unpack to; times its size
 CHANNELS = ("q", "dq", "tau")
+FIELDS = {"q": "position", "dq": "velocity", "tau": "effort"}  # of JointState
 SINCE_1970 = 1e9  # s: no clock that counts from its own start has come so far
 
 

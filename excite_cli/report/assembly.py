@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
@@ -14,7 +15,7 @@ from excite_cli.report.compare_models import compare_diagnoses, compare_fits
 from excite_cli.report.compare_section import comparable, compare_results
 from excite_cli.report.diagnosis_sections import diagnosis_figures, diagnosis_sections
 from excite_cli.report.fit_sections import fit_figures, fit_sections
-from excite_cli.report.page import KeyFigure, Page, Picture, Section
+from excite_cli.report.page import KeyFigure, Page, Section, Text
 
 
 @dataclass(frozen=True)
@@ -22,14 +23,14 @@ class Source:
     """One file of a report.
 
     `name` tells it from the others on the page, `file` is its file name. A result needs the
-    `problem` that it was made for, and may have a `picture` of its robot.
+    `problem` that it was made for, and may show a `picture` of its robot.
     """
 
     name: str
     file: str
     content: Result | StoredFit | Diagnosis
     problem: Problem | None = None
-    picture: Picture | None = None
+    picture: bool = True
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class _Part:
     source: Source
     figures: tuple[KeyFigure, ...]
     sections: tuple[Section, ...]
+    answers: tuple[Text, ...] = ()
 
 
 def page_of(sources: Sequence[Source], show: Callable[[str, int], None]) -> Page:
@@ -58,6 +60,7 @@ def page_of(sources: Sequence[Source], show: Callable[[str, int], None]) -> Page
         "Made by excite from " + ", ".join(source.file for source in sources),
         tuple(figures),
         (*compared, *sections) if first else (*sections, *compared),
+        tuple(answer for part in parts for answer in part.answers),
     )
 
 
@@ -81,7 +84,8 @@ def _part(source: Source, campaign: Campaign | None) -> _Part:
     if isinstance(content, StoredFit):
         return _Part(source, fit_figures(content), fit_sections(content))
     assert isinstance(content, Diagnosis)
-    return _Part(source, diagnosis_figures(content), diagnosis_sections(content))
+    answer = Text(answer_in_words(content), "answer" if content.good else "bad")
+    return _Part(source, diagnosis_figures(content), diagnosis_sections(content), (answer,))
 
 
 def _distinct(parts: Sequence[_Part]) -> list[_Part]:

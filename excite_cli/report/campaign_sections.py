@@ -5,7 +5,7 @@ from excite_cli.report.condition_section import condition_figures, condition_sec
 from excite_cli.report.config_section import config_section
 from excite_cli.report.margin_section import margin_figures, margin_section
 from excite_cli.report.motion_section import motion_section
-from excite_cli.report.page import KeyFigure, Picture, Section
+from excite_cli.report.page import KeyFigure, Section
 from excite_cli.report.weakest_section import weakest_section
 
 
@@ -14,7 +14,7 @@ def campaign_figures(campaign: Campaign) -> tuple[KeyFigure, ...]:
     return (*condition_figures(campaign), *margin_figures(campaign))
 
 
-def campaign_sections(campaign: Campaign, picture: Picture | None = None) -> tuple[Section, ...]:
+def campaign_sections(campaign: Campaign, picture: bool = True) -> tuple[Section, ...]:
     """Condition numbers, what shows least, motions, margins, how it was made."""
     return (
         condition_section(campaign, picture),

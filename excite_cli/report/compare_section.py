@@ -3,24 +3,21 @@
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from excite_cli.report.campaign import Campaign, in_figures
-from excite_cli.report.chart import PAPER, SERIES, Chart, draw_chart, legend_below
+from excite_cli.report.chart import Colour
 from excite_cli.report.config_differences import differences
 from excite_cli.report.page import Block, Charts, Section, Table, Text
-from excite_cli.report.style import logarithmic
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from excite_cli.report.plot import Panel, Plot, Series
 
 _NOT_COMPARABLE = (
     "These files differ in robot, moved joints, rows, effects or weights: their condition numbers "
     "are about different parameters, or in different units, and do not compare."
 )
-_MARKERS = ("o", "s", "^", "D", "v", "P")
+_COLOURS: tuple[Colour, ...] = ("blue", "vermilion", "green", "purple")
+_HEIGHT = 200  # px
 
 
 def compare_results(campaigns: Sequence[Campaign]) -> Section:
@@ -57,38 +54,33 @@ def _reached(campaign: Campaign) -> float:
     return campaign.result.motions[-1].stacked_condition_number
 
 
-def _chart(campaigns: Sequence[Campaign]) -> Chart:
+def _chart(campaigns: Sequence[Campaign]) -> Plot:
     """Stacked condition numbers by the number of motions; a file goes on where its prior ends."""
     offsets = [_before(campaign, campaigns) for campaign in campaigns]
-
-    def draw(figure: "Figure") -> None:
-        axes = figure.add_subplot()
-        lines = [
-            [motion.stacked_condition_number for motion in campaign.result.motions]
-            for campaign in campaigns
-        ]
-        logarithmic(axes, [value for line in lines for value in line if np.isfinite(value)])
-        for number, (campaign, line) in enumerate(zip(campaigns, lines, strict=True)):
-            begin = 1 + offsets[number]
-            axes.plot(
-                range(begin, begin + len(line)), np.where(np.isfinite(line), line, np.nan), "-",
-                color=SERIES[number % len(SERIES)], marker=_MARKERS[number % len(_MARKERS)],
-                markersize=6, markeredgecolor=PAPER, label=_cut(campaign.name),
-            )  # fmt: skip
-        count = max(offset + len(line) for offset, line in zip(offsets, lines, strict=True))
-        axes.set_xlim(0.5, count + 0.5)
-        axes.set_xticks(range(1, count + 1, -(-count // 10)))
-        axes.grid(axis="x", visible=False)
-        axes.set_xlabel("motions so far [–]")
-        axes.set_ylabel("stacked condition number [–]")
-        legend_below(figure, 2)
-
-    said = "; ".join(
-        f"{campaign.name}: "
-        + ", ".join(in_figures(m.stacked_condition_number) for m in campaign.result.motions)
+    lines = [
+        [motion.stacked_condition_number for motion in campaign.result.motions]
         for campaign in campaigns
+    ]
+    count = max(offset + len(line) for offset, line in zip(offsets, lines, strict=True))
+    series = []
+    for number, (campaign, offset, line) in enumerate(zip(campaigns, offsets, lines, strict=True)):
+        y = np.full(count, np.nan)
+        y[offset : offset + len(line)] = np.where(np.isfinite(line), line, np.nan)
+        series.append(Series(_cut(campaign.name), y, _COLOURS[number % len(_COLOURS)], "joined"))
+    said = "; ".join(
+        f"{campaign.name}: {', '.join(map(in_figures, line))}"
+        for campaign, line in zip(campaigns, lines, strict=True)
     )
-    return draw_chart("Stacked condition numbers", f"{said}.", draw, height=2.9)
+    axis = "stacked condition number [–]"
+    return Plot(
+        "Stacked condition numbers",
+        f"{said}.",
+        "motions so far [–]",
+        np.arange(1.0, count + 1),
+        (Panel(axis, tuple(series), height=_HEIGHT, logarithmic=True),),
+        span=(0.5, count + 0.5),
+        counted=True,
+    )
 
 
 def _before(campaign: Campaign, campaigns: Sequence[Campaign]) -> int:

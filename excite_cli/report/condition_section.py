@@ -1,7 +1,6 @@
 """How well the parameters can be seen after each motion, beside the best of random motions."""
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,29 +8,26 @@ from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
 from excite_cli.report.campaign import Campaign, counted, in_figures
-from excite_cli.report.chart import BLUE, PAPER, VERMILION, Chart, draw_chart, legend_below
-from excite_cli.report.page import Block, Charts, KeyFigure, Picture, Section, Table, Text
+from excite_cli.report.chart import Colour
+from excite_cli.report.page import Block, Charts, KeyFigure, Section, Table, Text
+from excite_cli.report.plot import Panel, Plot, Series
+from excite_cli.report.posture_chart import posture_chart
 from excite_cli.report.spectrum_chart import spectrum_chart
-from excite_cli.report.style import logarithmic
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-_MOST_LABELLED = 6
+_HEIGHT = 200  # px
 _NO_BASELINE = (
     "This file holds no random motions to compare with. `excite compare-random CONFIG --optimized "
     "FILE.h5 -o BOTH.h5` draws them under the same constraints and stores both."
 )
 
 
-def condition_section(campaign: Campaign, picture: Picture | None = None) -> Section:
+def condition_section(campaign: Campaign, picture: bool = True) -> Section:
     """Condition numbers per motion as a chart and a table, and the singular values.
 
-    A `picture` of the robot stands beside them.
+    With a `picture` the robot stands beside them, where it is nearest to something.
     """
     result = campaign.result
-    shown: tuple[Chart | Picture, ...] = () if picture is None else (picture,)
+    shown = (posture_chart(campaign),) if picture else ()
     blocks: list[Block] = [
         Charts((*shown, condition_chart(result), spectrum_chart(result, campaign.problem))),
         condition_table(result),
@@ -111,73 +107,43 @@ def _weighting_words(campaign: Campaign) -> str:
     return f" Of the regressor with {', '.join(parts)}." if parts else ""
 
 
-def condition_chart(result: Result) -> Chart:
+def condition_chart(result: Result) -> Plot:
     """Own and stacked condition number of every motion on a logarithmic axis."""
-    parts: list[tuple[str, str, Sequence[Motion] | Sequence[RandomMotion]]] = [
-        ("optimised", BLUE, result.motions)
+    parts: list[tuple[str, Colour, Sequence[Motion] | Sequence[RandomMotion]]] = [
+        ("optimised", "blue", result.motions)
     ]
     if result.random:
-        parts.append(("random", VERMILION, result.random))
-
-    def draw(figure: "Figure") -> None:
-        axes = figure.add_subplot()
-        numbers = [
-            number
-            for _, _, motions in parts
-            for motion in motions
-            for number in (motion.condition_number, motion.stacked_condition_number)
-        ]
-        logarithmic(axes, [number for number in numbers if np.isfinite(number)])
-        for word, colour, motions in parts:
-            _draw_sequence(axes, word, colour, motions)
-        count = max(len(motions) for _, _, motions in parts)
-        axes.set_xlim(0.5, count + 0.5)
-        axes.set_xticks(range(1, count + 1, -(-count // 10)))
-        axes.grid(axis="x", visible=False)
-        axes.set_xlabel("motion [–]")
-        axes.set_ylabel("condition number [–]")
-        legend_below(figure, 2)
-
+        parts.append(("random", "vermilion", result.random))
+    indices = sorted({motion.index for _, _, motions in parts for motion in motions})
+    at = {index: k for k, index in enumerate(indices)}
+    series = []
+    for word, colour, motions in parts:
+        alone, stacked = np.full((2, len(at)), np.nan)
+        for motion in motions:
+            alone[at[motion.index]] = motion.condition_number
+            stacked[at[motion.index]] = motion.stacked_condition_number
+        alone, stacked = (np.where(np.isfinite(each), each, np.nan) for each in (alone, stacked))
+        series.append(Series(f"{word}, alone", alone, colour, "rings"))
+        series.append(Series(f"{word}, stacked", stacked, colour, "joined"))
     said = "; ".join(
         f"{word}: stacked {_listed(m.stacked_condition_number for m in motions)}, alone "
         f"{_listed(m.condition_number for m in motions)}"
         for word, _, motions in parts
     )
-    return draw_chart(
+    return Plot(
         "Condition number after each motion",
         f"Condition numbers by motion, {said}.",
-        draw,
-        height=2.9,
+        "motion [–]",
+        np.array(indices, dtype=float),
+        (Panel("condition number [–]", tuple(series), height=_HEIGHT, logarithmic=True),),
         caption="Filled: with all motions before stacked. Open: the motion alone.",
+        span=(indices[0] - 0.5, indices[-1] + 0.5),
+        counted=True,
     )
 
 
 def _listed(numbers: Iterable[float]) -> str:
     return ", ".join(in_figures(number) for number in numbers)
-
-
-def _draw_sequence(
-    axes: "Axes", word: str, colour: str, motions: Sequence[Motion] | Sequence[RandomMotion]
-) -> None:
-    indices = [motion.index for motion in motions]
-    stacked = np.array([motion.stacked_condition_number for motion in motions])
-    own = np.array([motion.condition_number for motion in motions])
-    stacked, own = (np.where(np.isfinite(part), part, np.nan) for part in (stacked, own))
-    axes.plot(indices, stacked, "o-", color=colour, markersize=5, label=f"{word}, stacked")
-    axes.plot(
-        indices, own, "o", color=colour, markerfacecolor=PAPER, markersize=8, zorder=1.9,
-        label=f"{word}, alone",
-    )  # fmt: skip
-    if len(motions) > _MOST_LABELLED:
-        return
-    for index, number, alone in zip(indices, stacked, own, strict=True):
-        if np.isfinite(number):
-            above = bool(alone < number)  # away from the open circle
-            axes.annotate(
-                in_figures(number), (index, number), xytext=(0, 8 if above else -8),
-                textcoords="offset points", ha="center", va="bottom" if above else "top",
-                color=colour,
-            )  # fmt: skip
 
 
 def condition_table(result: Result) -> Table:

@@ -1,8 +1,6 @@
 """What is still unexplained: on which quantities the rest depends, as a map and as pictures."""
 
 from collections.abc import Sequence
-from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,26 +8,12 @@ from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import Diagnosis, Unexplained
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.words import covariate_in_words, rests_in_words
-from excite_cli.report.chart import (
-    BLUE,
-    INK,
-    MUTED,
-    VERMILION,
-    Chart,
-    draw_chart,
-    few_ticks,
-    legend_below,
-    limits_about,
-)
-from excite_cli.report.effect_chart import LAYOUT
+from excite_cli.report.chart import Colour, limits_about
 from excite_cli.report.page import Block, Charts, Section, Text
+from excite_cli.report.plot import Panel, Plot, Series, merged
 from excite_cli.report.residual_unit import readable_unit
-from excite_cli.report.style import matplotlib_part
+from excite_cli.report.share_map import share_map
 from excite_cli.robot.model import Array
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _SHOWN = 0.01  # share from which on a quantity gets a line of the map
 _MOST_ROWS = 18
@@ -97,45 +81,22 @@ def _map(dependence: Dependence) -> Block:
         f"the rest of some joint, at most {most[rows[0]]:.0%}: "
         f"{covariate_in_words(dependence.quantities[rows[0]])} for {dependence.joints[j]}."
     )
-    wide = len(dependence.joints) > 6
-    return draw_chart(
+    return share_map(
         "Share of the rest that one quantity explains [%]",
         words,
-        partial(_draw_map, dependence, rows, wide),
-        height=1.25 + 0.22 * len(rows),
-        wide=wide,
-        caption=(
-            "Columns: the joint whose torque is left. A share counts as far as runs left out "
-            "confirm it; shares overlap, since quantities of one motion do. Not every one is "
-            "significant: the sentences above say which are."
-        ),
+        [covariate_in_words(dependence.quantities[k]) for k in rows],
+        dependence.joints,
+        dependence.shares[:, rows].T,
+        _SHOWN / 2,
+        "Columns: the joint whose torque is left. A share counts as far as runs left out confirm "
+        "it; shares overlap, since quantities of one motion do. Not every one is significant: the "
+        "sentences above say which are.",
     )
-
-
-def _draw_map(dependence: Dependence, rows: Sequence[int], wide: bool, figure: "Figure") -> None:
-    axes = figure.add_subplot()
-    rectangle = matplotlib_part("patches").Rectangle
-    for y, k in enumerate(rows):
-        for x, share in enumerate(dependence.shares[:, k]):
-            if share < _SHOWN / 2:
-                continue
-            alpha = 0.08 + 0.5 * float(np.sqrt(share))
-            axes.add_patch(rectangle((x - 0.48, y - 0.46), 0.96, 0.92, fc=BLUE, alpha=alpha, lw=0))
-            axes.text(x, y, f"{100 * share:.0f}", ha="center", va="center", fontsize=8, color=INK)
-    axes.set_xlim(-0.5, len(dependence.joints) - 0.5)
-    axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.set_yticks(range(len(rows)), [covariate_in_words(dependence.quantities[k]) for k in rows])
-    axes.set_xticks(range(len(dependence.joints)), dependence.joints, rotation=40, ha="right",
-                    rotation_mode="anchor")  # fmt: skip
-    axes.grid(visible=False)
-    axes.tick_params(length=0)
-    for side in axes.spines.values():
-        side.set_visible(False)
 
 
 def _picture(
     found: Diagnosis, traces: Traces, unexplained: Unexplained, covariate: Covariate
-) -> list[Chart]:
+) -> list[Plot]:
     """What is left of the joint over the covariate; nothing if too few samples are known."""
     if covariate.quantity not in _SERIES:
         return []  # of columns of the log no trace is kept
@@ -167,25 +128,27 @@ def _picture(
         f"{np.sqrt(np.mean(left[known] ** 2)):.3g} {unit}."
     )
 
-    def draw(figure: "Figure") -> None:
-        axes: Axes = figure.add_subplot()
-        factor, scaled = readable_unit(unit, float(np.quantile(np.abs(left[known]), 0.98)))
-        dots = np.random.default_rng(0).permutation(np.flatnonzero(known))[:_MOST_DOTS]
-        axes.plot(
-            x[dots], factor * left[dots], ".", color=MUTED, ms=3.6, alpha=0.6, mew=0, label="left"
-        )
-        for colour, (label, center, middle) in zip((VERMILION, BLUE), means, strict=False):
-            axes.plot(center, factor * middle, "o-", color=colour, ms=3, lw=1.2,
-                      label=f"mean {label}".strip())  # fmt: skip
-        shown = [np.quantile(left[known], [0.005, 0.995]), *(middle for _, _, middle in means)]
-        axes.set_ylim(*limits_about(factor * np.concatenate(shown)))
-        axes.set_xlabel(axis, labelpad=2)
-        axes.set_ylabel(f"left [{scaled}]")
-        few_ticks(axes)
-        legend_below(figure)
-
-    return [draw_chart(f"{unexplained.joint}: left, over {covariate_in_words(covariate)}", words,
-                       draw, height=2.5, layout=LAYOUT)]  # fmt: skip
+    factor, scaled = readable_unit(unit, float(np.quantile(np.abs(left[known]), 0.98)))
+    dots = np.random.default_rng(0).permutation(np.flatnonzero(known))[:_MOST_DOTS]
+    at, (samples, *middles) = merged(
+        (x[dots], left[dots]), *((center, middle) for _, center, middle in means)
+    )
+    colours: tuple[Colour, ...] = ("vermilion", "blue")
+    shown = [np.quantile(left[known], [0.005, 0.995]), *(middle for _, _, middle in means)]
+    panel = Panel(
+        f"left [{scaled}]",
+        (
+            Series("left", factor * samples, "muted", "dots"),
+            *(
+                Series(f"mean {label}".strip(), factor * own, colour, "joined")
+                for colour, (label, _, _), own in zip(colours, means, middles, strict=False)
+            ),
+        ),
+        span=limits_about(factor * np.concatenate(shown)),
+        height=210,
+    )
+    title = f"{unexplained.joint}: left, over {covariate_in_words(covariate)}"
+    return [Plot(title, words, axis, at, (panel,))]
 
 
 def _means(x: Array, y: Array) -> tuple[Array, Array]:

@@ -3,17 +3,14 @@
 from collections.abc import Sequence
 from math import isnan
 
-from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.change_words import changes_in_words
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import (
-    SMALL_SHARE,
+    SMALL_PART,
     approximation_in_words,
     by_worth,
     counted,
     covariate_in_words,
-    is_small,
-    no_gain_in_words,
     other_name_of,
     p_in_words,
     place_in_words,
@@ -28,12 +25,10 @@ _COLUMNS = ("effect", "where", "size ± standard deviation", "p", "takes off", "
 
 def found_section(found: Diagnosis) -> Section:
     """Tables of what was found, absorbed and approximated, and the sentences about them."""
-    ranked = by_worth(found.named)
-    large = [each for each in ranked if not is_small(each)]
-    small = [each for each in ranked if is_small(each)]
+    large, small = by_worth(found.named, found)
     if len(small) < 2 or not large:
-        large, small = ranked, []
-    blocks: list[Block] = [] if found.good else [Text(no_gain_in_words(found), "bad")]
+        large, small = [*large, *small], []
+    blocks: list[Block] = []
     if large:
         blocks.append(
             Table(
@@ -54,7 +49,7 @@ def found_section(found: Diagnosis) -> Section:
             Table(
                 (*_COLUMNS, "cannot be told from"),
                 tuple(_row(found, each) for each in small),
-                title=f"{len(small)} small ones (each below {SMALL_SHARE:.1%} of the residual)",
+                title=f"{len(small)} small ones (each below {SMALL_PART:.0%} of the fall)",
                 right=frozenset({3, 4, 5}),
                 folded=True,
             )
@@ -93,14 +88,13 @@ def _lead(found: Diagnosis) -> str:
         ", ".join(dict.fromkeys(title_of(record.kind) for record in found.declared))
         or "no effect beside the rigid bodies"
     )
-    answer = f"{answer_in_words(found)} " if found.good else ""  # else it is said before all
     if not found.effects:
         return (
-            f"{answer}With {declared} declared, the mean error of the torque on "
+            f"With {declared} declared, the mean error of the torque on "
             f"{found.sealed_run}, which took no part, is {found.after.mean_relative_moving:.2%} "
             "where joints move."
         )
-    return f"{answer}Declared: {declared}. {verdict(found)}"
+    return f"Declared: {declared}. {verdict(found)}"
 
 
 def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:

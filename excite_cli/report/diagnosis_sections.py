@@ -1,9 +1,11 @@
 """What a page says about a diagnosis, in the order in which a reader asks."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from excite_cli.diagnosis.next_motion import next_experiment
-from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.diagnosis.words import (
     counted,
     ends_in_words,
@@ -14,10 +16,11 @@ from excite_cli.diagnosis.words import (
 from excite_cli.report.dependence_section import dependence_section
 from excite_cli.report.diagnosis_found_section import found_section
 from excite_cli.report.effect_section import effect_section
-from excite_cli.report.page import Block, Fold, KeyFigure, Section, Table, Text
+from excite_cli.report.page import Block, Charts, Fold, KeyFigure, Section, Table, Text
 from excite_cli.report.residual_error_section import by_joint, error_blocks
 from excite_cli.report.residual_findings import findings_blocks, processing_table
 from excite_cli.report.residual_section import residuals_in_time
+from excite_cli.report.robot_chart import robot_chart
 from excite_cli.report.suspect_section import suspect_section
 
 
@@ -47,7 +50,16 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
             counted(len(diagnosis.joints_left), "joint"),
             ", ".join(diagnosis.joints_left) or "what is left behaves like noise",
         ),
+        _warnings(diagnosis),
     )
+
+
+def _warnings(diagnosis: Diagnosis) -> KeyFigure:
+    """How many warnings there are about the data, and of what kinds; their texts are below."""
+    warned = [each for each in diagnosis.findings if each.severity == "warning"]
+    kinds = dict.fromkeys(each.kind.replace("_", " ") for each in warned)
+    remark = f"{', '.join(kinds)}: see Data and choices" if kinds else "taken as recorded"
+    return KeyFigure("about the data", counted(len(warned), "warning"), remark)
 
 
 def _none(diagnosis: Diagnosis) -> str:
@@ -85,6 +97,15 @@ def _errors(diagnosis: Diagnosis) -> Section:
         diagnosis.noise_floor,
         "On sealed data; raw: after, on the torque as recorded, without any filter.",
     )
+    if diagnosis.skeleton is not None:
+        what = "Relative error that stays where the joint moves, on sealed data"
+        robot = robot_chart(
+            "Where it stays", diagnosis.skeleton, diagnosis.joint_names,
+            diagnosis.after.relative_moving, what,
+        )  # fmt: skip
+        (charts, *others) = blocks
+        assert isinstance(charts, Charts)
+        blocks = (replace(charts, charts=(robot, *charts.charts)), *others)
     blocks = (*blocks, *(Text(ends_in_words(part)) for part in diagnosis.parts))
     lead = (
         f"On {diagnosis.sealed_run}, which took no part in choosing or fitting. Before: the "
@@ -136,8 +157,39 @@ def _named(data: dict[str, Any]) -> str:
     return f"{title_of(data['kind'])} on {', '.join(data['joints'])}"
 
 
+def _runs(diagnosis: Diagnosis) -> list[Table]:
+    """Every run, what it was for, and what is there in it and not in all others."""
+    names = [str(each) for each in diagnosis.processing.get("runs", ())]
+    if len(names) < 2:
+        return []
+    found = [each.effect for each in diagnosis.effects]
+    every = (*diagnosis.declared, *found)
+    uses = (*((name, "training") for name in names), (diagnosis.sealed_run, "sealed"))
+    rows = tuple(
+        (name, use, ", ".join(_own(each) for each in every if _within(name, each.runs)) or "–")
+        for name, use in uses
+    )
+    note = (
+        "Effects of single runs that are found are never looked for in the sealed one."
+        if any(each.runs for each in found)
+        else ""
+    )
+    return [Table(("run", "used as", "in it, not in all"), rows, title="Runs", note=note)]
+
+
+def _within(name: str, runs: Sequence[str]) -> bool:
+    """Whether a run, or a part or the whole of it, is among the runs."""
+    return any(
+        name == run or name.startswith(f"{run}/") or run.startswith(f"{name}/") for run in runs
+    )
+
+
+def _own(record: EffectRecord) -> str:
+    return f"{title_of(record.kind)} of {', '.join(record.joints)}"
+
+
 def _data(diagnosis: Diagnosis) -> Section:
-    blocks: list[Block] = [*findings_blocks(diagnosis.findings)]
+    blocks: list[Block] = [*findings_blocks(diagnosis.findings), *_runs(diagnosis)]
     blocks.append(processing_table(diagnosis.processing, diagnosis.joint_names))
     blocks.append(Fold("Configuration that was diagnosed", (Text(diagnosis.config, "code"),)))
     versions = ", ".join(f"{name} {version}" for name, version in diagnosis.versions.items())

@@ -2,30 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.diagnosis.traces import EffectTrace
-from excite_cli.report.chart import (
-    BLUE,
-    MUTED,
-    VERMILION,
-    Chart,
-    draw_chart,
-    few_ticks,
-    legend_below,
-    limits_about,
-)
+from excite_cli.report.chart import limits_about
+from excite_cli.report.plot import Panel, Plot, Series, merged
 from excite_cli.report.residual_unit import readable_unit, torque_or_force
 from excite_cli.robot.model import Array
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-LAYOUT = 0.66, 0.1, 0.08, 0.6  # [in] left, right, above and below the axes
 PREDICTED = "torque that the effect predicts"
 _MOST_DOTS = 260
 _WINDOW = 2.0  # s
@@ -81,7 +67,7 @@ def together(clouds: Sequence[Cloud]) -> Cloud:
     return replace(first, partial=first.partial - first.law + law, law=law)
 
 
-def draw_cloud(title: str, cloud: Cloud, caption: str = "") -> Chart:
+def cloud_plot(title: str, cloud: Cloud, caption: str = "") -> Plot:
     """Dots, medians with the middle 80 % of the samples, and the law."""
     words = (
         f"Torque that everything else leaves, over {cloud.axis}, with the fitted law, which "
@@ -89,36 +75,39 @@ def draw_cloud(title: str, cloud: Cloud, caption: str = "") -> Chart:
         f"{cloud.law.max():.3g} {cloud.unit}, samples from {cloud.partial.min():.3g} to "
         f"{cloud.partial.max():.3g} {cloud.unit}."
     )
-    return draw_chart(
-        title, words, partial(_draw, cloud), height=2.65, caption=caption, layout=LAYOUT
-    )
-
-
-def _draw(cloud: Cloud, figure: "Figure") -> None:
-    axes = figure.add_subplot()
     factor, unit = readable_unit(cloud.unit, float(np.quantile(np.abs(cloud.partial), 0.98)))
     cloud = replace(cloud, partial=factor * cloud.partial, law=factor * cloud.law)
     if cloud.diagonal:
         cloud = replace(cloud, x=cloud.law, axis=f"{PREDICTED} [{unit}]")
     rng = np.random.default_rng(0)
     dots = rng.permutation(len(cloud.x))[:_MOST_DOTS]
-    axes.plot(cloud.x[dots], cloud.partial[dots], ".", color=MUTED, ms=3.6, alpha=0.6, mew=0,
-              label="left by all else")  # fmt: skip
     center, middle, low, high = binned(cloud)
-    axes.vlines(center, low, high, color=BLUE, lw=1.0, alpha=0.7)
-    axes.plot(center, middle, "o", color=BLUE, ms=3.2, label="median, 80 %")
-    if cloud.diagonal:
-        ends = np.array([cloud.x.min(), cloud.x.max()])
-        axes.plot(ends, ends, color=VERMILION, lw=1.6, label="as predicted")
-    else:
-        axes.plot(*law_line(cloud), color=VERMILION, lw=1.6, label="fitted law")
+    ends = np.array([cloud.x.min(), cloud.x.max()])
+    law = (ends, ends) if cloud.diagonal else law_line(cloud)
+    x, (left, median, predicted) = merged(
+        (cloud.x[dots], cloud.partial[dots]), (center, middle), law
+    )
+    whiskers = [_at_points(median, center, end) for end in (low, high)]
     outer = [np.quantile(each, [0.005, 0.995]) for each in (cloud.partial, cloud.law)]
-    axes.set_ylim(*limits_about(np.concatenate([*outer, low, high])))
-    axes.set_xlim(*limits_about(np.quantile(cloud.x, [0.003, 0.997]), 0.04))
-    axes.set_xlabel(cloud.axis, labelpad=2)
-    axes.set_ylabel(f"{torque_or_force(unit)} [{unit}]")
-    few_ticks(axes)
-    legend_below(figure)
+    panel = Panel(
+        f"{torque_or_force(unit)} [{unit}]",
+        (
+            Series("left by all else", left, "muted", "dots"),
+            Series("median, 80 %", median, "blue", "marks", whiskers[0], whiskers[1]),
+            Series("as predicted" if cloud.diagonal else "fitted law", predicted, "vermilion"),
+        ),
+        span=limits_about(np.concatenate([*outer, low, high])),
+        height=210,
+    )  # fmt: skip
+    span = limits_about(np.quantile(cloud.x, [0.003, 0.997]), 0.04)
+    return Plot(title, words, cloud.axis, x, (panel,), caption=caption, span=span)
+
+
+def _at_points(points: Array, center: Array, ends: Array) -> Array:
+    """Ends of whiskers where `points`, merged with others, has the value of its center."""
+    found = np.full(len(points), np.inf)
+    found[np.isfinite(points)] = ends[np.argsort(center, kind="stable")]
+    return found
 
 
 def binned(cloud: Cloud) -> tuple[Array, Array, Array, Array]:
@@ -174,9 +163,9 @@ def _slope(x: Array, y: Array, i: int, k: int) -> float:
     return float((y[k] - y[i]) / max(x[k] - x[i], 1e-300))
 
 
-def draw_window(
+def window_plot(
     title: str, trace: EffectTrace, row: int, unit: str, caption: str = ""
-) -> Chart | None:
+) -> Plot | None:
     """The two seconds in which the effect shows most, in time; None if they hold too little."""
     inside = _window(trace, row)
     if inside is None:
@@ -188,18 +177,16 @@ def draw_window(
         f"{np.nanmin(left):.3g} to {np.nanmax(left):.3g} {unit}; the effect predicts from "
         f"{np.nanmin(own):.3g} to {np.nanmax(own):.3g} {unit}."
     )
-
-    def draw(figure: "Figure") -> None:
-        axes = figure.add_subplot()
-        factor, scaled = readable_unit(unit, float(np.nanmax(np.abs(left))))
-        axes.plot(t, factor * left, ".-", color=MUTED, lw=0.8, ms=3, label="left by all else")
-        axes.plot(t, factor * own, color=VERMILION, lw=1.5, label="the effect")
-        axes.set_xlabel("time [s]", labelpad=2)
-        axes.set_ylabel(f"{torque_or_force(unit)} [{scaled}]")
-        few_ticks(axes)
-        legend_below(figure)
-
-    return draw_chart(title, words, draw, height=2.65, caption=caption, layout=LAYOUT)
+    factor, scaled = readable_unit(unit, float(np.nanmax(np.abs(left))))
+    panel = Panel(
+        f"{torque_or_force(unit)} [{scaled}]",
+        (
+            Series("left by all else", factor * left, "muted", "joined"),
+            Series("the effect", factor * own, "vermilion"),
+        ),
+        height=210,
+    )
+    return Plot(title, words, "time [s]", t, (panel,), caption=caption)
 
 
 def _window(trace: EffectTrace, row: int) -> slice | None:

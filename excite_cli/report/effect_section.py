@@ -7,11 +7,11 @@ import numpy as np
 from excite_cli.diagnosis.records import Diagnosis, JointAlias, NamedEffect
 from excite_cli.diagnosis.traces import EffectTrace, Traces
 from excite_cli.diagnosis.words import (
-    SMALL_SHARE,
+    SMALL_PART,
     approximation_in_words,
+    by_worth,
     counted,
     covariate_in_words,
-    is_small,
     p_in_words,
     place_in_words,
     sealed_in_words,
@@ -20,9 +20,9 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.effects.base import Effect, Picture
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.report.chart import Chart
-from excite_cli.report.effect_chart import Cloud, cloud_of, draw_cloud, draw_window, together
+from excite_cli.report.effect_chart import Cloud, cloud_of, cloud_plot, together, window_plot
 from excite_cli.report.page import Block, Charts, Fold, Section, Text
+from excite_cli.report.plot import Plot
 
 
 def effect_section(found: Diagnosis) -> Section | None:
@@ -35,9 +35,7 @@ def effect_section(found: Diagnosis) -> Section | None:
             "`excite diagnose` again to have the pictures."
         )
         return Section("diagnosis-evidence", "Evidence", (old,))
-    ranked = sorted(found.effects, key=lambda each: -each.share_of_residual)
-    large = [each for each in ranked if not is_small(each)]
-    small = [each for each in ranked if is_small(each)]
+    large, small = by_worth(found.effects, found)
     blocks: list[Block] = []
     whole = _combined(found, found.traces)
     if whole:
@@ -47,7 +45,7 @@ def effect_section(found: Diagnosis) -> Section | None:
     if small:
         cards = _cards(found, found.traces, small)
         what = counted(len(small), "small effect")
-        text = f"{what} (each below {SMALL_SHARE:.1%} of the residual)"
+        text = f"{what} (each below {SMALL_PART:.0%} of the fall of the error)"
         blocks.append(Fold(text, (Charts(cards),)) if large else Charts(cards))
     lead = (
         "What the measured torque of the training data holds once everything else in the model is "
@@ -59,9 +57,9 @@ def effect_section(found: Diagnosis) -> Section | None:
     return Section("diagnosis-evidence", "Evidence", tuple(blocks), lead)
 
 
-def _cards(found: Diagnosis, traces: Traces, effects: Sequence[NamedEffect]) -> tuple[Chart, ...]:
+def _cards(found: Diagnosis, traces: Traces, effects: Sequence[NamedEffect]) -> tuple[Plot, ...]:
     units = dict(zip(found.joint_names, traces.torque_units, strict=True))
-    charts: list[Chart] = []
+    charts: list[Plot] = []
     for named in effects:
         trace = _trace_of(named, traces)
         if trace is None:
@@ -78,10 +76,10 @@ def _cards(found: Diagnosis, traces: Traces, effects: Sequence[NamedEffect]) -> 
             caption = _caption(found, named) if not row else ""
             chart = None
             if _picture(trace) == "window" and np.ptp(cloud.law) > 0:
-                chart = draw_window(shown, trace, row, units[joint], caption)
-            charts.append(draw_cloud(shown, cloud, caption) if chart is None else chart)
+                chart = window_plot(shown, trace, row, units[joint], caption)
+            charts.append(cloud_plot(shown, cloud, caption) if chart is None else chart)
         if not trace.quantity:
-            window = draw_window(f"{title}; {trace.rows[0]} in time", trace, 0,
+            window = window_plot(f"{title}; {trace.rows[0]} in time", trace, 0,
                                  units[trace.rows[0]])  # fmt: skip
             charts += [window] if window is not None else []
     return tuple(charts)
@@ -143,7 +141,7 @@ def _over_speed(trace: EffectTrace) -> bool:
     return kind.function_of == ("speed",) and kind.scope == "joint"
 
 
-def _combined(found: Diagnosis, traces: Traces) -> tuple[Chart, ...]:
+def _combined(found: Diagnosis, traces: Traces) -> tuple[Plot, ...]:
     """For each joint with several effects over its speed: all of them at once."""
     units = dict(zip(found.joint_names, traces.torque_units, strict=True))
     charts = []
@@ -157,7 +155,7 @@ def _combined(found: Diagnosis, traces: Traces) -> tuple[Chart, ...]:
             continue
         clouds: list[Cloud] = [cloud_of(trace, 0, units[joint]) for trace in parts]
         names = ", ".join(title_of(trace.kind) for trace in parts)
-        charts.append(draw_cloud(f"Friction of {joint}", together(clouds), f"{names}."))
+        charts.append(cloud_plot(f"Friction of {joint}", together(clouds), f"{names}."))
     return tuple(charts)
 
 

@@ -1,7 +1,6 @@
 """How far every constraint stays from its bound over time, where it is closest, what is proved."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,23 +11,10 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.proof.worst_margin import Worst
 from excite_cli.report.campaign import Campaign, in_figures
-from excite_cli.report.chart import (
-    BLUE,
-    FORBIDDEN,
-    INK,
-    LIMIT,
-    VERMILION,
-    Chart,
-    draw_chart,
-    few_ticks,
-    time_axis,
-)
 from excite_cli.report.motion_section import drawn_motions, not_drawn
 from excite_cli.report.page import Block, Charts, Choice, KeyFigure, Section, Table, Text
+from excite_cli.report.plot import Panel, Plot, Series
 from excite_cli.robot.model import Array
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _POINTS = 400
 
@@ -46,6 +32,7 @@ class _Line:
     unit: str
     worst: Worst
     proved: bool | None
+    link: str
 
 
 def margin_section(campaign: Campaign) -> Section:
@@ -178,35 +165,28 @@ def _line(constraint: Constraint, margins: Array, times: Array, motion: Motion) 
         unit="–" if shares else constraint.unit,
         worst=seen if stored is None else stored,
         proved=motion.certified.get(constraint.name),
+        link=f"margins of motion {motion.index}",
     )
 
 
-def _chart(line: _Line) -> Chart:
+def _chart(line: _Line) -> Plot:
     index = int(np.argmin(line.values))
     smallest, worst = float(line.values[index]), line.worst
     top = max(float(line.values.max()), 1e-9)
-    bottom = min(smallest, 0.0) - 0.15 * top
-
-    def draw(figure: "Figure") -> None:
-        axes = figure.add_subplot()
-        axes.axhspan(bottom, 0.0, color=FORBIDDEN, linewidth=0)
-        axes.axhline(0.0, color=LIMIT, linewidth=0.9, linestyle=(0, (4, 2)))
-        axes.plot(line.times, line.values, color=BLUE, label="smallest margin")
-        axes.plot(
-            line.times[index], smallest, "o", color=VERMILION, markersize=6, clip_on=False, zorder=5
-        )
-        axes.set_ylim(bottom, 1.08 * top)
-        axes.annotate(
-            "forbidden", (0.99, 0.015), xycoords="axes fraction", ha="right", va="bottom",
-            color=INK, fontsize=7.5,
-        )  # fmt: skip
-        time_axis(axes, line.times)
-        few_ticks(axes)
-        of_joints = line.constraint.of_joints is not None
-        share = "share of limit" if of_joints else "share of its scale"
-        what = share if line.unit == "–" else "margin"
-        axes.set_ylabel(f"{what} [{line.unit}]", labelpad=2)
-
+    dot = np.full(len(line.times), np.inf)
+    dot[index] = smallest
+    of_joints = line.constraint.of_joints is not None
+    share = "share of limit" if of_joints else "share of its scale"
+    what = share if line.unit == "–" else "margin"
+    panel = Panel(
+        f"{what} [{line.unit}]",
+        (
+            Series("smallest margin", line.values, "blue"),
+            Series("worst", dot, "vermilion", "marks"),
+        ),
+        span=(min(smallest, 0.0) - 0.15 * top, 1.08 * top),
+        limits=(0.0, np.inf),
+    )
     name = line.constraint.name
     title = line.constraint.title
     state = {None: "", True: " Proved at every instant.", False: " Not proved between samples."}
@@ -214,6 +194,12 @@ def _chart(line: _Line) -> Chart:
         f"Closest: {in_figures(worst.margin)} {worst.unit} at {worst.time:.3f} s, {worst.label}."
         f"{state[line.proved]}"
     )
-    return draw_chart(
-        title, f"{title} ({name}). {said}", draw, 1.9, caption=said, layout=(0.62, 0.1, 0.1, 0.42)
+    return Plot(
+        title,
+        f"{title} ({name}). {said}",
+        "time [s]",
+        line.times,
+        (panel,),
+        link=line.link,
+        caption=said,
     )

@@ -1,7 +1,6 @@
 """Every motion joint by joint: position within its limits, speed and acceleration as shares."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,31 +8,16 @@ from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.report.campaign import Campaign, in_figures
-from excite_cli.report.chart import (
-    BLUE,
-    FORBIDDEN,
-    GREEN,
-    LIMIT,
-    PURPLE,
-    VERMILION,
-    Chart,
-    draw_chart,
-    few_ticks,
-    limits_about,
-    time_axis,
-)
+from excite_cli.report.chart import Colour, limits_about
 from excite_cli.report.page import Block, Charts, Choice, Section, Table, Text
+from excite_cli.report.plot import Panel, Plot, Series
 from excite_cli.robot.model import Array
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 # Instants per card: many joints and motions must not make the page heavy.
 _POINTS, _FEWEST_POINTS, _ALL_POINTS = 400, 160, 24_000
 _MOST_CHARTS = 120
 _WORDS = ("position", "speed", "acceleration", "torque")
-_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
+_COLOURS: tuple[Colour, ...] = ("blue", "vermilion", "green", "purple")
 
 
 @dataclass(frozen=True)
@@ -57,7 +41,9 @@ def motion_section(campaign: Campaign) -> Section:
     shown = drawn_motions(motions, problem.robot.n)
     for motion in shown:
         signals = _signals(problem, motion, _points(problem.robot.n * len(shown)))
-        cards = tuple(_card(problem, signals, joint) for joint in range(problem.robot.n))
+        cards = tuple(
+            _card(problem, signals, joint, motion.index) for joint in range(problem.robot.n)
+        )
         blocks: tuple[Block, ...] = (Charts(cards), _peaks(problem, signals))
         options.append((f"motion {motion.index}", blocks))
     duration = in_figures(problem.trajectory.duration)
@@ -115,62 +101,44 @@ def _shown(signals: _Signals, joint: int) -> list[int]:
     return [1, 2, 3] if np.isfinite(signals.upper[3, joint]) else [1, 2]
 
 
-def _card(problem: Problem, signals: _Signals, joint: int) -> Chart:
+def _card(problem: Problem, signals: _Signals, joint: int, motion: int) -> Plot:
     name = problem.robot.joint_names[joint]
+    shown = _shown(signals, joint)
+    bounded = bool(np.isfinite(signals.upper[shown, joint]).any())
+    shares = tuple(_share(signals, order, joint) for order in shown)
+    end = 1.15 * max(1.0, *(float(np.abs(each.y).max()) for each in shares))
+    beside = Panel(
+        f"share of {'limit' if bounded else 'peak'} [–]",
+        shares,
+        span=(-end, end),
+        limits=(-1.0, 1.0) if bounded else (-np.inf, np.inf),
+        height=120,
+    )
+    said = "; ".join(_peak_words(signals, order, joint) for order in (0, *shown))
+    return Plot(
+        name,
+        f"{name}: {said}.",
+        "time [s]",
+        signals.times,
+        (_position(signals, joint), beside),
+        link=f"motion {motion}",
+    )
 
-    def draw(figure: "Figure") -> None:
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(5, 4))
-        _draw_position(upper, signals, joint)
-        for order in _shown(signals, joint):
-            _draw_share(lower, signals, order, joint)
-        bounded = bool(np.isfinite(signals.upper[_shown(signals, joint), joint]).any())
-        _finish_shares(lower, bounded)
-        time_axis(lower, signals.times)
-        few_ticks(upper)
-        lower.xaxis.set_major_locator(upper.xaxis.get_major_locator())
-        lower.set_yticks([-1, 0, 1])
-        upper.tick_params(labelbottom=False, bottom=False)
-        figure.legend(
-            handles=[*upper.lines[-1:], *lower.lines[-len(_shown(signals, joint)) :]],
-            loc="lower center", ncols=4, handlelength=1.2, columnspacing=0.9, handletextpad=0.4,
-            borderaxespad=0.1,
-        )  # fmt: skip
 
-    said = "; ".join(_peak_words(signals, order, joint) for order in (0, *_shown(signals, joint)))
-    return draw_chart(name, f"{name}: {said}.", draw, 2.7, layout=(0.6, 0.07, 0.08, 0.6))
-
-
-def _draw_position(axes: "Axes", signals: _Signals, joint: int) -> None:
+def _position(signals: _Signals, joint: int) -> Panel:
     values = signals.values[0, :, joint]
-    limits = (signals.lower[0, joint], signals.upper[0, joint])
+    limits = (float(signals.lower[0, joint]), float(signals.upper[0, joint]))
     finite = [limit for limit in limits if np.isfinite(limit)]
-    low, high = limits_about([values.min(), values.max(), *finite])
-    axes.set_ylim(low, high)
-    for limit, end in zip(limits, (low, high), strict=True):
-        if np.isfinite(limit):
-            axes.axhspan(limit, end, color=FORBIDDEN, linewidth=0)
-            axes.axhline(limit, color=LIMIT, linewidth=0.9, linestyle=(0, (4, 2)))
-    axes.plot(signals.times, values, color=BLUE, label="position")
-    axes.set_ylabel(f"q [{signals.units[joint][0]}]", labelpad=2)
+    span = limits_about([values.min(), values.max(), *finite])
+    of_q = f"q [{signals.units[joint][0]}]"
+    return Panel(of_q, (Series("position", values, "blue"),), span=span, limits=limits)
 
 
-def _draw_share(axes: "Axes", signals: _Signals, order: int, joint: int) -> None:
+def _share(signals: _Signals, order: int, joint: int) -> Series:
     values, limit = signals.values[order, :, joint], signals.upper[order, joint]
     bounded = bool(np.isfinite(limit))
     size = limit if bounded else float(np.abs(values).max()) or 1.0
-    axes.plot(
-        signals.times, values / size, color=_COLOURS[order], linewidth=1.1,
-        linestyle="-" if bounded else (0, (1, 1)), label=_WORDS[order],
-    )  # fmt: skip
-
-
-def _finish_shares(axes: "Axes", bounded: bool) -> None:
-    peak = max(float(np.abs(line.get_ydata()).max()) for line in axes.lines)
-    end = 1.15 * max(1.0, peak)
-    for side in (-1.0, 1.0) if bounded else ():
-        axes.axhspan(side, side * end, color=FORBIDDEN, linewidth=0, zorder=0.5)
-    axes.set_ylim(-end, end)
-    axes.set_ylabel(f"share of {'limit' if bounded else 'peak'} [–]", labelpad=2, fontsize=7.5)
+    return Series(_WORDS[order], values / size, _COLOURS[order], "line" if bounded else "dotted")
 
 
 def _peak_words(signals: _Signals, order: int, joint: int) -> str:

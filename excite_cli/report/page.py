@@ -13,9 +13,10 @@ from importlib import resources
 from typing import Any
 
 from excite_cli.errors import MissingExtraError
-from excite_cli.report.chart import PREFIX, Chart
+from excite_cli.report.chart import Chart
+from excite_cli.report.plot import Plot
 
-_SCRIPTS = ("early.js", "page.js")
+_SCRIPTS = ("early.js", "page.js", "uplot/uPlot.iife.min.js", "plot.js")
 
 
 @dataclass(frozen=True)
@@ -45,20 +46,10 @@ class Text:
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A raster image (PNG bytes, no wider than its column) with its words."""
-
-    title: str
-    png: bytes
-    alternative: str
-    caption: str = ""
-
-
-@dataclass(frozen=True)
 class Charts:
-    """Charts (and pictures) side by side, as many as fit."""
+    """Charts side by side, as many as fit."""
 
-    charts: tuple[Chart | Picture, ...]
+    charts: tuple[Chart | Plot, ...]
     title: str = ""
 
 
@@ -78,7 +69,7 @@ class Choice:
     options: tuple[tuple[str, tuple["Block", ...]], ...]
 
 
-Block = Chart | Charts | Table | Text | Picture | Fold | Choice
+Block = Chart | Plot | Charts | Table | Text | Fold | Choice
 
 
 @dataclass(frozen=True)
@@ -102,12 +93,13 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class Page:
-    """What a report says, ready to be written."""
+    """What a report says, ready to be written; `answers` stand before all else."""
 
     title: str
     subtitle: str
     figures: tuple[KeyFigure, ...]
     sections: tuple[Section, ...]
+    answers: tuple[Text, ...] = ()
 
 
 def render(page: Page) -> str:
@@ -141,8 +133,7 @@ def _environment() -> Any:
     safe = importlib.import_module("markupsafe").Markup
     environment.globals["policy"] = _policy()
     environment.globals["asset"] = lambda name: safe(_asset(name))
-    environment.filters["drawing"] = lambda chart, name: safe(chart.svg.replace(PREFIX, f"{name}-"))
-    environment.filters["base64"] = _base64
+    environment.filters["drawing"] = lambda chart: safe(chart.svg)
     environment.filters["sentence"] = _sentence
     environment.tests["of_kind"] = lambda block, name: type(block).__name__ == name
     return environment
@@ -150,7 +141,7 @@ def _environment() -> Any:
 
 @functools.cache
 def _policy() -> str:
-    """What a browser lets the page do: run its own two scripts, and load nothing."""
+    """What a browser lets the page do: run its own scripts, and load nothing."""
     digests = (hashlib.sha256(_asset(name).encode()).digest() for name in _SCRIPTS)
     own = " ".join(f"'sha256-{_base64(digest)}'" for digest in digests)
     return (

@@ -7,7 +7,7 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit_words import above_the_floor
 from excite_cli.report.chart import Chart
 from excite_cli.report.page import Block, Charts, Table, Text
-from excite_cli.report.residual_error_chart import Dumbbells, draw_dumbbells
+from excite_cli.report.residual_error_chart import Dumbbells, dumbbell_chart
 
 
 def error_blocks(
@@ -46,7 +46,7 @@ def _relative(words: tuple[str, str], first: Errors, second: Errors) -> Chart:
     )
     known = [x for x in second.relative_moving.values() if math.isfinite(x)]
     span = f"; joints from {min(known):.1%} to {max(known):.1%} {words[1]}" if known else ""
-    return draw_dumbbells(
+    return dumbbell_chart(
         "Relative error where the joint moves",
         "RMS error / RMS torque [%]",
         values,
@@ -77,7 +77,7 @@ def _rms(
     known = [j for j in joints if math.isfinite(second.rms[j])]
     told = ", ".join(f"{j} {first.rms[j]:.3g} → {second.rms[j]:.3g}" for j in known)
     what = "torque" if unit == "N·m" else "force"
-    return draw_dumbbells(
+    return dumbbell_chart(
         f"RMS error of the {what}, all samples",
         f"RMS error [{unit}]",
         values,

@@ -1,31 +1,18 @@
 """Torque over time, run by run: what was measured, what the model says, what is left."""
 
 from collections.abc import Sequence
-from functools import partial
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from excite_cli.identification.torque_trace import TorqueTrace
-from excite_cli.report.chart import (
-    BLUE,
-    FORBIDDEN,
-    MUTED,
-    VERMILION,
-    Chart,
-    draw_chart,
-    few_ticks,
-    thinned,
-    time_axis,
-)
+from excite_cli.report.chart import thinned
 from excite_cli.report.page import Block, Charts, Choice, Text
+from excite_cli.report.plot import Panel, Plot, Series
 from excite_cli.report.residual_unit import readable_unit, torque_or_force
 from excite_cli.robot.model import Array
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_LAYOUT = 0.66, 0.08, 0.08, 0.6  # [in] left, right, above and below the axes
 # Points of all lines together, and of one line at most and at least: the page must stay light.
 _BUDGET, _MOST, _FEWEST = 240_000, 700, 150
 
@@ -65,16 +52,55 @@ def _label(run: str, parts: Sequence[TorqueTrace]) -> str:
     return run
 
 
-def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: int) -> Chart:
+def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: int) -> Plot:
     left = [part.measured[:, j] - part.predicted[:, j] for part in parts]
     before = [part.measured[:, j] - part.before[:, j] for part in parts if part.before is not None]
     words = f"Torque of {name}, measured with RMS {_rms([p.measured[:, j] for p in parts])} {unit}"
     words += f"; the model leaves RMS {_rms(left)} {unit}"
     if before:
         words += f", the declared model without the effects found {_rms(before)} {unit}"
-    return draw_chart(
-        name, f"{words}.", partial(_draw, parts, j, unit, points), height=3.0, layout=_LAYOUT
+    at = thinned(sum(len(part.t) for part in parts), points)
+    measured = _joined([part.measured[at, j] for part in parts])
+    predicted = _joined([part.predicted[at, j] for part in parts])
+    factor, of_torque = readable_unit(unit, _largest(measured))
+    rest = [Series("left", measured - predicted, "vermilion")]
+    if before:
+        alone = _joined([part.before[at, j] for part in parts if part.before is not None])
+        rest.insert(0, Series("left before", measured - alone, "muted", "dashed"))
+    small, of_left = readable_unit(unit, max(_largest(each.y) for each in rest))
+    upper = Panel(
+        f"{torque_or_force(unit)} [{of_torque}]",
+        (
+            Series("measured", factor * measured, "muted"),
+            Series("model", factor * predicted, "blue"),
+        ),
     )
+    lower = Panel(f"left [{of_left}]", tuple(replace(each, y=small * each.y) for each in rest))
+    mixed = {part.sealed for part in parts} == {False, True}
+    return Plot(
+        name,
+        f"{words}.",
+        "time [s]",
+        _instants([part.t[at] for part in parts]),
+        (upper, lower),
+        link=f"time of {parts[0].run}",
+        shaded=tuple(
+            (float(part.t[0]), float(part.t[-1])) for part in parts if mixed and part.sealed
+        ),
+    )
+
+
+def _instants(parts: Sequence[Array]) -> Array:
+    """Instants of all parts, and one between any two of them, at which nothing is known."""
+    between = [0.5 * (one[-1] + two[0]) for one, two in pairwise(parts)]
+    return np.concatenate(
+        [parts[0], *(np.r_[t, part] for t, part in zip(between, parts[1:], strict=True))]
+    )
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    """Values at `_instants`."""
+    return np.concatenate([parts[0], *(np.r_[np.nan, part] for part in parts[1:])])
 
 
 def _rms(series: Sequence[Array]) -> str:
@@ -83,43 +109,5 @@ def _rms(series: Sequence[Array]) -> str:
     return f"{float(np.sqrt(np.mean(whole**2))):.3g}" if len(whole) else "unknown"
 
 
-def _draw(parts: Sequence[TorqueTrace], j: int, unit: str, points: int, figure: "Figure") -> None:
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    at = thinned(sum(len(part.t) for part in parts), points)
-    mixed = {part.sealed for part in parts} == {False, True}
-    factor, of_torque = readable_unit(unit, _largest([part.measured[at, j] for part in parts]))
-    left = [part.measured[at, j] - part.predicted[at, j] for part in parts]
-    before = [
-        part.measured[at, j] - part.before[at, j] for part in parts if part.before is not None
-    ]
-    small, of_left = readable_unit(unit, _largest([*left, *before]))
-    for number, part in enumerate(parts):
-        t, labelled = part.t[at], number == 0
-        upper.plot(t, factor * part.measured[at, j], color=MUTED, lw=1.0,
-                   label="measured" if labelled else None)  # fmt: skip
-        upper.plot(t, factor * part.predicted[at, j], color=BLUE, lw=1.0,
-                   label="model" if labelled else None)  # fmt: skip
-        if before:
-            lower.plot(t, small * before[number], color=MUTED, lw=0.8, ls=(0, (3, 1.5)),
-                       label="left before" if labelled else None)  # fmt: skip
-        lower.plot(t, small * left[number], color=VERMILION, lw=1.0,
-                   label="left" if labelled else None)  # fmt: skip
-        if mixed and part.sealed:
-            for axes in (upper, lower):
-                axes.axvspan(part.t[0], part.t[-1], color=FORBIDDEN, lw=0, zorder=0)
-    upper.set_ylabel(f"{torque_or_force(unit)} [{of_torque}]")
-    lower.set_ylabel(f"left [{of_left}]")
-    few_ticks(upper, up=3)
-    few_ticks(lower, up=3)
-    time_axis(lower, [float(parts[0].t[0]), float(parts[-1].t[-1])])
-    upper.set_xlabel("")
-    figure.align_ylabels()
-    figure.legend(
-        loc="lower center", ncols=4, handlelength=1.2, columnspacing=0.9, handletextpad=0.4,
-        borderaxespad=0.1,
-    )  # fmt: skip
-
-
-def _largest(series: Sequence[Array]) -> float:
-    whole = np.concatenate(list(series))
-    return float(np.nanmax(np.abs(whole))) if np.isfinite(whole).any() else 1.0
+def _largest(values: Array) -> float:
+    return float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 1.0

@@ -62,6 +62,23 @@ def own_link(robot: Robot, joint: int) -> LinkFrame:
     return LinkFrame(name, joint, np.eye(3), np.zeros(3))
 
 
+def carrying_frame(robot: Robot, link: str | None, where: str) -> LinkFrame:
+    """The link that `where` names, or the last one of a robot with one end.
+
+    Raises
+    ------
+    ConfigError
+        There is no such link, or the robot has several ends and none is named.
+    """
+    if link is not None:
+        return link_frame(robot, link, where)
+    ends = leaves(robot)
+    if len(ends) > 1:
+        names = ", ".join(own_link(robot, joint).name for joint in ends)
+        raise ConfigError(f"{where}: the robot has several ends; name what carries it: {names}.")
+    return own_link(robot, ends[0])
+
+
 def leaves(robot: Robot) -> tuple[int, ...]:
     """Moved joints that carry no other moved joint."""
     parents = {int(robot.model.parents[_first(robot) + j]) - _first(robot) for j in range(robot.n)}

@@ -32,6 +32,7 @@ from excite_cli.diagnosis.records import (
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_file import new_hdf5
+from excite_cli.robot.skeleton import Skeleton
 from excite_cli.store import checked
 from excite_cli.store.approximation_text import approximation_as_data, approximation_of
 from excite_cli.store.joint_errors import require_joints
@@ -78,6 +79,7 @@ _LATER: dict[str, Any] = {
     "inertia_names": tuple[str, ...],
     "trained": Errors | None,
     "overfit": Overfit | None,
+    "skeleton": Skeleton | None,
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],
@@ -160,6 +162,8 @@ def _read(file: Any, path: Path) -> Diagnosis:
     ends = [error for part in found.parts for error in (part.before, part.after)]
     untouched = [found.untouched] if found.untouched else []
     require_joints(joints, (found.before, found.after, *ends, *untouched), found.noise_floor)
+    if found.skeleton is not None and not found.skeleton.fits(len(joints)):
+        raise ValueError("its skeleton is that of another robot")
     if not _named_joints(found) <= set(joints):
         raise ValueError("it names joints that are not its own")
     return found

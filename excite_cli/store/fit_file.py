@@ -19,6 +19,7 @@ from excite_cli.identification.consistent import ConsistentParameters
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.identify import Identification
+from excite_cli.identification.link_changes import LinkChange
 from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_file import new_hdf5
@@ -110,8 +111,10 @@ def _write(path: Path, found: Identification, attributes: dict[str, Any]) -> Non
             consistent = file.create_group("bodies/consistent")
             for name in ("phi", "effects", "eigenvalues"):
                 consistent[name] = getattr(fit.consistent, name)
-            for name in ("cost", "status", "solved"):
+            for name in ("cost", "status", "solved", "spread"):
                 consistent.attrs[name] = getattr(fit.consistent, name)
+            # As a dataset: attributes end at 64 KB, which a humanoid comes near.
+            consistent["links"] = json.dumps([asdict(link) for link in fit.links])
 
 
 def _effect_data(effect: Effect) -> dict[str, Any]:
@@ -194,6 +197,7 @@ def _read_fit(file: Any, joints: tuple[str, ...]) -> Fit:
     if {len(each) for each in texts.values()} != {size}:
         raise ValueError("its parameters lack units or words")
     phi = checked.array(file["bodies/phi"], (None,))
+    consistent = file["bodies"].get("consistent")
     return Fit(
         method=checked.text(settings, "method"),
         inertias=checked.text(settings, "inertias"),
@@ -207,7 +211,8 @@ def _read_fit(file: Any, joints: tuple[str, ...]) -> Fit:
         phi=phi,
         count=checked.count(settings, "count"),
         samples=checked.number(settings, "samples"),
-        consistent=_consistent(file["bodies"].get("consistent"), len(phi), size - rank),
+        consistent=_consistent(consistent, len(phi), size - rank),
+        links=_links(consistent, len(phi) // 10),
         **texts,
         **arrays,
     )
@@ -236,4 +241,16 @@ def _consistent(group: Any, phi: int, effects: int) -> ConsistentParameters | No
         cost=checked.number(group.attrs, "cost"),
         status=checked.text(group.attrs, "status"),
         solved=checked.flag(group.attrs, "solved"),
+        # Files of earlier versions took the prior as it was given.
+        spread=checked.number(group.attrs, "spread") if "spread" in group.attrs else 1.0,
     )
+
+
+def _links(group: Any, bodies: int) -> tuple[LinkChange, ...]:
+    """What changed per link; files of earlier versions have none."""
+    if group is None or "links" not in group:
+        return ()
+    links = checked.record(group["links"][()], tuple[LinkChange, ...])
+    if len(links) not in (0, bodies):
+        raise ValueError("'links' are not those of its bodies")
+    return tuple(links)

@@ -18,6 +18,7 @@ from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.cells import figure, percent
+from excite_cli.summary.link_changes import link_data, link_parts
 from excite_cli.summary.noise_floor import floor_cells, floor_columns
 from excite_cli.summary.written import files_in_words
 
@@ -47,6 +48,7 @@ def identification_parts(found: Identification) -> Parts:
     return [
         _parameter_table(fit),
         _error_table(found),
+        *link_parts(fit.links),
         *([above] if above else []),
         *sentences,
     ]
@@ -129,8 +131,10 @@ def _data(found: Identification) -> dict[str, Any]:
             "solved": fit.consistent.solved,
             "status": fit.consistent.status,
             "cost": fit.consistent.cost,
+            "spread": fit.consistent.spread,
             "smallest_eigenvalue": float(fit.consistent.eigenvalues.min()),
         },
+        "links": link_data(fit.links),
         "closed_loop_bias": {
             "testable": found.hausman.testable,
             "p_value": found.hausman.p_value,
@@ -170,7 +174,7 @@ def _in_words(found: Identification | StoredFit) -> str:
 
 
 def _stored_parts(found: StoredFit) -> Parts:
-    return [_parameter_table(found.fit), _error_table(found)]
+    return [_parameter_table(found.fit), _error_table(found), *link_parts(found.fit.links)]
 
 
 show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)])

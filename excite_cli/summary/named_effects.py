@@ -5,10 +5,9 @@ from collections.abc import Sequence
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord, JointAlias, NamedEffect
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import (
-    SMALL_SHARE,
+    SMALL_PART,
     approximation_in_words,
     by_worth,
-    is_small,
     other_name_of,
     p_in_words,
     place_in_words,
@@ -24,11 +23,9 @@ _SIZE = "size ± std"
 def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
     """The named effects, small ones in one line, and what each cannot be told from."""
     everything = len(found.joint_names)
-    ranked = by_worth(found.named)
-    small = [each for each in ranked if is_small(each)]
+    shown, small = by_worth(found.named, found)
     if verbose or len(small) < 2:  # a line about one is no shorter than the one
-        small = []
-    shown = [each for each in ranked if not any(each is other for other in small)]
+        shown, small = [*shown, *small], []
     parts: Parts = [effect_table(shown, everything, verbose)]
     if small:
         listed = ", ".join(
@@ -37,7 +34,7 @@ def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
             for each in small
         )
         parts.append(
-            f"and {len(small)} small ones (each below {SMALL_SHARE:.1%}): {listed} "
+            f"and {len(small)} small ones (each below {SMALL_PART:.0%} of the fall): {listed} "
             "(--verbose: sizes)"
         )
     parts += [text for named in found.named for text in other_names(named, everything)]

@@ -19,7 +19,7 @@ def problem_notes(problem: Problem) -> Iterator[Note]:
     extra = len(problem.extension.names)
     effects = f" and {extra} columns of effects" if extra else ""
     yield _said(
-        f"{robot.name}: {robot.n} joints, {problem.base.rank} base parameters{effects}, "
+        f"{robot.name}: {robot.n} joints, {problem.base.rank} {_of(problem)}{effects}, "
         f"{problem.variables} variables; criterion: {criterion.kind}"
     )
     names = ", ".join(_counted_name(constraint) for constraint in problem.constraints) or "none"
@@ -122,6 +122,12 @@ def _constraint(constraint: Constraint) -> Iterator[Note]:
         yield _detail(f"  checked  {label}")
     for pair in constraint.left_out:
         yield _detail(f"  dropped  {dropped_in_words(pair)}")
+
+
+def _of(problem: Problem) -> str:
+    """What the columns are parameters of."""
+    load = problem.spec.criterion.of == "load"
+    return "parameters of the load" if load else "base parameters"
 
 
 def _symbols(problem: Problem) -> list[str]:

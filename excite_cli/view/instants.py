@@ -8,6 +8,7 @@ from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.drawing import Nearest
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.states import States
+from excite_cli.excitation.nearest import nearest_bodies
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
@@ -64,25 +65,12 @@ def instants_of(problem: Problem, segment: Segment, times: Array) -> Instants:
         poses=poses,
         mass=CenterOfMass(problem.robot).position(states),
         zmp=_ground_points(problem, states),
-        nearest=_nearest(problem, poses, margins),
+        nearest=nearest_bodies(problem, poses, margins),
         margins=tuple(
             _track(constraint, margin)
             for constraint, margin in zip(problem.constraints, margins, strict=True)
         ),
     )
-
-
-def closest_time(problem: Problem, segment: Segment, rate: float = 100.0) -> float:
-    """When [s] the robot comes nearest to itself or to what stands around; 0 if nothing tells."""
-    duration = segment.trajectory.duration
-    times = np.linspace(0.0, duration, max(2, int(np.ceil(duration * rate)) + 1))
-    states = States(problem.kinematics, *segment.trajectory.states(times, segment.coefficients))
-    found = [
-        constraint.margins(states).min(axis=1)
-        for constraint in problem.constraints
-        if constraint.drawing.capsules
-    ]
-    return float(times[int(np.argmin(np.min(found, axis=0)))]) if found else 0.0
 
 
 def _track(constraint: Constraint, margins: Array) -> MarginTrack:
@@ -101,19 +89,3 @@ def _track(constraint: Constraint, margins: Array) -> MarginTrack:
 def _ground_points(problem: Problem, states: States) -> Array | None:
     found = (constraint.ground_point(states) for constraint in problem.constraints)
     return next((points for points in found if points is not None), None)
-
-
-def _nearest(problem: Problem, poses: Poses, margins: list[Array]) -> Nearest | None:
-    """Among all pairs of bodies that the problem keeps apart."""
-    parts = zip(problem.constraints, margins, strict=True)
-    found = [near for c, margin in parts if (near := c.nearest(poses, margin)) is not None]
-    if not found:
-        return None
-    chosen = np.argmin([near.distances for near in found], axis=0).tolist()
-    at = [(found[index], t) for t, index in enumerate(chosen)]
-    return Nearest(
-        np.array([near.distances[t] for near, t in at]),
-        np.array([near.ends[t] for near, t in at]),
-        tuple(near.capsules[t] for near, t in at),
-        tuple(near.labels[t] for near, t in at),
-    )

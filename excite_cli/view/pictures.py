@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.excitation.nearest import closest_time
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
@@ -15,7 +16,7 @@ from excite_cli.trajectory.chain import Segment
 from excite_cli.view.camera import fitted_camera
 from excite_cli.view.geometry import Colour
 from excite_cli.view.ground import PAPER
-from excite_cli.view.instants import Instants, closest_time, instants_of
+from excite_cli.view.instants import Instants, instants_of
 from excite_cli.view.marks import Marks, caption_of, pillow_part
 from excite_cli.view.rays import embree_part
 from excite_cli.view.scene import Scene, build_scene, outermost

@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _CREASE = np.cos(np.radians(35.0))  # faces that meet at less are one smooth surface
+_HALF_CREASE = np.cos(np.radians(17.5))
 _RIM = 48
 _RINGS = 8
 
@@ -52,21 +53,59 @@ def smooth_surface(triangles: Triangles, cell: float = 0.0) -> Surface:
     sides = points[faces]
     area = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
     flat = area / np.linalg.norm(area, axis=1, keepdims=True)
-    corners = _corner_normals(faces, area, flat)
+    smooth, normals = _smooth_points(faces, area, flat, len(points))
+    owner = faces.reshape(-1)
+    creased = np.flatnonzero(~smooth[owner])
+    corners = _corner_normals(owner[creased], creased // 3, area, flat)
     # Corners of one point with nearly one normal are one point of the surface.
-    keys = np.column_stack([faces.reshape(-1, 1), np.round(corners * 50).astype(np.intp)])
-    _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    keys = np.column_stack([owner[creased], np.round(corners * 50).astype(np.int64) + 50])
+    first, inverse = _same_rows(keys)
+    number = np.cumsum(smooth) - 1
+    joined = number[owner]
+    joined[creased] = smooth.sum() + inverse
     return Surface(
-        points[faces.reshape(-1)[first]], corners[first], inverse.reshape(-1, 3).astype(np.intp)
+        np.vstack([points[smooth], points[owner[creased][first]]]),
+        np.vstack([normals[smooth], corners[first]]),
+        joined.reshape(-1, 3).astype(np.intp),
     )
+
+
+def _smooth_points(
+    faces: Indices, area: Array, flat: Array, count: int
+) -> tuple[NDArray[np.bool_], Array]:
+    """Points whose faces are all within half a crease of their mean, and these means (V, 3).
+
+    No two such faces are a crease apart, so that the point has one normal.
+    """
+    owner = faces.reshape(-1)
+    sums = [np.bincount(owner, np.repeat(area[:, k], 3), count) for k in range(3)]
+    total = np.column_stack(sums).astype(float)
+    normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-30)
+    within = np.einsum("fcx,fx->fc", normals[faces], flat) > _HALF_CREASE
+    away = np.bincount(owner, ~within.reshape(-1), count)
+    smooth = (away == 0) & (np.bincount(owner, minlength=count) > 0)
+    return np.asarray(smooth), np.asarray(normals)
+
+
+def _same_rows(keys: NDArray[np.int64]) -> tuple[Indices, Indices]:
+    """First of each set of equal rows (N, k), and which set each row belongs to."""
+    one = keys - keys.min(axis=0, initial=0)
+    spans = one.max(axis=0, initial=0) + 1
+    if float(np.prod(spans.astype(float))) < 2.0**62:  # as one number: many times faster
+        total = one[:, 0]
+        for k in range(1, one.shape[1]):
+            total = total * spans[k] + one[:, k]
+        _, first, inverse = np.unique(total, return_index=True, return_inverse=True)
+    else:
+        _, first, inverse = np.unique(one, axis=0, return_index=True, return_inverse=True)
+    return np.asarray(first), np.asarray(inverse.ravel())
 
 
 def _welded(triangles: Triangles, cell: float) -> Triangles:
     points, faces = triangles
     size = float(np.ptp(points, axis=0).max(initial=0.0))
     grid = np.round(points / (cell or max(size, 1e-9) * 1e-6)).astype(np.int64)
-    _, inverse = np.unique(grid, axis=0, return_inverse=True)
-    inverse = inverse.ravel()
+    _, inverse = _same_rows(grid)
     count = np.bincount(inverse)
     merged = np.column_stack([np.bincount(inverse, points[:, k]) / count for k in range(3)])
     faces = inverse[faces]
@@ -76,10 +115,13 @@ def _welded(triangles: Triangles, cell: float) -> Triangles:
     return Triangles(merged, faces[proper].astype(np.intp))
 
 
-def _corner_normals(faces: Indices, area: Array, flat: Array) -> Array:
-    """Normal (3F, 3) of every corner: of the faces about its point that are no crease away."""
-    owner = faces.reshape(-1)
-    face = np.repeat(np.arange(len(faces)), 3)
+def _corner_normals(owner: Indices, face: Indices, area: Array, flat: Array) -> Array:
+    """Normals (K, 3) of corners, each of a point (K,) and a face (K,).
+
+    All corners of a point are there; its normal is that of the faces that are no crease away.
+    """
+    if not len(owner):
+        return np.zeros((0, 3))
     order = np.argsort(owner, kind="stable")
     owner, face = owner[order], face[order]
     starts = np.flatnonzero(np.diff(owner, prepend=-1))

@@ -218,5 +218,5 @@ def test_a_missing_matplotlib(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert _run("report", stored, "-o", tmp_path / "page.html", "--config", CONFIG) == 2
+    assert _run("report", stored, "--figures", tmp_path / "drawn", "--config", CONFIG) == 2
     assert "pip install 'excite-cli[plot]'" in capsys.readouterr().err

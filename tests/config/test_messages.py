@@ -99,6 +99,11 @@ LEVELS: dict[str, tuple[str, type[Section]]] = {
         data_spec.FilterSpec,
     ),
     "identification": (f"{ROBOT}\nidentification: {{@: 1}}", data_spec.IdentificationSpec),
+    "identification.known_payload": (
+        f"{ROBOT}\nidentification: "
+        "{known_payload: {runs: [a], mass: 1, center: [0, 0, 0], @: 1}}",
+        data_spec.KnownPayloadSpec,
+    ),
     "diagnosis": (f"{ROBOT}\ndiagnosis: {{@: 1}}", data_spec.DiagnosisSpec),
 }
 

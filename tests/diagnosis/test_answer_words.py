@@ -17,6 +17,7 @@ from excite_cli.diagnosis.records import (
 )
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.effects.base import Value
+from excite_cli.measurement.dataset import Finding
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 
 SPRING = {"stiffness": Value(6912.0, 30.0, "N·m/rad"), "preload": Value(10.0, 1.0, "N·m")}
@@ -72,7 +73,24 @@ def test_friction_is_one_share_and_the_rest_is_told_by_place(plain: Diagnosis) -
     assert answer_in_words(answer) == (
         "Friction is 75% of what your model misses, most on elbow (48 N·m at 1 rad/s). "
         f"On shoulder_pitch: spring at the joint (6.9 kN·m/rad, {0.1 / fall:.0%} of what it "
-        "misses). 3.6% of the torque stays, most on slide (10%)."
+        "misses). 3.6% of the torque stays, most on slide (10%). "
+        "Next: go on with the model and its effects (--apply NEW.yaml)."
+    )
+
+
+def test_names_that_fit_as_well_are_to_be_told_apart_next(plain: Diagnosis) -> None:
+    more, less = (
+        effect("spring", joint, SPRING, everywhere(plain, part))
+        for joint, part in (("elbow", 0.3), ("slide", 0.1))
+    )
+    armature = EffectRecord("armature", ("elbow",), {}, (1.0,))
+    drag = EffectRecord("nonlinear_viscous_friction", ("slide",), {}, (1.0,))
+    told = answer_in_words(
+        found(plain, replace(less, aliases=(drag,)), replace(more, aliases=(armature,)))
+    )
+    assert told.endswith(
+        " Next: a motion that tells spring at the joint of elbow from inertia of the motor "
+        "(armature) (excite optimize … --after)."
     )
 
 
@@ -90,10 +108,10 @@ def test_what_stays_is_told_with_what_it_depends_on(plain: Diagnosis) -> None:
     answer = found(plain, effect("coulomb_friction", "elbow", RUBS, everywhere(plain, 0.4)),
                    left=(0.1, 0.1))  # fmt: skip
     told = answer_in_words(replace(answer, unexplained=(rest,)))
-    assert told.endswith(
+    assert (
         "10% of the torque stays. What stays on elbow depends on history of angle of elbow and "
-        "time."
-    )
+        "time. Next: "
+    ) in told
 
 
 def test_a_fit_of_kept_inertias_has_its_share(plain: Diagnosis) -> None:
@@ -121,3 +139,17 @@ def test_nothing_and_nothing_good(plain: Diagnosis) -> None:
 def test_files_of_earlier_versions_know_no_parts(plain: Diagnosis) -> None:
     assert shares(plain) == {}
     assert answer_in_words(plain).startswith("Your model misses 1 effect, none of them large.")
+
+
+def test_what_lowers_nothing_is_told_so_with_the_warnings(plain: Diagnosis) -> None:
+    spring = effect("spring", "elbow", SPRING, everywhere(plain, -0.01))
+    vain = found(plain, spring, left=(0.51, 0.51), findings=())
+    assert answer_in_words(vain).startswith(
+        "What was found (1 effect) does not lower the error where joints move (50% before)."
+    )
+    assert answer_in_words(vain).endswith("Next: another motion, or longer.")
+    warned = replace(vain, findings=(Finding("lag", "warning", "speeds lag"),))
+    told = "Next: what is warned of the data (1 warning) comes first."
+    assert answer_in_words(warned).endswith(told)
+    carried = replace(spring, effect=replace(spring.effect, runs=("motion_1",)))
+    assert "does not lower" not in answer_in_words(found(plain, carried, left=(0.51, 0.51)))

@@ -30,7 +30,7 @@ from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 
-OWN = "eccentric_friction"
+OWN = "roller_friction"
 RIVALS = ("viscous_friction", "coulomb_friction", "asymmetric_friction", "spring")
 ELBOW = 2
 Named = dict[str, tuple[float, ...]]
@@ -56,7 +56,7 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="module")
 def planted(own: type[Effect]) -> tuple[Planted, ...]:
-    """An eccentric gear beside viscous and Coulomb friction."""
+    """Friction on three rollers beside viscous and Coulomb friction."""
     friction = {"viscous_friction": 4.0, "coulomb_friction": 2.0}
     plain = (plant(kind_named(kind), (ELBOW,), size) for kind, size in friction.items())
     return (*plain, plant(own, (ELBOW,), 3.0, {"sin": -1.5}))

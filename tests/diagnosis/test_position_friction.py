@@ -27,28 +27,37 @@ KINDS = (
 )
 
 
-def diagnosed() -> Diagnosis:
+MEANS = {0.0: "coulomb_friction", 1.0: "viscous_friction"}
+
+
+def diagnosed(power: float) -> Diagnosis:
     """Friction of 3 + 2 cos 2q − 1.5 sin 2q on the elbow, and dry friction elsewhere."""
     spec: Spec = load_spec(SMOKE, [f"diagnosis.kinds=[{KINDS}]"])
     robot: Robot = build_robot(spec.robot, SMOKE.parent)
     motions = [motion(robot, number) for number in range(1, 5)]
-    others = {"sin": -1.5, "periods": 2.0}
+    others = {"sin": -1.5, "periods": 2.0, "power": power}
     effects = [
         plant(kind_named("coulomb_friction"), (PITCH,), 5.0),
         plant(kind_named("position_friction"), (ELBOW,), 2.0, others),
-        plant(kind_named("coulomb_friction"), (ELBOW,), 3.0),
+        plant(kind_named(MEANS[power]), (ELBOW,), 3.0),
     ]
     data = simulate(robot, motions, SimulationSettings(rate=200.0, lead_in=0.5), effects).dataset
     return diagnose(robot, find_base_parameters(robot), data, spec)
 
 
-def test_it_is_named_beside_its_mean() -> None:
-    found = {(e.effect.kind, *e.effect.joints): e for e in diagnosed().effects}
+@pytest.mark.parametrize("power", MEANS)
+def test_it_is_named_beside_its_mean(power: float) -> None:
+    found = {(e.effect.kind, *e.effect.joints): e for e in diagnosed(power).effects}
     elbow = found["position_friction", "elbow"]
-    dry = {("coulomb_friction", joint) for joint in ("elbow", "shoulder_pitch")}
-    assert set(found) == {("position_friction", "elbow"), *dry}
-    assert elbow.effect.shape == {"periods": 2.0}
-    sizes = [elbow.parameters[name].value for name in ("cos", "sin")]
-    assert sizes == pytest.approx([2.0, -1.5], abs=0.1)
-    mean = found["coulomb_friction", "elbow"].parameters["coulomb"].value
-    assert mean == pytest.approx(3.0, abs=0.1)
+    mean = MEANS[power], "elbow"
+    assert set(found) == {
+        ("position_friction", "elbow"),
+        ("coulomb_friction", "shoulder_pitch"),
+        mean,
+    }
+    assert elbow.effect.shape == {"periods": 2.0, "power": power}
+    sizes = [elbow.parameters[name] for name in ("cos", "sin")]
+    assert [size.value for size in sizes] == pytest.approx([2.0, -1.5], abs=0.1)
+    assert {size.unit for size in sizes} == {"N·m·s/rad" if power else "N·m"}
+    (there,) = found[mean].parameters.values()
+    assert there.value == pytest.approx(3.0, abs=0.1)

@@ -81,6 +81,22 @@ def test_one_torque_in_another_unit(robot: Robot, sound: Dataset) -> None:
     assert "Do without: measurement.without_torque: [elbow_joint]. " in found.text
 
 
+def test_another_unit_shows_beside_friction_that_is_more_than_the_weight(
+    robot: Robot, sound: Dataset
+) -> None:
+    """As on a robot that rubs: half of the torque is weight, in mN·m or as it is."""
+    names = robot.joint_names
+    j = names.index(SHOULDER)
+    weight = np.concatenate([run.tau[:, j] for run in sound.runs]).std()
+    rubs = with_torque(
+        sound, lambda run: run.tau + 2.5 * weight * np.sign(run.dq) * (np.arange(len(names)) == j)
+    )
+    assert told(robot, rubs) == ()
+    scaled = with_torque(rubs, lambda run: np.where(np.arange(len(names)) == j, 1e3, 1.0) * run.tau)
+    (finding,) = told(robot, scaled)
+    assert (finding.kind, finding.joints) == ("torque_scale", (SHOULDER,))
+
+
 def test_gravity_that_is_subtracted_is_told_and_its_key_adds_it(
     robot: Robot, sound: Dataset, tmp_path: Path
 ) -> None:

@@ -8,7 +8,7 @@ from excite_cli.effects.catalogue import GROUP
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "effect.md"
 MODULE = "my_effects"
-_AS_ABOVE = "class EccentricFriction(Effect):\n    ...  # as above\n"
+_AS_ABOVE = "class RollerFriction(Effect):\n    ...  # as above\n"
 
 
 def blocks(language: str) -> list[str]:

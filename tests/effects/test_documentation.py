@@ -82,7 +82,7 @@ def test_example_is_a_kind_of_the_catalogue_once_installed(
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(__import__("sys").modules, own_package.MODULE, raising=False)
     robot = random_robot(4, joints=3, branches=False, prismatic=False)
-    spec = EffectSpec(kind="eccentric_friction", joints=("joint_2",))
+    spec = EffectSpec(kind="roller_friction", joints=("joint_2",))
     (effect,) = declared_effects((spec,), robot)
     assert isinstance(effect, Effect)
     signals = signals_of(robot, 300)

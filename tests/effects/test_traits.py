@@ -38,7 +38,7 @@ def smallest(kind: type[Effect]) -> Effect:
 def test_traits_name_only_kinds_of_the_catalogue(name: str) -> None:
     kind = KINDS[name]
     named = {*kind.refines, *kind.excludes, *kind.same_as, *kind.deviates_from, *kind.changes_of}
-    named |= {kind.varies} - {""}
+    named |= set(kind.varies)
     assert named <= set(NAMES) - {name}
     assert kind.surprise >= 0.0
     assert not set(kind.settings) & {p.name for p in (*kind.parameters, *kind.shapes)}

@@ -41,6 +41,29 @@ def test_channels_of_one_recording_are_joined_in_any_order(tmp_path: Path) -> No
         np.testing.assert_array_equal(run.tau, RUN.tau)
 
 
+def test_fields_of_joint_states_need_no_declaration(tmp_path: Path) -> None:
+    files = written(tmp_path, "q", "dq", "tau")
+    (run,) = read_dataset(files, MeasurementSpec(), JOINTS).runs
+    np.testing.assert_array_equal(run.tau, RUN.tau)
+    np.testing.assert_array_equal(run.dq, RUN.dq)
+    spec = MeasurementSpec(channels={"dq": None})
+    (run,) = read_dataset([files[0], files[2]], spec, JOINTS).runs
+    assert run.dq is None
+    spec = MeasurementSpec(channels={"tau": "effort"})  # of the others nothing is said
+    (run,) = read_dataset(files, spec, JOINTS).runs
+    np.testing.assert_array_equal(run.q, RUN.q)
+    with pytest.raises(FileError, match=r"no columns 'angle_<joint>'"):
+        read_dataset(files, MeasurementSpec(channels={"q": "angle", "tau": "torque", "dq": None}),
+                     JOINTS)  # fmt: skip
+
+
+def test_the_position_of_something_else_is_no_part_of_the_run(tmp_path: Path) -> None:
+    path = tmp_path / "gripper.csv"
+    path.write_text("t,temperature,gripper_position\n0,20,1\n0.01,20,1\n")
+    with pytest.raises(FileError, match=r"no columns 'q_<joint>'"):
+        read_dataset([path], MeasurementSpec(), JOINTS)
+
+
 def test_other_stamps_a_missing_channel_and_one_twice_are_refused(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"position.csv and robot_effort.csv.*other time stamps"):
         read(*written(tmp_path, "q", "tau", late="tau"))

@@ -12,11 +12,12 @@ from excite_cli.report.assembly import Source, page_of
 from excite_cli.report.campaign import Campaign, in_figures
 from excite_cli.report.campaign_sections import campaign_figures
 from excite_cli.report.compare_section import comparable, compare_results
-from excite_cli.report.condition_section import condition_section
+from excite_cli.report.condition_section import condition_chart, condition_section
 from excite_cli.report.config_differences import differences
 from excite_cli.report.margin_section import margin_figures, margin_section
 from excite_cli.report.motion_section import drawn_motions, motion_section
 from excite_cli.report.page import Block, Charts, Choice, Page, Section, Table, Text, render
+from excite_cli.report.plot import Plot
 from excite_cli.report.weakest_section import weakest_section
 from tests.report.case import Case
 from tests.report.structure import Structure
@@ -91,6 +92,15 @@ def test_without_random_motions_it_says_how_to_get_them(campaign: Campaign) -> N
     assert "excite compare-random" in _said(section)
     assert "random" not in section.lead
     assert len(_table(section, "Motions").columns) == 6
+
+
+def test_indices_with_gaps_have_their_own_places(campaign: Campaign) -> None:
+    (one, two) = campaign.result.random
+    gaps = replace(campaign.result, random=(replace(one, index=1), replace(two, index=7)))
+    plot = condition_chart(gaps)
+    assert plot.x.tolist() == [1.0, 7.0]
+    stacked = next(s for s in plot.panels[0].series if s.label == "random, stacked")
+    assert np.isfinite(stacked.y).all()
 
 
 def test_a_condition_number_that_is_not_finite(campaign: Campaign) -> None:
@@ -289,7 +299,8 @@ def test_without_limits_cards_speak_of_peaks(campaign: Campaign) -> None:
     assert isinstance(choice, Choice)
     cards = choice.options[0][1][0]
     assert isinstance(cards, Charts)
-    assert "share of peak [–]" in cards.charts[0].svg  # type: ignore[union-attr]
+    assert isinstance(cards.charts[0], Plot)
+    assert cards.charts[0].panels[1].axis == "share of peak [–]"
     assert "limits none to none" in cards.charts[0].alternative
     assert "nothing to keep away from" in _said(margin_section(free))
     assert margin_figures(free) == ()

@@ -7,9 +7,9 @@ import pytest
 
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.report.chart import Chart
 from excite_cli.report.effect_section import effect_section
 from excite_cli.report.page import Charts
+from excite_cli.report.plot import Plot
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 
 
@@ -21,7 +21,7 @@ def plain() -> Diagnosis:
     return replace(found, traces=traces)
 
 
-def charts(plain: Diagnosis, kinds: Sequence[str], quantity: str = "speed") -> list[Chart]:
+def charts(plain: Diagnosis, kinds: Sequence[str], quantity: str = "speed") -> list[Plot]:
     """The same samples, as effects of these kinds over this quantity."""
     assert plain.traces is not None
     (named,), (trace,) = plain.effects, plain.traces.effects
@@ -31,7 +31,8 @@ def charts(plain: Diagnosis, kinds: Sequence[str], quantity: str = "speed") -> l
         replace(plain, effects=effects, traces=replace(plain.traces, effects=drawn))
     )
     assert section is not None
-    return [c for block in section.blocks if isinstance(block, Charts) for c in block.charts]
+    cards = [c for block in section.blocks if isinstance(block, Charts) for c in block.charts]
+    return [card for card in cards if isinstance(card, Plot)]
 
 
 @pytest.mark.parametrize("kind", ["contact", "torque_offset", "payload", "of_another_installation"])

@@ -79,21 +79,79 @@ def test_it_is_there_at_once(page: Any) -> None:
     assert page.evaluate(f"{timing}.loadEventEnd - {timing}.responseEnd") < 5000
 
 
-def test_every_chart_has_lines_and_axes_with_units(page: Any) -> None:
-    charts = page.evaluate(
-        """() => [...document.querySelectorAll(".chart")].map((chart) => ({
-             title: chart.querySelector("figcaption").textContent,
-             longest: Math.max(...[...chart.querySelectorAll("svg path")].map(
-               (path) => path.getAttribute("d").length)),
-             texts: [...chart.querySelectorAll("svg text")].map((text) => text.textContent),
-           }))"""
+def test_drawings_have_lines_and_plots_axes_with_units(page: Any) -> None:
+    drawings = page.evaluate(
+        """() => [...document.querySelectorAll(".chart:has(svg)")].map(
+             (chart) => chart.querySelectorAll("svg path").length)"""
     )
-    assert len(charts) == 2 + 2 * 5 + 2 * 5
-    for chart in charts:
-        assert chart["longest"] > 20, chart["title"]
-        labels = [text for text in chart["texts"] if text.endswith("]")]
-        assert len(labels) >= 2, chart["title"]
-        assert all("[" in label for label in labels)
+    assert len(drawings) == 1  # the robot
+    assert drawings[0] > 5
+    plots = page.evaluate(
+        """() => [...document.querySelectorAll(".plot")].map(
+             (plot) => JSON.parse(plot.dataset.plot))"""
+    )
+    for plot in plots:
+        for axis in (plot["axis"], *(panel["axis"] for panel in plot["panels"])):
+            assert axis.endswith("]"), axis
+
+
+def test_logarithmic_axes_show_what_is_there(page: Any) -> None:
+    plot = page.locator("#condition .plot").first
+    plot.scroll_into_view_if_needed()
+    plot.locator("canvas").first.wait_for()
+    shown = plot.evaluate(
+        """(holder) => { const [plot] = holder.plots, {min, max} = plot.scales.y;
+             return [min, max, plot.data.slice(1).flat().filter((y) => y != null)]; }"""
+    )
+    low, high, values = shown
+    assert 0 < low < min(values)
+    assert max(values) < high < 2 * max(values)
+
+
+def shown(page: Any, number: int) -> Any:
+    """A chart of the first motion that is in sight, and drawn."""
+    plot = page.locator("#motions .plot:visible").nth(number)
+    plot.scroll_into_view_if_needed()
+    plot.locator("canvas").first.wait_for()
+    return plot
+
+
+def test_plots_are_drawn_when_they_come_into_sight(page: Any) -> None:
+    assert page.locator(".plot").count() == 2 + 2 * 5 + 2 * 5
+    plot = shown(page, 0)
+    ink = plot.locator("canvas").first.evaluate(
+        """(canvas) => new Set(new Uint32Array(canvas.getContext("2d").getImageData(
+             0, 0, canvas.width, canvas.height).data.buffer)).size"""
+    )
+    assert ink > 20  # paper, shades of lines, axes and forbidden ground
+
+
+def test_charts_of_a_motion_are_zoomed_together(page: Any) -> None:
+    first, second = shown(page, 0), shown(page, 1)
+    before = [plot.locator("canvas").first.screenshot() for plot in (first, second)]
+    box = first.locator(".u-over").first.bounding_box()
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 0.3 * box["width"], middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=4)
+    page.mouse.up()
+    page.mouse.move(0, 0)
+    zoomed = [plot.locator("canvas").first.screenshot() for plot in (first, second)]
+    assert all(one != two for one, two in zip(before, zoomed, strict=True))
+    first.focus()
+    page.keyboard.press("Escape")
+    again = [plot.locator("canvas").first.screenshot() for plot in (first, second)]
+    assert again == before
+
+
+def test_keys_move_the_cursor_and_values_are_spoken(page: Any) -> None:
+    shown(page, 0).focus()
+    page.keyboard.press("ArrowRight")
+    said = page.locator("#spoken").inner_text()
+    assert "position " in said
+    assert " rad" in said
+    page.keyboard.press("Shift+ArrowRight")
+    assert page.locator("#spoken").inner_text() != said
 
 
 def test_one_motion_is_shown_and_another_can_be_chosen(page: Any) -> None:
@@ -108,7 +166,7 @@ def test_one_motion_is_shown_and_another_can_be_chosen(page: Any) -> None:
 def test_light_and_dark_change_paper_and_lines(page: Any) -> None:
     colours = """() => [
       getComputedStyle(document.body).backgroundColor,
-      getComputedStyle(document.querySelector("[id$=line-1] path")).stroke]"""
+      getComputedStyle(document.querySelector(".chart svg path")).stroke]"""
     light = page.evaluate(colours)
     page.click("#theme")
     dark = page.evaluate(colours)
@@ -127,16 +185,15 @@ def test_folds_open(page: Any) -> None:
 
 
 def test_values_are_read_under_the_pointer(page: Any) -> None:
-    drawing = page.locator("[data-readout]:visible").nth(2)
-    drawing.scroll_into_view_if_needed()
-    box = drawing.bounding_box()
+    plot = shown(page, 2)
+    box = plot.locator(".u-over").first.bounding_box()
     page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.4 * box["height"])
-    words = page.locator(".readout:visible").inner_text()
-    assert words.startswith("time ")
-    assert " rad\n" in words
-    assert "speed" in words
+    values = plot.locator(".u-series:visible .u-value").all_inner_texts()
+    assert len(values) == 2 + 3  # time and position; time, speed and acceleration
+    assert all(any(letter.isdigit() for letter in value) for value in values)
+    other = page.locator("#motions .plot:visible").nth(1).locator(".u-series:visible .u-value")
+    assert other.all_inner_texts()[1] == values[1]  # the cursor is shared
     page.mouse.move(0, 0)
-    assert page.locator(".readout:visible").count() == 0
 
 
 def test_on_paper_every_motion_is_printed_and_no_button(page: Any) -> None:
@@ -144,3 +201,5 @@ def test_on_paper_every_motion_is_printed_and_no_button(page: Any) -> None:
     assert all(option.is_visible() for option in page.locator(".option").all())
     assert not page.locator("#theme").is_visible()
     assert not page.locator("nav").is_visible()
+    for plot in page.locator(".plot").all():
+        assert plot.locator("canvas").count() == 2 or plot.locator("canvas").count() == 1

@@ -1,4 +1,5 @@
-from dataclasses import fields, replace
+import json
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 import h5py
@@ -72,6 +73,29 @@ def test_traces_come_back_and_older_files_have_none(found: Identification, tmp_p
     with h5py.File(path, "a") as file:
         del file["traces"], file.attrs["torque_units"]
     assert (read_fit(path).traces, read_fit(path).torque_units) == ((), ())
+
+
+def test_links_come_back_and_older_files_have_none(found: Identification, tmp_path: Path) -> None:
+    path = tmp_path / "fit.h5"
+    marked = replace(found.fit.links[0], marks=("mass 9 kg where the URDF has 1 kg",))
+    fit = replace(found.fit, links=(marked, *found.fit.links[1:]))
+    write_fit(path, replace(found, fit=fit), PROBLEM, "/somewhere", "abc")
+    stored = read_fit(path).fit
+    assert stored.links == fit.links
+    assert found.fit.consistent is not None
+    assert stored.consistent is not None
+    assert stored.consistent.spread == found.fit.consistent.spread
+    with h5py.File(path, "a") as file:
+        group = file["bodies/consistent"]
+        del group["links"], group.attrs["spread"]
+    older = read_fit(path).fit
+    assert older.links == ()
+    assert older.consistent is not None
+    assert older.consistent.spread == 1.0
+    with h5py.File(path, "a") as file:
+        file["bodies/consistent/links"] = json.dumps([asdict(marked)])  # of three bodies
+    with pytest.raises(FileError, match="damaged"):
+        read_fit(path)
 
 
 def test_the_traces_are_what_the_errors_say(found: Identification) -> None:

@@ -171,6 +171,14 @@ def test_export_of_a_fit_of_other_bodies(loop: Loop, tmp_path: Path) -> None:
 
     file = edited(loop.fit, tmp_path / "f.h5", change)
     told = refused("export", file, "-f", "urdf", "-o", tmp_path / "m.urdf")
+    assert "'links' are not those of its bodies" in told
+
+    def without_links(file: h5py.File) -> None:  # as earlier versions wrote it
+        change(file)
+        del file["bodies/consistent/links"]
+
+    file = edited(loop.fit, tmp_path / "g.h5", without_links)
+    told = refused("export", file, "-f", "urdf", "-o", tmp_path / "m.urdf")
     assert "parameters of other joints or bodies" in told
 
 

@@ -9,7 +9,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.chain import Segment
-from excite_cli.view.instants import Instants, closest_time, instants_of
+from excite_cli.view.instants import Instants, instants_of
 
 TIMES = np.linspace(0.0, 6.0, 41)
 
@@ -81,14 +81,6 @@ def test_margins_are_the_smallest_of_each_constraint(
 def test_centre_of_mass(problem: Problem, instants: Instants, states: States) -> None:
     np.testing.assert_allclose(instants.mass, CenterOfMass(problem.robot).position(states))
     assert instants.zmp is None
-
-
-def test_closest_time(problem: Problem, segment: Segment, instants: Instants) -> None:
-    assert instants.nearest is not None
-    at = closest_time(problem, segment)
-    there = instants_of(problem, segment, np.array([at])).nearest
-    assert there is not None
-    assert there.distances[0] <= instants.nearest.distances.min() + 0.03
 
 
 def test_index_at(instants: Instants) -> None:

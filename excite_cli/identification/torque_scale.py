@@ -1,0 +1,160 @@
+"""What is known of the torque's scale: how well the drives' gains are, and a payload on some runs.
+
+    τ_measured,j = (1 + g_j) τ_j,    g ~ N(0, s² (1 + 1 1ᵀ))
+
+Without a payload that somebody weighed, one gain of all joints is a scale of all inertias, friction
+and other loads: g is as uncertain as it is said to be, the joints' gains together as much as each
+beside the others, and so is everything that is found. A known payload's mass, centre and inertia
+are independent; what they make of its ten parameters is taken to first order.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.config.data_spec import (
+    IdentificationSpec,
+    KnownPayloadSpec,
+    MeasurementSpec,
+)
+from excite_cli.dynamics.nearest_inertias import half_of
+from excite_cli.dynamics.pseudo_inertia import moved
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import carried_body, drives_gain
+from excite_cli.errors import ConfigError
+from excite_cli.measurement.dataset import Finding
+from excite_cli.robot.link_frame import LinkFrame, link_frame, own_link
+from excite_cli.robot.model import Array, Robot
+
+# Of gains that a known payload is to tell: more is another unit.
+_ANY_GAIN = 0.3
+# Of a body that nobody described: radius of a sphere of its mass, and how wrong that may be [m].
+_RADIUS = 0.05
+_LEAST = 1e-4  # of the mass, and m: what was weighed and measured is no truer
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """Effects (the declared ones first), and what is known of their values: ‖rows θ − target‖².
+
+    In units of standard deviations; rows (m, k) over all their linear parameters.
+    """
+
+    effects: tuple[Effect, ...]
+    rows: Array
+    target: Array
+
+
+def knowledge_of(spec: IdentificationSpec, declared: Sequence[Effect], robot: Robot) -> Knowledge:
+    """The declared effects, gains and a known payload beside them, and what is known of these.
+
+    Raises
+    ------
+    ConfigError
+        The payload's link is unknown, or nothing moves it; no body has its inertia.
+    """
+    effects = tuple(declared)
+    known: list[tuple[list[Effect], Array, Array]] = []
+    payload = spec.known_payload
+    if payload is not None:
+        body, mean, covariance = known_body(payload, robot)
+        effects = _with([body], effects)
+        known.append(([body], mean, covariance))
+    if payload is not None or spec.gain_std is not None:
+        gains = [drives_gain(j) for j in range(robot.n)]
+        effects = _with(gains, effects)
+        deviation = _ANY_GAIN if spec.gain_std is None else spec.gain_std
+        spread = deviation**2 * (np.eye(robot.n) + 1.0)
+        known.append((gains, np.zeros(robot.n), spread))
+    starts = np.cumsum([0, *(len(effect.parameters) for effect in effects)])
+    rows = [np.zeros((0, starts[-1]))]
+    target = [np.zeros(0)]
+    for members, mean, covariance in known:
+        whiten = np.linalg.inv(half_of(covariance))
+        at = [
+            np.arange(starts[i], starts[i + 1]) for i in (effects.index(each) for each in members)
+        ]
+        wide = np.zeros((len(mean), starts[-1]))
+        wide[:, np.concatenate(at)] = whiten
+        rows.append(wide)
+        target.append(whiten @ mean)
+    return Knowledge(effects, np.concatenate(rows), np.concatenate(target))
+
+
+def with_known_load(
+    spec: IdentificationSpec, declared: Sequence[Effect], robot: Robot
+) -> tuple[Effect, ...]:
+    """The declared effects, and the payload that somebody weighed among them."""
+    if spec.known_payload is None:
+        return tuple(declared)
+    return _with([known_body(spec.known_payload, robot)[0]], tuple(declared))
+
+
+def assumed_scale(measurement: MeasurementSpec, spec: IdentificationSpec) -> list[Finding]:
+    """That what is found has the scale of constants that somebody gave, if nothing tells it."""
+    told = spec.known_payload is not None or spec.gain_std is not None
+    if told or measurement.torque == "link":
+        return []
+    of = "torque_constant and gear_ratio" if measurement.torque == "current" else "gear_ratio"
+    text = (
+        f"masses, friction and loads have the scale of measurement.{of} as given, and their ± know "
+        "nothing of its error. A payload of known mass on a run determines it "
+        "(identification.known_payload); identification.gain_std: 0.1 puts 10 % into every ±."
+    )
+    return [Finding("assumed_scale", "note", text)]
+
+
+def known_body(spec: KnownPayloadSpec, robot: Robot) -> tuple[Effect, Array, Array]:
+    """The payload as an effect of its runs; mean (10,) and covariance (10, 10) of its values."""
+    where = "identification.known_payload.link"
+    frame = (
+        own_link(robot, robot.n - 1) if spec.link is None else link_frame(robot, spec.link, where)
+    )
+    mass, about = spec.mass, 0.4 * spec.mass * _RADIUS**2
+    inertia = (about, 0.0, about, 0.0, 0.0, about) if spec.inertia is None else spec.inertia
+    numbers = np.array([mass, *spec.center, *inertia])
+    principal = np.linalg.eigvalsh(_tensor(inertia))
+    if principal[0] < 0.0 or principal[2] > (1.0 + _LEAST) * (principal[0] + principal[1]):
+        raise ConfigError(
+            "identification.known_payload.inertia: no body has it: its principal moments are "
+            f"{', '.join(f'{x:.3g}' for x in principal)} kg·m², and of three none is negative or "
+            "more than the others together. The order is Ixx, Ixy, Iyy, Ixz, Iyz, Izz, about the "
+            "centre of mass."
+        )
+    loose = mass * _RADIUS**2 if spec.inertia is None else 0.1 * max(map(abs, inertia))
+    std = np.array(
+        [
+            max(spec.std, _LEAST * mass),
+            *[max(spec.center_std, _LEAST)] * 3,
+            *[max(loose, _LEAST * about)] * 6,
+        ]
+    )
+    slope = np.stack(
+        [
+            (_ten(numbers + step, frame) - _ten(numbers - step, frame)) / (2.0 * step.max())
+            for step in np.diag(1e-4 * np.maximum(std, 1e-6))
+        ],
+        axis=1,
+    )
+    covariance = (slope * std**2) @ slope.T
+    return carried_body(frame.joint, spec.runs), _ten(numbers, frame), covariance
+
+
+def _ten(numbers: Array, frame: LinkFrame) -> Array:
+    """Ten parameters about the joint's frame of mass, centre, and inertia about it, in a link's."""
+    mass, centre = numbers[0], numbers[1:4]
+    about = _tensor(numbers[4:])
+    about = about + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    i = about[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
+    back = moved(frame.rotation.T, -frame.rotation.T @ frame.translation)
+    return np.asarray(back @ np.concatenate([[mass], mass * centre, i]))
+
+
+def _tensor(six: Sequence[float] | Array) -> Array:
+    xx, xy, yy, xz, yz, zz = six
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _with(more: Sequence[Effect], effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    return (*effects, *(each for each in more if each not in effects))

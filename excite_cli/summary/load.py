@@ -1,0 +1,89 @@
+"""What the robot carries, as a table and as data."""
+
+from typing import Any
+
+from excite_cli.identification.fit_words import with_deviation
+from excite_cli.identification.load import LoadIdentification
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.cells import percent
+
+
+def load_answer(found: LoadIdentification) -> Answer:
+    """What `excite identify --only payload` answers; status 1 where no body is so."""
+    return Answer(tuple(load_parts(found)), _data(found), found.possible)
+
+
+def load_parts(found: LoadIdentification) -> Parts:
+    """A sentence, the ten parameters, and errors per joint."""
+    rows = tuple(
+        (name, with_deviation(each.value, each.std), each.unit)
+        for name, each in found.parameters.items()
+    )
+    title = (
+        f"Load on {found.link}, in its frame (± one standard deviation; inertia about the centre)"
+    )
+    errors = tuple(
+        (
+            joint,
+            percent(found.without.relative_moving[joint]),
+            percent(found.with_load.relative_moving[joint]),
+        )
+        for joint in found.with_load.relative_moving
+    )
+    return [
+        _in_words(found),
+        Table(title, ("parameter", "value", "unit"), rows, left=("parameter", "unit")),
+        Table(
+            "Error of the torque where the joint moves, of these data",
+            ("joint", "fit without the load", "with it"),
+            errors,
+            left=("joint",),
+        ),
+    ]
+
+
+def _in_words(found: LoadIdentification) -> str:
+    """Mass and centre, from how much data."""
+    mass = found.parameters["mass"]
+    centre = ", ".join(with_deviation(1e3 * p.value, 1e3 * p.std) for p in _centre(found))
+    doubt = "" if found.possible else " No body is so."
+    if any(each.kind == "more_than_a_load" for each in found.findings):
+        doubt += " But these data hold more than a load, and the ± know nothing of that."
+    return (
+        f"{found.link} carries {with_deviation(mass.value, mass.std)} kg with its centre at "
+        f"({centre}) mm, from {found.seconds:.3g} s of motion.{doubt}"
+    )
+
+
+def _centre(found: LoadIdentification) -> list[Any]:
+    return [found.parameters[name] for name in ("cx", "cy", "cz")]
+
+
+def _data(found: LoadIdentification) -> dict[str, Any]:
+    """The answer for `--json`."""
+    return {
+        "good": found.possible,
+        "link": found.link,
+        "joint": found.joint,
+        "parameters": {
+            name: {"value": each.value, "std": each.std, "unit": each.unit}
+            for name, each in found.parameters.items()
+        },
+        "values": [float(x) for x in found.values],
+        "covariance": [[float(x) for x in row] for row in found.covariance],
+        "error": {
+            "without": found.without.as_data(),
+            "with_load": found.with_load.as_data(),
+            "of_the_fit": found.fit_error,
+        },
+        "seconds": found.seconds,
+        "findings": [
+            {"kind": f.kind, "severity": f.severity, "run": f.run, "text": f.text}
+            for f in found.findings
+        ],
+    }
+
+
+show(LoadIdentification, _in_words, load_parts)

@@ -1,0 +1,60 @@
+"""The robot where it is nearest to something: capsules to scale, the nearest two in vermilion."""
+
+import re
+
+import numpy as np
+import pytest
+
+from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.excitation.nearest import closest_time
+from excite_cli.geometry.coal_distances import CoalDistances
+from excite_cli.report.campaign import Campaign, in_figures
+from excite_cli.report.posture_chart import posture_chart
+from excite_cli.trajectory.chain import Segment
+from tests.report.case import Case
+
+PATH = re.compile(
+    r'd="M([\d.-]+) ([\d.-]+)L([\d.-]+) ([\d.-]+)" style="stroke: ([^;]*); stroke-width: ([\d.]+)'
+)
+
+
+@pytest.fixture(scope="module")
+def svg(case: Case) -> str:
+    problem, result = case
+    return posture_chart(Campaign("smoke", result, problem)).svg
+
+
+def test_the_nearest_two_are_those_of_coal(case: Case, svg: str) -> None:
+    problem, result = case
+    kept = next(each for each in problem.constraints if isinstance(each, SelfCollision))
+    motion = result.motions[0]
+    at = closest_time(problem, Segment("", problem.trajectory, motion.coefficients))
+    q = problem.trajectory.states(np.array([at]), motion.coefficients)[0]
+    distances = CoalDistances(problem.robot, kept.capsules, kept.pairs.checked).distances(q)[0]
+    first, second = kept.pairs.checked[int(np.argmin(distances))]
+    warm = [each for each in PATH.findall(svg) if "vermilion" in each[4]]
+    assert len(warm) == 3  # two capsules, and the line between them
+    line = warm[-1]
+    scale = _scale(svg, kept)
+    radii = sorted(kept.capsules[k].radius for k in (first, second))
+    widths = sorted(float(each[5]) + 1.4 for each in warm[:2])  # the rim
+    assert widths == pytest.approx([2 * r * scale for r in radii], abs=0.11)
+    length = np.hypot(float(line[2]) - float(line[0]), float(line[3]) - float(line[1]))
+    assert length <= distances.min() * scale + 0.2
+    chart = posture_chart(Campaign("smoke", result, problem))
+    assert f"{in_figures(1e3 * distances.min())} mm apart" in chart.caption
+    assert kept.capsules[first].name in chart.alternative
+
+
+def _scale(svg: str, kept: SelfCollision) -> float:
+    """Points of the drawing per metre, by the thickest capsule."""
+    widest = max(float(each[5]) for each in PATH.findall(svg))
+    return widest / (2 * max(c.radius for c in kept.capsules))
+
+
+def test_all_of_it_is_within_the_drawing(svg: str) -> None:
+    width, height = map(float, re.search(r'viewBox="0 0 (\S+) (\S+)"', svg).groups())  # type: ignore[union-attr]
+    for *ends, _, stroke in PATH.findall(svg):
+        for x, y in (ends[:2], ends[2:]):
+            assert float(stroke) / 2 <= float(x) <= width - float(stroke) / 2
+            assert float(stroke) / 2 <= float(y) <= height - float(stroke) / 2
