@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from excite_cli.api.loading import load_case as load_case
     from excite_cli.api.loading import load_data as load_data
     from excite_cli.api.loading import load_problem as load_problem
+    from excite_cli.api.model import Model as Model
     from excite_cli.api.motions import load_motions as load_motions
     from excite_cli.api.motions import motions_of as motions_of
     from excite_cli.api.planning import plan as plan
@@ -94,6 +95,7 @@ _HOMES = {
     "api.identifying": ("identify", "identify_load", "save_fit"),
     "api.load_planning": ("LoadProblem", "plan_load"),
     "api.loading": ("Case", "load_case", "load_data", "load_problem"),
+    "api.model": ("Model",),
     "api.motions": ("load_motions", "motions_of"),
     "api.planning": ("plan", "plan_after"),
     "api.proposing": ("propose", "save_proposal"),

@@ -8,25 +8,25 @@ from pathlib import Path
 from excite_cli.api.arguments import checked
 from excite_cli.api.entering import Start, durations_of
 from excite_cli.api.exported_chains import ExportedChain, Wanted, chains_of
-from excite_cli.api.models import write_models
+from excite_cli.api.models import write_model, write_models
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import existing
 from excite_cli.claim import claim, leave
 from excite_cli.config.inputs import files_of_config
-from excite_cli.config.load import parse_spec
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.export.motion_exporter import MotionExporter
 from excite_cli.export.motion_rosbag2 import is_bag
 from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.export.timed import timed_motion
 from excite_cli.given_files import refuse_inputs_as_outputs
-from excite_cli.robot.model import build_robot
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
+from excite_cli.store.stored_model import is_text, read_model
 
 # Formats of identified models, and the suffixes of their files.
-MODELS = {"urdf": ".urdf", "mjcf": ".xml", "yaml": ".yaml"}
+MODELS = {"urdf": ".urdf", "mjcf": ".xml", "yaml": ".yaml", "c": ".c"}
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,12 @@ def export_file(
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Exported:
-    """Write motions as controllers take them, or a fit as a robot model: `excite export`.
+    """Write motions for controllers, or a model for simulators or in C: `excite export`.
 
-    `file` is a result, a motion in a controller's format, or a fit. Formats of motions are `csv`,
-    `ros2`, `rosbag2`, `mcap`, `moveit`, `npz`, of fits `urdf`, `mjcf`, `yaml`. `output` is by
-    default named after `file`; several motions get their numbers before the suffix.
+    `file` is a result, a motion in a controller's format, or a model (a fit, a diagnosis, a config
+    with its numbers). Formats of motions are `csv`, `ros2`, `rosbag2`, `mcap`, `moveit`, `npz`, of
+    models `urdf`, `mjcf`, `c`, and of fits `yaml`. `output` is by default named after `file`;
+    several motions get their numbers before the suffix.
 
     Motions (`chosen` of a result's by their index) are sampled at `rate` [Hz], exact at every
     instant [s, rad, rad/s, rad/s²; m for sliding joints]; `equidistant` stretches the step so that
@@ -104,8 +105,9 @@ def export_file(
     if periods < 1:
         raise ConfigError(f"--periods {periods}: a motion is played once or more.")
     path, target = existing(file), Path(output) if output is not None else None
-    if is_fit(path) != (format in MODELS):
-        what, own = ("a fit", MODELS) if is_fit(path) else ("no fit", MOTION_EXPORTERS)
+    modelled = is_fit(path) or is_diagnosis(path)
+    if modelled != (format in MODELS) and not (format in MODELS and is_text(path)):
+        what, own = ("a model", MODELS) if modelled else ("no model", MOTION_EXPORTERS)
         raise FileError(
             f"{path} is {what}: it cannot be exported as {format}. Its formats: {', '.join(own)}."
         )
@@ -198,26 +200,22 @@ def _held(paths: list[Path], exporter: MotionExporter, overwrite: bool) -> Itera
 def _export_model(
     file: Path, format: str, output: Path | None, overwrite: bool, tell: Tell
 ) -> Exported:
-    """A fit as URDF, MJCF or YAML, as `excite identify` writes them."""
+    """A fit, a diagnosis or a config with its numbers as URDF, MJCF, YAML or C.
+
+    URDF and MJCF hold the physically consistent bodies of a fit, where it has them; C is the model
+    that the table of errors belongs to.
+    """
     path = output or Path(f"{file.stem}{MODELS[format]}")
     with held({"output": path}, overwrite, (file,)):
-        stored = read_fit(file)
-        spec = parse_spec(stored.config, f"the config stored in {file}")
-        robot = build_robot(spec.robot, Path(stored.config_folder))
-        if robot.fingerprint() != stored.fingerprint:
-            raise FileError(
-                f"{file} was made with another robot than the URDF gives now ({spec.robot.urdf}). "
-                "Identify again."
-            )
-        if (
-            stored.fit.joint_names != robot.joint_names
-            or len(stored.fit.phi) != 10 * robot.n_bodies
-        ):
-            raise FileError(
-                f"{file} holds parameters of other joints or bodies than its config. Identify "
-                "again."
-            )
-        own = files_of_config(spec, Path(stored.config_folder), None)
+        stored = read_model(file)
+        config = file if stored.what in ("config", "urdf") else None
+        own = files_of_config(stored.spec, stored.folder, config)
         refuse_inputs_as_outputs({"--output": path}, (*own, *stored.sources))
-        write_models(robot, stored.fit, {"parameters" if format == "yaml" else format: path}, tell)
+        if format != "yaml":
+            model = stored.model if format == "c" else stored.consistent or stored.model
+            write_model(stored.robot, model, format, path, tell)
+        elif stored.what == "fit":
+            write_models(stored.robot, read_fit(file).fit, {"parameters": path}, tell)
+        else:
+            raise FileError(f"{file} is no fit: as yaml, only fits are exported.")
     return Exported(format, (path,))

@@ -4,17 +4,20 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from excite_cli.atomic import write_text_atomically
-from excite_cli.export.exported import IdentifiedModel, ModelText
+from excite_cli.export.c_model import c_model
+from excite_cli.export.exported import ModelText
 from excite_cli.export.mjcf import mjcf
 from excite_cli.export.parameters import parameters_yaml
 from excite_cli.export.urdf import updated_urdf
 from excite_cli.identification.fit import Fit
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note, Tell
 
 _WRITERS: dict[str, Callable[[Robot, IdentifiedModel], ModelText]] = {
     "urdf": updated_urdf,
     "mjcf": mjcf,
+    "c": c_model,
 }
 
 
@@ -25,16 +28,16 @@ def write_models(
 
     What a format cannot hold is reported.
     """
-    count = range(len(fit.effects))
-    values = tuple(fit.consistent_effect_values(i) for i in count)
-    model = IdentifiedModel(fit.best_phi(), fit.effects, values)
     for kind, path in paths.items():
-        if path is None:
-            continue
-        if kind == "parameters":
+        if path is not None and kind == "parameters":
             write_text_atomically(Path(path), parameters_yaml(robot, fit))
-            continue
-        exported = _WRITERS[kind](robot, model)
-        write_text_atomically(Path(path), exported.text)
-        for note in exported.notes:
-            tell(Note(Level.NOTE, f"{path}: {note}"))
+        elif path is not None:
+            write_model(robot, fit.best_model, kind, Path(path), tell)
+
+
+def write_model(robot: Robot, model: IdentifiedModel, kind: str, path: Path, tell: Tell) -> None:
+    """Write a model as `kind`: `urdf`, `mjcf` or `c`; what that cannot hold is reported."""
+    exported = _WRITERS[kind](robot, model)
+    write_text_atomically(path, exported.text)
+    for note in exported.notes:
+        tell(Note(Level.NOTE, f"{path}: {note}"))

@@ -16,7 +16,7 @@ from excite_cli.errors import ConfigError
 def export(
     file: Annotated[
         Path,
-        typer.Argument(help="A result file, a fit, or a motion (CSV, …).", show_default=False),
+        typer.Argument(help="A result file, a motion (CSV, …), or a model.", show_default=False),
     ],
     format_: Annotated[
         str,
@@ -24,7 +24,7 @@ def export(
             "--format",
             "-f",
             metavar="FORMAT",
-            help="csv, ros2, rosbag2, mcap, moveit, npz of motions; urdf, mjcf, yaml of a fit.",
+            help="csv, ros2, rosbag2, mcap, moveit, npz of motions; urdf, mjcf, c, yaml of models.",
             autocompletion=complete_format,
         ),
     ],
@@ -74,18 +74,22 @@ def export(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Write motions in the formats that controllers take, or a fit as a robot model.
+    """Write motions in the formats that controllers take, or a model for simulators and in C.
 
     Positions, speeds and accelerations come from the motion's coefficients, so they are exact at
     any rate. The last instant is the motion's end; where the duration is no whole number of steps,
     the last step is between half and one and a half of the others. Several motions go to files with
     their numbers in the name. With --entry the robot starts and ends at rest. Units: s, rad (m).
 
+    A model is a fit, a diagnosis or a config of `diagnose --apply`. As C it is one file without
+    dependencies or allocation, with every effect that C can hold and a test of itself.
+
     Examples:
       excite export ur10.h5 --format csv --motion 1 -o motion.csv
       excite export ur10.h5 --format ros2 --entry --rate 500
       excite export ur10.h5 --format csv --motion 1 --slow 0.3 -o slow.csv
       excite export fit.h5 --format mjcf -o identified.xml
+      excite export diagnosis.h5 --format c -o arm.c
     """
     from excite_cli.api.exporting import export_answer, export_file
     from excite_cli.api.threads import single_threaded

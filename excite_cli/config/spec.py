@@ -16,6 +16,7 @@ from excite_cli.config.data_spec import (
     MeasurementSpec,
     RunStates,
 )
+from excite_cli.config.identified_spec import IdentifiedSpec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.section import Integer, Positive, Power, Section
 from excite_cli.config.trajectory_spec import FourierSpec, SamplingSpec, TrajectorySpec
@@ -108,6 +109,9 @@ class Spec(Section):
         default_factory=dict,
         description="what differs between runs, {run: {kind of effect: state}}, as {monday_3: "
         "{payload: tool_2kg}}; runs of one state share its effect, `none` is without",
+    )
+    identified: IdentifiedSpec | None = Field(
+        None, description="the model with its numbers, as `excite diagnose --apply` writes it"
     )
     measurement: MeasurementSpec = MeasurementSpec()
     identification: IdentificationSpec = IdentificationSpec()

@@ -3,29 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from excite_cli.diagnosis.declared_model import Model, width_of
-from excite_cli.diagnosis.prediction import Prediction, errors_on, predicted
 from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.dynamics.regressor import standard_parameters
-from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.identified_model import IdentifiedModel, Prediction, errors_on
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace
 from excite_cli.robot.model import Array, Robot
-
-
-@dataclass(frozen=True)
-class FittedModel:
-    """Inertias φ (P,), effects, and the values of all their linear parameters in order."""
-
-    phi: Array
-    effects: tuple[Effect, ...]
-    values: Array
 
 
 @dataclass(frozen=True)
@@ -35,9 +22,9 @@ class Played:
     robot: Robot
     runs: Sequence[PreparedRun]
 
-    def predictions(self, fitted: FittedModel) -> list[Prediction]:
+    def predictions(self, fitted: IdentifiedModel) -> list[Prediction]:
         """What a model says of every run."""
-        return [_predicted(self.robot, fitted, run) for run in self.runs]
+        return [fitted.predicted(self.robot, run) for run in self.runs]
 
     def errors(self, predictions: Sequence[Prediction]) -> Errors:
         """Errors of predictions for all runs."""
@@ -67,21 +54,25 @@ class BeforeAfter:
     traces: tuple[TorqueTrace, ...]
 
 
-def both_models(model: Model, traced: Traced, parameters: Array) -> tuple[FittedModel, FittedModel]:
+def both_models(
+    model: Model, traced: Traced, parameters: Array
+) -> tuple[IdentifiedModel, IdentifiedModel]:
     """The declared model fitted to the training data, and the one with `parameters`."""
     return refitted(model, traced, ()), _fitted(model, traced, traced.chosen, parameters)
 
 
-def refitted(model: Model, traced: Traced, chosen: Sequence[int]) -> FittedModel:
+def refitted(model: Model, traced: Traced, chosen: Sequence[int]) -> IdentifiedModel:
     """The model with these of the candidates, fitted to the training data."""
     parameters = robust_solve(traced.data, traced.candidates, chosen, traced.levels)
     return _fitted(model, traced, chosen, parameters)
 
 
-def _fitted(model: Model, traced: Traced, chosen: Sequence[int], parameters: Array) -> FittedModel:
+def _fitted(
+    model: Model, traced: Traced, chosen: Sequence[int], parameters: Array
+) -> IdentifiedModel:
     effects = (*model.declared, *(traced.candidates[i].effect for i in chosen))
     values = parameters[len(parameters) - width_of(effects) :]
-    return FittedModel(model.full_inertias(parameters), effects, values)
+    return IdentifiedModel(model.full_inertias(parameters), effects, values)
 
 
 def on_sealed(
@@ -103,10 +94,4 @@ def _by_urdf(played: Played) -> Sequence[Prediction]:
     phi = standard_parameters(played.robot)
     if not phi.any():
         return ()
-    return played.predictions(FittedModel(phi, *urdf_friction(played.robot)))
-
-
-def _predicted(robot: Robot, fitted: FittedModel, run: PreparedRun) -> Prediction:
-    body = RigidBody(robot, fitted.phi, run.q, run.v, run.a)
-    values = fitted.values if len(fitted.effects) else np.zeros(0)
-    return predicted(body, fitted.effects, values, run)
+    return played.predictions(IdentifiedModel(phi, *urdf_friction(played.robot)))

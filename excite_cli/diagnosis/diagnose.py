@@ -10,7 +10,7 @@ import numpy as np
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import joint_aliases
-from excite_cli.diagnosis.before_after import FittedModel, Played, both_models, on_sealed
+from excite_cli.diagnosis.before_after import Played, both_models, on_sealed
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
@@ -47,6 +47,7 @@ from excite_cli.dynamics.regressor import standard_parameter_names, standard_par
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import PreparedRun, prepare, require_motion
@@ -220,14 +221,11 @@ def _path(traced: Traced, candidates: Sequence[int], errors: SealedErrors) -> Er
     return found and replace(found, effects=tuple(candidates.index(i) for i in order))
 
 
-def _declared(model: Model, after: FittedModel, robot: Robot) -> tuple[EffectRecord, ...]:
+def _declared(model: Model, after: IdentifiedModel, robot: Robot) -> tuple[EffectRecord, ...]:
     """The declared effects, with the values that they have beside those that were found."""
-    records, at = [], 0
-    for effect in model.declared:
-        values = after.values[at : at + len(effect.parameters)]
-        records.append(record_of(effect, robot.joint_names, values))
-        at += len(values)
-    return tuple(records)
+    count = len(model.declared)
+    told = list(after.by_effect)[:count]
+    return tuple(record_of(effect, robot.joint_names, values) for effect, values in told)
 
 
 def _by_joint(robot: Robot, values: Array) -> dict[str, float]:

@@ -14,13 +14,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.before_after import FittedModel, Played
+from excite_cli.diagnosis.before_after import Played
 from excite_cli.diagnosis.declared_model import Model
-from excite_cli.diagnosis.prediction import Prediction
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.identification.averages import apply
 from excite_cli.identification.errors_of_torque import FEWEST
+from excite_cli.identification.identified_model import IdentifiedModel, Prediction
 from excite_cli.identification.regression import effect_columns, seen_of, with_effects
 from excite_cli.robot.model import Array
 
@@ -31,7 +31,7 @@ def sealed_errors(
     played: Played,
     model: Model,
     traced: Traced,
-    after: FittedModel,
+    after: IdentifiedModel,
     first: Sequence[Prediction],
     last: Sequence[Prediction],
     from_urdf: bool,
@@ -107,7 +107,7 @@ def _grams(
     played: Played,
     model: Model,
     fit: _Fit,
-    after: FittedModel,
+    after: IdentifiedModel,
     first: Sequence[Prediction],
     last: Sequence[Prediction],
 ) -> list[Array | None]:

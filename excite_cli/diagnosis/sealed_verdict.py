@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.diagnosis.before_after import FittedModel, Played, refitted
+from excite_cli.diagnosis.before_after import Played, refitted
 from excite_cli.diagnosis.declared_model import Model
-from excite_cli.diagnosis.prediction import Prediction
 from excite_cli.diagnosis.records import Removed
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.identification.errors_of_torque import Errors, block_sums, drawn_blocks
+from excite_cli.identification.identified_model import IdentifiedModel, Prediction
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
@@ -39,7 +39,7 @@ class Worth:
 
 
 def worth_on_sealed(
-    played: Played, model: Model, traced: Traced, after: FittedModel
+    played: Played, model: Model, traced: Traced, after: IdentifiedModel
 ) -> dict[int, Worth]:
     """Worth of every chosen candidate on the sealed runs `played`, beside all others."""
     with_all = played.predictions(after)

@@ -7,11 +7,12 @@ measured.
 
 from collections.abc import Sequence
 
-from excite_cli.diagnosis.before_after import FittedModel, Played, on_sealed
+from excite_cli.diagnosis.before_after import Played, on_sealed
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.records import Assumption, SealedEnds
 from excite_cli.effects.base import Effect
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.prepare import prepare
 from excite_cli.identification.processing import Processing
 from excite_cli.identification.split import Split
@@ -47,7 +48,7 @@ def _declared(effect: Effect, sealed: Sequence[Run], model: Model) -> bool:
 
 def on_sealed_ends(
     model: Model,
-    models: tuple[FittedModel, FittedModel],
+    models: tuple[IdentifiedModel, IdentifiedModel],
     ends: Sequence[Run],
     processing: Processing,
 ) -> tuple[SealedEnds, ...]:

@@ -3,9 +3,11 @@
 On joints that turn about one fixed direction it cannot be told from the link's own inertia.
 """
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.c_code import real
 from excite_cli.robot.model import Array
 
 
@@ -23,6 +25,11 @@ class Armature(Effect):
     def columns(self, signals: Signals) -> Array:
         """a_j, (T, 1, 1)."""
         return signals.a[:, list(self.joints), None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """I a_j."""
+        j = self.joints[0]
+        return f"tau[{j}] += {real(values[0])} * a[{j}];"
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂a_j = weight."""

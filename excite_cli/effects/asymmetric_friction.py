@@ -4,11 +4,13 @@
 f_c = (f⁺ + f⁻)/2 and b = (f⁺ − f⁻)/2, the same two columns in another basis.
 """
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier
+from excite_cli.effects.c_code import real
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 
@@ -33,6 +35,11 @@ class AsymmetricFriction(Effect):
         """(1 + sgn v_j)/2 and −(1 − sgn v_j)/2, (T, 1, 2)."""
         sign = smooth_sign(signals.v[:, self.joints[0]])
         return 0.5 * np.stack([sign + 1.0, sign - 1.0], axis=-1)[:, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """f⁺ (s + 1)/2 + f⁻ (s − 1)/2."""
+        j, (forward, backward) = self.joints[0], map(real, 0.5 * values)
+        return f"tau[{j}] += {forward} * (s[{j}] + 1) + {backward} * (s[{j}] - 1);"
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂v_j = (sum of both weights) · slope of the smoothed sign / 2."""

@@ -46,6 +46,7 @@ class Backlash(Effect):
     """`share` (1: a clean gap) of the load that a gap of `gap` rad takes away and gives back."""
 
     kind: ClassVar = "backlash"
+    over_time: ClassVar = True
     title: ClassVar = "backlash of the gear"
     signature: ClassVar = "when the load changes sign it is missing for a while, then comes a blow"
     parameters: ClassVar = (whole_share("share"),)

@@ -84,6 +84,8 @@ class Effect(ABC):
     of_whole_torque: ClassVar[bool] = False
     # A body that one joint carries: part of the load of joints, and named by its link if one likes.
     carried: ClassVar[bool] = False
+    # Its torque at an instant depends on the time, or on other instants: it needs a series.
+    over_time: ClassVar[bool] = False
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
     why_not_excitable: ClassVar[str] = ""
 
@@ -400,6 +402,13 @@ class Effect(ABC):
         else:
             robot.apply(self, values)
         robot.tell_controller(self, values)
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """C statements that add its torque to `tau` (`c_code`); `columns` of the log by name.
+
+        Empty: C has no such effect.
+        """
+        return ""
 
     def urdf(self, values: Array) -> dict[str, float]:
         """Attributes of the URDF's <dynamics> that hold this effect; empty if none can."""

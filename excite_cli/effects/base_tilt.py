@@ -7,7 +7,7 @@ are two angles: roll about x and pitch about y where gravity is along z. On a ro
 lies along another axis, roll and pitch are about the other two, in the order x, y, z.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.effects.c_code import all_joints, reals
 from excite_cli.effects.directional import left_by_angles
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
@@ -56,6 +57,10 @@ class BaseTilt(Effect):
     def columns(self, signals: Signals) -> Array:
         """G (−axis × g) for both axes, (T, n, 2)."""
         return signals.body.gravity_axes @ _changes(signals.body.robot).T
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """Gravity that is turned."""
+        return all_joints(f"tilted({reals(values)}, q, out)")
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """The derivative of gravity's torque by position, gravity being −axis × g."""

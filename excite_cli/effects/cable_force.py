@@ -4,11 +4,13 @@ U = c₁ q_j q_k + c₂ q_j² q_k + c₃ q_j q_k², torque = ∂U/∂q in both r
 Terms of one angle alone are springs.
 """
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals, Tier
+from excite_cli.effects.c_code import real
 from excite_cli.robot.model import Array
 
 
@@ -33,6 +35,15 @@ class CableForce(Effect):
         x, y = signals.q[:, self.joints[0]], signals.q[:, self.joints[1]]
         rows = [[y, 2 * x * y, y * y], [x, x * x, 2 * x * y]]
         return np.moveaxis(np.array(rows), 2, 0)
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """Gradients of the three potentials."""
+        (j, k), (b, first, second) = self.joints, map(real, values)
+        x, y = f"q[{j}]", f"q[{k}]"
+        return (
+            f"tau[{j}] += {b} * {y} + 2 * {first} * {x} * {y} + {second} * {y} * {y}; "
+            f"tau[{k}] += {b} * {x} + {first} * {x} * {x} + 2 * {second} * {x} * {y};"
+        )
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """The symmetric second derivatives of the three potentials."""

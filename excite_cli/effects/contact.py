@@ -20,6 +20,7 @@ from excite_cli.effects.base import (
     Tier,
     steps_by_ratio,
 )
+from excite_cli.effects.c_code import all_joints, real, reals
 from excite_cli.effects.seen import Seen
 from excite_cli.effects.simulated_robot import Push, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
@@ -35,6 +36,7 @@ class Contact(Effect):
     """A force (fx, fy, fz) on the tip from `start` to `end`, in axes of the world; all rows."""
 
     kind: ClassVar = "contact"
+    over_time: ClassVar = True
     title: ClassVar = "contact with the surroundings"
     signature: ClassVar = "residuals on many joints that appear at one instant and go at another"
     scope: ClassVar[Scope] = "robot"
@@ -94,6 +96,12 @@ class Contact(Effect):
         if inside.any():
             columns[inside] = _columns(signals, inside)
         return columns
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """−Jᵀ f within the window."""
+        start, end = real(self.shape["start"]), real(self.shape["end"])
+        push = all_joints(f"pushed((const real[3]){{{reals(-np.asarray(values))}}}, q, out)")
+        return f"if (t >= {start} && t <= {end}) {push}"
 
     def absurd(self, values: Array, seen: Seen) -> str:
         """A touch that nobody feels is none."""

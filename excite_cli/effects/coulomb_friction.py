@@ -1,8 +1,10 @@
 """Dry friction: τ_j = f_c sgn v_j."""
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier
+from excite_cli.effects.c_code import real
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 
@@ -26,6 +28,11 @@ class CoulombFriction(Effect):
     def columns(self, signals: Signals) -> Array:
         """sgn v_j, (T, 1, 1)."""
         return smooth_sign(signals.v[:, list(self.joints), None])
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """c sgn v_j."""
+        j = self.joints[0]
+        return f"tau[{j}] += {real(values[0])} * s[{j}];"
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂v_j = weight · slope of the smoothed sign."""

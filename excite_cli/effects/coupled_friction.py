@@ -18,6 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.effects.c_code import real
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.effects.simulated_robot import Coupling, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
@@ -87,6 +88,17 @@ class CoupledFriction(Effect):
         viscous = s * v[:, ::-1]
         coulomb = np.stack([sign, s * sign], axis=-1)
         return np.stack([viscous, coulomb], axis=-1)
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """Both rows of both parts."""
+        (j, k), (viscous, coulomb) = self.joints, values
+        way = self.shape["direction"]
+        shaft = f"{real(coulomb)} * SIGN(v[{j}] + {real(way)} * v[{k}])"
+        return (
+            f"{{ const real shaft = {shaft}; "
+            f"tau[{j}] += {real(viscous * way)} * v[{k}] + shaft; "
+            f"tau[{k}] += {real(viscous * way)} * v[{j}] + {real(way)} * shaft; }}"
+        )
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """The speed of the shaft that both joints turn."""

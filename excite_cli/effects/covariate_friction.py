@@ -15,9 +15,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Abscissa, Parameter, Signals
+from excite_cli.effects.base import Abscissa, Cotangents, Parameter, Signals
+from excite_cli.effects.c_code import real
 from excite_cli.effects.of_covariate import PER_UNIT, OfCovariate
-from excite_cli.effects.sign import smooth_sign
+from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array, Robot
 
 _GRID = (0.0, 0.7, 1.5, -0.7)  # κ times what the column varies by; falling to a half is 0.7
@@ -73,6 +74,20 @@ class CovariateFriction(OfCovariate):
         v = signals.v[:, self.joints[0]]
         both = np.stack([smooth_sign(v), v], axis=-1)
         return (self.deviation_of(signals)[:, None] * both)[:, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """δ (c sgn v_j + b v_j)."""
+        j, (c, b) = self.joints[0], map(real, values)
+        bent, delta = self.shape.get("curvature", 0.0), self.deviation_in_c(columns)
+        if bent:
+            delta = f"(-expm1({real(-bent)} * {delta}) / {real(bent)})"
+        return f"tau[{j}] += {delta} * ({c} * s[{j}] + {b} * v[{j}]);"
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂v_j = δ (w_c · slope of the sign + w_v)."""
+        j, w = self.joints[0], self.deviation_of(signals)[:, None] * weights[:, 0]
+        slope = smooth_sign_slope(signals.v[:, j])
+        return Cotangents(v=signals.only(j, w[:, 0] * slope + w[:, 1]))
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """The column's deviation from its reference with the sign of the speed."""

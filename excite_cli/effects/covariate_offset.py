@@ -4,9 +4,11 @@ Torque sensors drift with their temperature, and with what flows beside them. An
 the one at the reference c₀.
 """
 
+from collections.abc import Sequence
 from typing import ClassVar
 
-from excite_cli.effects.base import Abscissa, Parameter, Signals
+from excite_cli.effects.base import Abscissa, Cotangents, Parameter, Signals
+from excite_cli.effects.c_code import real
 from excite_cli.effects.of_covariate import PER_UNIT, OfCovariate
 from excite_cli.robot.model import Array
 
@@ -25,6 +27,15 @@ class CovariateOffset(OfCovariate):
     def columns(self, signals: Signals) -> Array:
         """δ, (T, 1, 1)."""
         return self.deviation_of(signals)[:, None, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """b δ."""
+        delta = self.deviation_in_c(columns)
+        return f"tau[{self.joints[0]}] += {real(values[0])} * {delta};"
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """Nothing: it does not depend on the motion."""
+        return Cotangents()
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """The column."""

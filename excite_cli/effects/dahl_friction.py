@@ -39,7 +39,8 @@ from excite_cli.effects.base import (
     Value,
     steps_by_ratio,
 )
-from excite_cli.effects.sign import sign_width, smooth_sign, smooth_sign_slope
+from excite_cli.effects.c_code import real
+from excite_cli.effects.sign import WIDTH, sign_width, smooth_sign, smooth_sign_slope
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
@@ -56,6 +57,7 @@ class DahlFriction(Effect):
     """τ_j = f (z − sgn v_j), f ≥ 0, with z following the direction of motion over `distance`."""
 
     kind: ClassVar = "dahl_friction"
+    over_time: ClassVar = True
     title: ClassVar = "dry friction with memory (Dahl)"
     signature: ClassVar = "after a reversal friction builds up over a distance instead of jumping"
     function_of: ClassVar = ("speed",)
@@ -93,6 +95,13 @@ class DahlFriction(Effect):
         j = self.joints[0]
         state = _Path.of(signals, j, self.shape["distance"]).state[::2][-len(signals.q) :]
         return (state - smooth_sign(signals.v[:, j]))[:, None, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """f (z − sgn v_j)."""
+        j = self.joints[0]
+        shape = (self.shape["distance"], _SLIDING, max(WIDTH, _STANDING))
+        state = f"dahl(memory, {j}, {', '.join(map(real, shape))})"
+        return f"tau[{j}] += {real(values[0])} * ({state} - s[{j}]);"
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """The recursion backwards, λ_k = weight_k + ∂z_{k+1}/∂z_k λ_{k+1}, and the sign's slope.

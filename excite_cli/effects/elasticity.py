@@ -8,12 +8,13 @@ of all joints changes by
 With an encoder at the link nothing of this shows.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier, Value
+from excite_cli.effects.c_code import all_joints, real
 from excite_cli.effects.directional import slope_of_gradient
 from excite_cli.effects.seen import Seen
 from excite_cli.effects.simulated_robot import SimulatedRobot, Transmission, rotor_inertia
@@ -27,6 +28,7 @@ class Elasticity(Effect):
     """The gear of one joint turns by compliance · load_j; shows in all rows."""
 
     kind: ClassVar = "elasticity"
+    over_time: ClassVar = True
     title: ClassVar = "elastic gear"
     signature: ClassVar = "the residual follows the fourth derivative of the motion, on many joints"
     parameters: ClassVar = (Parameter("compliance", "rad/(N·m)", 1e-6, 1e-3, nonnegative=True),)
@@ -77,6 +79,12 @@ class Elasticity(Effect):
         parts = (body.by_position, body.by_velocity, body.mass)
         twists = self._twist(signals)[:, :, None, None]
         return -sum(part[:, :, [j]] * twist for part, twist in zip(parts, twists, strict=True))
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """−c (∂τ/∂q_j load_j + ∂τ/∂v_j load_j' + ∂τ/∂a_j load_j'')."""
+        j, c = self.joints[0], real(-float(values[0]))
+        rates = (f"{c} * {name}[{j}]" for name in ("load", "load_rate", "load_bend"))
+        return all_joints(f"slopes(q, v, a, {j}, {', '.join(rates)}, out)")
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """Through τ_j and its rates, and through the derivatives (`slope_of_gradient`)."""

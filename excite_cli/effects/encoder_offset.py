@@ -3,12 +3,13 @@
 To first order the torque of all joints changes by offset · ∂τ/∂q_j at the measured position.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.c_code import all_joints, real
 from excite_cli.effects.directional import left_by_angles, slope_of_gradient
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
@@ -51,6 +52,10 @@ class EncoderOffset(Effect):
     def columns(self, signals: Signals) -> Array:
         """∂τ/∂q_j, (T, n, 1)."""
         return signals.body.by_position[:, :, list(self.joints)]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """x ∂τ/∂q_j."""
+        return all_joints(f"slopes(q, v, a, {self.joints[0]}, {real(values[0])}, 0, 0, out)")
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """Second derivatives of the torque along q_j (`slope_of_gradient`)."""

@@ -17,8 +17,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.effects.base import Abscissa, Effect, Parameter, Signals
-from excite_cli.effects.sign import smooth_sign
+from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.c_code import real
+from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array, Robot
 
 # Of the span; the last is a straight line. Steps of single runs explain what a coarse grid leaves.
@@ -94,6 +95,19 @@ class FrictionChange(Effect):
         """φ sgn v_j and φ v_j, (T, 1, 2)."""
         v = signals.v[:, self.joints[0]]
         return (self.progress(signals.start) * np.stack([smooth_sign(v), v], axis=-1))[:, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """φ(start) (c sgn v_j + b v_j)."""
+        j, (c, b) = self.joints[0], map(real, values)
+        constant, whole = self.shape["time_constant"], -self.shape["span"]
+        progress = f"expm1(-start / {real(constant)}) / {real(np.expm1(whole / constant))}"
+        return f"tau[{j}] += {progress} * ({c} * s[{j}] + {b} * v[{j}]);"
+
+    def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
+        """∂/∂v_j = φ (w_c · slope of the sign + w_v)."""
+        j, w = self.joints[0], self.progress(signals.start) * weights[:, 0]
+        slope = smooth_sign_slope(signals.v[:, j])
+        return Cotangents(v=signals.only(j, w[:, 0] * slope + w[:, 1]))
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """The campaign's time with the sign of the speed."""

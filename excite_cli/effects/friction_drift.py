@@ -5,12 +5,14 @@ recording to the next. Warming up makes both rates negative. Rates of opposite s
 they are what a curve over speed becomes where a run is faster at its end than at its start.
 """
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals, Tier
+from excite_cli.effects.c_code import real
 from excite_cli.effects.rare_sizes import nearest_of_sign
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
@@ -20,6 +22,7 @@ class FrictionDrift(Effect):
     """τ_j = t (coulomb_rate · sgn v_j + viscous_rate · v_j), both of either sign, but the same."""
 
     kind: ClassVar = "friction_drift"
+    over_time: ClassVar = True
     title: ClassVar = "friction that drifts during a run"
     signature: ClassVar = "friction is not the same at the end of a run as at its start"
     function_of: ClassVar = ("speed", "time")
@@ -37,6 +40,11 @@ class FrictionDrift(Effect):
         """t sgn v_j and t v_j, (T, 1, 2)."""
         v = signals.v[:, self.joints[0]]
         return (signals.t[:, None] * np.stack([smooth_sign(v), v], axis=-1))[:, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """t (c sgn v_j + b v_j)."""
+        j, (c, b) = self.joints[0], map(real, values)
+        return f"tau[{j}] += t * ({c} * s[{j}] + {b} * v[{j}]);"
 
     def possible(self, values: Array, early: bool) -> bool:
         """Whether both rates have the same sign: friction falls, or rises, as a whole."""

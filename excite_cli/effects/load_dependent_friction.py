@@ -3,11 +3,13 @@
 `load` is the rigid-body torque of the joint, not the friction itself.
 """
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.c_code import real
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 
@@ -30,6 +32,11 @@ class LoadDependentFriction(Effect):
         """|load_j| sgn v_j, (T, 1, 1)."""
         j = list(self.joints)
         return (np.abs(signals.load[:, j]) * smooth_sign(signals.v[:, j]))[:, :, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """μ |load_j| sgn v_j."""
+        j = self.joints[0]
+        return f"tau[{j}] += {real(values[0])} * fabs(load[{j}]) * s[{j}];"
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """The column itself: friction is a straight line over it."""

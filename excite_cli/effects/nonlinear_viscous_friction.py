@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Value
+from excite_cli.effects.c_code import real
 from excite_cli.effects.sign import sign_width
 from excite_cli.robot.model import Array, Robot
 
@@ -40,6 +41,12 @@ class NonlinearViscousFriction(Effect):
         """sgn(v_j) |v_j|^p, (T, 1, 1)."""
         v = signals.v[:, list(self.joints), None]
         return v * (v**2 + sign_width() ** 2) ** ((self.shape["power"] - 1.0) / 2.0)
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """f v_j (v_j² + w²)^((p−1)/2)."""
+        j, half = self.joints[0], 0.5 * (self.shape["power"] - 1.0)
+        square = f"v[{j}] * v[{j}] + {real(sign_width() ** 2)}"
+        return f"tau[{j}] += {real(values[0])} * v[{j}] * pow({square}, {real(half)});"
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂v_j = weight · (v² + w²)^((p−3)/2) (p v² + w²)."""

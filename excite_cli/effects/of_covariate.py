@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Effect, Parameter, Signals, Value
+from excite_cli.effects.c_code import real
 from excite_cli.robot.model import Array, Robot
 
 PER_UNIT = "/unit"
@@ -52,6 +53,11 @@ class OfCovariate(Effect):
     def deviation_of(self, signals: Signals) -> Array:
         """δ (T,)."""
         return signals.covariates[self.covariate] - self.shape["reference"]
+
+    def deviation_in_c(self, columns: Sequence[str]) -> str:
+        """c − c₀ in C."""
+        place = list(columns).index(self.covariate)
+        return f"(column[{place}] - {real(self.shape['reference'])})"
 
     def report(self, values: Array, covariance: Array) -> dict[str, Value]:
         """Sizes per unit of the column, and where it is at its reference."""

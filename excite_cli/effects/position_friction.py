@@ -13,6 +13,7 @@ import numpy as np
 
 from excite_cli.effects.angle_curve import hats_over_angle
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals, Value
+from excite_cli.effects.c_code import real
 from excite_cli.effects.seen import Seen
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array, Robot
@@ -92,6 +93,13 @@ class PositionFriction(Effect):
         angle = self.shape["periods"] * signals.q[:, j]
         around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         return (around * self._of_speed(signals.v[:, j])[0][:, None])[:, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """(c cos N q_j + d sin N q_j) times v_j or its sign."""
+        j, (c, d) = self.joints[0], map(real, values)
+        angle = f"{real(self.shape['periods'])} * q[{j}]"
+        of_speed = f"{'v' if self._viscous else 's'}[{j}]"
+        return f"tau[{j}] += ({c} * cos({angle}) + {d} * sin({angle})) * {of_speed};"
 
     def _of_speed(self, v: Array) -> tuple[Array, Array]:
         """What the speed makes of friction (T,), and its derivative."""

@@ -29,6 +29,7 @@ from excite_cli.effects.base import (
     Value,
     deviation,
 )
+from excite_cli.effects.c_code import real
 from excite_cli.robot.model import Array, Robot
 
 _CYCLES = 1.0  # least number of periods within the travelled range
@@ -105,6 +106,12 @@ class Ripple(Effect):
         """cos(N q_j) and sin(N q_j), (T, 1, 2)."""
         angle = self.shape["periods"] * signals.q[:, self.joints[0]]
         return np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """c cos N q_j + d sin N q_j."""
+        j, (c, d) = self.joints[0], map(real, values)
+        angle = f"{real(self.shape['periods'])} * q[{j}]"
+        return f"tau[{j}] += {c} * cos({angle}) + {d} * sin({angle});"
 
     def curve(self, signals: Signals, every: Sequence[Signals]) -> Array | None:
         """Powers of the angle up to the fourth, where less than three periods are seen."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from excite_cli.effects.angle_curve import powers_of_angle
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Value, deviation
+from excite_cli.effects.c_code import real
 from excite_cli.robot.model import Array
 
 
@@ -32,6 +33,11 @@ class Spring(Effect):
         """q_j and 1, (T, 1, 2)."""
         q = signals.q[:, self.joints[0]]
         return np.stack([q, np.ones_like(q)], axis=-1)[:, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """k q_j + b."""
+        j, (stiffness, preload) = self.joints[0], map(real, values)
+        return f"tau[{j}] += {stiffness} * q[{j}] + {preload};"
 
     def curve(self, signals: Signals, every: Sequence[Signals]) -> Array | None:
         """Powers of the angle up to the fourth: a spring that hardens is another."""

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.c_code import real
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array, Robot
 
@@ -50,6 +51,13 @@ class StribeckFriction(Effect):
         """exp(−(v_j/v_s)²) sgn v_j, (T, 1, 1)."""
         v = signals.v[:, list(self.joints), None]
         return np.exp(-((v / self.shape["stribeck_speed"]) ** 2)) * smooth_sign(v)
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """Δf exp(−(v_j/v_s)²) sgn v_j."""
+        j = self.joints[0]
+        ratio = f"v[{j}] / {real(self.shape['stribeck_speed'])}"
+        peak = f"exp(-({ratio}) * ({ratio}))"
+        return f"tau[{j}] += {real(values[0])} * {peak} * s[{j}];"
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂v_j = weight · exp(−(v/v_s)²) (slope of the sign − 2 v/v_s² · sign)."""

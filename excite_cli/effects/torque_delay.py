@@ -4,12 +4,13 @@ One delay for all joints of the effect, of all terms of the torque: a lag of fri
 a delay. It is looked for on all joints together, on those of an arm, and on single ones.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
+from excite_cli.effects.c_code import real
 from excite_cli.effects.seen import Seen
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.link_frame import branches
@@ -26,6 +27,7 @@ class TorqueDelay(Effect):
     """Row j of every joint named: −δ d(torque_j)/dt with one δ."""
 
     kind: ClassVar = "torque_delay"
+    over_time: ClassVar = True
     title: ClassVar = "delay of the measured torque"
     signature: ClassVar = "the residual is the torque's rate of change, on all joints alike"
     function_of: ClassVar = ("load",)
@@ -67,6 +69,11 @@ class TorqueDelay(Effect):
     def columns(self, signals: Signals) -> Array:
         """−d(torque)/dt, (T, len(joints), 1)."""
         return -signals.rate(signals.torque[:, list(self.joints)])[:, :, None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """−δ d(torque_j)/dt."""
+        late = real(-float(values[0]))
+        return " ".join(f"tau[{j}] += {late} * torque_rate[{j}];" for j in self.joints)
 
     def abscissa(self, signals: Signals) -> Abscissa | None:
         """The rate of the torque; of several joints each has its own, so None."""

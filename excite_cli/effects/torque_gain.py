@@ -5,10 +5,11 @@ inertial parameters, which then are all wrong by it. It is that of the joint's w
 friction beside it is told as it is in the robot, not as the sensor shows it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.c_code import real
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
 
@@ -34,6 +35,11 @@ class TorqueGain(Effect):
     def columns(self, signals: Signals) -> Array:
         """torque_j, (T, 1, 1)."""
         return signals.torque[:, list(self.joints), None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """g torque_j."""
+        j = self.joints[0]
+        return f"tau[{j}] += {real(values[0])} * torque[{j}];"
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]

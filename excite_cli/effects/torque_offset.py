@@ -1,11 +1,12 @@
 """A constant in the measured torque: τ_j = b."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals
+from excite_cli.effects.c_code import real
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
 
@@ -25,6 +26,10 @@ class TorqueOffset(Effect):
     def columns(self, signals: Signals) -> Array:
         """Ones, (T, 1, 1)."""
         return np.ones((len(signals.t), 1, 1))
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """b."""
+        return f"tau[{self.joints[0]}] += {real(values[0])};"
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """Time: a constant stays where it is."""

@@ -17,6 +17,7 @@ from excite_cli.effects.base import (
     Tier,
     steps_by_ratio,
 )
+from excite_cli.effects.c_code import real
 from excite_cli.effects.parameter import whole_share
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
@@ -91,6 +92,12 @@ class TorqueSaturation(Effect):
         """−(|torque_j| − L)₊ sgn(torque_j), (T, 1, 1)."""
         torque, level = signals.torque[:, list(self.joints), None], self.shape["level"]
         return np.clip(torque, -level, level) - torque
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """s (torque_j, cut off, less torque_j)."""
+        j, level, share = self.joints[0], real(self.shape["level"]), real(values[0])
+        over = f"fmin(fmax(torque[{j}], -{level}), {level}) - torque[{j}]"
+        return f"tau[{j}] += {share} * ({over});"
 
     def abscissa(self, signals: Signals) -> Abscissa:
         """The model's torque, before it is cut off."""

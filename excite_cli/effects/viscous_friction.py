@@ -1,8 +1,10 @@
 """Friction proportional to speed: τ_j = f_v v_j."""
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier
+from excite_cli.effects.c_code import real
 from excite_cli.robot.model import Array
 
 
@@ -23,6 +25,11 @@ class ViscousFriction(Effect):
     def columns(self, signals: Signals) -> Array:
         """v_j, (T, 1, 1)."""
         return signals.v[:, list(self.joints), None]
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """b v_j."""
+        j = self.joints[0]
+        return f"tau[{j}] += {real(values[0])} * v[{j}];"
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂v_j = weight."""

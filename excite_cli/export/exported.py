@@ -17,15 +17,6 @@ class ModelText:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class IdentifiedModel:
-    """What is exported: `phi` (10·n_bodies,), effects with their linear parameters in order."""
-
-    phi: Array
-    effects: tuple[Effect, ...] = ()
-    values: tuple[Array, ...] = ()
-
-
 def in_words(effects: Sequence[Effect], joint_names: Sequence[str]) -> str:
     """`spring at axis_2; armature at axis_1, axis_3`."""
     places: dict[str, list[str]] = {}

@@ -1,13 +1,17 @@
 """The problem of a config with the effects that a diagnosis found in it."""
 
 import os
+from dataclasses import asdict, fields
+from math import isfinite
 from pathlib import Path
+from typing import Any
 
 from excite_cli.config.spec import Spec
 from excite_cli.config.write import yaml_text
 from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.export.parameters import effect_specs
+from excite_cli.identification.processing import Processing
 
 
 def found_config(
@@ -33,6 +37,8 @@ def found_config(
     records = [*found.declared, *(named.effect for named in kept)]
     effects = [effect_of(record, found.joint_names) for record in records]
     tree["effects"] = effect_specs(effects, found.joint_names)
+    if not smallest:  # of fewer effects the values would be others
+        tree["identified"] = _identified(found, records)
     some = f" of {len(found.effects)}" * smallest
     comment = (
         f"{len(kept)}{some} effects found by `excite diagnose`, added to the declared model.\n"
@@ -40,3 +46,29 @@ def found_config(
         f"before, {after:.2%} after (moving samples)."
     )
     return yaml_text(tree, comment)
+
+
+def _identified(found: Diagnosis, records: list[EffectRecord]) -> dict[str, Any]:
+    """The model with its numbers, for who plays it (`identified`)."""
+    figures = ("relative", "relative_moving", "rms", "rms_moving")
+    filters = {field.name for field in fields(Processing)} - {"reasons"}
+    return {
+        "inertias": dict(zip(found.inertia_names, map(float, found.phi), strict=True)),
+        "effects": [_of_effect(record) for record in records],
+        "sealed_run": found.sealed_run,
+        "error": {
+            name: {joint: _known(x) for joint, x in getattr(found.after, name).items()}
+            for name in figures
+        },
+        "noise": {joint: x for joint, x in (found.noise_floor or {}).items() if isfinite(x)},
+        "processing": {name: x for name, x in found.processing.items() if name in filters},
+    }
+
+
+def _of_effect(record: EffectRecord) -> dict[str, Any]:
+    told = {name: x for name, x in asdict(record).items() if x and name != "link"}
+    return {name: list(x) if isinstance(x, tuple) else x for name, x in told.items()}
+
+
+def _known(x: float) -> float | None:
+    return x if isfinite(x) else None

@@ -11,13 +11,13 @@ import numpy as np
 from excite_cli.effects.base import Effect
 from excite_cli.errors import RobotError
 from excite_cli.export.exported import (
-    IdentifiedModel,
     ModelText,
     in_words,
     number,
     ten_as_body,
     vector,
 )
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, TreeJoint, tree_of
 
@@ -120,7 +120,7 @@ def _joint_attributes(
     """Attributes of every joint's <joint>, and the effects that have no place there."""
     attributes: list[dict[str, float]] = [{} for _ in range(robot.n)]
     left: list[Effect] = []
-    for effect, values in zip(model.effects, model.values, strict=True):
+    for effect, values in model.by_effect:
         found = effect.mjcf(values)
         of_joint = attributes[effect.joints[0]]
         clash = any(key in of_joint and key not in _ADDED for key in found)

@@ -18,13 +18,13 @@ from excite_cli.dynamics.regressor import payload_parameters, standard_parameter
 from excite_cli.effects.base import Effect
 from excite_cli.errors import RobotError
 from excite_cli.export.exported import (
-    IdentifiedModel,
     ModelText,
     in_words,
     number,
     ten_as_body,
     vector,
 )
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Array, Robot
 
 _INERTIA = (
@@ -189,7 +189,7 @@ def _friction(robot: Robot, root: ElementTree.Element, model: IdentifiedModel) -
     """Write <dynamics> of every moved joint; return what did not fit in."""
     held: dict[str, dict[str, float]] = {name: {} for name in robot.joint_names}
     left: list[Effect] = []
-    for effect, values in zip(model.effects, model.values, strict=True):
+    for effect, values in model.by_effect:
         attributes = effect.urdf(values)
         if not attributes or effect.runs or len(effect.joints) != 1:
             left.append(effect)

@@ -22,6 +22,7 @@ from excite_cli.identification.consistent_spread import consistent_near_prior
 from excite_cli.identification.covariance import Rows
 from excite_cli.identification.essential import essential_parameters
 from excite_cli.identification.factors import Mask, solve, triangle_of
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.implausible_links import marked
 from excite_cli.identification.least_squares import LinearFit, fit_rows
 from excite_cli.identification.link_changes import LinkChange, inertial_covariance, link_changes
@@ -33,7 +34,7 @@ from excite_cli.identification.regression import (
     signals_of,
     with_effects,
 )
-from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.model import Array
 from excite_cli.shown.record import Shown
 
 # A parameter is identifiable if the data fix it to this share of its value or usual size.
@@ -105,12 +106,17 @@ class Fit(Shown):
         """φ (P,): the consistent set if there is one, else `phi`."""
         return self.phi if self.consistent is None else self.consistent.phi
 
-    def predict_raw(self, run: RunColumns, robot: Robot) -> tuple[Array, Array]:
-        """Rigid-body torque and τ̂ (T, n) at the working rate, not averaged."""
-        values = self.values[self.rank :]
-        signals = signals_of(run.prepared, robot, self.phi)
-        columns = effect_columns(self.effects, with_effects(signals, self.effects, values))
-        return signals.load, signals.load + columns @ values
+    @property
+    def model(self) -> IdentifiedModel:
+        """What it predicts with: `phi` and the effects."""
+        return IdentifiedModel(self.phi, self.effects, self.values[self.rank :])
+
+    @property
+    def best_model(self) -> IdentifiedModel:
+        """As `model`, of the physically consistent set if there is one."""
+        if self.consistent is None:
+            return self.model
+        return IdentifiedModel(self.consistent.phi, self.effects, self.consistent.effects)
 
     def _part(self, index: int) -> slice:
         first = self.rank + sum(len(e.parameters) for e in self.effects[:index])

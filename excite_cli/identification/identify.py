@@ -11,7 +11,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ExciteError
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
-from excite_cli.identification.errors_of_torque import Errors, torque_errors
+from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import (
     Fit,
     columns_of,
@@ -28,6 +28,7 @@ from excite_cli.identification.hausman import (
     instrument_dataset,
     not_testable,
 )
+from excite_cli.identification.identified_model import errors_on
 from excite_cli.identification.implausible_links import implausible
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import noise_floor
@@ -154,21 +155,12 @@ def judged(
 ) -> tuple[Errors, tuple[TorqueTrace, ...]]:
     """Errors of the fit's torque on the runs of `regression`, and this torque over time."""
     runs = [run.prepared for run in regression.runs]
-    predicted = [found.predict_raw(run, regression.robot) for run in regression.runs]
-    raw = [torque for _, torque in predicted]
-    errors = torque_errors(
-        regression.robot.joint_names,
-        [run.tau for run in runs],
-        [run.averaged_torque(each) for run, each in zip(runs, raw, strict=True)],
-        [run.valid for run in runs],
-        [run.moving & run.valid for run in runs],
-        [run.tau_raw for run in runs],
-        raw,
-        runs[0].step,
-    )
+    robot = regression.robot
+    predicted = [found.model.predicted(robot, run) for run in runs]
+    errors = errors_on(robot, runs, predicted)
     return errors, tuple(
-        torque_trace(run, load, torque, sealed=sealed)
-        for run, (load, torque) in zip(runs, predicted, strict=True)
+        torque_trace(run, each.load, each.torque, sealed=sealed)
+        for run, each in zip(runs, predicted, strict=True)
     )
 
 

@@ -41,6 +41,11 @@ def is_marked(path: Path, own: OwnFile) -> bool:
         return False
 
 
+def is_own(path: Path) -> bool:
+    """Whether `path` is an HDF5 file."""
+    return path.is_file() and bool(h5py.is_hdf5(path))
+
+
 @contextmanager
 def opened(path: Path, own: OwnFile) -> Iterator[Any]:
     """The open file, checked to be of this kind; whatever goes wrong while it is read is reported.

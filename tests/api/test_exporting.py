@@ -21,9 +21,9 @@ from tests.api.conftest import SMALL, SMOKE, Loop
 
 def test_what_the_format_cannot_hold_is_one_sentence(loop: Loop, tmp_path: Path) -> None:
     target = tmp_path / "x.csv"
-    with pytest.raises(FileError, match=r"fit\.h5 is a fit: it cannot be exported as csv"):
+    with pytest.raises(FileError, match=r"fit\.h5 is a model: it cannot be exported as csv"):
         export_file(loop.fit, "csv", target)
-    with pytest.raises(FileError, match=r"arm\.h5 is no fit: it cannot be exported as urdf"):
+    with pytest.raises(FileError, match=r"arm\.h5 is no model: it cannot be exported as urdf"):
         export_file(str(loop.result), "urdf", target)
     with pytest.raises(FileError, match=r"There is no file none\.h5"):
         export_file("none.h5", "csv", target)

@@ -138,7 +138,7 @@ def test_a_motion_of_others_is_written_in_another_format(here: Here) -> None:
     ("arguments", "words"),
     [
         (("-f", "cvs"), "--format cvs: unknown. Did you mean 'csv'?"),
-        (("-f", "urdf"), "is no fit: it cannot be exported as urdf. Its formats: csv, ros2"),
+        (("-f", "urdf"), "is no model: it cannot be exported as urdf. Its formats: csv, ros2"),
         (("-f", "csv", "--motion", "7"), "has no motion 7; it has 1, 2"),
         (("-f", "csv", "--motion", "x"), "--motion x: give the number"),
         (("-f", "csv", "--rate", "0"), "--rate 0: give instants per second"),
@@ -191,7 +191,9 @@ def test_a_fit_gives_the_same_models_as_identification(here: Here) -> None:
         again.unlink()
     status, _, err = here("export", "fit.h5", "-f", "csv")
     assert status == 2
-    assert "fit.h5 is a fit: it cannot be exported as csv. Its formats: urdf, mjcf, yaml." in err
+    assert (
+        "fit.h5 is a model: it cannot be exported as csv. Its formats: urdf, mjcf, yaml, c." in err
+    )
     (here.folder / "arm.yaml").unlink()
     status, _, err = here("export", "fit.h5", "-f", "urdf", "-o", "a.urdf")
     assert status == 2

@@ -8,6 +8,7 @@ import pytest
 from excite_cli.config import (
     constraints_spec,
     data_spec,
+    identified_spec,
     robot_spec,
     spec,
     trajectory_spec,
@@ -66,6 +67,15 @@ LEVELS: dict[str, tuple[str, type[Section]]] = {
         f"{ROBOT}\nconstraints: {{surroundings: {{walls: {{left: "
         "{point: [0, 1, 0], normal: [0, -1, 0], @: 1}}}}",
         constraints_spec.WallSpec,
+    ),
+    "identified": (
+        f"{ROBOT}\nidentified: {{inertias: {{}}, @: 1}}",
+        identified_spec.IdentifiedSpec,
+    ),
+    "identified.effects.0": (
+        f"{ROBOT}\nidentified: {{inertias: {{}}, "
+        "effects: [{kind: spring, joints: [elbow], values: [1, 0], @: 1}]}",
+        identified_spec.IdentifiedEffectSpec,
     ),
     "uncertainty": (f"{ROBOT}\nuncertainty: {{@: 1}}", uncertainty_spec.UncertaintySpec),
     "uncertainty.bodies.elbow": (

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.prediction import Prediction
 from excite_cli.diagnosis.sealed_verdict import (
     removed_in_draws,
     rises_on_one,
@@ -13,6 +12,7 @@ from excite_cli.diagnosis.sealed_verdict import (
 )
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.identified_model import Prediction
 from excite_cli.identification.prepare import PreparedRun
 from tests.diagnosis.explicit_data import STEP, prepared
 

@@ -142,6 +142,7 @@ def test_packages_above_know_no_kind_by_name(package: str) -> None:
     own = {f"excite_cli.effects.{path.stem}" for path in (PACKAGE / "effects").glob("*.py")}
     shared = {
         "base",
+        "c_code",
         "catalogue",
         "place",
         "placing",

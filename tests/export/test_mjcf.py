@@ -8,8 +8,8 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import RobotError
-from excite_cli.export.exported import IdentifiedModel
 from excite_cli.export.mjcf import mjcf
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.simulation.true_robot import true_inertias
 from tests.robot.random_robots import random_robot
@@ -36,7 +36,7 @@ def check(robot: Robot) -> None:
     effects = declared_effects(tuple(EffectSpec(kind=kind) for kind in KINDS), robot)
     rng = np.random.default_rng(0)
     values = tuple(rng.uniform(0.1, 2.0, len(effect.parameters)) for effect in effects)
-    exported = mjcf(robot, IdentifiedModel(phi, effects, values))
+    exported = mjcf(robot, IdentifiedModel(phi, effects, np.concatenate(values)))
     q, v, a = robot.draw_states(15, seed=1)
     expected = RigidBody(robot, phi, q, v, a).load
     n = robot.n

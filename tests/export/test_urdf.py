@@ -8,8 +8,8 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import RobotError
-from excite_cli.export.exported import IdentifiedModel
 from excite_cli.export.urdf import updated_urdf
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.simulation.true_robot import true_inertias
 from tests.robot.random_robots import random_robot
@@ -51,7 +51,7 @@ def test_friction_goes_to_dynamics_and_the_rest_is_told(tmp_path: Path) -> None:
     kinds = ("viscous_friction", "coulomb_friction", "spring")
     specs = tuple(EffectSpec(kind=kind, joints=("panda_joint2",)) for kind in kinds)
     effects = declared_effects(specs, robot)
-    values = (np.array([1.5]), np.array([0.25]), np.array([10.0, 1.0]))
+    values = np.array([1.5, 0.25, 10.0, 1.0])
     cad = standard_parameters(robot)
     exported = updated_urdf(robot, IdentifiedModel(cad, effects, values))
     again = reloaded(PANDA, exported.text, tmp_path)

@@ -14,12 +14,12 @@ from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.dynamics.regressor import payload_parameters, standard_parameters
 from excite_cli.dynamics.states import States
 from excite_cli.errors import ConfigError
-from excite_cli.export.exported import IdentifiedModel
 from excite_cli.export.mjcf import mjcf
 from excite_cli.export.urdf import updated_urdf
 from excite_cli.geometry.capsules import fit_capsules
 from excite_cli.geometry.collision_pairs import choose_pairs
 from excite_cli.geometry.reasons import Why
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.simulation.mujoco_model import build_plant
 from excite_cli.simulation.true_robot import true_inertias

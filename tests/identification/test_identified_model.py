@@ -8,7 +8,6 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from excite_cli.config.data_spec import FilterSpec
-from excite_cli.diagnosis.prediction import errors_on, predicted
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
@@ -20,6 +19,7 @@ from excite_cli.effects.sign import smooth_sign
 from excite_cli.effects.torque_delay import TorqueDelay
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.identification.fit import rebuilt
+from excite_cli.identification.identified_model import IdentifiedModel, errors_on
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.regression import build_regression
@@ -62,7 +62,9 @@ def torque(
     run: PreparedRun,
     name: RunId,
 ) -> Array:
-    return predicted(body_of(robot, phi, run), kinds, values, replace(run, run=name)).torque
+    return (
+        IdentifiedModel(phi, tuple(kinds), values).predicted(robot, replace(run, run=name)).torque
+    )
 
 
 def test_prediction_is_columns_times_parameters(robot: Robot, runs: list[PreparedRun]) -> None:
@@ -134,7 +136,7 @@ def test_errors_are_those_of_the_residual(robot: Robot, runs: list[PreparedRun])
     found = errors_on(
         robot,
         runs,
-        [predicted(body_of(robot, phi, run), (), np.zeros(0), run) for run in runs],
+        [IdentifiedModel(phi).predicted(robot, run) for run in runs],
     )
     tau = np.concatenate([run.tau for run in runs])
     model = np.concatenate(

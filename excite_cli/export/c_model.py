@@ -1,0 +1,120 @@
+"""A model as one C file: recursive Newton–Euler with its inertias, and the code of its effects.
+
+Every effect states its own C (`Effect.in_c`); the file is `model_template.c` with its gaps filled.
+"""
+
+from importlib.resources import files
+
+import numpy as np
+
+from excite_cli.effects.base import Effect
+from excite_cli.effects.c_code import reals
+from excite_cli.effects.sign import WIDTH
+from excite_cli.export.exported import ModelText, in_words
+from excite_cli.identification.identified_model import IdentifiedModel, Series
+from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.tree import Tree, tree_of
+
+_TESTED, _STEP, _SEED = 24, 0.01, 20170529
+
+
+def c_model(robot: Robot, model: IdentifiedModel, made: str = "") -> ModelText:
+    """The C file, and what it leaves out; `made`: where the model comes from, in a few words."""
+    kept = model.without(model.of_single_runs)
+    columns = tuple(dict.fromkeys(each.covariate for each in kept.effects if each.covariate))
+    codes = [
+        (effect, effect.in_c(values, columns) or ("" if not effect.carried else " "))
+        for effect, values in kept.by_effect
+    ]
+    unknown = tuple(effect for effect, code in codes if not code)
+    kept = kept.without(unknown)
+    names = robot.joint_names
+    left = [*model.of_single_runs, *unknown]
+    text = (files("excite_cli.export") / "model_template.c").read_text(encoding="utf-8")
+    tree = tree_of(robot)
+    gaps = {
+        "ROBOT": _comment(robot.name),
+        "MADE": _comment(made),
+        "JOINTS": _lines(f"{j} {name}" for j, name in enumerate(names)),
+        "COLUMNS": _lines(f"{k} {name}" for k, name in enumerate(columns)),
+        "EFFECTS": _lines(in_words(kept.effects, names).split("; ") if kept.effects else ()),
+        "LEFT": _lines(in_words(left, names).split("; ") if left else ()),
+        "N": str(robot.n),
+        "NCOLUMNS": str(len(columns)),
+        "WIDTH": repr(WIDTH),
+        "RATES": str(int(any("_rate" in code or "load_bend" in code for _, code in codes))),
+        "TREE": _tree(tree),
+        "BODIES": _bodies(kept.phi, tree),
+        "LOADED": _bodies(kept.phi + kept.carried(robot.n), tree),
+        "GRAVITY": reals(tree.gravity),
+        "ROBOT_EFFECTS": _code(codes, defects=False),
+        "DEFECTS": _code(codes, defects=True),
+        **_tested(robot, kept, columns),
+    }
+    for name, filling in gaps.items():
+        text = text.replace(f"@{name}@", filling)
+    notes = []
+    if model.of_single_runs:
+        notes.append(
+            f"not in it, since only some recordings had them: "
+            f"{in_words(model.of_single_runs, names)}"
+        )
+    if unknown:
+        notes.append(f"C has no code for: {in_words(unknown, names)}")
+    return ModelText(text, tuple(notes))
+
+
+def _code(codes: list[tuple[Effect, str]], defects: bool) -> str:
+    kept = (code for effect, code in codes if effect.data_defect == defects and code.strip())
+    return "\n".join(f"    {code}" for code in kept)
+
+
+def _tree(tree: Tree) -> str:
+    rows = (
+        f"    {{{joint.parent}, {int(joint.sliding)}, {{{reals(joint.rotation)}}}, "
+        f"{{{reals(joint.position)}}}, {{{reals(joint.axis)}}}}}"
+        for joint in tree.joints
+    )
+    return ",\n".join(rows)
+
+
+def _bodies(phi: Array, tree: Tree) -> str:
+    bodies = phi.reshape(-1, 10)[tree.first_body :]
+    return ",\n".join(f"    {{{reals(ten)}}}" for ten in bodies)
+
+
+def _tested(robot: Robot, model: IdentifiedModel, columns: tuple[str, ...]) -> dict[str, str]:
+    """A series with reversals, and its torques."""
+    rng = np.random.default_rng(_SEED)
+    t: Array = np.asarray(_STEP * np.arange(_TESTED))
+    rates, phases = rng.uniform(5.0, 25.0, robot.n), rng.uniform(0.0, 6.0, robot.n)
+    angle = np.outer(t, rates) + phases
+    q = 0.1 * np.sin(angle) + rng.uniform(-1.0, 1.0, robot.n)
+    v, a = 0.1 * rates * np.cos(angle), -0.1 * rates**2 * np.sin(angle)
+    logged = {name: 20.0 + rng.uniform(0.0, 20.0, len(t)) for name in columns}
+    tau = model.told(robot, Series(t, q, v, a, covariates=logged)).torque
+    column = np.stack(list(logged.values()), axis=1) if columns else np.zeros(0)
+    return {
+        "TESTED": str(_TESTED),
+        "TEST_STEP": repr(_STEP),
+        "TEST_Q": _wrapped(q),
+        "TEST_V": _wrapped(v),
+        "TEST_A": _wrapped(a),
+        "TEST_TAU": _wrapped(tau),
+        "TEST_COLUMN": _wrapped(np.append(column, 0.0)),
+    }
+
+
+def _wrapped(x: Array) -> str:
+    rows = np.atleast_2d(x)
+    return "\n    " + ",\n    ".join(reals(row) for row in rows)
+
+
+def _lines(words: object) -> str:
+    found = [f" *   {_comment(word)}" for word in words]  # type: ignore[attr-defined]
+    return "\n".join(found) or " *   none"
+
+
+def _comment(words: str) -> str:
+    """Names may hold anything: nothing of them ends a comment."""
+    return words.replace("*/", "* /").replace("\n", " ").replace("@", "(at)")

@@ -1,0 +1,451 @@
+/* @ROBOT@: joint torques of an identified model. @MADE@
+ *
+ * Standard C99, no dependency but the C library's <tgmath.h>, no allocation, no global state.
+ * Compile with -DEXCITE_FLOAT for single precision, with -DEXCITE_MAIN for a program that tests
+ * itself (exit status 0: the recorded torques come out) and prints the time of a call.
+ *
+ * excite_torque    torque at the next instant of a series, with what came before in `memory`
+ * excite_series    torque at all instants of a recorded series, as the program's error table has it
+ * excite_load      torque of the rigid bodies alone
+ * excite_self_test largest deviation from recorded torques, relative to the largest of them
+ *
+ * All arrays have EXCITE_JOINTS entries per instant, in this order:
+@JOINTS@
+ * Units: rad, rad/s, rad/s^2, N.m (sliding joints: m, N). Columns of the log, EXCITE_COLUMNS per
+ * instant (NULL if there are none):
+@COLUMNS@
+ * Effects in it:
+@EFFECTS@
+ * Not in it:
+@LEFT@
+ * Rates of torques (elastic gears, delays) are central differences in excite_series and backward
+ * ones in excite_torque, which cannot look ahead; all else is the same in both.
+ */
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+#include <tgmath.h>
+
+#ifdef EXCITE_FLOAT
+typedef float real;
+#else
+typedef double real;
+#endif
+#define R(x) ((real)(x))
+
+#define EXCITE_JOINTS @N@
+#define EXCITE_COLUMNS @NCOLUMNS@
+#define N EXCITE_JOINTS
+#define SIGN(x) tanh((x) / R(@WIDTH@))
+#define RATES @RATES@ /* some effect looks at rates of torques */
+
+/* What a model remembers of a series; excite_begin empties it. */
+typedef struct {
+    real step, start, t;     /* between instants [s]; time on the campaign's clock, and since */
+    size_t count;            /* instants so far */
+    real q[N], v[N];         /* of the last one, then of this one */
+    real last_q[N], last_v[N];
+    real bristle[N];         /* of friction with memory */
+    real load[2][N], torque[2][N]; /* of the last two */
+} excite_memory;
+
+typedef struct {
+    int parent, slides;      /* parent -1: the world */
+    real rotation[9], position[3], axis[3];
+} joint_of;
+
+static const joint_of JOINT[N] = {
+@TREE@
+};
+/* Mass, first moment, inertia (xx, xy, yy, xz, yz, zz) about the joint's frame. */
+static const real BODY[N][10] = {
+@BODIES@
+};
+/* The same with what the links carry. */
+static const real LOADED[N][10] = {
+@LOADED@
+};
+static const real GRAVITY[3] = {@GRAVITY@};
+static const real STILL[N] = {0};
+
+static void cross(const real *x, const real *y, real *out)
+{
+    out[0] = x[1] * y[2] - x[2] * y[1];
+    out[1] = x[2] * y[0] - x[0] * y[2];
+    out[2] = x[0] * y[1] - x[1] * y[0];
+}
+
+/* Rotation (row by row) and place of joint j in its parent. */
+static void place(int j, real q, real *r, real *p)
+{
+    const joint_of *own = &JOINT[j];
+    const real *m = own->rotation, *u = own->axis;
+    memcpy(p, own->position, 3 * sizeof(real));
+    if (own->slides) {
+        memcpy(r, m, 9 * sizeof(real));
+        for (int i = 0; i < 3; ++i)
+            p[i] += q * (m[3 * i] * u[0] + m[3 * i + 1] * u[1] + m[3 * i + 2] * u[2]);
+        return;
+    }
+    const real c = cos(q), s = sin(q), d = 1 - c;
+    const real turn[9] = {
+        c + d * u[0] * u[0], d * u[0] * u[1] - s * u[2], d * u[0] * u[2] + s * u[1],
+        d * u[1] * u[0] + s * u[2], c + d * u[1] * u[1], d * u[1] * u[2] - s * u[0],
+        d * u[2] * u[0] - s * u[1], d * u[2] * u[1] + s * u[0], c + d * u[2] * u[2],
+    };
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k)
+            r[3 * i + k] = m[3 * i] * turn[k] + m[3 * i + 1] * turn[3 + k] + m[3 * i + 2] * turn[6 + k];
+}
+
+static void into(const real *r, const real *x, real *out) /* out = r' x */
+{
+    for (int i = 0; i < 3; ++i)
+        out[i] = r[i] * x[0] + r[3 + i] * x[1] + r[6 + i] * x[2];
+}
+
+static void out_of(const real *r, const real *x, real *out) /* out += r x */
+{
+    for (int i = 0; i < 3; ++i)
+        out[i] += r[3 * i] * x[0] + r[3 * i + 1] * x[1] + r[3 * i + 2] * x[2];
+}
+
+/* Recursive Newton-Euler; every body by its ten parameters, in which it is linear. */
+static void rigid(
+    const real body[N][10], const real *gravity, const real *q, const real *v, const real *a, real *tau)
+{
+    real r[N][9], p[N][3], w[N][3], dw[N][3], acc[N][3], f[N][3], n[N][3];
+    static const real zero[3] = {0, 0, 0};
+    const real up[3] = {-gravity[0], -gravity[1], -gravity[2]};
+    for (int j = 0; j < N; ++j) {
+        const int parent = JOINT[j].parent;
+        const real *u = JOINT[j].axis, *ten = body[j];
+        const real *w0 = parent < 0 ? zero : w[parent], *dw0 = parent < 0 ? zero : dw[parent];
+        const real *acc0 = parent < 0 ? up : acc[parent];
+        real x[3], y[3], lifted[3], h[3], z[3];
+        place(j, q[j], r[j], p[j]);
+        cross(w0, p[j], x);
+        cross(w0, x, y);
+        cross(dw0, p[j], x);
+        for (int i = 0; i < 3; ++i)
+            lifted[i] = acc0[i] + x[i] + y[i];
+        into(r[j], lifted, acc[j]);
+        into(r[j], w0, w[j]);
+        into(r[j], dw0, dw[j]);
+        cross(w[j], u, x);
+        if (JOINT[j].slides) {
+            for (int i = 0; i < 3; ++i)
+                acc[j][i] += u[i] * a[j] + 2 * x[i] * v[j];
+        } else {
+            for (int i = 0; i < 3; ++i) {
+                dw[j][i] += u[i] * a[j] + x[i] * v[j];
+                w[j][i] += u[i] * v[j];
+            }
+        }
+        h[0] = ten[1], h[1] = ten[2], h[2] = ten[3];
+        cross(dw[j], h, x);
+        cross(w[j], h, y);
+        cross(w[j], y, z);
+        for (int i = 0; i < 3; ++i)
+            f[j][i] = ten[0] * acc[j][i] + x[i] + z[i];
+        const real inertia[9] = {
+            ten[4], ten[5], ten[7], ten[5], ten[6], ten[8], ten[7], ten[8], ten[9]};
+        real spin[3] = {0, 0, 0}, moment[3] = {0, 0, 0};
+        out_of(inertia, w[j], spin);
+        out_of(inertia, dw[j], moment);
+        cross(w[j], spin, x);
+        cross(h, acc[j], y);
+        for (int i = 0; i < 3; ++i)
+            n[j][i] = moment[i] + x[i] + y[i];
+    }
+    for (int j = N - 1; j >= 0; --j) {
+        const int parent = JOINT[j].parent;
+        const real *u = JOINT[j].axis, *felt = JOINT[j].slides ? f[j] : n[j];
+        tau[j] = u[0] * felt[0] + u[1] * felt[1] + u[2] * felt[2];
+        if (parent >= 0) {
+            real force[3] = {0, 0, 0}, lever[3];
+            out_of(r[j], f[j], force);
+            cross(p[j], force, lever);
+            out_of(r[j], n[j], n[parent]);
+            for (int i = 0; i < 3; ++i) {
+                f[parent][i] += force[i];
+                n[parent][i] += lever[i];
+            }
+        }
+    }
+}
+
+/* x dtau/dq_j + y dtau/dv_j + z dtau/da_j of the rigid bodies, exactly: torque is a polynomial of
+ * second degree in v_j and in a sliding q_j, linear in a_j, and has angles q_j and 2 q_j only. */
+static inline void slopes(
+    const real *q, const real *v, const real *a, int j, real x, real y, real z, real *out)
+{
+    real state[N], ahead[N], behind[N];
+    const real none[3] = {0, 0, 0};
+    memset(out, 0, N * sizeof(real));
+    memcpy(state, q, sizeof(state));
+    if (x != 0) {
+        const real near = R(0.78539816339744830962), far = R(1.57079632679489661923);
+        const real weight[2] = {1, JOINT[j].slides ? 0 : (1 - sqrt(R(2.0))) / 2};
+        const real shift[2] = {JOINT[j].slides ? R(0.5) : near, far};
+        for (int k = 0; k < 2; ++k) {
+            if (weight[k] == 0)
+                continue;
+            state[j] = q[j] + shift[k];
+            rigid(BODY, GRAVITY, state, v, a, ahead);
+            state[j] = q[j] - shift[k];
+            rigid(BODY, GRAVITY, state, v, a, behind);
+            for (int i = 0; i < N; ++i)
+                out[i] += x * weight[k] * (ahead[i] - behind[i]);
+        }
+    }
+    if (y != 0) {
+        memcpy(state, v, sizeof(state));
+        state[j] = v[j] + 1;
+        rigid(BODY, none, q, state, STILL, ahead);
+        state[j] = v[j] - 1;
+        rigid(BODY, none, q, state, STILL, behind);
+        for (int i = 0; i < N; ++i)
+            out[i] += y * R(0.5) * (ahead[i] - behind[i]);
+    }
+    if (z != 0) {
+        memset(state, 0, sizeof(state));
+        state[j] = z;
+        rigid(BODY, none, q, STILL, state, ahead);
+        for (int i = 0; i < N; ++i)
+            out[i] += ahead[i];
+    }
+}
+
+/* What gravity does more where the base is turned about the two axes that it is least along. */
+static inline void tilted(real roll, real pitch, const real *q, real *out)
+{
+    int along = 0, next = 0;
+    for (int i = 1; i < 3; ++i)
+        if (fabs(GRAVITY[i]) > fabs(GRAVITY[along]))
+            along = i;
+    real change[3] = {0, 0, 0};
+    for (int i = 0; i < 3; ++i)
+        if (i != along) {
+            real axis[3] = {0, 0, 0}, turned[3];
+            axis[i] = next++ ? pitch : roll;
+            cross(GRAVITY, axis, turned);
+            for (int k = 0; k < 3; ++k)
+                change[k] += turned[k];
+        }
+    rigid(BODY, change, q, STILL, STILL, out);
+}
+
+/* J' f of a force in the world's axes at the frame of the last joint. */
+static inline void pushed(const real *force, const real *q, real *out)
+{
+    real r[N][9], p[N][3];
+    for (int j = 0; j < N; ++j) {
+        const int parent = JOINT[j].parent;
+        place(j, q[j], r[j], p[j]);
+        if (parent >= 0) {
+            real own[9], at[3];
+            memcpy(own, r[j], sizeof(own));
+            memcpy(at, p[parent], sizeof(at));
+            out_of(r[parent], p[j], at);
+            memcpy(p[j], at, sizeof(at));
+            for (int i = 0; i < 3; ++i)
+                for (int k = 0; k < 3; ++k)
+                    r[j][3 * i + k] = r[parent][3 * i] * own[k] + r[parent][3 * i + 1] * own[3 + k]
+                        + r[parent][3 * i + 2] * own[6 + k];
+        }
+    }
+    memset(out, 0, N * sizeof(real));
+    for (int j = N - 1; j >= 0; j = JOINT[j].parent) {
+        real axis[3] = {0, 0, 0}, arm[3], moved[3];
+        out_of(r[j], JOINT[j].axis, axis);
+        for (int i = 0; i < 3; ++i)
+            arm[i] = p[N - 1][i] - p[j][i];
+        cross(axis, arm, moved);
+        const real *way = JOINT[j].slides ? axis : moved;
+        out[j] = way[0] * force[0] + way[1] * force[1] + way[2] * force[2];
+    }
+}
+
+/* The bristle of a joint's friction with memory, one instant on. */
+static inline real dahl(
+    excite_memory *memory, int j, real distance, real sliding, real standing)
+{
+    const real q0 = memory->last_q[j], q1 = memory->q[j];
+    const real v0 = memory->last_v[j], v1 = memory->v[j], step = memory->step;
+    if (memory->count == 0)
+        return memory->bristle[j] = tanh(v1 / sliding);
+    const real between = v0 * v1 < 0 ? q0 + R(0.5) * step * v0 * v0 / (v0 - v1) : R(0.5) * (q0 + q1);
+    const real way[2] = {between - q0, q1 - between};
+    for (int k = 0; k < 2; ++k) {
+        const real side = tanh(way[k] / (R(0.5) * step * standing));
+        const real kept = exp(-side * way[k] / distance);
+        const real sign = tanh(way[k] / (R(0.5) * step * R(@WIDTH@)));
+        memory->bristle[j] = kept * memory->bristle[j] + (1 - kept) * sign;
+    }
+    return memory->bristle[j];
+}
+
+/* One instant: torque of the robot in `torque`, and with defects of the measurement in `tau`. */
+static void robot_torque(
+    excite_memory *memory, const real *q, const real *v, const real *a, const real *column,
+    const real *load, const real *load_rate, const real *load_bend, real *tau)
+{
+    const real t = memory->t, start = memory->start;
+    real s[N];
+    for (int j = 0; j < N; ++j)
+        s[j] = SIGN(v[j]);
+    memcpy(tau, load, N * sizeof(real));
+    (void)t, (void)start, (void)s, (void)a, (void)q, (void)column, (void)load_rate, (void)load_bend;
+@ROBOT_EFFECTS@
+}
+
+static void measured_torque(
+    const real *q, const real *v, const real *column, const real *load, const real *torque,
+    const real *torque_rate, real *tau)
+{
+    memmove(tau, torque, N * sizeof(real));
+    (void)q, (void)v, (void)column, (void)load, (void)torque_rate;
+@DEFECTS@
+}
+
+void excite_load(const real q[N], const real v[N], const real a[N], real tau[N])
+{
+    rigid(LOADED, GRAVITY, q, v, a, tau);
+}
+
+/* `step` between the instants [s]; `start` on the campaign's clock [s]. */
+void excite_begin(excite_memory *memory, real step, real start)
+{
+    memset(memory, 0, sizeof(*memory));
+    memory->step = step;
+    memory->start = start;
+}
+
+static void next(excite_memory *memory, const real *q, const real *v)
+{
+    memcpy(memory->last_q, memory->q, sizeof(memory->q));
+    memcpy(memory->last_v, memory->v, sizeof(memory->v));
+    memcpy(memory->q, q, sizeof(memory->q));
+    memcpy(memory->v, v, sizeof(memory->v));
+    memory->t = (real)memory->count * memory->step;
+}
+
+/* First and second backward difference; `last` are the one and the two before. */
+static inline void backward(
+    const real *now, real last[2][N], size_t count, real step, real *rate, real *bend)
+{
+    for (int j = 0; j < N; ++j) {
+        rate[j] = count > 0 ? (now[j] - last[0][j]) / step : 0;
+        bend[j] = count > 1 ? (now[j] - 2 * last[0][j] + last[1][j]) / (step * step) : 0;
+        if (count > 1)
+            rate[j] += R(0.5) * step * bend[j];
+        last[1][j] = last[0][j];
+        last[0][j] = now[j];
+    }
+}
+
+void excite_torque(
+    excite_memory *memory, const real q[N], const real v[N], const real a[N],
+    const real column[], real tau[N])
+{
+    real load[N], torque[N], rate[N] = {0}, bend[N] = {0};
+    next(memory, q, v);
+    rigid(LOADED, GRAVITY, q, v, a, load);
+    if (RATES)
+        backward(load, memory->load, memory->count, memory->step, rate, bend);
+    robot_torque(memory, q, v, a, column, load, rate, bend, torque);
+    if (RATES)
+        backward(torque, memory->torque, memory->count, memory->step, rate, bend);
+    measured_torque(q, v, column, load, torque, rate, tau);
+    memory->count += 1;
+}
+
+/* Central differences of rows; one-sided at the ends. */
+static void rates(size_t count, real step, const real *x, real *out)
+{
+    for (size_t k = 0; k < count; ++k) {
+        const size_t before = k ? k - 1 : 0, after = k + 1 < count ? k + 1 : k;
+        for (int j = 0; j < N; ++j)
+            out[k * N + j] = count < 3 ? 0
+                : (x[after * N + j] - x[before * N + j]) / ((real)(after - before) * step);
+    }
+}
+
+/* Numbers that excite_series needs to work with. */
+size_t excite_work(size_t count)
+{
+    return 4 * N * count;
+}
+
+void excite_series(
+    size_t count, real step, real start, const real *q, const real *v, const real *a,
+    const real *column, real *tau, real *work)
+{
+    real *load = work, *rate = work + N * count, *bend = work + 2 * N * count;
+    real *torque = work + 3 * N * count;
+    excite_memory memory;
+    excite_begin(&memory, step, start);
+    for (size_t k = 0; k < count; ++k)
+        rigid(LOADED, GRAVITY, q + k * N, v + k * N, a + k * N, load + k * N);
+    if (RATES) {
+        rates(count, step, load, rate);
+        rates(count, step, rate, bend);
+    }
+    for (size_t k = 0; k < count; ++k) {
+        next(&memory, q + k * N, v + k * N);
+        robot_torque(
+            &memory, q + k * N, v + k * N, a + k * N, column ? column + k * EXCITE_COLUMNS : 0,
+            load + k * N, RATES ? rate + k * N : STILL, RATES ? bend + k * N : STILL, torque + k * N);
+        memory.count += 1;
+    }
+    if (RATES)
+        rates(count, step, torque, rate);
+    for (size_t k = 0; k < count; ++k)
+        measured_torque(
+            q + k * N, v + k * N, column ? column + k * EXCITE_COLUMNS : 0, load + k * N,
+            torque + k * N, RATES ? rate + k * N : STILL, tau + k * N);
+}
+
+#define TESTED @TESTED@
+static const real TEST_Q[TESTED * N] = {@TEST_Q@};
+static const real TEST_V[TESTED * N] = {@TEST_V@};
+static const real TEST_A[TESTED * N] = {@TEST_A@};
+static const real TEST_TAU[TESTED * N] = {@TEST_TAU@};
+static const real TEST_COLUMN[TESTED * EXCITE_COLUMNS + 1] = {@TEST_COLUMN@};
+
+real excite_self_test(void)
+{
+    real tau[TESTED * N], work[4 * N * TESTED], worst = 0, largest = 0;
+    excite_series(TESTED, R(@TEST_STEP@), 0, TEST_Q, TEST_V, TEST_A, TEST_COLUMN, tau, work);
+    for (size_t i = 0; i < TESTED * N; ++i) {
+        worst = fmax(worst, fabs(tau[i] - TEST_TAU[i]));
+        largest = fmax(largest, fabs(TEST_TAU[i]));
+    }
+    return worst / largest;
+}
+
+#ifdef EXCITE_MAIN
+#include <stdio.h>
+#include <time.h>
+int main(void)
+{
+    const real worst = excite_self_test();
+    const long calls = 200000;
+    excite_memory memory;
+    real tau[N], sum = 0;
+    excite_begin(&memory, R(@TEST_STEP@), 0);
+    const clock_t began = clock();
+    for (long k = 0; k < calls; ++k) {
+        const size_t at = (size_t)k % TESTED;
+        excite_torque(
+            &memory, TEST_Q + at * N, TEST_V + at * N, TEST_A + at * N,
+            TEST_COLUMN + at * EXCITE_COLUMNS, tau);
+        sum += tau[0];
+    }
+    const double seconds = (double)(clock() - began) / CLOCKS_PER_SEC;
+    printf("deviation %.2g of the largest torque; %.3f us per call (%g)\n", (double)worst,
+        1e6 * seconds / (double)calls, (double)sum);
+    return worst <= (sizeof(real) == sizeof(float) ? R(1e-3) : R(1e-9)) ? 0 : 1;
+}
+#endif

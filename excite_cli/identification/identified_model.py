@@ -1,0 +1,151 @@
+"""A model with all its numbers: inertias, effects, their values. What it predicts, and slopes.
+
+    τ = L + R + D,    L = Y (φ + bodies carried) ,    R = R(q, v, a, L),    D = D(…, L + R)
+
+R are the effects of the robot, which may look at the load L (gears carry bodies among the effects,
+too), D the defects of the measurement, which look at the robot's whole torque.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.effects.base import Effect, Signals
+from excite_cli.identification.errors_of_torque import Errors, torque_errors
+from excite_cli.identification.prepare import PreparedRun
+from excite_cli.identification.regression import effect_columns, seen_of, with_effects
+from excite_cli.measurement.run_identity import RunId
+from excite_cli.robot.model import Array, Robot
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Of one run, (T, n) at the working rate: rigid-body torque, and all of it with the effects."""
+
+    load: Array
+    torque: Array
+
+
+@dataclass(frozen=True)
+class Series:
+    """States (T, n) at equidistant instants `t` (T,) [s], and what else effects look at.
+
+    `start` [s] on the campaign's clock; `covariates` (T,) by name.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    run: RunId = field(default_factory=RunId)
+    start: float = 0.0
+    covariates: Mapping[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class IdentifiedModel:
+    """Inertias φ (10·n_bodies,), effects, and `values` (k,) of all their linear parameters."""
+
+    phi: Array
+    effects: tuple[Effect, ...] = ()
+    values: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def by_effect(self) -> Iterator[tuple[Effect, Array]]:
+        """Every effect with its linear parameters."""
+        at = 0
+        for effect in self.effects:
+            yield effect, self.values[at : at + len(effect.parameters)]
+            at += len(effect.parameters)
+
+    def without(self, left: tuple[Effect, ...]) -> "IdentifiedModel":
+        """The same without these effects."""
+        kept = [(effect, values) for effect, values in self.by_effect if effect not in left]
+        values = np.concatenate([np.zeros(0), *(each for _, each in kept)])
+        return replace(self, effects=tuple(effect for effect, _ in kept), values=values)
+
+    @property
+    def of_single_runs(self) -> tuple[Effect, ...]:
+        """Effects that some recordings had: no part of the robot as such."""
+        return tuple(effect for effect in self.effects if effect.runs)
+
+    def predicted(self, robot: Robot, run: PreparedRun) -> Prediction:
+        """What it says of the motion of a prepared run."""
+        body = RigidBody(robot, self.phi, run.q, run.v, run.a)
+        return self._told(seen_of(run, body))
+
+    def told(self, robot: Robot, series: Series) -> Prediction:
+        """What it says of a series of states."""
+        return self._told(self._seen(robot, series))
+
+    def _told(self, signals: Signals) -> Prediction:
+        load = signals.load
+        if not self.effects:
+            return Prediction(load, load)
+        columns = effect_columns(self.effects, with_effects(signals, self.effects, self.values))
+        return Prediction(load, np.asarray(load + columns @ self.values))
+
+    def _seen(self, robot: Robot, series: Series) -> Signals:
+        body = RigidBody(robot, self.phi, series.q, series.v, series.a)
+        return Signals(
+            series.t, series.q, series.v, series.a, body.load, body.load, body,
+            series.run, series.start, series.covariates,
+        )  # fmt: skip
+
+    def pull_back(self, robot: Robot, series: Series, weights: Array) -> tuple[Array, Array, Array]:
+        """Derivatives by q, v, a, each (T, n), of Σ weights ∘ τ; weights (T, n).
+
+        Raises
+        ------
+        NotImplementedError
+            An effect has no derivatives (`excitable` says so).
+        """
+        signals = with_effects(self._seen(robot, series), self.effects, self.values)
+        carried = self.carried(robot.n, series.run)
+        total = np.zeros((3, *weights.shape))
+        onward = weights.copy()  # what reaches the torque, then the load
+        for defects in (True, False):
+            found = np.zeros_like(weights)
+            for effect, values in self.by_effect:
+                if effect.carried or effect.data_defect != defects or not effect.active(series.run):
+                    continue
+                rows = onward[:, list(effect.rows(robot.n))]
+                back = effect.pull_back(signals, rows[:, :, None] * values)
+                for order, direct in enumerate((back.q, back.v, back.a)):
+                    if direct is not None:
+                        total[order] += direct
+                for through in (back.load, back.torque):
+                    if through is not None:
+                        found += through
+            onward = onward + found
+        body = RigidBody(robot, self.phi + carried, series.q, series.v, series.a)
+        total += np.array(body.pull_back(onward))
+        return total[0], total[1], total[2]
+
+    def carried(self, n: int, run: RunId | None = None) -> Array:
+        """φ (10·n_bodies,) of the bodies among the effects, of `n` moved joints."""
+        count, phi = len(self.phi), np.zeros(len(self.phi))
+        for effect, values in self.by_effect:
+            if effect.carried and effect.active(run or RunId()):
+                first = count + 10 * (effect.joints[-1] - n)
+                phi[first : first + 10] += values
+        return phi
+
+
+def errors_on(
+    robot: Robot, runs: Sequence[PreparedRun], predictions: Sequence[Prediction]
+) -> Errors:
+    """Errors of the predictions for `runs`."""
+    raw = [each.torque for each in predictions]
+    return torque_errors(
+        robot.joint_names,
+        [run.tau for run in runs],
+        [run.averaged_torque(each) for run, each in zip(runs, raw, strict=True)],
+        [run.valid for run in runs],
+        [run.moving & run.valid for run in runs],
+        [run.tau_raw for run in runs],
+        raw,
+        runs[0].step,
+    )

@@ -1,0 +1,227 @@
+"""A model that was identified once, from a fit, a diagnosis, or a config that holds its numbers."""
+
+from dataclasses import dataclass, fields
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from excite_cli.config.identified_spec import IdentifiedSpec
+from excite_cli.config.load import load_spec, parse_spec
+from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.candidates import effect_of
+from excite_cli.diagnosis.records import EffectRecord
+from excite_cli.dynamics.regressor import standard_parameter_names, standard_parameters
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import kind_named, urdf_friction
+from excite_cli.errors import ConfigError, FileError
+from excite_cli.given_files import require_stored
+from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.processing import Processing
+from excite_cli.identification.torque_trace import TorqueTrace
+from excite_cli.robot.model import Robot, build_robot
+from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
+from excite_cli.store.fit_file import is_fit, read_fit
+from excite_cli.store.own_file import is_own
+
+_TEXT = {".yaml", ".yml"}
+
+
+@dataclass(frozen=True)
+class StoredModel:
+    """`model` of `robot` with what was known of it when it was made.
+
+    `what` it is: "fit", "diagnosis", "config", or "urdf" for a config without numbers. `error` on
+    `sealed_run`, which no fit saw; `noise` of the filtered torque by joint, where known;
+    `processing`: the filters of both. `traces`: torque over time of training and sealed data.
+    `consistent`: the same of bodies that can be, where a fit has them.
+    """
+
+    path: Path
+    what: str
+    spec: Spec
+    folder: Path
+    robot: Robot
+    model: IdentifiedModel
+    sealed_run: str = ""
+    error: Errors | None = None
+    noise: dict[str, float] | None = None
+    processing: Processing | None = None
+    traces: tuple[TorqueTrace, ...] = ()
+    consistent: IdentifiedModel | None = None
+    sources: tuple[str, ...] = ()
+
+
+def read_model(path: Path) -> StoredModel:
+    """Read a model: a fit, a diagnosis, or a config (`--apply`, or the URDF as it is).
+
+    Raises
+    ------
+    FileError
+        The file is missing, is none of these, or was made with another robot than its URDF is now.
+    ConfigError, RobotError
+        The config cannot be, or declares effects and has no values for them.
+    """
+    require_stored(path)
+    if not path.is_file():
+        raise FileError(f"There is no file {path}.")
+    if is_fit(path):
+        return _of_fit(path)
+    if is_diagnosis(path):
+        return _of_diagnosis(path)
+    if is_own(path):
+        raise FileError(
+            f"{path} holds no model. Give a fit (`excite identify -o`), a diagnosis (`excite "
+            "diagnose -o`), or a config that `excite diagnose --apply` wrote."
+        )
+    return _of_config(path)
+
+
+def _of_fit(path: Path) -> StoredModel:
+    stored = read_fit(path)
+    spec, folder, robot = _robot(path, stored.config, stored.config_folder, stored.fingerprint)
+    fit = stored.fit
+    if fit.joint_names != robot.joint_names or len(fit.phi) != 10 * robot.n_bodies:
+        raise _other_robot(path, spec)
+    noise = stored.noise_floor or dict(zip(fit.joint_names, map(float, fit.noise), strict=True))
+    return StoredModel(
+        path, "fit", spec, folder, robot, fit.model, stored.sealed_run, stored.error, noise,
+        _processing(stored.processing), stored.traces, fit.best_model, stored.sources,
+    )  # fmt: skip
+
+
+def _of_diagnosis(path: Path) -> StoredModel:
+    found = read_diagnosis(path)
+    spec, folder, robot = _robot(path, found.config, found.config_folder, found.fingerprint)
+    if found.joint_names != robot.joint_names or len(found.phi) != 10 * robot.n_bodies:
+        raise _other_robot(path, spec)
+    records = [*found.declared, *(named.effect for named in found.effects)]
+    noise = found.noise_floor or _by_joint(found.processing.get("noise_rms"), robot)
+    trained = () if found.traces is None else found.traces.runs
+    return StoredModel(
+        path, "diagnosis", spec, folder, robot, _model(found.phi, records, robot, path),
+        found.sealed_run, found.after, noise, _processing(found.processing),
+        (*trained, *found.sealed_traces),
+    )  # fmt: skip
+
+
+def is_text(path: Path) -> bool:
+    """Whether `path` is called as configs are."""
+    return path.suffix.lower() in _TEXT
+
+
+def _of_config(path: Path) -> StoredModel:
+    if not is_text(path):
+        raise FileError(
+            f"{path} is no model: give a fit or a diagnosis (HDF5), or a config (YAML)."
+        )
+    spec, folder = load_spec(path, []), path.resolve().parent
+    robot, told = build_robot(spec.robot, folder), spec.identified
+    if told is not None:
+        return _of_numbers(path, spec, folder, robot, told)
+    if spec.effects:
+        raise ConfigError(
+            f"{path}: it declares effects and holds no values for them (`identified`). Give the "
+            "fit or the diagnosis, or a config that `excite diagnose --apply` wrote."
+        )
+    phi = standard_parameters(robot)
+    if not phi.any():
+        raise ConfigError(f"{path}: the URDF has no masses, so it predicts no torque.")
+    effects, values = urdf_friction(robot)
+    return StoredModel(path, "urdf", spec, folder, robot, IdentifiedModel(phi, effects, values))
+
+
+def _of_numbers(
+    path: Path, spec: Spec, folder: Path, robot: Robot, told: IdentifiedSpec
+) -> StoredModel:
+    names = standard_parameter_names(robot)
+    unknown = [name for name in told.inertias if name not in names]
+    missing = [name for name in names if name not in told.inertias]
+    if unknown or missing:
+        what = f"unknown: {', '.join(unknown[:3])}" if unknown else f"missing: {missing[0]}"
+        raise ConfigError(
+            f"{path}: identified.inertias are not those of the robot ({what}). Diagnose again."
+        )
+    records = [
+        EffectRecord(
+            each.kind, each.joints, dict(each.shape), each.values, each.runs,
+            covariate=each.covariate,
+        )
+        for each in told.effects
+    ]  # fmt: skip
+    phi = np.array([told.inertias[name] for name in names])
+    return StoredModel(
+        path, "config", spec, folder, robot, _model(phi, records, robot, path), told.sealed_run,
+        _errors(told), dict(told.noise), _processing(dict(told.processing)),
+    )  # fmt: skip
+
+
+def _errors(told: IdentifiedSpec) -> Errors | None:
+    """What is known of the errors; the rest is NaN."""
+    if not told.error:
+        return None
+    known = {
+        name: {joint: nan if x is None else x for joint, x in by_joint.items()}
+        for name, by_joint in told.error.items()
+    }
+
+    def mean(name: str) -> float:
+        values = [x for x in known.get(name, {}).values() if x == x]
+        return float(np.mean(values)) if values else nan
+
+    return Errors(
+        mean("relative"),
+        mean("relative_moving"),
+        known.get("relative", {}),
+        known.get("relative_moving", {}),
+        known.get("rms", {}),
+        {},
+        (nan, nan),
+        rms_moving=known.get("rms_moving", {}),
+    )
+
+
+def _robot(path: Path, config: str, folder: str, fingerprint: str) -> tuple[Spec, Path, Robot]:
+    spec = parse_spec(config, f"the config stored in {path}")
+    robot = build_robot(spec.robot, Path(folder))
+    if robot.fingerprint() != fingerprint:
+        raise _other_robot(path, spec)
+    return spec, Path(folder), robot
+
+
+def _other_robot(path: Path, spec: Spec) -> FileError:
+    return FileError(
+        f"{path} was made with another robot than the URDF gives now ({spec.robot.urdf}). Identify "
+        "again."
+    )
+
+
+def _model(phi: Any, records: list[EffectRecord], robot: Robot, path: Path) -> IdentifiedModel:
+    effects: list[Effect] = []
+    for record in records:
+        kind = kind_named(record.kind, str(path))
+        if len(record.values) != len(kind.parameters):
+            raise FileError(
+                f"{path}: the effect '{record.kind}' has no {len(record.values)} values."
+            )
+        if not set(record.joints) <= set(robot.joint_names):
+            raise FileError(f"{path}: the effect '{record.kind}' acts on joints of another robot.")
+        effects.append(effect_of(record, robot.joint_names))
+    values = [np.asarray(record.values, dtype=float) for record in records]
+    return IdentifiedModel(np.asarray(phi), tuple(effects), np.concatenate([np.zeros(0), *values]))
+
+
+def _by_joint(values: Any, robot: Robot) -> dict[str, float] | None:
+    if not isinstance(values, list) or len(values) != robot.n:
+        return None
+    return dict(zip(robot.joint_names, map(float, values), strict=True))
+
+
+def _processing(data: dict[str, Any]) -> Processing | None:
+    """The filters; None in files of earlier versions, which do not tell them all."""
+    names = [field.name for field in fields(Processing) if field.name != "reasons"]
+    if not all(name in data for name in names):
+        return None
+    return Processing(**{name: data[name] for name in names})

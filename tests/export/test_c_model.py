@@ -1,0 +1,198 @@
+"""The C file says what the program says: every effect, many robots, both compilers, all bounds."""
+
+import ctypes
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import catalogue, kind_named
+from excite_cli.export.c_model import c_model
+from excite_cli.identification.identified_model import IdentifiedModel, Series
+from excite_cli.measurement.run_identity import RunId
+from excite_cli.robot.model import Array, Robot, build_robot
+from tests.docs.test_predict import PLANTED
+from tests.robot.random_robots import random_robot
+
+COMPILERS = [name for name in ("gcc", "clang", "cc") if shutil.which(name)]
+STRICT = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
+WITHOUT_CODE = {"backlash"}
+UR10 = RobotSpec(urdf=str(Path(__file__).parents[2] / "data" / "ur10_cb" / "ur10.urdf"))
+
+
+def compiled(text: str, folder: Path, compiler: str, *flags: str) -> ctypes.CDLL:
+    source, library = folder / "model.c", folder / f"model_{compiler}{len(flags)}.so"
+    source.write_text(text, encoding="utf-8")
+    command = [
+        compiler,
+        *STRICT,
+        "-O2",
+        *flags,
+        "-shared",
+        "-fPIC",
+        str(source),
+        "-o",
+        str(library),
+    ]
+    subprocess.run([*command, "-lm"], check=True)
+    return ctypes.CDLL(str(library))
+
+
+def series_of(robot: Robot, count: int = 120, columns: Sequence[str] = ()) -> Series:
+    rng = np.random.default_rng(5)
+    t = 0.02 * np.arange(count)
+    rates = rng.uniform(1.0, 4.0, robot.n)
+    angle = np.outer(t, rates) + rng.uniform(0.0, 6.0, robot.n)
+    q, v, a = np.sin(angle), rates * np.cos(angle), -(rates**2) * np.sin(angle)
+    logged = {name: 25.0 + rng.uniform(0.0, 20.0, count) for name in columns}
+    return Series(t, q, v, a, RunId("r"), 40.0, logged)
+
+
+def by_c(library: ctypes.CDLL, series: Series, real: type = ctypes.c_double) -> Array:
+    library.excite_work.restype = ctypes.c_size_t
+    library.excite_work.argtypes = [ctypes.c_size_t]
+    count, work = len(series.t), library.excite_work(len(series.t))
+    dtype = np.dtype(real)
+
+    def given(x: Array) -> tuple[np.ndarray, ctypes.c_void_p]:
+        kept = np.ascontiguousarray(x, dtype=dtype)
+        return kept, kept.ctypes.data_as(ctypes.c_void_p)
+
+    columns = np.stack([*series.covariates.values()], axis=1) if series.covariates else np.zeros(1)
+    held = [given(x) for x in (series.q, series.v, series.a, columns)]
+    tau, room = given(np.zeros_like(series.q)), given(np.zeros(work))
+    step, start = real(series.t[1] - series.t[0]), real(series.start)
+    library.excite_series.restype = None
+    library.excite_series.argtypes = [ctypes.c_size_t, real, real, *[ctypes.c_void_p] * 6]
+    library.excite_series(count, step, start, *(p for _, p in held), tau[1], room[1])
+    return np.array(tau[0], dtype=float)
+
+
+def relative(x: Array, y: Array) -> float:
+    return float(np.abs(x - y).max() / np.abs(y).max())
+
+
+def planted(kinds: Sequence[str] | None = None) -> tuple[tuple[Effect, ...], Array]:
+    rows = [
+        row for row in PLANTED if (row[0] not in WITHOUT_CODE if kinds is None else row[0] in kinds)
+    ]
+    effects = []
+    for name, joints, shape, _ in rows:
+        kind = kind_named(name)
+        effects.append(kind(joints, dict(shape), (), "temp" if kind.follows_covariate else ""))
+    return tuple(effects), np.concatenate([np.asarray(row[3], dtype=float) for row in rows])
+
+
+def test_all_kinds_have_code_but_those_that_are_told() -> None:
+    assert {row[0] for row in PLANTED} == set(catalogue())
+    silent = {
+        effect.kind
+        for effect in planted(list(catalogue()))[0]
+        if not effect.carried and not effect.in_c(np.ones(len(effect.parameters)), ("temp",))
+    }
+    assert silent == WITHOUT_CODE
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_all_effects_at_once(compiler: str, tmp_path: Path) -> None:
+    robot = build_robot(UR10)
+    effects, values = planted()
+    model = IdentifiedModel(standard_parameters(robot), effects, values)
+    series = series_of(robot, columns=("temp",))
+    expected = model.told(robot, series).torque
+    library = compiled(c_model(robot, model).text, tmp_path, compiler)
+    assert relative(by_c(library, series), expected) < 1e-9
+    library.excite_self_test.restype = ctypes.c_double
+    assert library.excite_self_test() < 1e-9
+
+
+@pytest.mark.parametrize("kind", sorted(set(catalogue()) - WITHOUT_CODE))
+def test_every_effect_alone(kind: str, tmp_path: Path) -> None:
+    robot = build_robot(UR10)
+    effects, values = planted([kind])
+    model = IdentifiedModel(standard_parameters(robot), effects, values)
+    follows = effects[0].follows_covariate
+    series = series_of(robot, columns=("temp",) if follows else ())
+    rigid = IdentifiedModel(model.phi).told(robot, series).torque
+    expected = model.told(robot, series).torque
+    found = by_c(compiled(c_model(robot, model).text, tmp_path, COMPILERS[0]), series)
+    effect = np.abs(expected - rigid).max()
+    assert effect > 0.0
+    assert np.abs(found - expected).max() < 1e-9 * max(effect, np.abs(expected).max() * 1e-2)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_trees_with_sliding_joints(seed: int, tmp_path: Path) -> None:
+    robot = random_robot(seed, joints=5)
+    j = next((j for j in range(robot.n) if robot.sliding[j]), 0)
+    effects = (kind_named("encoder_offset")((j,)), kind_named("elasticity")((j,)))
+    model = IdentifiedModel(standard_parameters(robot), effects, np.array([0.1, 1e-3]))
+    series = series_of(robot)
+    library = compiled(c_model(robot, model).text, tmp_path, COMPILERS[0])
+    assert relative(by_c(library, series), model.told(robot, series).torque) < 1e-9
+
+
+def test_single_precision(tmp_path: Path) -> None:
+    robot = build_robot(UR10)
+    effects, values = planted(["viscous_friction", "spring", "dahl_friction", "payload"])
+    model = IdentifiedModel(standard_parameters(robot), effects, values)
+    series = series_of(robot)
+    library = compiled(c_model(robot, model).text, tmp_path, COMPILERS[0], "-DEXCITE_FLOAT")
+    found = by_c(library, series, ctypes.c_float)
+    assert relative(found, model.told(robot, series).torque) < 1e-3
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_no_bound_is_broken(compiler: str, tmp_path: Path) -> None:
+    robot = build_robot(UR10)
+    effects, values = planted()
+    model = IdentifiedModel(standard_parameters(robot), effects, values)
+    source, program = tmp_path / "model.c", tmp_path / "model"
+    source.write_text(c_model(robot, model).text, encoding="utf-8")
+    flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O1"]
+    command = [compiler, *STRICT, *flags, "-DEXCITE_MAIN", str(source), "-o", str(program), "-lm"]
+    built = subprocess.run(command, capture_output=True, text=True)
+    if "cannot find" in built.stderr:  # the compiler came without its sanitizers
+        command = [each for each in command if each not in flags[:2]]
+        built = subprocess.run(command, capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    ran = subprocess.run([str(program)], capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "us per call" in ran.stdout
+
+
+def test_step_by_step_is_the_series_where_nothing_looks_ahead(tmp_path: Path) -> None:
+    robot = build_robot(UR10)
+    effects, values = planted(
+        ["coulomb_friction", "dahl_friction", "friction_drift", "torque_gain"]
+    )
+    model = IdentifiedModel(standard_parameters(robot), effects, values)
+    series = series_of(robot)
+    library = compiled(c_model(robot, model).text, tmp_path, COMPILERS[0])
+    memory = ctypes.create_string_buffer(8 * 20 * robot.n + 256)
+    library.excite_begin.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double]
+    library.excite_begin(memory, 0.02, series.start)
+    found = np.zeros_like(series.q)
+    for k in range(len(found)):
+        states = [np.ascontiguousarray(x[k]) for x in (series.q, series.v, series.a)]
+        pointers = [x.ctypes.data_as(ctypes.c_void_p) for x in states]
+        library.excite_torque(memory, *pointers, None, found[k].ctypes.data_as(ctypes.c_void_p))
+    assert relative(found, model.told(robot, series).torque) < 1e-9
+
+
+def test_effects_of_single_recordings_are_left_out_and_told() -> None:
+    robot = build_robot(UR10)
+    payload, backlash = (
+        kind_named("payload")((5,), {}, ("run_3",)),
+        kind_named("backlash")((2,), {"gap": 0.1}),
+    )
+    values = np.append(np.ones(10), 1.0)
+    found = c_model(robot, IdentifiedModel(standard_parameters(robot), (payload, backlash), values))
+    assert "only some recordings had them: payload at wrist_3_joint" in found.notes[0]
+    assert "C has no code for: backlash at elbow_joint" in found.notes[1]
