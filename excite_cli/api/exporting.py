@@ -23,7 +23,7 @@ from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
-from excite_cli.store.stored_model import is_text, read_model
+from excite_cli.store.model_file import is_text, read_model
 
 # Formats of identified models, and the suffixes of their files.
 MODELS = {"urdf": ".urdf", "mjcf": ".xml", "yaml": ".yaml", "c": ".c"}

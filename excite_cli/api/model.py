@@ -11,9 +11,10 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.errors import ConfigError
 from excite_cli.identification.identified_model import IdentifiedModel, Series
+from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array
 from excite_cli.shown.record import Shown, show
-from excite_cli.store.stored_model import StoredModel, read_model
+from excite_cli.store.model_file import read_model
 
 
 @dataclass(frozen=True, repr=False)

@@ -19,6 +19,7 @@ from excite_cli.cli.optimize import optimize
 from excite_cli.cli.report import report
 from excite_cli.cli.robots import robots
 from excite_cli.cli.schema import schema
+from excite_cli.cli.score import score
 from excite_cli.cli.simulate import simulate
 from excite_cli.cli.stopping import heed_signals
 from excite_cli.cli.streams import steady_streams
@@ -48,6 +49,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "identify": identify,
     "simulate": simulate,
     "diagnose": diagnose,
+    "score": score,
     "study": study,
     "export": export,
     "report": report,
@@ -60,7 +62,7 @@ _GROUPS = {
     "Get started": ("robots", "init", "schema"),
     "Plan motions": ("optimize", "check", "compare-random", "verify-gradient"),
     "Inspect and export": ("report", "view", "export"),
-    "From measured data": ("simulate", "identify", "diagnose"),
+    "From measured data": ("simulate", "identify", "diagnose", "score"),
     "Many cases": ("study",),
 }
 _ORDER = [name for names in _GROUPS.values() for name in names]

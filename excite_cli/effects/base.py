@@ -73,6 +73,7 @@ class Effect(ABC):
     function_of: ClassVar[tuple[Quantity, ...]] = ()
     defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
+    may_begin: ClassVar[bool] = False  # from one day on a robot may have it, or more of it
     # In all runs, but its size may change from run to run: in runs of its own it is that change.
     changes_between_runs: ClassVar[bool] = False
     of_campaign: ClassVar[bool] = False  # its columns look at the campaign's clock

@@ -53,6 +53,11 @@ def units_of(dataset: Dataset) -> tuple[str, ...]:
     return tuple(dict.fromkeys(run.id.key for run in dataset.runs))
 
 
+def whole(dataset: Dataset) -> list[Run]:
+    """All runs with time from their recording's start, on the campaign's clock; nothing sealed."""
+    return on_campaign_clock([_from_start(run) for run in dataset.runs])
+
+
 def split(
     dataset: Dataset,
     sealed: str | None = None,
@@ -69,7 +74,7 @@ def split(
     ConfigError
         There is no run of that name, or a single run is too short to be cut.
     """
-    runs = on_campaign_clock([_from_start(run) for run in dataset.runs])
+    runs = whole(dataset)
     if sealed is not None and sealed not in dataset.names:
         raise ConfigError(
             f"--sealed: there is no run '{sealed}'.{nearest(sealed, dataset.names)} "

@@ -14,8 +14,8 @@ from excite_cli.effects.sign import sign_of_width
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.differences import fourth_order_differences
 from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.store.stored_model import StoredModel
 from tests.api.conftest import Loop
 from tests.docs.test_predict import PLANTED
 
@@ -110,9 +110,7 @@ def test_what_cannot_be_told_is_refused_in_one_sentence(robot: Robot, tmp_path: 
     q, v, a = states(robot)
     with pytest.raises(ConfigError, match=r"Give \(T, 6\) each, or \(6,\): shoulder_pan_joint"):
         model_of(robot).torque(q[:, :3], v, a)
-    with pytest.raises(
-        ConfigError, match=r"dahl_friction depends on other instants\. Give"
-    ):
+    with pytest.raises(ConfigError, match=r"dahl_friction depends on other instants\. Give"):
         model_of(robot, "dahl_friction").torque(q, v, a)
     with pytest.raises(ConfigError, match="t is not equidistant"):
         model_of(robot).torque(q, v, a, T**2)

@@ -1,6 +1,6 @@
-"""A model that was identified once, from a fit, a diagnosis, or a config that holds its numbers."""
+"""Reading models: a fit, a diagnosis, or a config that holds its numbers."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -20,38 +20,13 @@ from excite_cli.given_files import require_stored
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.processing import Processing
-from excite_cli.identification.torque_trace import TorqueTrace
+from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.own_file import is_own
 
 _TEXT = {".yaml", ".yml"}
-
-
-@dataclass(frozen=True)
-class StoredModel:
-    """`model` of `robot` with what was known of it when it was made.
-
-    `what` it is: "fit", "diagnosis", "config", or "urdf" for a config without numbers. `error` on
-    `sealed_run`, which no fit saw; `noise` of the filtered torque by joint, where known;
-    `processing`: the filters of both. `traces`: torque over time of training and sealed data.
-    `consistent`: the same of bodies that can be, where a fit has them.
-    """
-
-    path: Path
-    what: str
-    spec: Spec
-    folder: Path
-    robot: Robot
-    model: IdentifiedModel
-    sealed_run: str = ""
-    error: Errors | None = None
-    noise: dict[str, float] | None = None
-    processing: Processing | None = None
-    traces: tuple[TorqueTrace, ...] = ()
-    consistent: IdentifiedModel | None = None
-    sources: tuple[str, ...] = ()
 
 
 def read_model(path: Path) -> StoredModel:
@@ -224,4 +199,5 @@ def _processing(data: dict[str, Any]) -> Processing | None:
     names = [field.name for field in fields(Processing) if field.name != "reasons"]
     if not all(name in data for name in names):
         return None
-    return Processing(**{name: data[name] for name in names})
+    stride = int(data["working_stride"])
+    return Processing(**{**{name: data[name] for name in names}, "working_stride": stride})

@@ -1,0 +1,64 @@
+"""`excite score`: a stored model against new data."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from excite_cli.cli import options
+from excite_cli.cli.console import Terminal
+from excite_cli.cli.help_page import OUTPUT
+
+
+def score(
+    model: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MODEL",
+            help="A fit, a diagnosis, or a config that `diagnose --apply` wrote.",
+            show_default=False,
+        ),
+    ],
+    data: options.Data,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="File for the score (HDF5).", rich_help_panel=OUTPUT),
+    ] = None,
+    sealed: Annotated[
+        bool,
+        typer.Option("--sealed", help="Of the model's own data, only what was sealed then."),
+    ] = False,
+    overwrite: options.Overwrite = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
+) -> None:
+    """Play a stored model on new data: does it still predict the torque, and if not, why?
+
+    Nothing is fitted. Every run has its error per joint beside that of the day the model was made,
+    and an alarm where its residual is beyond what the model's own allows, with the likely reason: a
+    payload, a contact, an offset, other friction, an encoder that slipped. Files are read one after
+    the other, so there may be hundreds.
+
+    Exit status 1: some run leaves what the model allows.
+
+    Examples:
+      excite score diagnosis.h5 monday.h5 tuesday.h5 -o week.h5
+    """
+    from excite_cli.api.scoring import score as score_data
+    from excite_cli.api.scoring import score_answer
+    from excite_cli.api.threads import single_threaded
+
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    with single_threaded(), terminal.live("score", len(data)) as line:
+        found = score_data(
+            model,
+            data,
+            sealed=sealed,
+            output=output,
+            overwrite=overwrite,
+            progress=line,
+            tell=terminal.tell,
+        )
+    terminal.show(score_answer(found))

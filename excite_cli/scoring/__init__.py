@@ -1,0 +1,1 @@
+"""Stored models against new data: errors, alarms, reasons, thresholds, changes."""

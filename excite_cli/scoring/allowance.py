@@ -1,0 +1,112 @@
+"""What residual a model allows a joint: that of its own data, carried over to another motion.
+
+When it was made, its residual had the RMS r₀ beside torque of the RMS τ₀: on sealed data, or on
+those that it was fitted to, where there is more of it. Of r₀, the
+noise n stays as it is, and what the model lacks grows with the torque,
+
+    allowed² = n² + (r₀² − n²) max(1, τ²/τ₀²),
+
+without a known n the whole of r₀. Residuals are serially correlated, so that samples say little of
+how far a mean of squares may go: that is told by means over blocks of a second of the model's own
+data, whose deviation is κ of their mean.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.identification.stored_model import StoredModel
+from excite_cli.robot.model import Array
+
+SECONDS = 1.0  # of a block
+# More than the model's own residual: models are a little worse in motions that they do not know.
+TOLERATED = 1.35
+_SIGMAS = 4.0  # of a mean over blocks
+_PEAK = 2.5  # times the largest block of the model's own data
+_LEAST_SPREAD, _FEWEST = 0.5, 4  # of blocks, relative; blocks
+
+
+@dataclass(frozen=True)
+class Allowance:
+    """Of every joint (n,): `residual` r₀, `noise` n, `torque` τ₀ when the model was made.
+
+    `spread` κ of blocks, and the largest block's RMS over its mean (`largest`).
+    """
+
+    residual: Array
+    noise: Array
+    torque: Array
+    spread: Array
+    largest: Array
+
+    def rms(self, torque: Array) -> Array:
+        """RMS (n,) of the residual that is allowed beside torque of RMS (n,)."""
+        lacking = np.maximum(self.residual**2 - self.noise**2, 0.0)
+        more = np.maximum(1.0, (torque / np.maximum(self.torque, 1e-12)) ** 2)
+        return np.sqrt(self.noise**2 + lacking * more)
+
+    def most(self, blocks: int) -> Array:
+        """Ratio (n,) of RMS to `rms` beyond which a run of so many blocks is out of it."""
+        chance = 1.0 + _SIGMAS * self.spread / np.sqrt(max(blocks, 1))
+        return TOLERATED * np.sqrt(chance)
+
+    @property
+    def most_of_a_block(self) -> Array:
+        """Ratio (n,) of a block's RMS to `rms` beyond which something happened in it."""
+        return _PEAK * np.maximum(self.largest, TOLERATED)
+
+
+def allowance_of(stored: StoredModel) -> Allowance | None:
+    """What the model allows; None where nothing is known of its errors."""
+    if stored.error is None:
+        return None
+    names = stored.robot.joint_names
+    residual = np.array([stored.error.rms.get(name, np.nan) for name in names])
+    relative = np.array([stored.error.relative.get(name, np.nan) for name in names])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        torque = np.where(relative > 0, residual / relative, np.nan)
+    if not np.isfinite(torque).any():
+        return None
+    noise = np.array([(stored.noise or {}).get(name, 0.0) for name in names])
+    noise = np.minimum(np.nan_to_num(noise), np.nan_to_num(residual))
+    own = [blocks_of(each.measured - each.predicted, each.t) for each in stored.traces]
+    torques = [blocks_of(each.measured, each.t) for each in stored.traces]
+    blocks = np.concatenate([np.zeros((0, stored.robot.n)), *own])
+    if len(blocks):
+        trained = np.sqrt(np.nanmean(blocks, axis=0))
+        larger = trained > residual
+        residual = np.where(larger, trained, residual)
+        torque = np.where(larger, np.sqrt(np.nanmean(np.concatenate(torques), axis=0)), torque)
+    return Allowance(residual, noise, torque, *_of_blocks(blocks, residual))
+
+
+def _of_blocks(blocks: Array, residual: Array) -> tuple[Array, Array]:
+    """κ of blocks (B, n) of the model's own data, and the largest over `residual`, by joint."""
+    n = len(residual)
+    if len(blocks) < _FEWEST:
+        return np.full(n, 1.0), np.full(n, 2.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        spread = np.nanstd(blocks, axis=0) / np.nanmean(blocks, axis=0)
+        largest = np.sqrt(np.nanmax(blocks, axis=0)) / residual
+    return np.fmax(spread, _LEAST_SPREAD), np.fmax(np.nan_to_num(largest, nan=2.0), 1.0)
+
+
+def blocks_of(residual: Array, t: Array) -> Array:
+    """Mean squares (B, n) of a residual (M, n) over blocks of a second; NaN without samples."""
+    if not len(t):
+        return np.zeros((0, residual.shape[1]))
+    block = ((t - t[0]) / SECONDS).astype(int)
+    last = int(block[-1])
+    if last and t[-1] - t[0] - last * SECONDS < 0.5 * SECONDS:
+        block[block == last] = last - 1  # no short ones
+    good = np.isfinite(residual)
+    sums = _sum(np.where(good, np.square(residual), 0.0), block)
+    counts = _sum(good.astype(float), block)
+    return np.where(counts > 0, sums / np.maximum(counts, 1.0), np.nan)
+
+
+def _sum(x: Array, block: Sequence[int] | Array) -> Array:
+    total = np.zeros((int(max(block)) + 1, x.shape[1]))
+    np.add.at(total, np.asarray(block), x)
+    return total

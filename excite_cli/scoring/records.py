@@ -1,0 +1,73 @@
+"""What a score holds, as frozen records."""
+
+from dataclasses import dataclass, field
+
+from excite_cli.diagnosis.records import EffectRecord
+from excite_cli.effects.base import Value
+from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.measurement.dataset import Finding
+from excite_cli.shown.record import Shown
+
+
+@dataclass(frozen=True)
+class Reason:
+    """What a run has that the model has not: an effect, its `parameters`, and what it explains.
+
+    `share` of the residual's energy, joints weighed by what the model allows them.
+    """
+
+    effect: EffectRecord
+    parameters: dict[str, Value]
+    share: float
+
+
+@dataclass(frozen=True)
+class ScoredRun:
+    """A run, or a part of it, beside the torque that the model predicts; nothing was fitted.
+
+    `allowed` RMS of the residual by joint [N·m] (N) that the model's own residual allows in this
+    motion, `ratio` of the RMS to it; `peak` the same of the worst block of a second; empty where
+    the model does not tell. `alarm` where joints (`left`) are beyond that; `reasons` are what
+    explains it best. `sums` (6, n): ‖e‖², ‖τ‖², the same where joints move, and both counts of
+    samples. `covariates`: means of the log's declared columns. `epoch` of the recording's
+    start [s], if known.
+    """
+
+    name: str
+    file: str
+    seconds: float
+    error: Errors
+    sums: tuple[tuple[float, ...], ...] = ()
+    allowed: dict[str, float] = field(default_factory=dict)
+    ratio: dict[str, float] = field(default_factory=dict)
+    peak: dict[str, float] = field(default_factory=dict)
+    left: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
+    covariates: dict[str, float] = field(default_factory=dict)
+    epoch: float | None = None
+
+    @property
+    def alarm(self) -> bool:
+        """Whether it leaves what the model's own residual allows."""
+        return bool(self.left)
+
+
+@dataclass(frozen=True, repr=False)
+class Score(Shown):
+    """Runs beside a stored model. `error` of all runs together, `made` that when it was made."""
+
+    model: str
+    what: str
+    joint_names: tuple[str, ...]
+    units: tuple[str, ...]
+    runs: tuple[ScoredRun, ...]
+    error: Errors
+    made: Errors | None
+    sealed_run: str = ""
+    noise: dict[str, float] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def alarms(self) -> tuple[ScoredRun, ...]:
+        """Runs that leave what the model's own residual allows."""
+        return tuple(run for run in self.runs if run.alarm)

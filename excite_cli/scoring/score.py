@@ -1,0 +1,201 @@
+"""Torque predicted by a stored model beside what was measured; nothing is fitted."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from excite_cli.config.data_spec import FilterSpec
+from excite_cli.errors import FileError
+from excite_cli.identification.errors_of_torque import FEWEST, Errors, block_sums
+from excite_cli.identification.identified_model import IdentifiedModel, Prediction, errors_on
+from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.processing import Processing, choose_processing
+from excite_cli.identification.stored_model import StoredModel
+from excite_cli.measurement.dataset import Run
+from excite_cli.robot.model import Array
+from excite_cli.scoring.allowance import Allowance, allowance_of, blocks_of
+from excite_cli.scoring.reason import reasons_of
+from excite_cli.scoring.records import Reason, ScoredRun
+
+_SAME_RATE = 0.01
+
+
+class Scorer:
+    """Scores runs one by one; keeps sums of squares, not samples."""
+
+    def __init__(self, stored: StoredModel) -> None:
+        self.stored, self.allowance = stored, allowance_of(stored)
+        self._correlated = _correlated(stored)
+
+    def of(self, runs: Sequence[Run], file: str, name: str = "") -> ScoredRun:
+        """Score of the parts of one recording, taken together.
+
+        Raises
+        ------
+        FileError
+            No part is long enough for the filters.
+        """
+        robot = self.stored.robot
+        prepared = self._prepared(runs)
+        model = self._model(prepared)
+        predictions = [model.predicted(robot, run) for run in prepared]
+        error = errors_on(robot, prepared, predictions)
+        found = ScoredRun(
+            name or runs[0].name,
+            file,
+            float(sum(run.duration for run in runs)),
+            error,
+            sums=_sums(prepared, predictions),
+            covariates={
+                column: float(np.mean(np.concatenate([run.covariates[column] for run in runs])))
+                for column in runs[0].covariates
+            },
+            epoch=runs[0].epoch,
+        )
+        if self.allowance is None:
+            return found
+        return self._judged(found, prepared, predictions, model, self.allowance)
+
+    def _prepared(self, runs: Sequence[Run]) -> list[PreparedRun]:
+        prepared, short = [], None
+        for run in runs:
+            try:
+                prepared.append(prepare(run, self._processing(run)))
+            except FileError as error:
+                short = error
+        if not prepared:
+            raise short or FileError("there is no run to score.")
+        return prepared
+
+    def _processing(self, run: Run) -> Processing:
+        """The filters of the model's own errors; at another rate of recording the same cut-offs."""
+        own, spec = self.stored.processing, self.stored.spec
+        if own is not None and abs(own.recorded_rate * run.step - 1.0) < _SAME_RATE:
+            return own
+        if own is None:
+            return choose_processing([run], spec.measurement.filter, spec.diagnosis.moving_speed)
+        same = FilterSpec(
+            position=own.position_cutoff or "none",
+            parallel=own.parallel_cutoff or "none",
+            rate=own.rate,
+            velocity=spec.measurement.filter.velocity,
+        )
+        return choose_processing([run], same, own.moving_speed)
+
+    def _model(self, prepared: Sequence[PreparedRun]) -> IdentifiedModel:
+        """The model, with what single recordings of its own data had where that fits better."""
+        whole = self.stored.model
+        standing = whole.without(whole.of_single_runs)
+        if not any(effect.active(run.run) for effect in whole.of_single_runs for run in prepared):
+            return standing
+        robot = self.stored.robot
+
+        def energy(model: IdentifiedModel) -> float:
+            told = [model.predicted(robot, run) for run in prepared]
+            return errors_on(robot, prepared, told).mean_relative
+
+        return whole if energy(whole) <= energy(standing) else standing
+
+    def _judged(
+        self,
+        found: ScoredRun,
+        prepared: Sequence[PreparedRun],
+        predictions: Sequence[Prediction],
+        model: IdentifiedModel,
+        allowance: Allowance,
+    ) -> ScoredRun:
+        robot, names = self.stored.robot, self.stored.robot.joint_names
+        rms = _by_name(found.error.rms, names)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            torque = rms / _by_name(found.error.relative, names)
+        allowed = allowance.rms(torque)
+        blocks = np.concatenate(
+            [
+                blocks_of(
+                    np.where(run.valid, run.tau - run.averaged_torque(told.torque), np.nan),
+                    np.asarray(run.averages @ run.t),
+                )
+                for run, told in zip(prepared, predictions, strict=True)
+            ]
+        )
+        ratio = rms / allowed
+        peak = np.sqrt(np.nanmax(np.vstack([blocks, np.zeros(robot.n)]), axis=0)) / allowed
+        with np.errstate(invalid="ignore"):
+            beyond = (ratio > allowance.most(len(blocks))) | (peak > allowance.most_of_a_block)
+        left = tuple(name for name, out in zip(names, beyond, strict=True) if out)
+        reasons: tuple[Reason, ...] = ()
+        if left:
+            longest = max(prepared, key=lambda run: len(run.t))
+            known = np.where(np.isfinite(allowed), allowed, np.nanmedian(allowed))
+            reasons = reasons_of(robot, model, longest, known, self._correlated)
+        return replace(
+            found,
+            allowed=_named(allowed, names),
+            ratio=_named(ratio, names),
+            peak=_named(peak, names),
+            left=left,
+            reasons=reasons,
+        )
+
+
+def together(runs: Sequence[ScoredRun], names: Sequence[str]) -> Errors:
+    """Errors over all runs, from their sums."""
+    wrong, size, wrong_moving, size_moving, count, moving = np.sum(
+        [run.sums for run in runs], axis=0
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative, slow = np.sqrt(wrong / size), np.sqrt(wrong_moving / size_moving)
+        relative, slow = (
+            np.where(each >= FEWEST, share, np.nan)
+            for each, share in ((count, relative), (moving, slow))
+        )
+        rms, rms_moving = np.sqrt(wrong / count), np.sqrt(wrong_moving / moving)
+    return Errors(
+        _mean(relative), _mean(slow), _named(relative, names), _named(slow, names),
+        _named(rms, names), {}, (np.nan, np.nan),
+        {name: int(each) for name, each in zip(names, count, strict=True)},
+        _named(rms_moving, names),
+    )  # fmt: skip
+
+
+def _sums(
+    prepared: Sequence[PreparedRun], predictions: Sequence[Prediction]
+) -> tuple[tuple[float, ...], ...]:
+    sums = [
+        block_sums(run.tau, run.averaged_torque(told.torque), run.valid, run.moving, run.step)
+        for run, told in zip(prepared, predictions, strict=True)
+    ]
+    total = np.concatenate(sums, axis=1).sum(axis=1)
+    return tuple(tuple(map(float, row)) for row in total)
+
+
+def _correlated(stored: StoredModel) -> float:
+    """How many filtered samples of the model's own residual say as much as one that is new."""
+    found = []
+    for trace in stored.traces:
+        residual = trace.measured - trace.predicted
+        for column in residual.T:
+            good = column[np.isfinite(column)]
+            if len(good) < 50:
+                continue
+            good = good - good.mean()
+            power = float(good @ good)
+            if power > 0:
+                lagged = [float(good[k:] @ good[:-k]) / power for k in range(1, 40)]
+                first = next((k for k, x in enumerate(lagged) if x < 0.05), len(lagged))
+                found.append(1.0 + 2.0 * sum(lagged[:first]))
+    return float(np.median(found)) if found else 4.0
+
+
+def _by_name(values: dict[str, float], names: Sequence[str]) -> Array:
+    return np.array([values.get(name, np.nan) for name in names])
+
+
+def _named(values: Array, names: Sequence[str]) -> dict[str, float]:
+    return {name: float(x) for name, x in zip(names, values, strict=True)}
+
+
+def _mean(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")

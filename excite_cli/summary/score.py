@@ -1,0 +1,174 @@
+"""A stored model beside new data, in sentences, tables and as data."""
+
+from math import isfinite
+from typing import Any
+
+from excite_cli.diagnosis.words import place_in_words, title_of, value_in_words
+from excite_cli.scoring.records import Reason, Score, ScoredRun
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.cells import figure, percent
+
+_TOLD = 3  # runs in the sentence
+
+
+def score_answer(found: Score) -> Answer:
+    """What `excite score` answers; status 1 where a run leaves what the model allows."""
+    return Answer(tuple(score_parts(found)), score_data(found), not found.alarms)
+
+
+def score_parts(found: Score) -> Parts:
+    """A sentence, the runs, and errors per joint."""
+    return [*sentences(found), _runs(found), _joints(found)]
+
+
+def sentences(found: Score) -> list[str]:
+    """How well the model predicts, and what happened in runs that leave what it allows."""
+    mean = percent(found.error.mean_relative_moving)
+    made = ""
+    if found.made is not None:
+        made = f"; it was {percent(found.made.mean_relative_moving)} when it was made"
+    first = (
+        f"{found.model} predicts the torque of {len(found.runs)} "
+        f"run{'s' * (len(found.runs) > 1)} to {mean} where joints move (mean over joints{made})."
+    )
+    if found.made is None:
+        return [first]
+    if not found.alarms:
+        return [f"{first} No run leaves what its own residual allows."]
+    told = [f"{run.name}: {in_words(run, found)}" for run in found.alarms[:_TOLD]]
+    more = len(found.alarms) - _TOLD
+    if more > 0:
+        told.append(f"and {more} more: see the table")
+    count = f"{len(found.alarms)} of {len(found.runs)}"
+    return [f"{count} runs leave what its own residual allows. {'. '.join(told)}.", first]
+
+
+def in_words(run: ScoredRun, found: Score) -> str:
+    """What explains a run, or that nothing does."""
+    if not run.left:
+        return "as the model allows"
+    worst = max(run.left, key=lambda joint: max(run.ratio[joint], run.peak[joint] / 2.5))
+    beyond = f"{run.ratio[worst]:.2g} times what is allowed on {worst}"
+    if not run.reasons:
+        return f"{beyond}; nothing that changes from day to day explains it"
+    return f"{' and '.join(_reason(each, found) for each in run.reasons)} ({beyond})"
+
+
+def _reason(reason: Reason, found: Score) -> str:
+    place = place_in_words(reason.effect, len(found.joint_names))
+    told = [
+        value_in_words(name, each) for name, each in reason.parameters.items() if name[0] != "I"
+    ][:4]
+    return f"{title_of(reason.effect.kind)}{place and ' at ' + place}, {', '.join(told)}"
+
+
+def _runs(found: Score) -> Table:
+    rows = tuple(
+        (
+            run.name,
+            f"{run.seconds:.4g}",
+            percent(run.error.mean_relative_moving),
+            percent(run.error.mean_relative),
+            _worst(run),
+            "ALARM" if run.alarm else "",
+            in_words(run, found) if run.alarm else "",
+        )
+        for run in found.runs
+    )
+    return Table(
+        "Runs: error of the torque, beside what the model's own residual allows",
+        ("run", "seconds", "where moving", "all samples", "ratio", "state", "likely reason"),
+        rows,
+        left=("run", "state"),
+        words=("likely reason",),
+        bold=tuple(k for k, run in enumerate(found.runs) if run.alarm),
+    )
+
+
+def _worst(run: ScoredRun) -> str:
+    known = [x for x in run.ratio.values() if isfinite(x)]
+    return f"{max(known):.2f}" if known else ""
+
+
+def _joints(found: Score) -> Table:
+    made = found.made
+    rows = tuple(
+        (
+            joint,
+            percent(found.error.relative_moving[joint]),
+            percent(made.relative_moving[joint]) if made else "",
+            figure(found.error.rms[joint]),
+            figure(made.rms[joint]) if made else "",
+            figure(found.noise[joint]) if joint in found.noise else "",
+            unit,
+            max(found.runs, key=lambda run: _ratio(run, joint)).name if made else "",
+        )
+        for joint, unit in zip(found.joint_names, found.units, strict=True)
+    )
+    return Table(
+        "Joints: error over all runs, and when the model was made",
+        ("joint", "where moving", "then", "RMS", "RMS then", "noise", "unit", "worst run"),
+        rows,
+        left=("joint", "unit", "worst run"),
+    )
+
+
+def _ratio(run: ScoredRun, joint: str) -> float:
+    ratio = run.ratio.get(joint, 0.0)
+    return ratio if isfinite(ratio) else 0.0
+
+
+def score_data(found: Score) -> dict[str, Any]:
+    """The answer for `--json`."""
+    return {
+        "good": not found.alarms,
+        "answer": sentences(found),
+        "model": found.model,
+        "runs": [_run_data(run, found) for run in found.runs],
+        "error": found.error.as_data(),
+        "made": None if found.made is None else found.made.as_data(),
+        "noise": found.noise,
+        "findings": [
+            {"kind": f.kind, "severity": f.severity, "run": f.run, "text": f.text}
+            for f in found.findings
+        ],
+    }
+
+
+def _run_data(run: ScoredRun, found: Score) -> dict[str, Any]:
+    return {
+        "name": run.name,
+        "file": run.file,
+        "seconds": run.seconds,
+        "relative_moving": run.error.relative_moving,
+        "relative": run.error.relative,
+        "rms": run.error.rms,
+        "samples": run.error.samples,
+        "allowed": run.allowed,
+        "ratio": run.ratio,
+        "peak": run.peak,
+        "alarm": run.alarm,
+        "joints": list(run.left),
+        "reasons": [
+            {
+                "kind": each.effect.kind,
+                "joints": list(each.effect.joints),
+                "shape": each.effect.shape,
+                "values": list(each.effect.values),
+                "parameters": {
+                    name: {"value": p.value, "std": p.std, "unit": p.unit}
+                    for name, p in each.parameters.items()
+                },
+                "share": each.share,
+            }
+            for each in run.reasons
+        ],
+        "in_words": in_words(run, found),
+        "covariates": run.covariates,
+        "epoch": run.epoch,
+    }
+
+
+show(Score, lambda found: sentences(found)[0], score_parts)
