@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from excite_cli.api.changes import compare as compare
     from excite_cli.api.checking import check as check
     from excite_cli.api.comparing import compare_random as compare_random
     from excite_cli.api.diagnosing import diagnose as diagnose
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from excite_cli.api.reporting import Report as Report
     from excite_cli.api.reporting import write_report as write_report
     from excite_cli.api.robots import describe_robot as describe_robot
+    from excite_cli.api.scoring import score as score
     from excite_cli.api.simulating import simulate as simulate
     from excite_cli.api.studying import run_study as run_study
     from excite_cli.api.verifying import verify_gradient as verify_gradient
@@ -69,6 +71,10 @@ if TYPE_CHECKING:
     from excite_cli.measurement.dataset import Dataset as Dataset
     from excite_cli.measurement.dataset import Run as Run
     from excite_cli.proposal.propose import Proposal as Proposal
+    from excite_cli.scoring.changes import Change as Change
+    from excite_cli.scoring.changes import Changes as Changes
+    from excite_cli.scoring.records import Score as Score
+    from excite_cli.scoring.records import ScoredRun as ScoredRun
     from excite_cli.shown.note import Level as Level
     from excite_cli.shown.note import Note as Note
     from excite_cli.simulation.settings import SimulationSettings as SimulationSettings
@@ -80,6 +86,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "api.changes": ("compare",),
     "api.checking": ("check",),
     "api.comparing": ("compare_random",),
     "api.diagnosing": ("diagnose", "save_config"),
@@ -101,6 +108,7 @@ _HOMES = {
     "api.proposing": ("propose", "save_proposal"),
     "api.reporting": ("Report", "write_report"),
     "api.robots": ("describe_robot",),
+    "api.scoring": ("score",),
     "api.simulating": ("simulate",),
     "api.studying": ("run_study",),
     "api.verifying": ("verify_gradient",),
@@ -127,6 +135,8 @@ _HOMES = {
     "identification.load": ("LoadIdentification",),
     "measurement.dataset": ("Dataset", "Run"),
     "proposal.propose": ("Proposal",),
+    "scoring.changes": ("Change", "Changes"),
+    "scoring.records": ("Score", "ScoredRun"),
     "shown.note": ("Level", "Note"),
     "simulation.settings": ("SimulationSettings",),
     "simulation.simulate": ("Simulation",),

@@ -8,6 +8,7 @@ import typer
 
 from excite_cli import __version__
 from excite_cli.cli.check import check
+from excite_cli.cli.compare import compare
 from excite_cli.cli.compare_random import compare_random
 from excite_cli.cli.console import INTERRUPTED, run_guarded, told_warnings
 from excite_cli.cli.diagnose import diagnose
@@ -50,6 +51,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "simulate": simulate,
     "diagnose": diagnose,
     "score": score,
+    "compare": compare,
     "study": study,
     "export": export,
     "report": report,
@@ -62,7 +64,7 @@ _GROUPS = {
     "Get started": ("robots", "init", "schema"),
     "Plan motions": ("optimize", "check", "compare-random", "verify-gradient"),
     "Inspect and export": ("report", "view", "export"),
-    "From measured data": ("simulate", "identify", "diagnose", "score"),
+    "From measured data": ("simulate", "identify", "diagnose", "score", "compare"),
     "Many cases": ("study",),
 }
 _ORDER = [name for names in _GROUPS.values() for name in names]

@@ -58,6 +58,7 @@ from excite_cli.identification.split import Split, split, with_ends_sealed
 from excite_cli.identification.torque_scale import assumed_scale, with_known_load
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
+from excite_cli.measurement.recorded import recorded
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.skeleton import skeleton_of
 
@@ -204,6 +205,7 @@ def _diagnosed(
         parts=on_sealed_ends(model, models, parts.ends, processing),
         untouched=sealed_part.untouched,
         skeleton=skeleton_of(robot),
+        recorded=recorded(dataset),
         large_rests=rests,
         joint_aliases=_joint_aliases(traced, doubts, robot),
         trained=trained.errors(after),

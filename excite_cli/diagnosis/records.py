@@ -12,6 +12,7 @@ from excite_cli.effects.base import Value
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.dataset import Finding
+from excite_cli.measurement.recorded import Recorded
 from excite_cli.robot.model import Array
 from excite_cli.robot.skeleton import Skeleton
 from excite_cli.shown.record import Shown
@@ -271,7 +272,7 @@ class Diagnosis(Shown):
     against the number of effects; None where there are none. `inertia_names`: of `phi`, as
     `m[elbow]`; `declared` effects have the values that belong to it. `trained`: errors
     of the model with effects on the data that it was fitted to; `overfit` if they say that it is.
-    `skeleton`: where the joints are, to draw the robot; None in earlier files.
+    `skeleton`: where the joints are, to draw the robot, `recorded`: when; not in earlier files.
     """
 
     config: str
@@ -310,6 +311,7 @@ class Diagnosis(Shown):
     trained: Errors | None = None
     overfit: Overfit | None = None
     skeleton: Skeleton | None = None
+    recorded: Recorded = field(default_factory=Recorded)
 
     @property
     def smallest(self) -> tuple[NamedEffect, ...]:

@@ -1,7 +1,7 @@
 """From a dataset to the parameters of the declared model, judged on data that took no part."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -40,6 +40,7 @@ from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_scale import assumed_scale, knowledge_of
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
+from excite_cli.measurement.recorded import Recorded, recorded
 from excite_cli.robot.model import Robot
 from excite_cli.shown.record import Shown
 
@@ -56,6 +57,7 @@ class Identification(Shown):
 
     `noise_floor` [N·m] (N): RMS per joint of what changes from period to period in training runs;
     None if no motion was repeated. `traces`: torque over time, in `torque_units` per joint.
+    `recorded`: when.
     """
 
     fit: Fit
@@ -68,6 +70,7 @@ class Identification(Shown):
     noise_floor: dict[str, float] | None = None
     torque_units: tuple[str, ...] = ()
     traces: tuple[TorqueTrace, ...] = ()
+    recorded: Recorded = field(default_factory=Recorded)
 
 
 def identify(
@@ -136,6 +139,7 @@ def identify(
         noise_floor=floor.named(robot.joint_names) if floor else None,
         torque_units=torque_units(robot),
         traces=(*training_traces, *sealed_traces),
+        recorded=recorded(dataset),
     )
 
 

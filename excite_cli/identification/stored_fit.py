@@ -7,6 +7,7 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.dataset import Finding
+from excite_cli.measurement.recorded import Recorded
 from excite_cli.shown.record import Shown
 
 
@@ -14,8 +15,8 @@ from excite_cli.shown.record import Shown
 class StoredFit(Shown):
     """A fit with its errors and what was noticed.
 
-    `closed_loop_bias` is a sentence, `torque_units` per joint, `traces` torque over time; files of
-    earlier versions have none of them.
+    `closed_loop_bias` is a sentence, `torque_units` per joint, `traces` torque over time,
+    `recorded` when; files of earlier versions have none of them.
     """
 
     config: str
@@ -33,3 +34,4 @@ class StoredFit(Shown):
     versions: dict[str, str] = field(default_factory=dict)
     torque_units: tuple[str, ...] = ()
     traces: tuple[TorqueTrace, ...] = ()
+    recorded: Recorded = field(default_factory=Recorded)

@@ -32,6 +32,7 @@ from excite_cli.diagnosis.records import (
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_file import new_hdf5
+from excite_cli.measurement.recorded import Recorded
 from excite_cli.robot.skeleton import Skeleton
 from excite_cli.store import checked
 from excite_cli.store.approximation_text import approximation_as_data, approximation_of
@@ -80,6 +81,7 @@ _LATER: dict[str, Any] = {
     "trained": Errors | None,
     "overfit": Overfit | None,
     "skeleton": Skeleton | None,
+    "recorded": Recorded,
 }
 _INFORMATION: dict[str, Any] = {
     "model": tuple[EffectRecord, ...],

@@ -23,6 +23,7 @@ from excite_cli.identification.link_changes import LinkChange
 from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_file import new_hdf5
+from excite_cli.measurement.recorded import Recorded
 from excite_cli.store import checked
 from excite_cli.store.joint_errors import require_joints
 from excite_cli.store.own_file import PROGRAM, OwnFile, is_marked, opened
@@ -79,6 +80,7 @@ def write_fit(
         "closed_loop_bias": found.hausman.sentence(),
         "findings": json.dumps([asdict(finding) for finding in found.findings]),
         "torque_units": json.dumps(found.torque_units),
+        "recorded": json.dumps(asdict(found.recorded)),
         "units": "rad, s, N·m, kg, m",
     }
     write_atomically(path, lambda temporary: _write(temporary, found, attributes))
@@ -167,6 +169,7 @@ def _read(file: Any, path: Path) -> StoredFit:
         versions=checked.record(attributes.get("versions", "{}"), dict[str, str]),
         torque_units=checked.record(attributes.get("torque_units", "[]"), tuple[str, ...]),
         traces=read_torque_traces(file["traces"], len(joints)) if "traces" in file else (),
+        recorded=checked.record(attributes.get("recorded", "{}"), Recorded),
     )
     require_joints(joints, (stored.error, stored.training_error), stored.noise_floor)
     if len(stored.torque_units) not in (0, len(joints)):

@@ -1,0 +1,62 @@
+"""`excite compare`: what changed between days."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from excite_cli.cli import options
+from excite_cli.cli.console import Terminal
+from excite_cli.errors import ConfigError
+
+
+def compare(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="OLD NEW…",
+            help="Fits, diagnoses or scores of one robot, in order of time.",
+            show_default=False,
+        ),
+    ],
+    covariate: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--covariate",
+            metavar="NAME=V,V,…",
+            help="A column to take out, with a value per file; those of the logs are known.",
+        ),
+    ] = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+) -> None:
+    """Tell which parameters and effects changed between days, each with its test.
+
+    Every parameter is followed over the files: is there a day since which it is another? What
+    temperature or another column of the log explains is taken out first, where there are days
+    enough. The p-values are corrected for the number of parameters and of days.
+
+    Examples:
+      excite compare january.h5 february.h5 march.h5
+    """
+    from excite_cli.api.changes import changes_answer
+    from excite_cli.api.changes import compare as compare_files
+    from excite_cli.api.threads import single_threaded
+
+    terminal = Terminal(as_json, quiet, verbose, False)
+    with single_threaded():
+        found = compare_files(files, dict(map(_column, covariate or ())))
+    terminal.show(changes_answer(found))
+
+
+def _column(text: str) -> tuple[str, list[float]]:
+    """A name and its numbers."""
+    name, _, values = text.partition("=")
+    try:
+        numbers = [float(each) for each in values.split(",")]
+    except ValueError:
+        numbers = []
+    if not (name and numbers):
+        raise ConfigError(f"--covariate {text}: give a name and numbers, as temp=21.5,24,30.")
+    return name, numbers

@@ -1,0 +1,82 @@
+"""What a fit, a diagnosis or a score says of its day, as numbers that can be compared."""
+
+from collections.abc import Iterator
+
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.identification.fit import Fit
+from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.scoring.changes import Known, Snapshot
+from excite_cli.scoring.records import Score
+
+
+def of_fit(name: str, stored: StoredFit) -> Snapshot:
+    """Base parameters and effects that the data fix."""
+    fit = stored.fit
+    joints = {
+        index: fit.joint_names[effect.joints[0]]
+        for index, effect in _owners(fit)
+        if len(effect.joints) == 1
+    }
+    known = {
+        fit.names[i]: Known(
+            float(fit.values[i]), float(fit.std[i]), fit.units[i], joints.get(i, "")
+        )
+        for i in range(len(fit.names))
+        if fit.identifiable[i]
+    }
+    return Snapshot(name, known, stored.recorded.epoch, stored.recorded.covariates)
+
+
+def _owners(fit: Fit) -> Iterator[tuple[int, Effect]]:
+    """Every parameter of an effect by its place, and the effect."""
+    at = fit.rank
+    for effect in fit.effects:
+        for _ in effect.parameters:
+            yield at, effect
+            at += 1
+
+
+def of_diagnosis(name: str, found: Diagnosis) -> Snapshot:
+    """Base parameters, the data-sheet lines of friction, and all other named effects."""
+    known = {
+        base: Known(float(value), float(std))
+        for base, value, std in zip(
+            found.base_names, found.base_values, found.base_std, strict=True
+        )
+        if std < 0.5 * abs(value)
+    }
+    for line in found.friction_lines:
+        for part, value in (("viscous", line.viscous), ("Coulomb", line.coulomb)):
+            label = f"{part} friction[{line.joint}]"
+            known[label] = Known(value.value, value.std, value.unit, line.joint)
+    for named in found.effects:
+        effect = named.effect
+        if effect.runs or (len(effect.joints) == 1 and kind_named(effect.kind).friction):
+            continue
+        for label, value in named.parameters.items():
+            if value.std == value.std:  # shapes have none
+                place = ",".join(effect.joints)
+                joint = effect.joints[0] if len(effect.joints) == 1 else ""
+                known[f"{effect.kind}.{label}[{place}]"] = Known(
+                    value.value, value.std, value.unit, joint, True
+                )
+    return Snapshot(name, known, found.recorded.epoch, found.recorded.covariates)
+
+
+def of_score(name: str, score: Score) -> list[Snapshot]:
+    """Every run: RMS of each joint's residual over what the model allows."""
+    return [
+        Snapshot(
+            f"{name}: {run.name}",
+            {
+                f"residual over allowed[{joint}]": Known(ratio, 0.0, "1", joint)
+                for joint, ratio in run.ratio.items()
+                if ratio == ratio
+            },
+            run.epoch,
+            run.covariates,
+        )
+        for run in score.runs
+    ]

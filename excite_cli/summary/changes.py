@@ -1,0 +1,101 @@
+"""What changed between days, in sentences, a table and as data."""
+
+from math import isfinite
+from typing import Any
+
+from excite_cli.identification.fit_words import with_deviation
+from excite_cli.scoring.changes import Change, Changes
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
+from excite_cli.shown.table import Parts, Table
+
+_SHOWN = 12  # rows at least, changed or not
+_TOLD = 4
+
+
+def changes_answer(found: Changes) -> Answer:
+    """What `excite compare` answers."""
+    return Answer(tuple(changes_parts(found)), changes_data(found))
+
+
+def changes_parts(found: Changes) -> Parts:
+    """A sentence, and the parameters, the surest change first."""
+    shown = found.changes[: max(_SHOWN, len(found.significant))]
+    rows = tuple(
+        (
+            change.name,
+            f"{change.before:.4g}",
+            with_deviation(change.after, change.std),
+            change.unit,
+            change.since,
+            f"{change.p_value:.2g}" if change.p_value < 0.995 else "1",
+            "CHANGED" if change.significant else "",
+        )
+        for change in shown
+    )
+    left = len(found.changes) - len(shown)
+    rest = [f"{left} more parameters did not change significantly."] if left else []
+    return [
+        *sentences(found),
+        Table(
+            "Changes (± one standard deviation of the change; p corrected for parameters and days)",
+            ("parameter", "before", "after", "unit", "since", "p", "verdict"),
+            rows,
+            left=("parameter", "unit", "since", "verdict"),
+            bold=tuple(k for k, change in enumerate(shown) if change.significant),
+        ),
+        *rest,
+    ]
+
+
+def sentences(found: Changes) -> list[str]:
+    """What changed since when."""
+    out = f" beside {', '.join(found.columns)}" if found.columns else ""
+    over = f"{len(found.days)} days, {len(found.changes)} parameters{out}"
+    if not found.significant:
+        return [f"Nothing changed that chance does not explain ({over})."]
+    told = [_told(change) for change in found.significant[:_TOLD]]
+    more = len(found.significant) - len(told)
+    rest = [f"and {more} more"] if more > 0 else []
+    return [f"{'; '.join([*told, *rest])} ({over})."]
+
+
+def _told(change: Change) -> str:
+    verb = "rose" if abs(change.after) > abs(change.before) else "fell"
+    if change.before * change.after < 0.0:
+        verb = "went"
+    unit = f" {change.unit}" if change.unit not in ("", "1") else ""
+    return (
+        f"{change.name} {verb} from {change.before:.3g} to "
+        f"{with_deviation(change.after, change.std)}{unit} since {change.since}"
+    )
+
+
+def changes_data(found: Changes) -> dict[str, Any]:
+    """The answer for `--json`."""
+    return {
+        "answer": sentences(found),
+        "days": list(found.days),
+        "epochs": list(found.epochs),
+        "covariates": {name: list(values) for name, values in found.covariates.items()},
+        "changes": [
+            {
+                "name": change.name,
+                "joint": change.joint,
+                "unit": change.unit,
+                "before": change.before,
+                "after": change.after,
+                "std": change.std,
+                "p_value": change.p_value,
+                "significant": change.significant,
+                "since": change.since,
+                "values": [x if isfinite(x) else None for x in change.values],
+                "stds": [x if isfinite(x) else None for x in change.stds],
+                "taken_out": change.taken_out,
+            }
+            for change in found.changes
+        ],
+    }
+
+
+show(Changes, lambda found: sentences(found)[0], changes_parts)
