@@ -156,5 +156,5 @@ def _told(
         share = (float(without @ without) - float(rest @ rest)) / max(first, 1e-30)
         told = effect.report(values[part], correlated * noise * covariance[part, part])
         record = record_of(effect, robot.joint_names, values[part])
-        reasons.append(Reason(replace(record), told, share))
+        reasons.append(Reason(replace(record, runs=()), told, share))
     return tuple(sorted(reasons, key=lambda each: -each.share))

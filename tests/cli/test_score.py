@@ -1,0 +1,139 @@
+"""`excite score` and `excite compare` as a user runs them, on simulated data of the smoke arm."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import pytest
+
+from tests.cli.conftest import Run
+from tests.cli.program import SMOKE, Program
+
+pytest.importorskip("mujoco")
+
+DECLARED = ("--set", "effects=[{kind: viscous_friction}, {kind: coulomb_friction}]")
+FRICTION = ("--effect", "coulomb_friction@all=2", "--effect", "viscous_friction@all=3")
+
+
+@dataclass(frozen=True)
+class Days:
+    """A fit of the first day, data of that day and of others, the program in their folder."""
+
+    program: Program
+    fit: Path
+    first: Path
+    sound: Path
+    loaded: Path
+    dry: Path
+
+
+@pytest.fixture(scope="session")
+def days(tmp_path_factory: pytest.TempPathFactory, cache: Path, two_motions: Run) -> Days:
+    folder = tmp_path_factory.mktemp("days")
+    program = Program(folder, cache)
+
+    def day(name: str, *effects: str) -> Path:
+        arguments = ("-o", f"{name}.h5", "--rate", "200", *FRICTION, *effects)
+        program.answer("simulate", SMOKE, two_motions.path, *arguments)
+        return folder / f"{name}.h5"
+
+    first = day("first", "--repeat", "2")
+    program.answer("identify", SMOKE, first, "-o", "fit.h5", *DECLARED)
+    return Days(
+        program,
+        folder / "fit.h5",
+        first,
+        day("sound", "--torque-noise", "0.011"),
+        day("loaded", "--effect", "payload@slide=2"),
+        day("dry", "--effect", "coulomb_friction@elbow=4"),
+    )
+
+
+def test_the_sealed_part_has_the_error_of_the_table(days: Days) -> None:
+    fit = days.program.answer("identify", SMOKE, days.first, *DECLARED)
+    found = days.program.answer("score", days.fit, days.first, "--sealed")
+    assert found["good"]
+    assert found["error"]["relative_moving"] == pytest.approx(fit["error"]["relative_moving"])
+    assert found["runs"][0]["relative"] == pytest.approx(fit["error"]["relative"])
+    assert not found["runs"][0]["alarm"]
+    assert found["runs"][0]["samples"] == fit["error"]["samples"]
+
+
+def test_a_payload_is_the_reason_of_the_alarm(days: Days) -> None:
+    ran = days.program("score", days.fit, days.sound, days.loaded, "-o", "score.h5")
+    assert ran.returncode == 1, ran.stderr
+    assert ran.stdout.startswith("2 of 4 runs leave what its own residual allows. loaded: ")
+    assert "payload that the model does not have at slide, mass 2.0" in ran.stdout
+    asked = days.program("score", days.fit, days.sound, days.loaded, "--json")
+    assert asked.returncode == 1
+    found = json.loads(asked.stdout)
+    assert [run["alarm"] for run in found["runs"]] == [False, False, True, True]
+    for run in found["runs"][2:]:
+        assert run["reasons"][0]["kind"] == "payload"
+        mass = run["reasons"][0]["parameters"]["mass"]
+        assert mass["value"] == pytest.approx(2.0, abs=0.1)
+        assert run["reasons"][0]["share"] > 0.9
+    with h5py.File(days.program.folder / "score.h5") as file:
+        assert file.attrs["content"] == "score"
+
+
+def test_friction_that_grew_is_named_with_its_size_and_since_when(days: Days) -> None:
+    ran = days.program("score", days.fit, days.dry, "--json")
+    assert ran.returncode == 1
+    for run in json.loads(ran.stdout)["runs"]:
+        assert run["joints"] == ["elbow"]
+        (reason,) = run["reasons"]
+        assert (reason["kind"], reason["joints"]) == ("coulomb_friction", ["elbow"])
+        assert reason["values"][0] == pytest.approx(4.0, rel=0.05)
+    days.program.answer("identify", SMOKE, days.sound, "-o", "sound_fit.h5", *DECLARED)
+    days.program.answer("identify", SMOKE, days.dry, "-o", "dry_fit.h5", *DECLARED)
+    found = days.program.answer("compare", days.fit, "sound_fit.h5", "dry_fit.h5")
+    changed = [each for each in found["changes"] if each["significant"]]
+    assert [each["name"] for each in changed] == ["coulomb_friction.coulomb[elbow]"]
+    assert changed[0]["since"] == "dry_fit"
+    assert changed[0]["before"] == pytest.approx(2.0, rel=0.03)
+    assert changed[0]["after"] == pytest.approx(6.0, rel=0.03)
+    shown = days.program("compare", days.fit, "dry_fit.h5").stdout
+    assert "coulomb_friction.coulomb[elbow] rose from 2" in shown
+
+
+def test_a_model_in_c_is_exported_from_a_fit(days: Days) -> None:
+    ran = days.program("export", days.fit, "--format", "c", "-o", "arm.c")
+    assert ran.returncode == 0, ran.stderr
+    text = (days.program.folder / "arm.c").read_text()
+    assert "#define EXCITE_JOINTS 5" in text
+    assert "viscous_friction at shoulder_yaw" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("score", "none.h5", "sound.h5"), "There is no file none.h5"),
+        (("score", "sound.h5", "sound.h5"), "sound.h5 holds no model. Give a fit"),
+        (("score", "fit.h5", "sound.h5", "sound.h5"), "sound.h5"),
+        (("score", "fit.h5", "sound.h5", "-o", "first.h5"), "first.h5 exists already"),
+        (("compare", "fit.h5"), "there is one day only. Give two files or more"),
+        (("compare", "fit.h5", "sound.h5"), "sound.h5 is no fit, diagnosis or score"),
+        (("compare", "fit.h5", "none.h5"), "There is no file none.h5"),
+        (("compare", "fit.h5", "fit.h5", "--covariate", "temp=20"), "1 values for 2 days"),
+        (("compare", "fit.h5", "fit.h5", "--covariate", "temp"), "give a name and numbers"),
+    ],
+)
+def test_bad_requests(days: Days, arguments: tuple[str, ...], told: str) -> None:
+    ran = days.program(*arguments)
+    assert ran.returncode == 2
+    assert told in ran.stderr.replace("\n", " ")
+
+
+def test_a_config_without_numbers_is_the_urdf(days: Days) -> None:
+    declared = days.program.folder / "declared.yaml"
+    robot = json.loads(json.dumps({"urdf": str(SMOKE.parents[1] / "data" / "smoke_arm.urdf")}))
+    declared.write_text(f"robot: {json.dumps(robot)}\neffects: [{{kind: viscous_friction}}]\n")
+    ran = days.program("score", declared, days.sound)
+    assert ran.returncode == 2
+    assert "declares effects and holds no values for them" in ran.stderr.replace("\n", " ")
+    declared.write_text(f"robot: {json.dumps(robot)}\n")
+    found = days.program("score", declared, days.sound)
+    assert found.returncode == 0, found.stderr
+    assert "does not tell how large its own errors were" in found.stderr.replace("\n", " ")
