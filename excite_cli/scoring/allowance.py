@@ -21,8 +21,9 @@ from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array
 
 SECONDS = 1.0  # of a block
-# More than the model's own residual: models are a little worse in motions that they do not know.
-TOLERATED = 1.35
+# More than the model's own residual: models are worse in motions that they do not know. With 1.35,
+# 3 of 240 sound runs raised an alarm, with ratios up to 1.75.
+TOLERATED = 1.5
 _SIGMAS = 4.0  # of a mean over blocks
 _PEAK = 2.5  # times the largest block of the model's own data
 _LEAST_SPREAD, _FEWEST = 0.5, 4  # of blocks, relative; blocks
