@@ -6,8 +6,8 @@ Four motions are diagnosed; then come twenty runs of other motions, one a week, 
 sees each in a file of its own. The robot is cold in weeks 1 and 2 (dry friction of all joints is
 more), carries a payload in week 12, is touched in week 15, and an encoder has slipped from week 17
 on. Sizes, joints, noise and friction are drawn from the seed. Every event must be named with its
-run, and no other run may raise an alarm. A wrist that slipped may change the torque by less than the
-model's own residual: such weeks are counted apart.
+run, and no other run may raise an alarm. A wrist that slipped may change the torque by less than
+the model's own residual: such weeks are counted apart.
 """
 
 import argparse

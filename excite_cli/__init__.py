@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from excite_cli.api.reporting import write_report as write_report
     from excite_cli.api.robots import describe_robot as describe_robot
     from excite_cli.api.scoring import score as score
+    from excite_cli.api.scoring import thresholds as thresholds
     from excite_cli.api.simulating import simulate as simulate
     from excite_cli.api.studying import run_study as run_study
     from excite_cli.api.verifying import verify_gradient as verify_gradient
@@ -75,6 +76,7 @@ if TYPE_CHECKING:
     from excite_cli.scoring.changes import Changes as Changes
     from excite_cli.scoring.records import Score as Score
     from excite_cli.scoring.records import ScoredRun as ScoredRun
+    from excite_cli.scoring.thresholds import Thresholds as Thresholds
     from excite_cli.shown.note import Level as Level
     from excite_cli.shown.note import Note as Note
     from excite_cli.simulation.settings import SimulationSettings as SimulationSettings
@@ -108,7 +110,7 @@ _HOMES = {
     "api.proposing": ("propose", "save_proposal"),
     "api.reporting": ("Report", "write_report"),
     "api.robots": ("describe_robot",),
-    "api.scoring": ("score",),
+    "api.scoring": ("score", "thresholds"),
     "api.simulating": ("simulate",),
     "api.studying": ("run_study",),
     "api.verifying": ("verify_gradient",),
@@ -137,6 +139,7 @@ _HOMES = {
     "proposal.propose": ("Proposal",),
     "scoring.changes": ("Change", "Changes"),
     "scoring.records": ("Score", "ScoredRun"),
+    "scoring.thresholds": ("Thresholds",),
     "shown.note": ("Level", "Note"),
     "simulation.settings": ("SimulationSettings",),
     "simulation.simulate": ("Simulation",),

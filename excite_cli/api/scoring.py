@@ -1,5 +1,6 @@
 """Stored models against new data: `excite score`."""
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,12 +10,14 @@ from excite_cli.api.loading import Case, load_data
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import refuse_twice
+from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import FileError
 from excite_cli.identification.split import split, whole
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.scoring.records import Score, ScoredRun
 from excite_cli.scoring.score import Scorer, together
+from excite_cli.scoring.thresholds import Residual, Thresholds, thresholds_of
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.score_file import write_score
 from excite_cli.summary.score import score_answer as score_answer
@@ -89,6 +92,43 @@ def score(
             tell(Note(Level.WARNING, finding.text))
         if output is not None:
             write_score(Path(output), found)
+        return found
+
+
+@checked()
+def thresholds(
+    model: Model | str | Path,
+    data: Dataset | str | Path | Sequence[str | Path],
+    *,
+    false_alarms: float = 1.0,
+    time_constant: float = 0.02,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    tell: Tell = log_note,
+) -> Thresholds:
+    """Thresholds of a collision detector from sound runs: `excite score --thresholds`.
+
+    They are made for so many `false_alarms` an hour on all joints together, and for a residual
+    behind a low pass of `time_constant` [s]. Written to `output` (JSON) if that is given.
+
+    Raises
+    ------
+    ConfigError, FileError, RobotError
+        See `score`; there is less than half a minute of data.
+    """
+    given = model if isinstance(model, Model) else load_model(model)
+    stored = given.made
+    scorer, case = Scorer(stored), Case(stored.spec, stored.folder, stored.robot)
+    paths = [] if isinstance(data, Dataset) else _paths(data)
+    with held({"thresholds": output}, overwrite, (stored.path, *paths)):
+        runs: list[Residual] = []
+        for each in [data] if isinstance(data, Dataset) else paths:
+            dataset = each if isinstance(each, Dataset) else load_data(case, each, tell)
+            for parts in _recordings(dataset, None, given).values():
+                runs += scorer.residuals(parts)
+        found = thresholds_of(stored.robot.joint_names, runs, false_alarms, time_constant)
+        if output is not None:
+            write_text_atomically(Path(output), json.dumps(found.as_data(), indent=1) + "\n")
         return found
 
 

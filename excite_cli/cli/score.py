@@ -28,6 +28,18 @@ def score(
         bool,
         typer.Option("--sealed", help="Of the model's own data, only what was sealed then."),
     ] = False,
+    limits: Annotated[
+        Path | None,
+        typer.Option(
+            "--thresholds",
+            metavar="FILE.json",
+            help="Write thresholds of a collision detector, from these runs.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    false_alarms: Annotated[
+        float, typer.Option("--false-alarms", help="Per hour, that the thresholds are made for.")
+    ] = 1.0,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -41,13 +53,17 @@ def score(
     payload, a contact, an offset, other friction, an encoder that slipped. Files are read one after
     the other, so there may be hundreds.
 
+    --thresholds: how large the residual of each joint may be, by speed and load, before a detector
+    that watches it says collision; the runs should be sound ones.
+
     Exit status 1: some run leaves what the model allows.
 
     Examples:
       excite score diagnosis.h5 monday.h5 tuesday.h5 -o week.h5
+      excite score diagnosis.h5 sound.h5 --thresholds thresholds.json --false-alarms 0.5
     """
     from excite_cli.api.scoring import score as score_data
-    from excite_cli.api.scoring import score_answer
+    from excite_cli.api.scoring import score_answer, thresholds
     from excite_cli.api.threads import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
@@ -61,4 +77,6 @@ def score(
             progress=line,
             tell=terminal.tell,
         )
+        if limits is not None:
+            thresholds(model, data, false_alarms=false_alarms, output=limits, overwrite=overwrite)
     terminal.show(score_answer(found))

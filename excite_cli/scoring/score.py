@@ -17,6 +17,7 @@ from excite_cli.robot.model import Array
 from excite_cli.scoring.allowance import Allowance, allowance_of, blocks_of
 from excite_cli.scoring.reason import reasons_of
 from excite_cli.scoring.records import Reason, ScoredRun
+from excite_cli.scoring.thresholds import Residual
 
 _SAME_RATE = 0.01
 
@@ -56,6 +57,16 @@ class Scorer:
         if self.allowance is None:
             return found
         return self._judged(found, prepared, predictions, model, self.allowance)
+
+    def residuals(self, runs: Sequence[Run]) -> list[Residual]:
+        """Unfiltered residuals of the parts of a recording, as a detector sees them."""
+        robot, found = self.stored.robot, []
+        for run in self._prepared(runs):
+            told = self._model([run]).predicted(robot, run)
+            good = np.isfinite(run.tau_raw)
+            residual = np.where(good, run.tau_raw - told.torque, 0.0)
+            found.append(Residual(residual, run.v, told.load, float(run.t[1] - run.t[0])))
+        return found
 
     def _prepared(self, runs: Sequence[Run]) -> list[PreparedRun]:
         prepared, short = [], None

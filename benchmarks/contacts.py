@@ -1,0 +1,119 @@
+"""Collisions planted in MuJoCo: how many does a detector see, how soon, at one false alarm an hour?
+
+    python -m benchmarks.contacts [--contacts N] [--clean N] [--seed S]
+
+A UR10 is diagnosed on four motions; thresholds come from twenty further sound runs. Then N runs
+have a push of 15 to 80 N on the tip for 0.2 to 0.5 s each, other runs have none. Beside thresholds
+that follow speed and load (`excite score --thresholds`): fixed ones, of the same law of maxima.
+"""
+
+import argparse
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.battery.motions import arm, pool, trajectory
+from benchmarks.known_payload import friction_of
+from excite_cli import Case, Model, diagnose
+from excite_cli.config.data_spec import EffectSpec
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.scoring.score import Scorer
+from excite_cli.scoring.thresholds import Residual, thresholds_of
+from excite_cli.simulation.planned_motion import PlannedMotion
+from excite_cli.simulation.planted import plant
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.simulate import simulate
+
+DAYS, SOUND, BATCH = 4, 20, 20
+
+
+def main() -> None:
+    """Print detection rate, delay, and false alarms of both detectors."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--contacts", type=int, default=200)
+    parser.add_argument("--clean", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    of, rng = arm("ur10"), np.random.default_rng([arguments.seed, 17])
+    best, base = pool("ur10", int(rng.integers(8))), friction_of(of.robot.n, rng)
+    seed, every = int(rng.integers(2**31)), tuple(range(of.robot.n))
+
+    def played(count: int, pushed: bool) -> tuple[Dataset, list[tuple[float, float]]]:
+        motions = tuple(
+            PlannedMotion(f"motion_{k}", trajectory(), best[int(i)])
+            for k, i in enumerate(rng.integers(0, len(best), count), start=1)
+        )
+        effects, times = list(base), []
+        for k in range(count if pushed else 0):
+            push = rng.normal(size=3)
+            push *= rng.uniform(15.0, 80.0) / np.linalg.norm(push)
+            start = float(rng.uniform(2.0, 8.0))
+            end = start + float(rng.uniform(0.2, 0.5))
+            shape = {"fy": push[1], "fz": push[2], "start": start, "end": end}
+            one = plant(kind_named("contact"), every, float(push[0]), shape, (f"motion_{k + 1}",))
+            effects.append(one)
+            times.append((start, end))
+        settings = SimulationSettings(seed=seed, rate=250.0, torque_noise=0.01)
+        data = simulate(of.robot, motions, settings, effects).dataset
+        own = np.random.default_rng(int(rng.integers(2**31)))  # the simulator's noise is the seed's
+        runs = tuple(
+            replace(run, tau=run.tau + 0.005 * run.tau.std(axis=0) * own.normal(size=run.tau.shape))
+            for run in data.runs
+        )
+        return replace(data, runs=runs), times
+
+    declared = tuple(EffectSpec(kind=kind) for kind in ("viscous_friction", "coulomb_friction"))
+    case = Case(of.spec.model_copy(update={"effects": declared}), Path("configs"), of.robot)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "model.h5"
+        diagnose(case, played(DAYS, False)[0], output=file, tell=lambda note: None)
+        scorer = Scorer(Model.load(file).made)
+        sound = [x for run in played(SOUND, False)[0].runs for x in scorer.residuals([run])]
+        followed = thresholds_of(of.robot.joint_names, sound)
+        fixed = thresholds_of(
+            of.robot.joint_names,
+            [Residual(x.residual, 0 * x.speed + 1.0, 0 * x.load, x.step) for x in sound],
+        )
+        tests: list[tuple[Residual, tuple[float, float] | None]] = []
+        while len(tests) < arguments.contacts + arguments.clean:
+            pushed = len(tests) < arguments.contacts
+            data, times = played(BATCH, pushed)
+            for k, run in enumerate(data.runs):
+                (residual,) = scorer.residuals([run])
+                first = run.t[-1] - run.t[0] - len(residual.residual) * residual.step
+                window = (times[k][0] - first / 2, times[k][1] - first / 2) if pushed else None
+                tests.append((residual, window))
+    print("detector          detected   delay median / 90 %   false alarms per hour")
+    for name, detector in (("speed and load", followed), ("fixed", fixed)):
+        delays, hits, alarms, seconds = [], 0, 0, 0.0
+        for residual, window in tests:
+            own = residual
+            if detector is fixed:
+                own = Residual(
+                    residual.residual, 0 * residual.speed + 1.0, 0 * residual.load, residual.step
+                )
+            t = residual.step * np.arange(len(residual.residual))
+            beyond = (detector.beyond(own) > 1.0).any(axis=1)
+            quiet = np.ones(len(t), bool)
+            if window is not None:
+                inside = (t >= window[0]) & (t <= window[1])
+                seen = np.flatnonzero(beyond & inside)
+                hits += bool(len(seen))
+                if len(seen):
+                    delays.append(float(t[seen[0]] - window[0]))
+                quiet = t < window[0] - 0.05
+            seconds += float(quiet.sum() * residual.step)
+            starts = np.flatnonzero(beyond & quiet)
+            alarms += int((np.diff(starts, prepend=-10_000) > 250).sum())
+        middle, late = (1e3 * float(np.quantile(delays, x)) for x in (0.5, 0.9))
+        print(
+            f"{name:16s} {hits:4d} of {arguments.contacts}   {middle:5.0f} / {late:.0f} ms"
+            f"            {3600 * alarms / seconds:.1f} ({alarms} in {seconds / 60:.0f} min)"
+        )
+
+
+if __name__ == "__main__":
+    main()
