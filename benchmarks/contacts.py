@@ -3,7 +3,7 @@
     python -m benchmarks.contacts [--contacts N] [--clean N] [--seed S]
 
 A UR10 is diagnosed on four motions; thresholds come from twenty further sound runs. Then N runs
-have a push of 15 to 80 N on the tip for 0.2 to 0.5 s each, other runs have none. Beside thresholds
+have a push of 2 to 20 N on the tip for 0.2 to 0.5 s each, other runs have none. Beside thresholds
 that follow speed and load (`excite score --thresholds`): fixed ones, of the same law of maxima.
 """
 
@@ -49,7 +49,7 @@ def main() -> None:
         effects, times = list(base), []
         for k in range(count if pushed else 0):
             push = rng.normal(size=3)
-            push *= rng.uniform(15.0, 80.0) / np.linalg.norm(push)
+            push *= rng.uniform(2.0, 20.0) / np.linalg.norm(push)
             start = float(rng.uniform(2.0, 8.0))
             end = start + float(rng.uniform(0.2, 0.5))
             shape = {"fy": push[1], "fz": push[2], "start": start, "end": end}

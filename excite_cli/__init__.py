@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from excite_cli.api.planning import plan_after as plan_after
     from excite_cli.api.proposing import propose as propose
     from excite_cli.api.proposing import save_proposal as save_proposal
+    from excite_cli.api.replaying import replay as replay
     from excite_cli.api.reporting import Report as Report
     from excite_cli.api.reporting import write_report as write_report
     from excite_cli.api.robots import describe_robot as describe_robot
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
     from excite_cli.scoring.changes import Changes as Changes
     from excite_cli.scoring.records import Score as Score
     from excite_cli.scoring.records import ScoredRun as ScoredRun
+    from excite_cli.scoring.replayed import Replay as Replay
     from excite_cli.scoring.thresholds import Thresholds as Thresholds
     from excite_cli.shown.note import Level as Level
     from excite_cli.shown.note import Note as Note
@@ -108,6 +110,7 @@ _HOMES = {
     "api.motions": ("load_motions", "motions_of"),
     "api.planning": ("plan", "plan_after"),
     "api.proposing": ("propose", "save_proposal"),
+    "api.replaying": ("replay",),
     "api.reporting": ("Report", "write_report"),
     "api.robots": ("describe_robot",),
     "api.scoring": ("score", "thresholds"),
@@ -139,6 +142,7 @@ _HOMES = {
     "proposal.propose": ("Proposal",),
     "scoring.changes": ("Change", "Changes"),
     "scoring.records": ("Score", "ScoredRun"),
+    "scoring.replayed": ("Replay",),
     "scoring.thresholds": ("Thresholds",),
     "shown.note": ("Level", "Note"),
     "simulation.settings": ("SimulationSettings",),

@@ -8,7 +8,7 @@ from pathlib import Path
 from excite_cli.api.arguments import checked
 from excite_cli.api.entering import Start, durations_of
 from excite_cli.api.exported_chains import ExportedChain, Wanted, chains_of
-from excite_cli.api.models import write_model, write_models
+from excite_cli.api.models import for_simulators, write_model, write_models
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import existing
 from excite_cli.claim import claim, leave
@@ -202,8 +202,8 @@ def _export_model(
 ) -> Exported:
     """A fit, a diagnosis or a config with its numbers as URDF, MJCF, YAML or C.
 
-    URDF and MJCF hold the physically consistent bodies of a fit, where it has them; C is the model
-    that the table of errors belongs to.
+    URDF and MJCF hold physically consistent bodies, and straight friction where they have no form
+    for what was found; C is the model that the table of errors belongs to.
     """
     path = output or Path(f"{file.stem}{MODELS[format]}")
     with held({"output": path}, overwrite, (file,)):
@@ -212,7 +212,12 @@ def _export_model(
         own = files_of_config(stored.spec, stored.folder, config)
         refuse_inputs_as_outputs({"--output": path}, (*own, *stored.sources))
         if format != "yaml":
-            model = stored.model if format == "c" else stored.consistent or stored.model
+            model = stored.model
+            notes: tuple[str, ...] = ()
+            if format != "c":
+                model, notes = for_simulators(stored, format)
+            for note in notes:
+                tell(Note(Level.NOTE, f"{path}: {note}"))
             write_model(stored.robot, model, format, path, tell)
         elif stored.what == "fit":
             write_models(stored.robot, read_fit(file).fit, {"parameters": path}, tell)

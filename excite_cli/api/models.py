@@ -4,21 +4,26 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from excite_cli.atomic import write_text_atomically
+from excite_cli.export import mjcf, urdf
 from excite_cli.export.c_model import c_model
 from excite_cli.export.exported import ModelText
-from excite_cli.export.mjcf import mjcf
 from excite_cli.export.parameters import parameters_yaml
-from excite_cli.export.urdf import updated_urdf
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Robot
+from excite_cli.scoring.straight_friction import with_straight_friction
 from excite_cli.shown.note import Level, Note, Tell
+from excite_cli.store.model_file import consistent_model
 
 _WRITERS: dict[str, Callable[[Robot, IdentifiedModel], ModelText]] = {
-    "urdf": updated_urdf,
-    "mjcf": mjcf,
+    "urdf": urdf.updated_urdf,
+    "mjcf": mjcf.mjcf,
     "c": c_model,
 }
+
+
+_HOLDS = {"urdf": urdf.holds, "mjcf": mjcf.holds}
 
 
 def write_models(
@@ -33,6 +38,19 @@ def write_models(
             write_text_atomically(Path(path), parameters_yaml(robot, fit))
         elif path is not None:
             write_model(robot, fit.best_model, kind, Path(path), tell)
+
+
+def for_simulators(stored: StoredModel, kind: str) -> tuple[IdentifiedModel, tuple[str, ...]]:
+    """A model with bodies that can be, and with friction of a form that `kind` holds; a note."""
+    model = consistent_model(stored)
+    model, joints = with_straight_friction(stored, model, _HOLDS[kind])
+    if not joints:
+        return model, ()
+    text = (
+        f"friction of {', '.join(joints)} has a form that {kind.upper()} cannot hold: it is the "
+        "nearest viscous and Coulomb friction"
+    )
+    return model, (text,)
 
 
 def write_model(robot: Robot, model: IdentifiedModel, kind: str, path: Path, tell: Tell) -> None:

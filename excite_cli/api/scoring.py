@@ -65,7 +65,7 @@ def score(
             progress(f"file {k + 1} of {len(sets)}", k)
             dataset = each if isinstance(each, Dataset) else load_data(case, each, tell)
             findings += dataset.findings
-            own = _recordings(dataset, stored.sealed_run if sealed else None, given)
+            own = recordings_of(dataset, stored.sealed_run if sealed else None, given)
             source = str(each) if isinstance(each, Path) else ", ".join(dataset.sources)
             for name, parts in own.items():
                 label = name if len(sets) == 1 else f"{Path(source).stem}: {name}"
@@ -124,7 +124,7 @@ def thresholds(
         runs: list[Residual] = []
         for each in [data] if isinstance(data, Dataset) else paths:
             dataset = each if isinstance(each, Dataset) else load_data(case, each, tell)
-            for parts in _recordings(dataset, None, given).values():
+            for parts in recordings_of(dataset, None, given).values():
                 runs += scorer.residuals(parts)
         found = thresholds_of(stored.robot.joint_names, runs, false_alarms, time_constant)
         if output is not None:
@@ -136,7 +136,7 @@ def _paths(data: str | Path | Sequence[str | Path]) -> list[Path]:
     return [Path(each) for each in ([data] if isinstance(data, str | Path) else data)]
 
 
-def _recordings(dataset: Dataset, sealed: str | None, model: Model) -> dict[str, list[Run]]:
+def recordings_of(dataset: Dataset, sealed: str | None, model: Model) -> dict[str, list[Run]]:
     """Parts of every recording by its name; of the `sealed` part alone if it is named."""
     runs = whole(dataset)
     if sealed is not None:

@@ -17,6 +17,7 @@ from excite_cli.cli.help_page import HelpfulCommand, HelpfulGroup, split_docstri
 from excite_cli.cli.identify import identify
 from excite_cli.cli.init import init
 from excite_cli.cli.optimize import optimize
+from excite_cli.cli.replay import replay
 from excite_cli.cli.report import report
 from excite_cli.cli.robots import robots
 from excite_cli.cli.schema import schema
@@ -52,6 +53,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "diagnose": diagnose,
     "score": score,
     "compare": compare,
+    "replay": replay,
     "study": study,
     "export": export,
     "report": report,
@@ -64,7 +66,7 @@ _GROUPS = {
     "Get started": ("robots", "init", "schema"),
     "Plan motions": ("optimize", "check", "compare-random", "verify-gradient"),
     "Inspect and export": ("report", "view", "export"),
-    "From measured data": ("simulate", "identify", "diagnose", "score", "compare"),
+    "From measured data": ("simulate", "identify", "diagnose", "score", "compare", "replay"),
     "Many cases": ("study",),
 }
 _ORDER = [name for names in _GROUPS.values() for name in names]

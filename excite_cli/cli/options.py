@@ -93,3 +93,13 @@ def changes(
     named = {"sequence.motions": motions, "seed": seed, "optimizer.restarts": restarts}
     given = [f"{key}={value}" for key, value in named.items() if value is not None]
     return [*(overrides or []), *given]
+
+
+StoredModel = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MODEL",
+        help="A fit, a diagnosis, or a config that `diagnose --apply` wrote.",
+        show_default=False,
+    ),
+]

@@ -11,14 +11,7 @@ from excite_cli.cli.help_page import OUTPUT
 
 
 def score(
-    model: Annotated[
-        Path,
-        typer.Argument(
-            metavar="MODEL",
-            help="A fit, a diagnosis, or a config that `diagnose --apply` wrote.",
-            show_default=False,
-        ),
-    ],
+    model: options.StoredModel,
     data: options.Data,
     output: Annotated[
         Path | None,

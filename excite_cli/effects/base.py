@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.effects.abscissa import Abscissa, Quantity, of_one_joint
+from excite_cli.effects.mjcf_parts import MjcfParts
 from excite_cli.effects.parameter import Parameter, Value, deviation, unit_of_slider
 from excite_cli.effects.place import Place
 from excite_cli.effects.rare_sizes import nearest_of_sign, two_deviations, unlikely_distance
@@ -418,6 +419,10 @@ class Effect(ABC):
     def mjcf(self, values: Array) -> dict[str, float]:
         """Attributes of MuJoCo's <joint> that hold this effect; empty if none can."""
         return {}
+
+    def put_into_mjcf(self, parts: MjcfParts, values: Array) -> bool:
+        """Add it to a MuJoCo model; false if that cannot hold it."""
+        return len(self.joints) == 1 and parts.add(self.joints[0], self.mjcf(values))
 
 
 def neighbours(robot: Robot) -> list[tuple[int, ...]]:

@@ -17,6 +17,7 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
 from excite_cli.effects.c_code import all_joints, reals
 from excite_cli.effects.directional import left_by_angles
+from excite_cli.effects.mjcf_parts import MjcfParts
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
@@ -62,6 +63,13 @@ class BaseTilt(Effect):
     def in_c(self, values: Array, columns: Sequence[str]) -> str:
         """Gravity that is turned."""
         return all_joints(f"tilted({reals(values)}, q, out)")
+
+    def put_into_mjcf(self, parts: MjcfParts, values: Array) -> bool:
+        """Gravity as the turned base sees it, to first order, as in `columns`."""
+        along = int(np.argmax(np.abs(parts.gravity)))
+        axes = np.delete(np.eye(3), along, axis=0)
+        parts.gravity = parts.gravity - np.cross(values @ axes, parts.gravity)
+        return True
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """The derivative of gravity's torque by position, gravity being −axis × g."""

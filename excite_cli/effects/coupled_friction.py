@@ -19,6 +19,7 @@ import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
 from excite_cli.effects.c_code import real
+from excite_cli.effects.mjcf_parts import MjcfParts, Tendon
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.effects.simulated_robot import Coupling, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
@@ -105,6 +106,14 @@ class CoupledFriction(Effect):
         first, second = self.joints
         shaft = signals.v[:, first] + self.shape["direction"] * signals.v[:, second]
         return Abscissa("speed of the coupled shaft", "rad/s", shaft)
+
+    def put_into_mjcf(self, parts: MjcfParts, values: Array) -> bool:
+        """Friction and damping of a tendon; its damping is the joints' own less, too."""
+        (first, second), (viscous, coulomb) = self.joints, map(float, values)
+        if coulomb < 0.0 or viscous < 0.0:
+            return False
+        parts.tendons.append(Tendon(first, second, self.shape["direction"], coulomb, viscous))
+        return True
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """Viscous: the other row's weight times s; Coulomb: both through the slope of the sign."""

@@ -48,6 +48,11 @@ class NonlinearViscousFriction(Effect):
         square = f"v[{j}] * v[{j}] + {real(sign_width() ** 2)}"
         return f"tau[{j}] += {real(values[0])} * v[{j}] * pow({square}, {real(half)});"
 
+    def mjcf(self, values: Array) -> dict[str, float]:
+        """Damping by v|v| or v³, which MuJoCo has from version 4 on."""
+        power = self.shape["power"]
+        return {f"damping_{power:.0f}": float(values[0])} if power in (2.0, 3.0) else {}
+
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂v_j = weight · (v² + w²)^((p−3)/2) (p v² + w²)."""
         j, p = self.joints[0], self.shape["power"]

@@ -5,10 +5,13 @@ of it gives the identified torque. A floating base stands at its reference.
 """
 
 import xml.etree.ElementTree as ElementTree
+from importlib import import_module
+from importlib.util import find_spec
 
 import numpy as np
 
 from excite_cli.effects.base import Effect
+from excite_cli.effects.mjcf_parts import MjcfParts
 from excite_cli.errors import RobotError
 from excite_cli.export.exported import (
     ModelText,
@@ -21,7 +24,7 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, TreeJoint, tree_of
 
-_ADDED = ("damping", "frictionloss", "armature")
+_POINT = 1e-6  # kg·m²: no body that moves has less, to MuJoCo
 
 
 def mjcf(robot: Robot, model: IdentifiedModel) -> ModelText:
@@ -33,22 +36,24 @@ def mjcf(robot: Robot, model: IdentifiedModel) -> ModelText:
         A body has inertias that MuJoCo refuses, since no mass distribution has them.
     """
     tree = tree_of(robot)
-    attributes, left = _joint_attributes(robot, model)
+    phi = model.phi + model.carried(robot.n)
+    parts, left = _parts(robot, model, tree.gravity)
     root = ElementTree.Element("mujoco", {"model": robot.name})
     ElementTree.SubElement(root, "compiler", {"angle": "radian", "autolimits": "false"})
-    ElementTree.SubElement(root, "option", {"gravity": vector(tree.gravity)})
+    ElementTree.SubElement(root, "option", {"gravity": vector(parts.gravity)})
     world = ElementTree.SubElement(root, "worldbody")
     placed: list[ElementTree.Element] = []
     for j, joint in enumerate(tree.joints):
         parent = world if joint.parent < 0 else placed[joint.parent]
-        body = _body(parent, joint, model.phi[_ten(tree, j)])
+        body = _body(parent, joint, phi[_ten(tree, j)])
         limits = _limits(robot, j)
         kind = "slide" if joint.sliding else "hinge"
         settings = {"name": joint.name, "type": kind, "axis": vector(joint.axis), **limits}
-        settings.update({key: number(value) for key, value in attributes[j].items()})
+        settings.update(_attributes(parts.joints[j]))
         joint_element = ElementTree.Element("joint", settings)
         body.insert(1, joint_element)
         placed.append(body)
+    _add_tendons(root, robot, parts)
     ElementTree.indent(root)
     notes = ["shapes, actuators and sensors are not in it"]
     if robot.payload is not None:
@@ -67,6 +72,9 @@ def _ten(tree: Tree, j: int) -> slice:
 def _body(parent: ElementTree.Element, joint: TreeJoint, ten: Array) -> ElementTree.Element:
     mass, center, inertia = ten_as_body(ten)
     moments = np.linalg.eigvalsh(inertia)
+    if abs(moments[0]) < _POINT:  # a point mass, or a body that the URDF gave no inertia
+        inertia = inertia + _POINT * np.eye(3)
+        moments = np.linalg.eigvalsh(inertia)
     if mass <= 0 or moments[0] <= 0 or moments[0] + moments[1] < moments[2]:
         raise RobotError(
             f"The body carried by '{joint.name}' (mass {mass:.3g} kg, principal moments "
@@ -114,20 +122,50 @@ def _limits(robot: Robot, j: int) -> dict[str, str]:
     return {"limited": "true", "range": f"{number(lower)} {number(upper)}"}
 
 
-def _joint_attributes(
-    robot: Robot, model: IdentifiedModel
-) -> tuple[list[dict[str, float]], list[Effect]]:
-    """Attributes of every joint's <joint>, and the effects that have no place there."""
-    attributes: list[dict[str, float]] = [{} for _ in range(robot.n)]
-    left: list[Effect] = []
-    for effect, values in model.by_effect:
-        found = effect.mjcf(values)
-        of_joint = attributes[effect.joints[0]]
-        clash = any(key in of_joint and key not in _ADDED for key in found)
-        negative = any(found[key] < 0 for key in _ADDED if key in found)
-        if not found or effect.runs or len(effect.joints) != 1 or clash or negative:
-            left.append(effect)
-            continue
-        for key, value in found.items():
-            of_joint[key] = of_joint.get(key, 0.0) + value if key in _ADDED else value
-    return attributes, left
+def holds(effect: Effect, values: Array) -> bool:
+    """Whether MuJoCo has a part for the effect."""
+    size = max(effect.joints, default=0) + 1
+    parts = MjcfParts([{} for _ in range(size)], np.zeros(3), _knows_polynomials())
+    return effect.put_into_mjcf(parts, values)
+
+
+def _parts(robot: Robot, model: IdentifiedModel, gravity: Array) -> tuple[MjcfParts, list[Effect]]:
+    """What the effects become in MuJoCo, and those that have no place there."""
+    parts = MjcfParts([{} for _ in range(robot.n)], np.array(gravity), _knows_polynomials())
+    left = [
+        effect
+        for effect, values in model.by_effect
+        if effect.runs or not (effect.carried or effect.put_into_mjcf(parts, values))
+    ]
+    for tendon in parts.tendons:  # it damps each of its joints alone as well
+        for joint in (tendon.first, tendon.second):
+            own = parts.joints[joint].get("damping", 0.0)
+            parts.joints[joint]["damping"] = max(own - tendon.damping, 0.0)
+    return parts, left
+
+
+def _knows_polynomials() -> bool:
+    """Whether the installed MuJoCo has damping by powers of the speed."""
+    if find_spec("mujoco") is None:
+        return False
+    return hasattr(import_module("mujoco").MjModel, "dof_dampingpoly")
+
+
+def _attributes(own: dict[str, float]) -> dict[str, str]:
+    powers = [own.get(name, 0.0) for name in ("damping", "damping_2", "damping_3")]
+    while len(powers) > 1 and not powers[-1]:
+        powers.pop()
+    told = {name: number(x) for name, x in own.items() if not name.startswith("damping")}
+    return {**told, "damping": vector(np.array(powers))} if any(powers) else told
+
+
+def _add_tendons(root: ElementTree.Element, robot: Robot, parts: MjcfParts) -> None:
+    if not parts.tendons:
+        return
+    tendons = ElementTree.SubElement(root, "tendon")
+    for each in parts.tendons:
+        told = {"frictionloss": number(each.friction), "damping": number(each.damping)}
+        fixed = ElementTree.SubElement(tendons, "fixed", told)
+        for joint, coefficient in ((each.first, 1.0), (each.second, each.ratio)):
+            name = robot.joint_names[joint]
+            ElementTree.SubElement(fixed, "joint", {"joint": name, "coef": number(coefficient)})

@@ -38,6 +38,11 @@ _INERTIA = (
 _UNCHANGED = 1e-14
 
 
+def holds(effect: Effect, values: Array) -> bool:
+    """Whether <dynamics> has a place for the effect."""
+    return bool(effect.urdf(values)) and bool((values >= 0.0).all())
+
+
 def updated_urdf(robot: Robot, model: IdentifiedModel) -> ModelText:
     """The URDF's text with `model` in it, and what a URDF cannot hold.
 

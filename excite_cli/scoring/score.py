@@ -38,7 +38,7 @@ class Scorer:
             No part is long enough for the filters.
         """
         robot = self.stored.robot
-        prepared = self._prepared(runs)
+        prepared = self.prepared(runs)
         model = self._model(prepared)
         predictions = [model.predicted(robot, run) for run in prepared]
         error = errors_on(robot, prepared, predictions)
@@ -61,14 +61,15 @@ class Scorer:
     def residuals(self, runs: Sequence[Run]) -> list[Residual]:
         """Unfiltered residuals of the parts of a recording, as a detector sees them."""
         robot, found = self.stored.robot, []
-        for run in self._prepared(runs):
+        for run in self.prepared(runs):
             told = self._model([run]).predicted(robot, run)
             good = np.isfinite(run.tau_raw)
             residual = np.where(good, run.tau_raw - told.torque, 0.0)
             found.append(Residual(residual, run.v, told.load, float(run.t[1] - run.t[0])))
         return found
 
-    def _prepared(self, runs: Sequence[Run]) -> list[PreparedRun]:
+    def prepared(self, runs: Sequence[Run]) -> list[PreparedRun]:
+        """Parts of a recording, filtered as for the model's own errors."""
         prepared, short = [], None
         for run in runs:
             try:

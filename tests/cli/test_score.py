@@ -21,6 +21,7 @@ class Days:
     """A fit of the first day, data of that day and of others, the program in their folder."""
 
     program: Program
+    motions: Path
     fit: Path
     first: Path
     sound: Path
@@ -42,6 +43,7 @@ def days(tmp_path_factory: pytest.TempPathFactory, cache: Path, two_motions: Run
     program.answer("identify", SMOKE, first, "-o", "fit.h5", *DECLARED)
     return Days(
         program,
+        two_motions.path,
         folder / "fit.h5",
         first,
         day("sound", "--torque-noise", "0.011"),
@@ -104,6 +106,30 @@ def test_a_model_in_c_is_exported_from_a_fit(days: Days) -> None:
     text = (days.program.folder / "arm.c").read_text()
     assert "#define EXCITE_JOINTS 5" in text
     assert "viscous_friction at shoulder_yaw" in text
+
+
+def test_the_exported_model_moves_as_the_robot_did(days: Days) -> None:
+    ran = days.program("replay", days.fit, days.first, "--sealed", "--json")
+    assert ran.returncode == 0, ran.stderr
+    found = json.loads(ran.stdout)
+    assert found["mean"]["after"] < 0.2 * found["mean"]["before"]
+    assert found["mean"]["after"] < 2e-3
+    assert set(found["after"]) == set(found["before"])
+    assert "deviates from the robot by" in days.program("replay", days.fit, days.first).stdout
+
+
+def test_thresholds_hold_for_sound_runs_and_not_for_a_load(days: Days) -> None:
+    made = days.program("score", days.fit, days.first, "--thresholds", "limits.json")
+    assert made.returncode == 2
+    assert "s of sound data say nothing of an hour" in made.stderr.replace("\n", " ")
+    arguments = ("-o", "long.h5", "--rate", "200", "--repeat", "4", *FRICTION)
+    days.program.answer("simulate", SMOKE, days.motions, *arguments)
+    made = days.program("score", days.fit, "long.h5", "--thresholds", "limits.json")
+    assert made.returncode == 0, made.stderr
+    told = json.loads((days.program.folder / "limits.json").read_text())
+    assert told["false_alarms_per_hour"] == 1.0
+    assert set(told["joints"]["elbow"]) == {"c", "level"}
+    assert all(joint["level"] > 1.0 for joint in told["joints"].values())
 
 
 @pytest.mark.parametrize(

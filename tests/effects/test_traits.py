@@ -144,6 +144,7 @@ def test_packages_above_know_no_kind_by_name(package: str) -> None:
         "base",
         "c_code",
         "catalogue",
+        "mjcf_parts",
         "place",
         "placing",
         "simulated_robot",

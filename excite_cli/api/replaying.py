@@ -1,0 +1,108 @@
+"""Recorded torques played on an exported model: `excite replay`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from excite_cli.api.arguments import checked
+from excite_cli.api.loading import Case, dataset_of
+from excite_cli.api.model import Model, load_model
+from excite_cli.api.models import for_simulators
+from excite_cli.api.scoring import recordings_of
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.effects.catalogue import urdf_friction
+from excite_cli.errors import RobotError
+from excite_cli.export.mjcf import mjcf
+from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.prepare import PreparedRun
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.robot.model import Array
+from excite_cli.scoring.replayed import Replay
+from excite_cli.scoring.score import Scorer
+from excite_cli.shown.note import Tell, log_note
+from excite_cli.simulation.replay import Played, drift, inertias
+from excite_cli.summary.replay import replay_answer as replay_answer
+
+_POSTURES = 40
+
+
+@checked()
+def replay(
+    model: Model | str | Path,
+    data: Dataset | str | Path | Sequence[str | Path],
+    *,
+    sealed: bool = False,
+    tell: Tell = log_note,
+) -> Replay:
+    """Recorded torques played on the exported model (MJCF), and on the URDF: `excite replay`.
+
+    `sealed`: of the data that the model was made of, only the part that was sealed then.
+
+    Returns
+    -------
+    Replay
+        RMS deviations from the measured motion [rad] (m) by joint, `before` and `after`; a loose
+        position loop, the same for both, holds the models (`excite_cli.simulation.replay`).
+
+    Raises
+    ------
+    FileError, ConfigError, RobotError, MissingExtraError
+        See `Model.load` and `load_data`; MuJoCo refuses the model, or is not installed.
+    """
+    given = model if isinstance(model, Model) else load_model(model)
+    stored = given.made
+    robot = stored.robot
+    dataset = dataset_of(Case(stored.spec, stored.folder, robot), data, tell)
+    own = recordings_of(dataset, stored.sealed_run if sealed else None, given)
+    scorer = Scorer(stored)
+    runs = [run for parts in own.values() for run in scorer.prepared(parts)]
+    simple, notes = for_simulators(stored, "mjcf")
+    exported = mjcf(robot, simple)
+    q = np.concatenate([run.q for run in runs])
+    inertia = inertias(exported.text, q[:: max(1, len(q) // _POSTURES)])
+    lost: list[str] = []
+
+    def deviation(text: str, played: list[Played], name: str) -> dict[str, float]:
+        found = drift(text, played, inertia)
+        if found.lost:
+            lost.append(name)
+        return dict(zip(robot.joint_names, map(float, found.rms), strict=True))
+
+    before: dict[str, float] | str = ""
+    phi = standard_parameters(robot)
+    if phi.any():
+        effects, values = urdf_friction(robot)
+        try:
+            untouched = mjcf(robot, IdentifiedModel(phi, effects, values)).text
+        except RobotError as refused:
+            notes = (*notes, f"the URDF is not played: {refused}")
+            untouched = ""
+        before = untouched and deviation(
+            untouched, [_played(run, run.tau_raw) for run in runs], "the URDF"
+        )
+    after = deviation(
+        exported.text, [_played(run, _of_robot(given, run)) for run in runs], "the model"
+    )
+    return Replay(
+        str(stored.path),
+        tuple(own),
+        float(sum(run.t[-1] - run.t[0] for run in runs)),
+        before or None,
+        after,
+        tuple(lost),
+        tuple(n for n, s in zip(robot.joint_names, robot.sliding, strict=True) if s),
+        (*notes, *exported.notes),
+    )
+
+
+def _played(run: PreparedRun, torque: Array) -> Played:
+    return Played(run.t, run.q, run.v, torque)
+
+
+def _of_robot(model: Model, run: PreparedRun) -> Array:
+    """The robot's torque (T, n): what was measured, less what the model holds for its defects."""
+    stored = model.made
+    defects = tuple(effect for effect in stored.model.effects if effect.data_defect)
+    whole = stored.model.predicted(stored.robot, run).torque
+    return run.tau_raw - (whole - stored.model.without(defects).predicted(stored.robot, run).torque)

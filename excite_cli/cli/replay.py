@@ -1,0 +1,40 @@
+"""`excite replay`: recorded torques played on an exported model."""
+
+from typing import Annotated
+
+import typer
+
+from excite_cli.cli import options
+from excite_cli.cli.console import Terminal
+
+
+def replay(
+    model: options.StoredModel,
+    data: options.Data,
+    sealed: Annotated[
+        bool,
+        typer.Option("--sealed", help="Of the model's own data, only what was sealed then."),
+    ] = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+) -> None:
+    """Play recorded torques on the model as simulators get it: does it move as the robot did?
+
+    The model is exported to MJCF and driven by the measured torques in MuJoCo, beside the URDF as
+    it is. Both are held by the same loose position loop (10 rad/s), as no model follows torques
+    alone for long; the table has how far each deviates from the measured motion.
+
+    Exit status 1: the model deviates no less than the URDF.
+
+    Examples:
+      excite replay diagnosis.h5 measured.h5 --sealed
+    """
+    from excite_cli.api.replaying import replay as replay_data
+    from excite_cli.api.replaying import replay_answer
+    from excite_cli.api.threads import single_threaded
+
+    terminal = Terminal(as_json, quiet, verbose, False)
+    with single_threaded():
+        found = replay_data(model, data, sealed=sealed, tell=terminal.tell)
+    terminal.show(replay_answer(found))
