@@ -13,11 +13,12 @@ from excite_cli.api.scoring import recordings_of
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.errors import RobotError
+from excite_cli.export.exported import ModelText
 from excite_cli.export.mjcf import mjcf
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.robot.model import Array
+from excite_cli.robot.model import Array, Robot
 from excite_cli.scoring.replayed import Replay
 from excite_cli.scoring.score import Scorer
 from excite_cli.shown.note import Tell, log_note
@@ -69,18 +70,13 @@ def replay(
             lost.append(name)
         return dict(zip(robot.joint_names, map(float, found.rms), strict=True))
 
-    before: dict[str, float] | str = ""
-    phi = standard_parameters(robot)
-    if phi.any():
-        effects, values = urdf_friction(robot)
-        try:
-            untouched = mjcf(robot, IdentifiedModel(phi, effects, values)).text
-        except RobotError as refused:
-            notes = (*notes, f"the URDF is not played: {refused}")
-            untouched = ""
-        before = untouched and deviation(
-            untouched, [_played(run, run.tau_raw) for run in runs], "the URDF"
-        )
+    before = None
+    untouched = _urdf(robot)
+    if isinstance(untouched, str):
+        notes = (*notes, untouched)
+    elif untouched is not None:
+        as_measured = [_played(run, run.tau_raw) for run in runs]
+        before = deviation(untouched.text, as_measured, "the URDF")
     after = deviation(
         exported.text, [_played(run, _of_robot(given, run)) for run in runs], "the model"
     )
@@ -88,12 +84,24 @@ def replay(
         str(stored.path),
         tuple(own),
         float(sum(run.t[-1] - run.t[0] for run in runs)),
-        before or None,
+        before,
         after,
         tuple(lost),
         tuple(n for n, s in zip(robot.joint_names, robot.sliding, strict=True) if s),
         (*notes, *exported.notes),
     )
+
+
+def _urdf(robot: Robot) -> ModelText | str | None:
+    """The URDF as it is, why MuJoCo refuses it, or None where it has no masses."""
+    phi = standard_parameters(robot)
+    if not phi.any():
+        return None
+    effects, values = urdf_friction(robot)
+    try:
+        return mjcf(robot, IdentifiedModel(phi, effects, values))
+    except RobotError as refused:
+        return f"the URDF is not played: {refused}"
 
 
 def _played(run: PreparedRun, torque: Array) -> Played:
