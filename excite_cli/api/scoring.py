@@ -3,15 +3,16 @@
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.loading import Case, load_data
+from excite_cli.api.loading import Case, load_data, tell_findings
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import refuse_twice
 from excite_cli.atomic import write_text_atomically
-from excite_cli.errors import FileError
+from excite_cli.errors import ExciteError, FileError
 from excite_cli.identification.split import split, whole
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
@@ -21,6 +22,9 @@ from excite_cli.scoring.thresholds import Residual, Thresholds, thresholds_of
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.score_file import write_score
 from excite_cli.summary.score import score_answer as score_answer
+from excite_cli.workers.base import News, Workers
+from excite_cli.workers.base import Tell as WorkersTell
+from excite_cli.workers.here import Here
 
 
 @checked()
@@ -31,6 +35,7 @@ def score(
     sealed: bool = False,
     output: str | Path | None = None,
     overwrite: bool = False,
+    workers: Workers | None = None,
     progress: Callable[[str, int], None] = lambda text, done: None,
     tell: Tell = log_note,
 ) -> Score:
@@ -38,7 +43,8 @@ def score(
 
     `data` are measured data or their files, which are read one after the other; `sealed`: of the
     data that the model was made of, only the part that was sealed then. Written to `output` (HDF5)
-    if that is given.
+    if that is given. `workers` (`open_workers`) share the files; of many, one that cannot be read
+    is told and left out.
 
     Returns
     -------
@@ -54,25 +60,20 @@ def score(
     """
     given = model if isinstance(model, Model) else load_model(model)
     stored = given.made
-    scorer, case = Scorer(stored), Case(stored.spec, stored.folder, stored.robot)
     paths = [] if isinstance(data, Dataset) else _paths(data)
     refuse_twice(paths)
     with held({"output": output}, overwrite, (stored.path, *paths)):
-        runs: list[ScoredRun] = []
-        findings: list[Finding] = []
-        sets: Sequence[Dataset | Path] = [data] if isinstance(data, Dataset) else paths
-        for k, each in enumerate(sets):
-            progress(f"file {k + 1} of {len(sets)}", k)
-            dataset = each if isinstance(each, Dataset) else load_data(case, each, tell)
-            findings += dataset.findings
-            own = recordings_of(dataset, stored.sealed_run if sealed else None, given)
-            source = str(each) if isinstance(each, Path) else ", ".join(dataset.sources)
-            for name, parts in own.items():
-                label = name if len(sets) == 1 else f"{Path(source).stem}: {name}"
-                try:
-                    runs.append(scorer.of(parts, source, label))
-                except FileError as short:
-                    tell(Note(Level.WARNING, str(short), name))
+        if isinstance(data, Dataset):
+            done: list[_Scored | Exception] = [_scored(given, data, "", sealed, single=True)]
+        else:
+            shared = (str(stored.path), sealed, len(paths) == 1)
+
+            def watch(news: News) -> None:
+                progress(f"{news.done} of {news.total} files", news.done)
+
+            place = workers or Here()
+            done = place.map(score_file, shared, [*map(str, paths)], watch, keep_failures=True)
+        runs, findings = _gathered(done, [*map(str, paths)], tell)
         if not runs:
             raise FileError("no run is long enough to be scored: record longer ones.")
         found = Score(
@@ -93,6 +94,56 @@ def score(
         if output is not None:
             write_score(Path(output), found)
         return found
+
+
+_Scored = tuple[list[ScoredRun], list[Finding]]
+
+
+def score_file(shared: tuple[str, bool, bool], path: str, tell: WorkersTell) -> _Scored:
+    """Scores of the runs of one file, for workers; `shared`: the model's file, sealed, only one."""
+    model, sealed, single = shared
+    given = _known_model(model, Path(model).stat().st_mtime_ns)
+    case = Case(given.made.spec, given.made.folder, given.made.robot)
+    return _scored(given, load_data(case, path, lambda note: None), path, sealed, single)
+
+
+@lru_cache(maxsize=1)
+def _known_model(path: str, stamp: int) -> Model:
+    """Read once by each worker."""
+    return load_model(path)
+
+
+def _scored(model: Model, data: Dataset, path: str, sealed: bool, single: bool) -> _Scored:
+    scorer, runs, findings = Scorer(model.made), [], list(data.findings)
+    own = recordings_of(data, model.made.sealed_run if sealed else None, model)
+    for name, parts in own.items():
+        label = name if single else f"{Path(path).stem}: {name}"
+        try:
+            runs.append(scorer.of(parts, path or ", ".join(data.sources), label))
+        except FileError as short:
+            findings.append(Finding("not scored", "warning", str(short), name))
+    return runs, findings
+
+
+def _gathered(
+    done: Sequence[_Scored | Exception], paths: Sequence[str], tell: Tell
+) -> tuple[list[ScoredRun], list[Finding]]:
+    """Runs and findings of all files; those that cannot be read are findings if others can."""
+    runs: list[ScoredRun] = []
+    findings: list[Finding] = []
+    failures = [each for each in done if isinstance(each, Exception)]
+    if failures and len(failures) == len(done):
+        raise failures[0]
+    for path, each in zip(paths or [""], done, strict=True):
+        if isinstance(each, ExciteError):
+            findings.append(Finding("not read", "warning", f"left out: {each}", path))
+        elif isinstance(each, Exception):
+            raise each
+        else:
+            runs += each[0]
+            findings += each[1]
+    tell_findings(findings, tell)
+    return runs, findings
 
 
 @checked()

@@ -33,6 +33,8 @@ def score(
     false_alarms: Annotated[
         float, typer.Option("--false-alarms", help="Per hour, that the thresholds are made for.")
     ] = 1.0,
+    workers: options.Workers = 1,
+    scheduler: options.Scheduler = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -58,15 +60,21 @@ def score(
     from excite_cli.api.scoring import score as score_data
     from excite_cli.api.scoring import score_answer, thresholds
     from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import working
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    with single_threaded(), terminal.live("score", len(data)) as line:
+    with (
+        single_threaded(),
+        working(workers, scheduler, 1, terminal.tell) as place,
+        terminal.live("score", len(data)) as line,
+    ):
         found = score_data(
             model,
             data,
             sealed=sealed,
             output=output,
             overwrite=overwrite,
+            workers=place,
             progress=line,
             tell=terminal.tell,
         )

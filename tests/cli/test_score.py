@@ -132,6 +132,20 @@ def test_thresholds_hold_for_sound_runs_and_not_for_a_load(days: Days) -> None:
     assert all(joint["level"] > 1.0 for joint in told["joints"].values())
 
 
+def test_workers_share_the_files_and_one_that_cannot_be_read_is_left_out(days: Days) -> None:
+    (days.program.folder / "broken.h5").write_bytes(b"no HDF5")
+    files = ("sound.h5", "loaded.h5", "dry.h5")
+    one, two = (
+        json.loads(days.program("score", days.fit, *files, "--json", *more).stdout)
+        for more in ((), ("--workers", "2"))
+    )
+    assert one == two
+    ran = days.program("score", days.fit, "sound.h5", "broken.h5")
+    assert ran.returncode == 0
+    assert "left out: broken.h5" in ran.stderr.replace("\n", " ")
+    assert days.program("score", days.fit, "broken.h5").returncode == 2
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
