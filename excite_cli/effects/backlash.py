@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from excite_cli.effects.base import Effect, Parameter, Signals, Tier, steps_by_ratio
+from excite_cli.effects.c_code import real
 from excite_cli.effects.parameter import whole_share
 from excite_cli.effects.simulated_robot import SimulatedRobot, Transmission, rotor_inertia
 from excite_cli.robot.model import Array, Robot
@@ -120,6 +121,12 @@ class Backlash(Effect):
         """Flights, blows, and the shift of the link, in all rows, (T, n, 1)."""
         gaps = np.array([self.shape["gap"]])
         return _Motion.of(signals, self.joints[0]).columns(gaps)[0][:, :, None]
+
+    def in_c_series(self, values: Array) -> str:
+        """Flights and blows of a whole series; a controller cannot know them in time."""
+        j, numbers = self.joints[0], (self.shape["gap"], float(values[0]), _FINE)
+        told = ", ".join(map(real, numbers))
+        return f"backlash(count, step, q, v, a, load, {j}, {told}, torque, spare);"
 
 
 @dataclass(frozen=True)

@@ -412,6 +412,13 @@ class Effect(ABC):
         """
         return ""
 
+    def in_c_series(self, values: Array) -> str:
+        """The same for a recorded series as a whole, where an instant alone tells too little.
+
+        `count`, `step`, `q`, `v`, `a`, `load` (rows), `torque` to add to, and `spare` to work in.
+        """
+        return ""
+
     def urdf(self, values: Array) -> dict[str, float]:
         """Attributes of the URDF's <dynamics> that hold this effect; empty if none can."""
         return {}

@@ -22,11 +22,13 @@ def c_model(robot: Robot, model: IdentifiedModel, made: str = "") -> ModelText:
     """The C file, and what it leaves out; `made`: where the model comes from, in a few words."""
     kept = model.without(model.of_single_runs)
     columns = tuple(dict.fromkeys(each.covariate for each in kept.effects if each.covariate))
-    codes = [
-        (effect, effect.in_c(values, columns) or ("" if not effect.carried else " "))
-        for effect, values in kept.by_effect
-    ]
-    unknown = tuple(effect for effect, code in codes if not code)
+    codes = [(effect, effect.in_c(values, columns)) for effect, values in kept.by_effect]
+    series = [effect.in_c_series(values) for effect, values in kept.by_effect]
+    unknown = tuple(
+        effect
+        for (effect, code), whole in zip(codes, series, strict=True)
+        if not (code or whole or effect.carried)
+    )
     kept = kept.without(unknown)
     names = robot.joint_names
     left = [*model.of_single_runs, *unknown]
@@ -49,6 +51,7 @@ def c_model(robot: Robot, model: IdentifiedModel, made: str = "") -> ModelText:
         "GRAVITY": reals(tree.gravity),
         "ROBOT_EFFECTS": _code(codes, defects=False),
         "DEFECTS": _code(codes, defects=True),
+        "SERIES_EFFECTS": "\n".join(f"    {code}" for code in series if code),
         **_tested(robot, kept, columns),
     }
     for name, filling in gaps.items():
@@ -65,7 +68,7 @@ def c_model(robot: Robot, model: IdentifiedModel, made: str = "") -> ModelText:
 
 
 def _code(codes: list[tuple[Effect, str]], defects: bool) -> str:
-    kept = (code for effect, code in codes if effect.data_defect == defects and code.strip())
+    kept = (code for effect, code in codes if effect.data_defect == defects and code)
     return "\n".join(f"    {code}" for code in kept)
 
 

@@ -19,7 +19,7 @@
  * Not in it:
 @LEFT@
  * Rates of torques (elastic gears, delays) are central differences in excite_series and backward
- * ones in excite_torque, which cannot look ahead; all else is the same in both.
+ * ones in excite_torque, which cannot look ahead and knows no backlash; all else is the same in both.
  */
 #include <math.h>
 #include <stddef.h>
@@ -286,6 +286,85 @@ static inline real dahl(
     return memory->bristle[j];
 }
 
+/* Means over the samples' own intervals of what is known on a grid `finer` times as fine. */
+static inline void into_sample(size_t fine, size_t finer, size_t count, real x, real *mean)
+{
+    const size_t half = finer / 2, k = (fine + half) / finer;
+    const size_t own = k == 0 ? finer - half : (k + 1 == count ? half + 1 : finer);
+    if (k < count)
+        mean[k] += x / (real)own;
+}
+
+static inline real between(const real *x, size_t stride, size_t fine, size_t finer, size_t count)
+{
+    const size_t k = fine / finer;
+    const real share = (real)(fine % finer) / (real)finer;
+    return k + 1 < count ? x[k * stride] + share * (x[(k + 1) * stride] - x[k * stride])
+                         : x[(count - 1) * stride];
+}
+
+/* Play of a gear: where the load changes its side the link flies across the gap, free of torque,
+ * and strikes the other flank. */
+static inline void backlash(
+    size_t count, real step, const real *q, const real *v, const real *a, const real *load, int j,
+    real gap, real share, real coarsest, real *torque, real *spare)
+{
+    real *lost = spare, *behind = spare + count, *inertia = spare + 2 * count, column[N], slope[N];
+    if (count < 3)
+        return;
+    const size_t finer = (size_t)fmax(1, ceil(step / coarsest)), whole = (count - 1) * finer + 1;
+    const real fine_step = step / (real)finer;
+    for (size_t k = 0; k < count; ++k) {
+        slopes(q + k * N, v + k * N, a + k * N, j, 0, 0, 1, column);
+        inertia[k] = fmax(column[j], R(1e-12));
+        lost[k] = behind[k] = 0;
+    }
+#define LOAD(i) between(load + j, N, i, finer, count)
+#define PULL(i) (LOAD(i) / between(inertia, 1, i, finer, count))
+    for (size_t i = 0; i < whole;) {
+        const real own = LOAD(i);
+        const int starts = i > 0 && (PULL(i) < 0) != (PULL(i - 1) < 0);
+        if (!starts) {
+            into_sample(i, finer, count, R(0.5) * gap * (real)((own > 0) - (own < 0)), behind);
+            i += 1;
+            continue;
+        }
+        const real side = PULL(i) < 0 ? -1 : 1;
+        real speed = 0, way = 0, blow = 0;
+        size_t end = i;
+        int met = 0;
+        while (end < whole && !met) {
+            speed += side * PULL(end);
+            way += speed;
+            met = way * (fine_step * fine_step) < 0 || way * (fine_step * fine_step) >= gap;
+            end += 1;
+        }
+        if (end >= whole)
+            met = 0;
+        const size_t last = met ? end : whole;
+        for (size_t k = i; k < last; ++k) {
+            blow += LOAD(k);
+            into_sample(k, finer, count, -LOAD(k), lost);
+        }
+        /* At the flank it is struck, and a change of side there is no start of another flight. */
+        if (last < whole) {
+            const real there = LOAD(last);
+            into_sample(last, finer, count, blow, lost);
+            into_sample(
+                last, finer, count, R(0.5) * gap * (real)((there > 0) - (there < 0)), behind);
+        }
+        i = last + 1;
+    }
+    for (size_t k = 0; k < count; ++k) {
+        slopes(q + k * N, v + k * N, a + k * N, j, 0, 0, 1, column);
+        slopes(q + k * N, v + k * N, a + k * N, j, 1, 0, 0, slope);
+        for (int r = 0; r < N; ++r)
+            torque[k * N + r] += share * (column[r] / inertia[k] * lost[k] - slope[r] * behind[k]);
+    }
+#undef LOAD
+#undef PULL
+}
+
 /* One instant: torque of the robot in `torque`, and with defects of the measurement in `tau`. */
 static void robot_torque(
     excite_memory *memory, const real *q, const real *v, const real *a, const real *column,
@@ -375,7 +454,7 @@ static void rates(size_t count, real step, const real *x, real *out)
 /* Numbers that excite_series needs to work with. */
 size_t excite_work(size_t count)
 {
-    return 4 * N * count;
+    return (4 * N + 3) * count;
 }
 
 void excite_series(
@@ -383,7 +462,7 @@ void excite_series(
     const real *column, real *tau, real *work)
 {
     real *load = work, *rate = work + N * count, *bend = work + 2 * N * count;
-    real *torque = work + 3 * N * count;
+    real *torque = work + 3 * N * count, *spare = work + 4 * N * count;
     excite_memory memory;
     excite_begin(&memory, step, start);
     for (size_t k = 0; k < count; ++k)
@@ -399,6 +478,8 @@ void excite_series(
             load + k * N, RATES ? rate + k * N : STILL, RATES ? bend + k * N : STILL, torque + k * N);
         memory.count += 1;
     }
+    (void)spare;
+@SERIES_EFFECTS@
     if (RATES)
         rates(count, step, torque, rate);
     for (size_t k = 0; k < count; ++k)
@@ -416,7 +497,7 @@ static const real TEST_COLUMN[TESTED * EXCITE_COLUMNS + 1] = {@TEST_COLUMN@};
 
 real excite_self_test(void)
 {
-    real tau[TESTED * N], work[4 * N * TESTED], worst = 0, largest = 0;
+    real tau[TESTED * N], work[(4 * N + 3) * TESTED], worst = 0, largest = 0;
     excite_series(TESTED, R(@TEST_STEP@), 0, TEST_Q, TEST_V, TEST_A, TEST_COLUMN, tau, work);
     for (size_t i = 0; i < TESTED * N; ++i) {
         worst = fmax(worst, fabs(tau[i] - TEST_TAU[i]));
