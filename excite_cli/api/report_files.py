@@ -9,10 +9,12 @@ from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import FileError
 from excite_cli.excitation.result import Result
 from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.scoring.records import Score
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.own_file import PROGRAM
 from excite_cli.store.result_file import read_result
+from excite_cli.store.score_file import is_score, read_score
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,7 @@ class Told:
 
     path: Path
     name: str
-    content: Result | StoredFit | Diagnosis
+    content: Result | StoredFit | Diagnosis | Score
 
     @property
     def earlier(self) -> frozenset[str]:
@@ -31,8 +33,8 @@ class Told:
 
     @property
     def stage(self) -> int:
-        """Motions come first, then what was identified, then what was diagnosed."""
-        return (Result, StoredFit, Diagnosis).index(type(self.content))
+        """Motions come first, then what was identified, diagnosed, and scored."""
+        return (Result, StoredFit, Diagnosis, Score).index(type(self.content))
 
 
 def read_files(paths: Sequence[Path]) -> tuple[Told, ...]:
@@ -52,19 +54,22 @@ def read_files(paths: Sequence[Path]) -> tuple[Told, ...]:
     return in_order(found)
 
 
-def _read(path: Path) -> Result | StoredFit | Diagnosis:
+def _read(path: Path) -> Result | StoredFit | Diagnosis | Score:
     if path.is_dir():
         raise FileError(f"{path} is a folder. Give files: result, fit or diagnosis (.h5).")
     if is_fit(path):
         return read_fit(path)
     if is_diagnosis(path):
         return read_diagnosis(path)
+    if is_score(path):
+        return read_score(path)
     try:
         return read_result(path)
     except FileError as error:
         raise FileError(
             f"{error} A report is made of results (`{PROGRAM} optimize`, `{PROGRAM} "
-            f"compare-random`), fits (`{PROGRAM} identify`) and diagnoses (`{PROGRAM} diagnose`)."
+            f"compare-random`), fits (`{PROGRAM} identify`), diagnoses (`{PROGRAM} diagnose`) and "
+            f"scores (`{PROGRAM} score`)."
         ) from error
 
 

@@ -30,21 +30,23 @@ def compare(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
 ) -> None:
     """Tell which parameters and effects changed between days, each with its test.
 
     Every parameter is followed over the files: is there a day since which it is another? What
     temperature or another column of the log explains is taken out first, where there are days
-    enough. The p-values are corrected for the number of parameters and of days.
+    enough. The p-values are corrected for the number of parameters and of days. Of a score, every
+    run is a day; of fits and diagnoses, give two or more: january.h5 february.h5 march.h5.
 
     Examples:
-      excite compare january.h5 february.h5 march.h5
+      excite compare week.h5
     """
     from excite_cli.api.changes import changes_answer
     from excite_cli.api.changes import compare as compare_files
     from excite_cli.api.threads import single_threaded
 
-    terminal = Terminal(as_json, quiet, verbose, False)
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with single_threaded():
         found = compare_files(files, dict(map(_column, covariate or ())))
     terminal.show(changes_answer(found))

@@ -7,7 +7,7 @@ neither wait nor print.
 from collections.abc import Callable
 
 MOTION_FORMATS = ("csv", "ros2", "rosbag2", "mcap", "moveit", "npz")
-MODEL_FORMATS = ("urdf", "mjcf", "yaml")
+MODEL_FORMATS = ("urdf", "mjcf", "yaml", "c")
 
 
 def complete_format(incomplete: str) -> list[str]:

@@ -18,6 +18,7 @@ def replay(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
 ) -> None:
     """Play recorded torques on the model as simulators get it: does it move as the robot did?
 
@@ -34,7 +35,7 @@ def replay(
     from excite_cli.api.replaying import replay_answer
     from excite_cli.api.threads import single_threaded
 
-    terminal = Terminal(as_json, quiet, verbose, False)
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with single_threaded():
         found = replay_data(model, data, sealed=sealed, tell=terminal.tell)
     terminal.show(replay_answer(found))

@@ -54,8 +54,8 @@ def score(
     Exit status 1: some run leaves what the model allows.
 
     Examples:
-      excite score diagnosis.h5 monday.h5 tuesday.h5 -o week.h5
-      excite score diagnosis.h5 sound.h5 --thresholds thresholds.json --false-alarms 0.5
+      excite score diagnosis.h5 measured.h5 -o week.h5
+      excite score diagnosis.h5 measured.h5 --sealed
     """
     from excite_cli.api.scoring import score as score_data
     from excite_cli.api.scoring import score_answer, thresholds

@@ -50,7 +50,7 @@ class NonlinearViscousFriction(Effect):
 
     def mjcf(self, values: Array) -> dict[str, float]:
         """Damping by v|v| or v³, which MuJoCo has from version 4 on."""
-        power = self.shape["power"]
+        power = self.shape.get("power")
         return {f"damping_{power:.0f}": float(values[0])} if power in (2.0, 3.0) else {}
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:

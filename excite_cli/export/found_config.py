@@ -37,7 +37,8 @@ def found_config(
     records = [*found.declared, *(named.effect for named in kept)]
     effects = [effect_of(record, found.joint_names) for record in records]
     tree["effects"] = effect_specs(effects, found.joint_names)
-    if not smallest:  # of fewer effects the values would be others
+    # Of fewer effects the values would be others; files of earlier versions do not name inertias.
+    if not smallest and len(found.inertia_names) == len(found.phi):
         tree["identified"] = _identified(found, records)
     some = f" of {len(found.effects)}" * smallest
     comment = (

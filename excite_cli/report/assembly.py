@@ -16,6 +16,9 @@ from excite_cli.report.compare_section import comparable, compare_results
 from excite_cli.report.diagnosis_sections import diagnosis_figures, diagnosis_sections
 from excite_cli.report.fit_sections import fit_figures, fit_sections
 from excite_cli.report.page import KeyFigure, Page, Section, Text
+from excite_cli.report.score_sections import score_figures, score_sections
+from excite_cli.scoring.records import Score
+from excite_cli.summary.score import sentences
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,7 @@ class Source:
 
     name: str
     file: str
-    content: Result | StoredFit | Diagnosis
+    content: Result | StoredFit | Diagnosis | Score
     problem: Problem | None = None
     picture: bool = True
 
@@ -83,6 +86,9 @@ def _part(source: Source, campaign: Campaign | None) -> _Part:
         return _Part(source, campaign_figures(campaign), sections)
     if isinstance(content, StoredFit):
         return _Part(source, fit_figures(content), fit_sections(content))
+    if isinstance(content, Score):
+        told = Text(" ".join(sentences(content)), "bad" if content.alarms else "answer")
+        return _Part(source, score_figures(content), score_sections(content), (told,))
     assert isinstance(content, Diagnosis)
     answer = Text(answer_in_words(content), "answer" if content.good else "bad")
     return _Part(source, diagnosis_figures(content), diagnosis_sections(content), (answer,))
@@ -129,7 +135,12 @@ def _compared(sources: Sequence[Source], campaigns: dict[str, Campaign]) -> tupl
 
 
 def _title(sources: Sequence[Source]) -> str:
-    kinds = {Result: "motions", StoredFit: "identified parameters", Diagnosis: "diagnosis"}
+    kinds: dict[type, str] = {
+        Result: "motions",
+        StoredFit: "identified parameters",
+        Diagnosis: "diagnosis",
+        Score: "score",
+    }
     robots = dict.fromkeys(s.problem.robot.name for s in sources if s.problem is not None)
     words = ", ".join(dict.fromkeys(kinds[type(source.content)] for source in sources))
     return f"{', '.join(robots)}: {words}" if robots else words.capitalize()

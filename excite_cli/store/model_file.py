@@ -64,7 +64,7 @@ def _of_fit(path: Path) -> StoredModel:
     spec, folder, robot = _robot(path, stored.config, stored.config_folder, stored.fingerprint)
     fit = stored.fit
     if fit.joint_names != robot.joint_names or len(fit.phi) != 10 * robot.n_bodies:
-        raise _other_robot(path, spec)
+        raise _other_bodies(path)
     noise = stored.noise_floor or dict(zip(fit.joint_names, map(float, fit.noise), strict=True))
     return StoredModel(
         path, "fit", spec, folder, robot, fit.model, stored.sealed_run, stored.error, noise,
@@ -76,7 +76,7 @@ def _of_diagnosis(path: Path) -> StoredModel:
     found = read_diagnosis(path)
     spec, folder, robot = _robot(path, found.config, found.config_folder, found.fingerprint)
     if found.joint_names != robot.joint_names or len(found.phi) != 10 * robot.n_bodies:
-        raise _other_robot(path, spec)
+        raise _other_bodies(path)
     records = [*found.declared, *(named.effect for named in found.effects)]
     noise = found.noise_floor or _by_joint(found.processing.get("noise_rms"), robot)
     trained = () if found.traces is None else found.traces.runs
@@ -202,6 +202,12 @@ def _robot(path: Path, config: str, folder: str, fingerprint: str) -> tuple[Spec
     if robot.fingerprint() != fingerprint:
         raise _other_robot(path, spec)
     return spec, Path(folder), robot
+
+
+def _other_bodies(path: Path) -> FileError:
+    return FileError(
+        f"{path} holds parameters of other joints or bodies than its config. Identify again."
+    )
 
 
 def _other_robot(path: Path, spec: Spec) -> FileError:

@@ -20,7 +20,7 @@ def score_answer(found: Score) -> Answer:
 
 def score_parts(found: Score) -> Parts:
     """A sentence, the runs, and errors per joint."""
-    return [*sentences(found), _runs(found), _joints(found)]
+    return [*sentences(found), runs_table(found), joints_table(found)]
 
 
 def sentences(found: Score) -> list[str]:
@@ -64,7 +64,8 @@ def _reason(reason: Reason, found: Score) -> str:
     return f"{title_of(reason.effect.kind)}{place and ' at ' + place}, {', '.join(told)}"
 
 
-def _runs(found: Score) -> Table:
+def runs_table(found: Score) -> Table:
+    """Every run with its error, state and likely reason."""
     rows = tuple(
         (
             run.name,
@@ -92,7 +93,8 @@ def _worst(run: ScoredRun) -> str:
     return f"{max(known):.2f}" if known else ""
 
 
-def _joints(found: Score) -> Table:
+def joints_table(found: Score) -> Table:
+    """Every joint's error over all runs, beside that when the model was made."""
     made = found.made
     rows = tuple(
         (

@@ -78,6 +78,13 @@ def test_a_payload_is_the_reason_of_the_alarm(days: Days) -> None:
         assert run["reasons"][0]["share"] > 0.9
     with h5py.File(days.program.folder / "score.h5") as file:
         assert file.attrs["content"] == "score"
+    made = days.program("report", "score.h5", "-o", "score.html")
+    assert made.returncode == 0, made.stderr
+    page = (days.program.folder / "score.html").read_text(encoding="utf-8")
+    assert "2 of 4 runs leave what its own residual allows" in page
+    assert "RMS of the residual over what the model allows" in page
+    found = days.program.answer("compare", "score.h5")
+    assert found["days"][0] == "score: sound: motion_1"
 
 
 def test_friction_that_grew_is_named_with_its_size_and_since_when(days: Days) -> None:

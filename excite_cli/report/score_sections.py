@@ -1,0 +1,74 @@
+"""What a page says about a stored model on new data: ratios over the runs, alarms, joints."""
+
+import numpy as np
+
+from excite_cli.report.chart import Colour
+from excite_cli.report.page import Charts, KeyFigure, Section, Table
+from excite_cli.report.plot import Panel, Plot, Series
+from excite_cli.scoring.records import Score
+from excite_cli.shown.table import Table as ShownTable
+from excite_cli.summary.score import joints_table, runs_table
+
+_COLOURS: tuple[Colour, ...] = ("blue", "vermilion", "green", "purple", "ink", "muted")
+
+
+def score_figures(score: Score) -> tuple[KeyFigure, ...]:
+    """What sums a score up."""
+    made = "" if score.made is None else f"{score.made.mean_relative_moving:.2%} when it was made"
+    return (
+        KeyFigure("error on these runs, moving", f"{score.error.mean_relative_moving:.2%}", made),
+        KeyFigure(
+            "runs out of what the model allows",
+            f"{len(score.alarms)} of {len(score.runs)}",
+            "its own residual, in proportion to the torque",
+        ),
+    )
+
+
+def score_sections(score: Score) -> tuple[Section, ...]:
+    """Ratios over the runs, the runs with their reasons, and the joints."""
+    sections = [
+        Section("runs", "Runs", (_table(runs_table(score)),)),
+        Section("joints", "Joints", (_table(joints_table(score)),)),
+    ]
+    if score.made is not None and len(score.runs) > 1:
+        sections.insert(0, Section("ratios", "Residual over the runs", (Charts((_plot(score),)),)))
+    return tuple(sections)
+
+
+def _plot(score: Score) -> Plot:
+    count = len(score.runs)
+    series = tuple(
+        Series(
+            joint,
+            np.array([run.ratio.get(joint, np.nan) for run in score.runs]),
+            _COLOURS[k % len(_COLOURS)],
+            "joined",
+        )
+        for k, joint in enumerate(score.joint_names)
+    )
+    alarms = ", ".join(run.name for run in score.alarms) or "none"
+    return Plot(
+        "RMS of the residual over what the model allows",
+        f"Ratio of every joint over {count} runs; alarms: {alarms}.",
+        "run",
+        np.arange(1.0, count + 1.0),
+        (Panel("ratio", series, height=240),),
+        caption="1: as on the day the model was made. Runs are numbered as in the table.",
+        wide=True,
+        counted=True,
+    )
+
+
+def _table(shown: ShownTable) -> Table:
+    """A table of the terminal, on the page."""
+    places = {name: k for k, name in enumerate(shown.columns)}
+    told = {places[name] for name in (*shown.left, *shown.words)}
+    return Table(
+        shown.columns,
+        shown.rows,
+        shown.title,
+        right=frozenset(set(places.values()) - told),
+        strong=frozenset(shown.bold),
+        wordy=frozenset(places[name] for name in shown.words),
+    )
