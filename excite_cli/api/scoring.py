@@ -88,7 +88,7 @@ def score(
             stored.noise or {},
             tuple(findings),
         )
-        found = replace(found, findings=(*found.findings, *_noticed(found)))
+        found = replace(found, findings=(*found.findings, *_noticed(found, given, sealed)))
         for finding in found.findings[len(findings) :]:
             tell(Note(Level.WARNING, finding.text))
         if output is not None:
@@ -193,6 +193,11 @@ def recordings_of(dataset: Dataset, sealed: str | None, model: Model) -> dict[st
     if sealed is not None:
         spec = model.made.spec
         named = sealed if sealed in dataset.names else None
+        if named is None and len(dataset.recordings) > 1:
+            raise FileError(
+                f"--sealed: these data have no run '{sealed}', on which {model.made.path} was "
+                "judged. Give the data that it was made of, or leave --sealed out."
+            )
         parts = split(dataset, named, spec.diagnosis.block, spec.identification.needed_runs)
         runs = list(parts.sealed)
     found: dict[str, list[Run]] = {}
@@ -201,11 +206,18 @@ def recordings_of(dataset: Dataset, sealed: str | None, model: Model) -> dict[st
     return found
 
 
-def _noticed(found: Score) -> list[Finding]:
+def _noticed(found: Score, model: Model, sealed: bool) -> list[Finding]:
     if found.made is None:
         text = (
             f"{found.model} does not tell how large its own errors were: no run can be out of what "
             "it allows. Give a fit, a diagnosis, or a config that `excite diagnose --apply` wrote."
         )
         return [Finding("no_allowance", "warning", text)]
+    changing = [effect.title for effect in model.effects if effect.of_campaign]
+    if changing and not sealed:
+        text = (
+            f"{changing[0]}: other recordings have no place on the clock of the campaign that the "
+            "model was made of; the first of each file is taken for its beginning"
+        )
+        return [Finding("other_campaign", "warning", text)]
     return []

@@ -160,6 +160,7 @@ def test_workers_share_the_files_and_one_that_cannot_be_read_is_left_out(days: D
         (("score", "sound.h5", "sound.h5"), "sound.h5 holds no model. Give a fit"),
         (("score", "fit.h5", "sound.h5", "sound.h5"), "sound.h5"),
         (("score", "fit.h5", "sound.h5", "-o", "first.h5"), "first.h5 exists already"),
+        (("score", "fit.h5", "sound.h5", "--sealed"), "these data have no run"),
         (("compare", "fit.h5"), "there is one day only. Give two files or more"),
         (("compare", "fit.h5", "sound.h5"), "sound.h5 is no fit, diagnosis or score"),
         (("compare", "fit.h5", "none.h5"), "There is no file none.h5"),
