@@ -509,10 +509,13 @@ real excite_self_test(void)
 #ifdef EXCITE_MAIN
 #include <stdio.h>
 #include <time.h>
+#ifndef EXCITE_CALLS
+#define EXCITE_CALLS 200000
+#endif
 int main(void)
 {
     const real worst = excite_self_test();
-    const long calls = 200000;
+    const long calls = EXCITE_CALLS;
     excite_memory memory;
     real tau[N], sum = 0;
     excite_begin(&memory, R(@TEST_STEP@), 0);

@@ -30,11 +30,16 @@ def average_rows(
     width = GAUSSIAN / cutoff / h if cutoff else 1.0
     kernel = np.exp(-0.5 * (offsets / width) ** 2)
     kernel /= kernel.sum()
+    shape = (len(centers), samples)
+    if len(centers) and centers.min() >= half and centers.max() + half < samples:
+        kind = np.int32 if len(centers) * len(kernel) < 2**31 else np.int64
+        columns = (centers.astype(kind)[:, None] + offsets.astype(kind)).ravel()
+        starts = np.arange(0, len(columns) + 1, len(kernel), dtype=kind)
+        return csr_matrix((np.tile(kernel, len(centers)), columns, starts), shape)
     columns = (centers[:, None] + offsets).ravel()
     inside = (columns >= 0) & (columns < samples)
     rows = np.repeat(np.arange(len(centers)), len(kernel))
     values = np.tile(kernel, len(centers))
-    shape = (len(centers), samples)
     return csr_matrix((values[inside], (rows[inside], columns[inside])), shape)
 
 

@@ -92,17 +92,8 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     FileError
         The run is too short for the filters, or recorded too slowly for their cut-off.
     """
-    fs, q = 1.0 / run.step, run.q
-    if processing.position_cutoff is not None:
-        q = _smooth(q, processing.position_cutoff, fs, run.label)
-        _require_smooth(run, q, processing.position_cutoff)
-    if processing.velocity == "measured" and run.dq is not None:
-        v = run.dq
-        if processing.position_cutoff is not None:
-            v = _smooth(v, processing.position_cutoff, fs, run.label)
-    else:
-        v = np.gradient(q, run.step, axis=0)
-    a = np.gradient(v, run.step, axis=0)
+    fs = 1.0 / run.step
+    q = _positions(run, processing, fs)
     border = int(np.ceil(processing.border * fs))
     stride = processing.working_stride
     inside = slice(border, len(run.t) - border)
@@ -120,8 +111,9 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     # The torque is averaged at the full rate: picking samples first would fold its noise down.
     of_torque = average_rows(len(run.t[inside]), centers * stride, run.step, cutoff)
     recorded = run.usable()[inside]
-    speed = np.abs(np.asarray(averages @ v[keep]))
-    counted = recorded & _sliding(v, run.step, processing, left_out.coupled)[inside]
+    v, a, sliding = _motion(run, q, processing, left_out.coupled, keep)
+    speed = np.abs(np.asarray(averages @ v))
+    counted = recorded & sliding[inside]
     past = q[:border]
     if run.before is not None and len(run.before):
         earlier = run.before
@@ -129,49 +121,104 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
             earlier = _smooth(earlier, processing.position_cutoff, fs, run.label)
         past = np.concatenate([earlier, past])
     counted &= left_out.on_the_way(q[inside], past)
-    joints = range(run.q.shape[1])
-    for_fit = [without(of_torque, counted[:, j]) for j in joints]
     # The very same weights for the columns: left out at the working rate, other stretches of time
     # would be, and the torque would lag by milliseconds.
     to_full_rate = interpolation(len(t), stride, len(counted))
-    fit_averages = tuple((each @ to_full_rate).tocsr() for each in for_fit)
-    of_valid = [without(of_torque, recorded[:, j]) for j in joints]
-    valid_averages = tuple(
-        averages if each is of_torque else (each @ to_full_rate).tocsr() for each in of_valid
-    )
-    tau = run.tau[inside]
+    tau, joints = run.tau[inside], range(run.q.shape[1])
+    # Averages at the full rate are as large as all else together: one joint's at a time.
+    fit = [_averaged(without(of_torque, counted[:, j]), to_full_rate, run, tau, j) for j in joints]
+    valid = [
+        _Averaged(averages, np.asarray(of_torque @ tau[:, j]), filled(of_torque) & filled(averages))
+        if recorded[:, j].all()
+        else _averaged(without(of_torque, recorded[:, j]), to_full_rate, None, tau, j)
+        for j in joints
+    ]
     return PreparedRun(
         run=run.id,
         t=t,
         q=q[keep],
-        v=v[keep],
-        a=a[keep],
+        v=v,
+        a=a,
         tau_raw=run.tau[keep],
         averages=averages,
-        tau=np.stack([np.asarray(of_valid[j] @ tau[:, j]) for j in joints], axis=1),
-        valid=np.stack([filled(of_valid[j]) & filled(valid_averages[j]) for j in joints], axis=1),
-        valid_averages=valid_averages,
+        tau=np.stack([each.tau for each in valid], axis=1),
+        valid=np.stack([each.filled for each in valid], axis=1),
+        valid_averages=tuple(each.averages for each in valid),
         moving=speed > processing.moving_speed,
-        fit_averages=fit_averages,
-        tau_fit=np.stack([np.asarray(for_fit[j] @ tau[:, j]) for j in joints], axis=1),
-        usable=np.stack([filled(for_fit[j]) & filled(fit_averages[j]) for j in joints], axis=1),
+        fit_averages=tuple(each.averages for each in fit),
+        tau_fit=np.stack([each.tau for each in fit], axis=1),
+        usable=np.stack([each.filled for each in fit], axis=1),
         step=float((centers[1] - centers[0]) * h),
         start=run.start,
         covariates={name: values[keep] for name, values in run.covariates.items()},
         before=past[len(past) % stride :: stride],
-        rounding=_rounding(run, for_fit, tau),
+        rounding=() if run.torque_step is None else tuple(each.rounding for each in fit),
     )
 
 
-def _rounding(run: Run, averages: Sequence[csr_matrix], tau: Array) -> tuple:
-    """Per joint what its steps leave uncertain; nothing where torques come in none."""
-    if run.torque_step is None:
-        return ()
-    steps = run.torque_step.tolist()
-    return tuple(
-        rounding_of(each, tau[:, j], steps[j]) if steps[j] else None
-        for j, each in enumerate(averages)
-    )
+@dataclass(frozen=True)
+class _Averaged:
+    """One joint's `averages` (M, T) at the working rate, of its torque (M,), and which are any."""
+
+    averages: csr_matrix
+    tau: Array
+    filled: NDArray[np.bool_]
+    rounding: csr_matrix | None = None
+
+
+def _averaged(
+    full: csr_matrix, to_full_rate: csr_matrix, run: Run | None, tau: Array, j: int
+) -> _Averaged:
+    """Of averages at the full rate; with `run`, what the steps of its torque leave uncertain."""
+    own = (full @ to_full_rate).tocsr()
+    rounding = None
+    if run is not None and run.torque_step is not None and run.torque_step[j]:
+        rounding = rounding_of(full, tau[:, j], float(run.torque_step[j]))
+    return _Averaged(own, np.asarray(full @ tau[:, j]), filled(full) & filled(own), rounding)
+
+
+def _positions(run: Run, processing: Processing, fs: float) -> Array:
+    """Smoothed positions (T, n), one joint after the other: filters take room."""
+    cutoff = processing.position_cutoff
+    if cutoff is None:
+        return run.q
+    q = np.empty_like(run.q)
+    for j in range(q.shape[1]):
+        q[:, j] = _smooth(run.q[:, j], cutoff, fs, run.label)
+    _require_smooth(run, q, cutoff)
+    return q
+
+
+def _motion(
+    run: Run,
+    q: Array,
+    processing: Processing,
+    coupled: Sequence[tuple[int, int, float]],
+    keep: slice,
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Speeds and accelerations at the samples to `keep`, and where joints slide (T, n)."""
+    n = q.shape[1]
+
+    def speed(j: int) -> Array:
+        if processing.velocity != "measured" or run.dq is None:
+            return np.asarray(np.gradient(q[:, j], run.step))
+        cutoff = processing.position_cutoff
+        return (
+            run.dq[:, j]
+            if cutoff is None
+            else _smooth(run.dq[:, j], cutoff, 1.0 / run.step, run.label)
+        )
+
+    sliding = np.empty(q.shape, dtype=bool)
+    v, a = (np.empty((len(q[keep]), n)) for _ in range(2))
+    for j in range(n):
+        own = speed(j)
+        v[:, j], a[:, j] = own[keep], np.gradient(own, run.step)[keep]
+        sliding[:, j] = _sliding(own, run.step, processing)
+    for j, k, s in coupled:
+        both = _sliding(speed(j) + s * speed(k), run.step, processing)
+        sliding[:, [j, k]] &= both[:, None]
+    return v, a, sliding
 
 
 def require_motion(
@@ -211,24 +258,15 @@ def require_motion(
         )
 
 
-def _sliding(
-    v: Array, h: float, processing: Processing, coupled: Sequence[tuple[int, int, float]]
-) -> NDArray[np.bool_]:
-    """Samples (T, n) in which a joint moves and is not about to reverse, nor has just done so."""
-    if coupled:
-        sums = np.stack([v[:, j] + s * v[:, k] for j, k, s in coupled], axis=1)
-        both = _sliding(np.concatenate([v, sums], axis=1), h, processing, ())
-        own = both[:, : v.shape[1]]
-        for pair, (j, k, _) in enumerate(coupled):
-            own[:, [j, k]] &= both[:, v.shape[1] + pair, None]
-        return own
+def _sliding(v: Array, h: float, processing: Processing) -> NDArray[np.bool_]:
+    """Samples (T,) in which a joint moves and is not about to reverse, nor has just done so."""
     margin = _STICKING
     if processing.position_cutoff is not None:
         margin = max(margin, _SMEARED / processing.position_cutoff)
     crossing = np.zeros(v.shape, dtype=np.uint8)
     crossing[1:] = np.signbit(v[1:]) != np.signbit(v[:-1])
     half = round(margin / h)
-    near = maximum_filter1d(crossing, 2 * half + 1, axis=0) > 0
+    near = maximum_filter1d(crossing, 2 * half + 1) > 0
     return ~near & (np.abs(v) > processing.moving_speed)
 
 
