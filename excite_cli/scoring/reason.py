@@ -86,7 +86,7 @@ def _best(
         columns[:, rows] = own[::every] * scale[:, rows, None]
         flat = columns.reshape(left.size, -1)
         together = np.hstack([beside, flat])
-        values, covariance, _ = _solved(together, left.ravel())
+        values, covariance = _solved(together, left.ravel())
         own_values = values[beside.shape[1] :]
         own_covariance = correlated * covariance[beside.shape[1] :, beside.shape[1] :]
         if not _possible(effect, own_values, own_covariance):
@@ -121,13 +121,13 @@ def _possible(effect: Effect, values: Array, covariance: Array) -> bool:
         return False
 
 
-def _solved(columns: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Least squares: values, covariance at unit variance, and the Gram matrix."""
+def _solved(columns: Array, y: Array) -> tuple[Array, Array]:
+    """Least squares: values, and their covariance at unit variance."""
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
     scaled = columns / size
     gram = scaled.T @ scaled
     inverse = np.linalg.pinv(gram, hermitian=True, rcond=1e-10)
-    return inverse @ (scaled.T @ y) / size, inverse / np.outer(size, size), gram
+    return inverse @ (scaled.T @ y) / size, inverse / np.outer(size, size)
 
 
 def _told(
@@ -141,7 +141,7 @@ def _told(
     if not taken:
         return ()
     columns = np.hstack([each for _, each in taken])
-    values, covariance, _ = _solved(columns, residual)
+    values, covariance = _solved(columns, residual)
     rest = residual - columns @ values
     noise = max(float(rest @ rest) / max(len(residual) - len(values), 1), 1e-30)
     reasons, at = [], 0

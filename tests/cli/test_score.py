@@ -85,6 +85,9 @@ def test_a_payload_is_the_reason_of_the_alarm(days: Days) -> None:
     assert "RMS of the residual over what the model allows" in page
     found = days.program.answer("compare", "score.h5")
     assert found["days"][0] == "score: sound: motion_1"
+    days.program.answer("score", days.fit, days.sound, "-o", "sound_score.h5")
+    sound = days.program.answer("compare", "sound_score.h5")
+    assert not any(each["significant"] for each in sound["changes"])  # two motions differ a little
 
 
 def test_friction_that_grew_is_named_with_its_size_and_since_when(days: Days) -> None:
