@@ -13,7 +13,7 @@ from excite_cli.config.spec import Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.identification.prepare import prepare
+from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.motion_files import motion_reader_for, read_motion
@@ -187,5 +187,5 @@ def _refuse_degrees(path: Path, q: Array, robot: Robot) -> None:
 def _measured(problem: Problem | Case, data: Dataset) -> list[Segment]:
     spec = problem.spec
     processing = choose_processing(data.runs, spec.measurement.filter, spec.diagnosis.moving_speed)
-    runs = [prepare(run, processing) for run in data.runs]
+    runs = prepare_all(data.runs, processing)
     return [Segment(run.run.key, *through_samples(run.t, run.q, run.v, run.a)) for run in runs]

@@ -18,6 +18,7 @@ from excite_cli.effects.placing import places_named
 from excite_cli.errors import ConfigError, ExciteWarning
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
+from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array, Robot
 
 _TOGETHER = 16  # effects that are filtered at once
@@ -178,17 +179,20 @@ def with_columns(
     for i, (effect, _) in enumerate(effects):
         alike.setdefault(effect.rows(n), []).append(i)
     columns: list[list[Array]] = [[] for _ in effects]
+    spool, shows, finite = Spool(), np.zeros(len(effects), bool), np.ones(len(effects), bool)
     for signal, run in zip(signals, runs, strict=True):
         for rows, members in alike.items():
             blocks = _filtered([effects[i][0] for i in members], rows, signal, run)
             for i, block in zip(members, blocks, strict=True):
-                columns[i].append(block)
+                columns[i].append(spool.keep(block))
+                shows[i] |= bool(np.abs(block).max(initial=0.0) > 0)
+                finite[i] &= bool(np.isfinite(block).all())
         signal.body.forget()
+        forget()
     return [
         Candidate(effect, effect.rows(n), tuple(blocks), tests)
-        for (effect, tests), blocks in zip(effects, columns, strict=True)
-        if any(np.abs(block).max(initial=0.0) > 0 for block in blocks)
-        and all(np.isfinite(block).all() for block in blocks)
+        for (effect, tests), blocks, there in zip(effects, columns, shows & finite, strict=True)
+        if there
     ]
 
 

@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.training import TrainingData
+from excite_cli.out_of_core import forget
 from excite_cli.robot.model import Array
 
 
@@ -37,6 +38,7 @@ def covariance_of(
             if run.rounding and (rounding := run.rounding[joint]) is not None:
                 rounded = rounding.T @ x
                 spread += rounded.T @ rounded
+            forget()
     if data.prior_precision is not None:
         at = np.arange(len(data.prior_precision))
         normal[at, at] += data.prior_precision

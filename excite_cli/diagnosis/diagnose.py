@@ -50,7 +50,7 @@ from excite_cli.identification.declared_runs import check_declared_runs, check_l
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
-from excite_cli.identification.prepare import PreparedRun, prepare, require_motion
+from excite_cli.identification.prepare import PreparedRun, prepare_all, require_motion
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
@@ -116,7 +116,7 @@ def _diagnosed(
     refuse_sealed_copies(parts)
     processing, training = _prepared(spec, parts)
     require_motion(training, processing, robot.joint_names, spec.measurement.without_torque)
-    kept = [prepare(run, processing) for run in parts.sealed]  # refused early where too short
+    kept = prepare_all(parts.sealed, processing)  # refused early where too short
     suspicious = check_recorded(robot, parts.training, training, processing, spec.measurement)
     traced = _traced(model, spec, parts, processing, progress)
     with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
@@ -126,7 +126,7 @@ def _diagnosed(
         del traced  # gigabytes, of large data: not beside the next one
         processing, training = _prepared(spec, parts)
         traced = _traced(model, spec, parts, processing, progress, start)
-        kept = [prepare(run, processing) for run in parts.sealed]
+        kept = prepare_all(parts.sealed, processing)
     progress("naming", 8)
     final = final_fit(traced)
     traced, parameters, covariance = final.traced, final.parameters, final.covariance
@@ -146,7 +146,7 @@ def _diagnosed(
         robot.joint_names,
     )
     doubts = approximations(traced, unexplained, robot.joint_names, rests)
-    ends = [prepare(run, processing) for run in parts.ends]
+    ends = prepare_all(parts.ends, processing)
     played = Played(robot, kept)
     told = played.predictions(models[0]), played.predictions(models[1])
     sealed_part = on_sealed(played, *told)
@@ -239,7 +239,7 @@ def _prepared(spec: Spec, parts: Split) -> tuple[Processing, list[PreparedRun]]:
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )
-    return processing, [prepare(run, processing) for run in parts.training]
+    return processing, prepare_all(parts.training, processing)
 
 
 def _traced(
@@ -254,7 +254,7 @@ def _traced(
     progress("filtering", 0)
 
     def prepared(left_out: LeftOut) -> list[PreparedRun]:
-        return [prepare(run, processing, left_out) for run in parts.training]
+        return prepare_all(parts.training, processing, left_out)
 
     return trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress, start)
 

@@ -8,7 +8,7 @@ from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
-from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.prepare import PreparedRun, prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Array, Dataset
 
@@ -32,7 +32,7 @@ def measured_stack(problem: Problem, data: Dataset) -> tuple[Stack, str]:
     processing = choose_processing(
         data.runs, problem.spec.measurement.filter, problem.spec.diagnosis.moving_speed
     )
-    runs = [prepare(run, processing) for run in data.runs]
+    runs = prepare_all(data.runs, processing)
     return stack_of_runs(problem, runs)
 
 

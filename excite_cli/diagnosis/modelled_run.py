@@ -11,6 +11,7 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import effect_columns, seen_of, with_effects
+from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
 
 
@@ -20,19 +21,20 @@ class ModelledRun:
     These are all standard parameters beside a prior, and the base parameters' columns without.
     """
 
-    def __init__(self, model: Model, run: PreparedRun) -> None:
+    def __init__(self, model: Model, run: PreparedRun, spool: Spool) -> None:
         self.model = model
         self._body = RigidBody(model.robot, standard_parameters(model.robot), run.q, run.v, run.a)
-        self.take(run)
+        self.take(run, spool)
 
-    def take(self, run: PreparedRun) -> None:
-        """The same motion with other averages."""
+    def take(self, run: PreparedRun, spool: Spool) -> None:
+        """The same motion with other averages; `spool` keeps the columns."""
         self.run = run
         columns = self._body.regressor
         if self.model.prior is None:
             columns = columns[:, :, self.model.base.selection]
-        self.inertial = run.averaged_for_fit(columns)
+        self.inertial = spool.keep(run.averaged_for_fit(columns))
         self._body.forget()
+        forget()
 
     def signals(self, phi: Array, effects: Sequence[Effect], values: Array) -> Signals:
         """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
@@ -53,15 +55,16 @@ def training_data(
     signals: Sequence[Signals],
 ) -> TrainingData:
     """Columns of the declared model and torque of every part; `folds` are left out together."""
-    declared, torques = [], []
+    declared, torques, spool = [], [], Spool()
     for body, signal in zip(modelled, signals, strict=True):
         run = body.run
         inertial, tau = body.inertial, run.tau_fit
         if model.prior is not None:
             tau = tau - inertial @ model.prior.mean
         effects = run.averaged_for_fit(effect_columns(model.declared, signal))
-        declared.append(np.concatenate([inertial, effects], axis=2))
+        declared.append(spool.keep(np.concatenate([inertial, effects], axis=2)))
         torques.append(tau)
+        forget()
     precision = None
     if model.prior is not None:
         precision = np.concatenate([model.prior.precision, np.zeros(model.declared_width)])

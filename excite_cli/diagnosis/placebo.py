@@ -15,6 +15,7 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.training import TrainingData
+from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
 
 _SHIFTS = 6
@@ -67,13 +68,14 @@ def placebo_gains(
         local = [c for c in candidates if c.rows == (joint,) and c.width == 1]
         if not local:
             continue
-        parts = []
+        parts, spool = [], Spool()
         for part, run in enumerate(data.runs):
             usable = run.usable[:, joint]
             own = noise.whitened(data.columns(candidates, chosen, part, joint), joint, usable)
             rest = noise.whitened(residuals[part][:, joint], joint, usable)
             columns = np.stack([c.columns[part][:, 0, 0] for c in local], axis=1)
-            parts.append((columns, own, rest, usable))
+            parts.append((spool.keep(columns), spool.keep(own), rest, usable))
+            forget()
         for _ in range(_SHIFTS):
             cross = np.zeros((len(at), len(local)))
             square, product = np.zeros(len(local)), np.zeros(len(local))
@@ -83,6 +85,7 @@ def placebo_gains(
                 cross += own.T @ moved
                 square += np.sum(moved**2, axis=0)
                 product += rest @ moved
+                forget()
             cross /= white.norms[at][:, None]
             left = square - np.einsum("ik,ik->k", cross, factor.solve(cross))
             good = left > 1e-2 * square

@@ -33,7 +33,7 @@ from excite_cli.diagnosis.torque_scale import check_scale
 from excite_cli.diagnosis.torque_shares import RoughModel, Samples, samples_of
 from excite_cli.errors import FileError
 from excite_cli.identification.motion_errors import check_motion
-from excite_cli.identification.prepare import PreparedRun, prepare
+from excite_cli.identification.prepare import PreparedRun, prepare_all
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.split import split
 from excite_cli.measurement.dataset import Dataset, Finding, Run
@@ -124,7 +124,7 @@ def check_dataset(
     needed = spec.identification.needed_runs
     runs = split(dataset, sealed, spec.diagnosis.block, needed).training
     processing = choose_processing(runs, spec.measurement.filter, spec.diagnosis.moving_speed)
-    prepared = [prepare(run, processing) for run in runs]
+    prepared = prepare_all(runs, processing)
     return check_recorded(robot, runs, prepared, processing, spec.measurement)
 
 

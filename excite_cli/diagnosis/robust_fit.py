@@ -5,13 +5,14 @@ min(1, c σ / |residual|) per sample, σ the joint's noise by its median absolut
 at reversals and blows do not pull friction and inertias.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.cholesky import Cholesky
 from excite_cli.diagnosis.training import TrainingData
+from excite_cli.out_of_core import forget
 from excite_cli.robot.model import Array
 
 _HUBER = 1.345
@@ -22,13 +23,16 @@ def robust_solve(
     data: TrainingData, candidates: Sequence[Candidate], chosen: Sequence[int], levels: Array
 ) -> Array:
     """Parameters (k,) of the declared model and the chosen candidates."""
-    blocks = [_rows(data, candidates, chosen, joint) for joint in range(data.n)]
+    usable = [
+        np.concatenate([run.usable[:, joint] for run in data.runs]) for joint in range(data.n)
+    ]
     sigma = np.asarray(levels, dtype=float)
-    weights = [np.ones(len(tau)) for _, tau in blocks]
-    x = np.zeros(blocks[0][0].shape[1])
+    weights = [np.ones(int(rows.sum())) for rows in usable]
+    x = np.zeros(0)
     for _ in range(_ROUNDS):
-        x = _solve(data, blocks, weights, sigma)
-        residuals = [tau - columns @ x for columns, tau in blocks]
+        x = _solve(data, candidates, chosen, weights, sigma)
+        left = np.concatenate(data.residuals(candidates, chosen, x))
+        residuals = [left[rows, joint] for joint, rows in enumerate(usable)]
         spread = [1.4826 * float(np.median(np.abs(r))) if len(r) else 0.0 for r in residuals]
         limits = [_HUBER * max(s, 1e-3 * level) for s, level in zip(spread, sigma, strict=True)]
         weights = [
@@ -40,25 +44,31 @@ def robust_solve(
 
 def _rows(
     data: TrainingData, candidates: Sequence[Candidate], chosen: Sequence[int], joint: int
-) -> tuple[Array, Array]:
-    """Columns (rows, k) and torque (rows,) of the usable samples of a joint."""
-    columns, torques = [], []
+) -> Iterator[tuple[Array, Array]]:
+    """Columns (rows, k) and torque (rows,) of the usable samples of a joint, part by part."""
     for part, run in enumerate(data.runs):
         usable = run.usable[:, joint]
-        columns.append(data.columns(candidates, chosen, part, joint)[usable])
-        torques.append(data.tau[part][usable, joint])
-    return np.concatenate(columns), np.concatenate(torques)
+        columns = data.columns(candidates, chosen, part, joint)[usable]
+        yield columns, data.tau[part][usable, joint]
+        forget()
 
 
 def _solve(
-    data: TrainingData, blocks: Sequence[tuple[Array, Array]], weights: list[Array], sigma: Array
+    data: TrainingData,
+    candidates: Sequence[Candidate],
+    chosen: Sequence[int],
+    weights: list[Array],
+    sigma: Array,
 ) -> Array:
-    size = blocks[0][0].shape[1]
+    size = data.declared[0].shape[2] + sum(candidates[i].width for i in chosen)
     normal, rhs = np.zeros((size, size)), np.zeros(size)
-    for (columns, tau), weight, s in zip(blocks, weights, sigma, strict=True):
-        weighted = columns * (weight / s**2)[:, None]
-        normal += weighted.T @ columns
-        rhs += weighted.T @ tau
+    for joint, (own, s) in enumerate(zip(weights, sigma, strict=True)):
+        done = 0
+        for columns, tau in _rows(data, candidates, chosen, joint):
+            weighted = columns * (own[done : done + len(tau)] / s**2)[:, None]
+            normal += weighted.T @ columns
+            rhs += weighted.T @ tau
+            done += len(tau)
     if data.prior_precision is not None:
         at = np.arange(len(data.prior_precision))
         normal[at, at] += data.prior_precision

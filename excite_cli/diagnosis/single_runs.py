@@ -13,7 +13,7 @@ from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.records import Assumption, SealedEnds
 from excite_cli.effects.base import Effect
 from excite_cli.identification.identified_model import IdentifiedModel
-from excite_cli.identification.prepare import prepare
+from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import Processing
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Run
@@ -60,7 +60,7 @@ def on_sealed_ends(
     found = []
     for active, runs in alike.items():
         own = [effect for effect, here in zip(single, active, strict=True) if here]
-        played = Played(model.robot, [prepare(run, processing) for run in runs])
+        played = Played(model.robot, prepare_all(runs, processing))
         errors = on_sealed(played, *map(played.predictions, models))
         found.append(
             SealedEnds(

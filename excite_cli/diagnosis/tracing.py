@@ -30,6 +30,7 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.seen import Seen
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.prepare import PreparedRun
+from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array
 
 _PASSES = 6
@@ -77,7 +78,8 @@ def trace(
     `start`: effects found in more of the same data; all numbers are fitted to these data alone.
     """
     left_out = LeftOut.by((*model.declared, *start))
-    bodies = [ModelledRun(model, run) for run in prepared(left_out)]
+    spool = Spool()
+    bodies = [ModelledRun(model, run, spool) for run in prepared(left_out)]
     fit = _first_fit(model, folds, bodies, start)
     first = _LENIENT if start else 0
     passes: list[_Pass] = []
@@ -85,8 +87,9 @@ def trace(
     def take(wanted: LeftOut) -> None:
         nonlocal left_out
         if wanted != left_out:
+            spool = Spool()
             for body, run in zip(bodies, prepared(wanted), strict=True):
-                body.take(run)
+                body.take(run, spool)
             left_out = wanted
 
     traced: Traced | None = None

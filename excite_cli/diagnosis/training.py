@@ -13,6 +13,7 @@ from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.grams import Grams, JointGram
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.identification.prepare import PreparedRun
+from excite_cli.out_of_core import forget
 from excite_cli.robot.model import Array
 
 # Blocks of a run whose samples are fitted and judged in turn; short runs have four at least.
@@ -117,6 +118,7 @@ class TrainingData:
             whole[fold] += white.T @ white
             rows = white[~self.sides[part][usable]]
             first[fold] += rows.T @ rows
+            forget()
         return JointGram(active, whole, first)
 
     def residuals(
@@ -134,6 +136,7 @@ class TrainingData:
                 residual[:, list(candidate.rows)] -= candidate.columns[part] @ values
                 at += candidate.width
             found.append(residual)
+            forget()
         return found
 
 

@@ -23,6 +23,7 @@ from excite_cli.diagnosis.records import Unexplained
 from excite_cli.diagnosis.traces import Dependence
 from excite_cli.diagnosis.training import Columns, TrainingData
 from excite_cli.effects.base import Signals
+from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array
 
 _MOST_NAMED = 3
@@ -50,7 +51,10 @@ def unexplained_structure(
     """
     kept: list[Columns] = [candidates[i] for i in chosen]
     past = _Past.of(signals)
-    features = [_features(data, signals, past, joint, joint_names) for joint in range(data.n)]
+    spool = Spool()
+    features = [
+        _features(data, signals, past, joint, joint_names, spool) for joint in range(data.n)
+    ]
     found: dict[int, Unexplained] = {}
     shares: Array | None = None
     plain_noise = NoiseModel.white(noise.sigma)
@@ -140,6 +144,7 @@ def _features(
     past: _Past,
     joint: int,
     joint_names: Sequence[str],
+    spool: Spool,
 ) -> list[Feature]:
     covariates, columns = _quantities(data, signals, joint, joint_names)
     own = joint_names[joint]
@@ -155,7 +160,7 @@ def _features(
             )
         )
     return [
-        Feature(covariate, (joint,), blocks)
+        Feature(covariate, (joint,), tuple(map(spool.keep, blocks)))
         for covariate, blocks in zip(covariates, columns, strict=True)
     ]
 

@@ -16,6 +16,7 @@ from scipy.sparse import csr_matrix
 
 from excite_cli.identification.factors import Mask
 from excite_cli.identification.noise import Noise, noise_of
+from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
 
 MOST_ENLARGED = 4.0
@@ -62,7 +63,7 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
     p, n = len(x), len(sigma)
     noises, meat, trace = [], np.zeros((p, p)), np.zeros(n)
     eaten, white, plain = np.zeros(n), np.zeros(p), 0
-    parts = []
+    parts, spool = [], Spool()
     for run in runs:
         residual = run.residual(x)
         if run.weights is not None:
@@ -71,7 +72,7 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
         noises.append(noise)
         columns = np.where(run.usable[..., None], run.columns, 0.0)
         spread = noise.spread_back(columns) / np.square(sigma)[:, None]
-        parts.append((spread, noise))
+        parts.append((spool.keep(spread), noise))
         own = np.diag(noise.innovation)
         projected = spread @ inverse
         eaten += own * np.einsum("tjp,tjp->j", projected, spread) * np.square(sigma)
@@ -80,6 +81,7 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
         scores = (columns @ inverse) * (np.sqrt(variance) / np.square(sigma))[:, None]
         white += np.square(scores).sum(axis=(0, 1))
         plain += int(run.usable.sum())
+        forget()
     ratio = np.clip(eaten / np.maximum(trace, 1e-300), 0.0, 1.0 - 1.0 / MOST_ENLARGED)
     enlarged = np.sqrt(1.0 / (1.0 - ratio))
     for spread, noise in parts:
@@ -88,6 +90,7 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         mixed = np.einsum("tjp,jk->tkp", spread, root).reshape(-1, p)
         meat += mixed.T @ mixed
+        forget()
     for run in runs:
         for j, rounding in enumerate(run.rounding):
             if rounding is not None:

@@ -2,7 +2,7 @@
 
 Samples one period apart are alike. d(L) = mean |q(t+L) − q(t)|² over the samples that are known at
 both ends has its first deep minimum near the period P, to whole samples. To first order
-q(t + L) − q(t) = v(t) (L − kP) for a lag L close to k periods: least squares over all k give P.
+q(t + L) − q(t) = v(t) (L − kP) for a lag L close to k periods: least squares over many k give P.
 """
 
 import numpy as np
@@ -15,6 +15,7 @@ _ALIKE = 0.02
 # A lag counts if at least this share of the known samples has a partner.
 _FEWEST = 1 / 8
 _STEPS = 4
+_MULTIPLES = 8  # periods that are looked at in a step, farther away from step to step
 _SLOPE = 200  # parts of a period over which a speed is taken
 
 
@@ -66,15 +67,24 @@ def _longest_gap(known: NDArray[np.bool_]) -> int:
     return int(np.diff(np.flatnonzero(known)).max()) - 1
 
 
+def _multiples(most: int, step: int) -> list[int]:
+    """How many periods apart samples are compared: a few cases, up to all that a step dares.
+
+    A lag is off by k times the error of the period; so it is known to that share before.
+    """
+    farthest = min(most, _MULTIPLES * 4**step)
+    return sorted({round(k) for k in np.linspace(1, farthest, min(farthest, _MULTIPLES))})
+
+
 def _refined(x: Array, known: NDArray[np.bool_], period: float) -> float:
     """The period that fits best at all its multiples."""
     half = max(1, round(period / _SLOPE))
     v, sure = np.zeros_like(x), np.zeros(len(x), bool)
     v[half:-half] = (x[2 * half :] - x[: -2 * half]) / (2 * half)
     sure[half:-half] = known[2 * half :] & known[half:-half] & known[: -2 * half]
-    for _ in range(_STEPS):
+    for step in range(_STEPS):
         above, below = 0.0, 0.0
-        for k in range(1, int((len(x) - 1) / period) + 1):
+        for k in _multiples(int((len(x) - 1) / period), step):
             lag = round(k * period)
             both = sure[:-lag] & known[lag:]
             slope = v[:-lag][both]

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from excite_cli.config.data_spec import IdentificationSpec
-from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.effects.base import Effect, Parameter, Signals, Value
@@ -34,6 +33,7 @@ from excite_cli.identification.regression import (
     signals_of,
     with_effects,
 )
+from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
 from excite_cli.shown.record import Shown
 
@@ -123,15 +123,14 @@ class Fit(Shown):
         return slice(first, first + len(self.effects[index].parameters))
 
 
-def columns_of(run: RunColumns, base: BaseParameters) -> Array:
-    """All columns (M, n, r + k): base parameters, then effects."""
-    return np.concatenate([run.inertial[:, :, base.selection], run.effects], axis=2)
-
-
-def rows_of(run: RunColumns, base: BaseParameters) -> Rows:
-    """Rows of a run for the least-squares fit."""
-    rounding = run.prepared.rounding
-    return Rows(columns_of(run, base), run.tau, run.usable, rounding=rounding)
+def all_rows(runs: Sequence[RunColumns]) -> list[Rows]:
+    """Rows of every run for the least-squares fit, those of many on disk."""
+    spool, found = Spool(), []
+    for run in runs:
+        columns = spool.keep(run.columns)
+        found.append(Rows(columns, run.tau, run.usable, rounding=run.prepared.rounding))
+        forget()
+    return found
 
 
 def fit(
@@ -194,8 +193,7 @@ def _settled(
     sizes = np.append(usual, [p.high for p in effect_parameters(regression.effects)])
     follow = follows_model(regression)
     for _ in range(_REBUILDS if follow else 1):
-        rows_of_runs = [rows_of(run, base) for run in regression.runs]
-        linear = fit_rows(rows_of_runs, spec.method, extra, sizes)
+        linear = fit_rows(all_rows(regression.runs), spec.method, extra, sizes)
         if not follow:
             break
         before = [run.effects @ linear.x[base.rank :] for run in regression.runs]
@@ -227,12 +225,13 @@ def follows_model(regression: Regression) -> bool:
 
 def rebuilt(regression: Regression, phi: Array, values: Array) -> Regression:
     """The effects' columns again, with the rigid body at `phi` and effects of `values`."""
-    runs = []
+    runs, spool = [], Spool()
     for run in regression.runs:
         signals: Signals = signals_of(run.prepared, regression.robot, phi)
         signals = with_effects(signals, regression.effects, values)
         columns = effect_columns(regression.effects, signals)
-        runs.append(replace(run, effects=run.prepared.averaged_for_fit(columns)))
+        runs.append(replace(run, effects=spool.keep(run.prepared.averaged_for_fit(columns))))
+        forget()
     return replace(regression, runs=tuple(runs))
 
 

@@ -9,7 +9,7 @@ Vandanjon & Gautier 2013, Brunot et al. 2018.) The instrumental-variable estimat
 regression on Z Π.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -18,9 +18,10 @@ from scipy.special import fdtrc
 
 from excite_cli.identification.covariance import Rows, estimate_covariance
 from excite_cli.identification.factors import run_factors, solve, stacked
-from excite_cli.identification.least_squares import fit_rows
+from excite_cli.identification.least_squares import factors_of, fit_rows
 from excite_cli.identification.periods import mean_of_other_periods, period_of
 from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
 
 Source = Literal["reference", "periods", "none"]
@@ -73,18 +74,25 @@ def instrument_dataset(dataset: Dataset) -> tuple[Dataset | None, Source, str]:
     if all(
         REFERENCE in run.extra and run.extra[REFERENCE].shape == run.q.shape for run in dataset.runs
     ):
-        runs = tuple(replace(run, q=_aligned(run), dq=None) for run in dataset.runs)
-        return replace(dataset, runs=runs), "reference", ""
-    periods = [period_of(run.q) for run in dataset.runs]
-    if all(period is not None for period in periods):
-        runs = tuple(
-            replace(run, q=mean_of_other_periods(run.q, period or 1), dq=None)
-            for run, period in zip(dataset.runs, periods, strict=True)
+        return replace(dataset, runs=_moving_as(dataset.runs, _aligned)), "reference", ""
+    periods = {id(run): period_of(run.q) for run in dataset.runs}
+    if all(period is not None for period in periods.values()):
+        runs = _moving_as(
+            dataset.runs, lambda run: mean_of_other_periods(run.q, periods[id(run)] or 1)
         )
         return replace(dataset, runs=runs), "periods", ""
     return None, "none", (
         "there is neither a reference motion (channel q_ref) nor a motion of two or more periods"
     )  # fmt: skip
+
+
+def _moving_as(runs: Sequence[Run], motion: Callable[[Run], Array]) -> tuple[Run, ...]:
+    """The runs with other positions."""
+    spool, found = Spool(), []
+    for run in runs:
+        found.append(replace(run, q=spool.keep(motion(run)), dq=None))
+        forget()
+    return tuple(found)
 
 
 def _aligned(run: Run) -> Array:
@@ -110,27 +118,21 @@ def hausman_test(
 ) -> Hausman:
     """Test columns of `runs` against instrument columns, per run (M, n, p); `noise` (n,) [N·m]."""
     p = runs[0].columns.shape[2]
-    weighted = [
-        (
-            (run.columns / noise[:, None])[run.usable],
-            (instrument / noise[:, None])[run.usable],
-        )
-        for run, instrument in zip(runs, instruments, strict=True)
-    ]
-    c = np.concatenate([pair[0] for pair in weighted])
-    z = np.concatenate([pair[1] for pair in weighted])
+    triangle = _triangle(runs, instruments, noise)
+    z, c = triangle[:, :p], triangle[:, p:]
     first_stage = np.linalg.lstsq(z / _norms(z), c, rcond=1e-10)[0] / _norms(z)[:, None]
-    left, values, directions = np.linalg.svd((c - z @ first_stage) / _norms(c), False)
-    del left
+    values, directions = np.linalg.svd((c - z @ first_stage) / _norms(c))[1:]
     kept = values > _DUST * np.sqrt(p)
     if not kept.any():
         return not_testable("the instruments repeat the columns without any noise")
     turn = directions[kept].T / values[kept] / _norms(c)[:, None]  # V turn: orthonormal columns
-    augmented = []
+    turn *= np.sqrt(sum(int(run.usable.sum()) for run in runs))
+    augmented, spool = [], Spool()
     for run, instrument in zip(runs, instruments, strict=True):
         left_over = (run.columns - instrument @ first_stage) @ turn
-        columns = np.concatenate([run.columns, left_over * np.sqrt(len(c))], axis=2)
+        columns = spool.keep(np.concatenate([run.columns, left_over], axis=2))
         augmented.append(Rows(columns, run.tau, run.usable))
+        forget()
     fitted = fit_rows(augmented, "wls")
     extra = int(kept.sum())
     if not fitted.seen[p:].all():
@@ -151,6 +153,16 @@ def hausman_test(
     )
 
 
+def _triangle(runs: Sequence[Rows], instruments: Sequence[Array], noise: Array) -> Array:
+    """R (·, 2p) of the usable rows [Z C] of all runs, divided by `noise`."""
+    factors = []
+    for run, instrument in zip(runs, instruments, strict=True):
+        both = np.concatenate([instrument, run.columns], axis=2)
+        factors.append(run_factors(both, np.zeros(run.tau.shape), run.usable))
+        forget()
+    return stacked(factors, noise)[:, :-1]
+
+
 def _norms(x: Array) -> Array:
     norms = np.linalg.norm(x, axis=0)
     return np.where(norms > 0, norms, 1.0)
@@ -160,14 +172,10 @@ def _bias(
     runs: Sequence[Rows], instruments: Sequence[Array], first_stage: Array, noise: Array
 ) -> tuple[Array, Array]:
     """Least squares less instrumental variables (p,), and the latter's standard deviation."""
-    projected = [
-        Rows(instrument @ first_stage, run.tau, run.usable)
-        for run, instrument in zip(runs, instruments, strict=True)
-    ]
-    solutions = []
-    for group in (runs, projected):
-        factors = [run_factors(run.columns, run.tau, run.usable) for run in group]
-        solutions.append(solve(stacked(factors, noise)))
-    plain, second = solutions
+    projected, spool = [], Spool()
+    for run, instrument in zip(runs, instruments, strict=True):
+        projected.append(Rows(spool.keep(instrument @ first_stage), run.tau, run.usable))
+        forget()
+    plain, second = (solve(stacked(factors_of(group), noise)) for group in (runs, projected))
     covariance = estimate_covariance(projected, second.x, second.inverse, noise)
     return plain.x - second.x, np.sqrt(np.diag(covariance.matrix))

@@ -14,12 +14,11 @@ from excite_cli.identification.declared_runs import check_declared_runs, check_l
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import (
     Fit,
-    columns_of,
+    all_rows,
     effect_parameters,
     fit,
     follows_model,
     rebuilt,
-    rows_of,
 )
 from excite_cli.identification.hausman import (
     SIGNIFICANT,
@@ -32,7 +31,7 @@ from excite_cli.identification.identified_model import errors_on
 from excite_cli.identification.implausible_links import implausible
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import noise_floor
-from excite_cli.identification.prepare import prepare, require_motion
+from excite_cli.identification.prepare import prepare_all, require_motion
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import Regression, build_regression
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
@@ -150,7 +149,7 @@ def _regression(
     runs: Sequence[Run],
     processing: Processing,
 ) -> Regression:
-    prepared = [prepare(run, processing, LeftOut.by(effects)) for run in runs]
+    prepared = prepare_all(runs, processing, LeftOut.by(effects))
     return build_regression(robot, base, effects, prepared)
 
 
@@ -184,7 +183,7 @@ def _hausman(
     processing = replace(processing, velocity="differentiated")
     try:
         left_out = LeftOut.by(training.effects)
-        prepared = [prepare(run, processing, left_out) for run in runs]
+        prepared = prepare_all(runs, processing, left_out)
         other = build_regression(
             training.robot, training.base, training.effects, prepared, found.phi,
             found.values[found.rank :],
@@ -192,8 +191,8 @@ def _hausman(
     except ExciteError as error:
         return not_testable(str(error))
     return hausman_test(
-        [rows_of(run, training.base) for run in training.runs],
-        [columns_of(run, training.base) for run in other.runs],
+        all_rows(training.runs),
+        [rows.columns for rows in all_rows(other.runs)],
         source,
         found.noise,
     )

@@ -22,6 +22,7 @@ from excite_cli.identification.factors import (
     stacked,
 )
 from excite_cli.identification.robust import huber_weights, robust_scale, within
+from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
 
 Method = Literal["ols", "wls", "irls"]
@@ -63,7 +64,7 @@ def fit_rows(
     """
     if sizes is not None:
         runs = _without_dust(runs, sizes)
-    factors = [run_factors(run.columns, run.tau, run.usable) for run in runs]
+    factors = factors_of(runs)
     n = runs[0].tau.shape[1]
     count = sum((run.usable.sum(axis=0) for run in runs), np.zeros(n, int))
     floor = _EXACT * _torque_size(factors, count)
@@ -72,7 +73,7 @@ def fit_rows(
     weights = None
     if method == "irls":
         weights, sigma, solution = _reweighted(runs, solution, floor, extra)
-        factors = _weighted_factors(runs, weights)
+        factors = factors_of(runs, weights=weights)
     found = _covariance(runs, weights, solution, sigma, extra)
     if extra is not None:
         sigma = sigma * np.sqrt(max(int(count.sum()) / max(found.samples, 1.0), 1.0))
@@ -94,20 +95,32 @@ def fit_rows(
     )
 
 
+def factors_of(
+    runs: Sequence[Rows], usable: Sequence[Mask] | None = None, weights: Sequence[Array] = ()
+) -> list[Array]:
+    """Factors (n, p+1, p+1) of every run; with other `usable` rows or `weights` if given."""
+    found = []
+    for k, run in enumerate(runs):
+        rows = run.usable if usable is None else usable[k]
+        found.append(run_factors(run.columns, run.tau, rows, weights[k] if weights else None))
+        forget()
+    return found
+
+
 def _without_dust(runs: Sequence[Rows], sizes: Array) -> Sequence[Rows]:
-    columns = np.max([np.abs(run.columns).max(axis=(0, 1), initial=0.0) for run in runs], axis=0)
+    columns = np.zeros_like(sizes)
+    for run in runs:
+        columns = np.maximum(columns, np.abs(run.columns).max(axis=(0, 1), initial=0.0))
+        forget()
     torque = max(float(np.abs(run.tau[run.usable]).max(initial=0.0)) for run in runs)
     dust = columns * sizes <= _EXACT * torque
     if not dust.any():
         return runs
-    return [replace(run, columns=run.columns * ~dust) for run in runs]
-
-
-def _weighted_factors(runs: Sequence[Rows], weights: Sequence[Array]) -> list[Array]:
-    return [
-        run_factors(run.columns, run.tau, run.usable, weight)
-        for run, weight in zip(runs, weights, strict=True)
-    ]
+    spool, found = Spool(), []
+    for run in runs:
+        found.append(replace(run, columns=spool.keep(run.columns * ~dust)))
+        forget()
+    return found
 
 
 def _covariance(
@@ -171,7 +184,7 @@ def _reweighted(
         residuals = [run.residual(solution.x) for run in runs]
         sigma = np.maximum(robust_scale(residuals, usable), floor)
         weights = tuple(huber_weights(residual, sigma) for residual in residuals)
-        factors = _weighted_factors(runs, weights)
+        factors = factors_of(runs, weights=weights)
         before, solution = solution.x, solve(stacked(factors, sigma, extra))
         step = np.abs(solution.x - before) / np.sqrt(np.maximum(np.diag(solution.inverse), 1e-300))
         if step[solution.seen].max(initial=0.0) < 1e-4:
@@ -182,7 +195,4 @@ def _reweighted(
 def _curvature(runs: Sequence[Rows], x: Array, sigma: Array, extra: Array | None) -> Array:
     """Inverse of Σ c cᵀ/σ² over the rows that count in full."""
     inner = [run.usable & within(run.residual(x), sigma) for run in runs]
-    factors = [
-        run_factors(run.columns, run.tau, mask) for run, mask in zip(runs, inner, strict=True)
-    ]
-    return solve(stacked(factors, sigma, extra)).inverse
+    return solve(stacked(factors_of(runs, inner), sigma, extra)).inverse

@@ -27,7 +27,7 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit, fit, rebuilt
 from excite_cli.identification.identify import judged
 from excite_cli.identification.left_out import LeftOut
-from excite_cli.identification.prepare import prepare, require_motion
+from excite_cli.identification.prepare import prepare_all, require_motion
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.regression import build_regression, effect_columns, with_effects
 from excite_cli.identification.stored_fit import StoredFit
@@ -101,7 +101,7 @@ def identify_load(
     processing = choose_processing(
         dataset.runs, spec.measurement.filter, spec.diagnosis.moving_speed
     )
-    prepared = [prepare(run, processing, LeftOut.by(effects)) for run in dataset.runs]
+    prepared = prepare_all(dataset.runs, processing, LeftOut.by(effects))
     require_motion(prepared, processing, robot.joint_names, spec.measurement.without_torque)
     regression = build_regression(robot, base, effects, prepared)
     # What the URDF says of the robot is in its fit, and nobody asks here for a consistent one.

@@ -14,17 +14,20 @@ around instants between samples are interpolated from those around the four next
 does to the gain of white noise, g = Σ w² relative to an average around a sample, is divided out.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, vstack
 
 from excite_cli.identification.averages import apply, average_rows, reach, without
 from excite_cli.identification.exact_period import exact_period
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+from excite_cli.out_of_core import forget
 
+_LONGEST = 600.0  # s of a run that are put together
+_AT_ONCE = 4096  # averages around instants between samples: four times as many on the way
 _FEWEST = 8  # phases at which a joint must have been seen twice
 _LOST = 0.1  # share of an average's weight that invalid samples may take
 # Misalignment of this share of the floor must be reported.
@@ -86,6 +89,7 @@ def noise_floor(parts: Sequence[Run], processing: Processing) -> NoiseFloor | No
         period = exact_period(run.q, run.known)
         if period is not None:
             sums += _sums(run, period, processing)
+        forget()
     squares, freedom, shifted, phases = sums
     enough = phases >= _FEWEST
     if not enough.any():
@@ -97,15 +101,16 @@ def noise_floor(parts: Sequence[Run], processing: Processing) -> NoiseFloor | No
     return NoiseFloor(rms, misalignment)
 
 
-def _put_together(parts: Sequence[Run]) -> list[_Whole]:
-    """Runs with gaps where their sealed blocks are."""
-    groups: list[list[Run]] = []
+def _put_together(parts: Sequence[Run]) -> Iterator[_Whole]:
+    """Runs with gaps where their sealed blocks are; very long ones in pieces."""
+    group: list[Run] = []
     for part in parts:
-        if part.part.block and groups and groups[-1][-1].id == part.id:
-            groups[-1].append(part)
-        else:
-            groups.append([part])
-    return [_whole(group) for group in groups]
+        joins = group and part.part.block and group[-1].id == part.id
+        if group and not (joins and part.t[-1] - group[0].t[0] <= _LONGEST):
+            yield _whole(group)
+            group = []
+        group.append(part)
+    yield _whole(group)
 
 
 def _whole(group: Sequence[Run]) -> _Whole:
@@ -143,8 +148,8 @@ def _sums(run: _Whole, period: float, processing: Processing) -> Array:
         return inside[:, :, None] & (share.reshape(*inside.shape, -1) <= lost)
 
     complete, good = seen(run.known[:, None]), seen(run.valid, _LOST)
-    counted = [without(rows, valid) for valid in run.valid.T]
-    torque = np.stack([each @ tau for each, tau in zip(counted, run.tau.T, strict=True)], axis=1)
+    pairs = zip(run.valid.T, run.tau.T, strict=True)
+    torque = np.stack([without(rows, valid) @ tau for valid, tau in pairs], axis=1)
     torque = torque.reshape(*inside.shape, -1)
     good &= complete
     times = good.sum(axis=0)
@@ -169,6 +174,10 @@ def _averages_around(
     instants: Array, samples: int, step: float, cutoff: float | None
 ) -> csr_matrix:
     """Averages (M, samples) around `instants` (M,), in samples, by cubic polynomials."""
+    if len(instants) > _AT_ONCE:
+        cuts = range(0, len(instants), _AT_ONCE)
+        parts = [instants[cut : cut + _AT_ONCE] for cut in cuts]
+        return vstack([_averages_around(part, samples, step, cutoff) for part in parts], "csr")
     base = np.floor(instants).astype(int)
     u = (instants - base)[:, None]
     weights = np.concatenate(

@@ -15,11 +15,13 @@ def period_of(q: Array) -> int | None:
 def mean_of_other_periods(x: Array, period: int) -> Array:
     """For every sample of x (T, …) the mean of the samples whole periods away from it."""
     count = len(x)
-    total = np.zeros_like(x)
-    seen = np.zeros(count)
-    for shift in range(period, count, period):
-        total[shift:] += x[:-shift]
-        total[:-shift] += x[shift:]
-        seen[shift:] += 1
-        seen[:-shift] += 1
-    return total / np.maximum(seen, 1.0).reshape(-1, *([1] * (x.ndim - 1)))
+    whole = -(-count // period)
+    padded = np.zeros((whole * period, *x.shape[1:]))
+    padded[:count] = x
+    seen = np.zeros(whole * period)
+    seen[:count] = 1.0
+    total = padded.reshape(whole, period, *x.shape[1:]).sum(axis=0)
+    others = seen.reshape(whole, period).sum(axis=0) - 1.0
+    phase = np.arange(count) % period
+    weights = np.maximum(others, 1.0).reshape(-1, *([1] * (x.ndim - 1)))
+    return np.asarray((total[phase] - x) / weights[phase])

@@ -1,7 +1,8 @@
 """From a raw run to smooth, differentiated motion, and the averages all columns go through."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from excite_cli.identification.processing import Processing
 from excite_cli.identification.rounding import rounding_of
 from excite_cli.measurement.dataset import Array, Run
 from excite_cli.measurement.run_identity import RunId
+from excite_cli.out_of_core import Spool, forget
 
 # Around a reversal a joint sticks: what its friction then is, only the torque itself knows.
 _STICKING = 0.02  # s
@@ -153,6 +155,45 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
         covariates={name: values[keep] for name, values in run.covariates.items()},
         before=past[len(past) % stride :: stride],
         rounding=() if run.torque_step is None else tuple(each.rounding for each in fit),
+    )
+
+
+def prepare_all(
+    runs: Sequence[Run], processing: Processing, left_out: LeftOut = LeftOut()
+) -> list[PreparedRun]:
+    """All of them, what is large of many on disk.
+
+    Raises
+    ------
+    FileError
+        See `prepare`.
+    """
+    spool, found = Spool(), []
+    for run in runs:
+        found.append(_kept(prepare(run, processing, left_out), spool))
+        forget()
+    return found
+
+
+def _kept(run: PreparedRun, spool: Spool) -> PreparedRun:
+    """The averages of joints are often the same, and are kept once."""
+    seen: dict[int, csr_matrix] = {}
+
+    def rows(averages: csr_matrix) -> csr_matrix:
+        if id(averages) not in seen:
+            seen[id(averages)] = spool.keep_rows(averages)
+        return seen[id(averages)]
+
+    names = ("t", "q", "v", "a", "tau_raw", "tau", "valid", "moving", "tau_fit", "usable")
+    series: dict[str, Any] = {name: spool.keep(getattr(run, name)) for name in names}
+    return replace(
+        run,
+        **series,
+        averages=rows(run.averages),
+        valid_averages=tuple(map(rows, run.valid_averages)),
+        fit_averages=tuple(map(rows, run.fit_averages)),
+        covariates={name: spool.keep(values) for name, values in run.covariates.items()},
+        rounding=tuple(each if each is None else rows(each) for each in run.rounding),
     )
 
 

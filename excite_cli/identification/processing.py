@@ -14,6 +14,7 @@ import numpy as np
 from excite_cli.config.data_spec import FilterSpec
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Array, Run
+from excite_cli.out_of_core import forget
 
 # The signal has met its floor where the spectrum is below this multiple of it.
 ABOVE_FLOOR = 20.0
@@ -101,6 +102,7 @@ def spectra(runs: Sequence[Run], fs: float) -> tuple[Array, Array]:
     for run in runs:
         frequency, power = welch(run.q, fs, nperseg=length, axis=0, detrend="linear")
         total, weight = total + power * len(run.t), weight + len(run.t)
+        forget()
     return frequency, total / weight
 
 

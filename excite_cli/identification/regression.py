@@ -11,6 +11,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
+from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array, Robot
 
 
@@ -18,9 +19,9 @@ from excite_cli.robot.model import Array, Robot
 class RunColumns:
     """One prepared run with its columns.
 
-    `inertial` (M, n, P) standard-parameter regressor (P = 10·n_bodies), `effects` (M, n, k) all
-    linear parameters of all effects in order, `tau` (M, n), `usable` and `moving` (M, n), `step`
-    between the samples [s]; `prepared` holds the motion at the working rate.
+    `inertial` (M, n, r) the regressor of the base parameters, `effects` (M, n, k) all linear
+    parameters of all effects in order, `tau` (M, n), `usable` and `moving` (M, n), `step` between
+    the samples [s]; `prepared` holds the motion at the working rate.
     """
 
     step: float
@@ -30,6 +31,11 @@ class RunColumns:
     usable: NDArray[np.bool_]
     moving: NDArray[np.bool_]
     prepared: PreparedRun
+
+    @property
+    def columns(self) -> Array:
+        """All columns (M, n, r + k): base parameters, then effects."""
+        return np.concatenate([self.inertial, self.effects], axis=2)
 
 
 @dataclass(frozen=True)
@@ -102,20 +108,22 @@ def build_regression(
 
     With `values` of the effects, they see the torque of these as well.
     """
-    found = []
+    found, spool = [], Spool()
     for prepared in runs:
         signals = signals_of(prepared, robot, phi)
         if values is not None:
             signals = with_effects(signals, effects, values)
+        inertial = signals.body.regressor[:, :, base.selection]
         found.append(
             RunColumns(
                 step=prepared.step,
-                inertial=prepared.averaged_for_fit(signals.body.regressor),
-                effects=prepared.averaged_for_fit(effect_columns(effects, signals)),
+                inertial=spool.keep(prepared.averaged_for_fit(inertial)),
+                effects=spool.keep(prepared.averaged_for_fit(effect_columns(effects, signals))),
                 tau=prepared.tau_fit,
                 usable=prepared.usable,
                 moving=prepared.moving,
                 prepared=prepared,
             )
         )
+        forget()
     return Regression(robot, base, tuple(effects), tuple(found))

@@ -18,6 +18,7 @@ from excite_cli.errors import FileError
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.row_hashes import row_hashes
+from excite_cli.out_of_core import forget
 
 Hashes = NDArray[np.uint64]
 _WINDOW = 32  # samples: beyond chance even for one joint with a coarse encoder
@@ -45,6 +46,7 @@ def refuse_sealed_copies(parts: Split) -> None:
         if (count := int(np.count_nonzero(own))) > most:
             most, source = count, run
         there |= own
+        forget()
     if there.mean() > _MOST:
         found = wanted[there]
         copies = [np.count_nonzero(np.isin(own, found)) for own in sealed]

@@ -2,14 +2,15 @@
 
 A recording with gaps is sealed, or left out, with all its stretches; if there is no other, its
 stretches count as recordings. Blocks are cut before any filter runs, so that nothing of a sealed
-block leaks into its neighbours.
+block leaks into its neighbours. Very long parts are cut once more: memory does not grow with them.
 
 Of runs with effects of their own the end may be sealed, too: only there it shows what such an
 effect is worth on data that took no part.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.identification.processing import Processing
@@ -19,6 +20,8 @@ from excite_cli.measurement.run_identity import Part, RunId
 
 # A single run is cut into about this many blocks of one to two seconds; every third is sealed.
 _BLOCKS, _SHORTEST, _LONGEST = 9, 1.0, 2.0
+_MOST_BLOCKS = 120  # of long ones: each loses its borders, and costs its share of time
+_MOST_SAMPLES = 400_000  # of a part
 _EVERY = 3
 _FEWEST = 10  # samples of a block
 _MOST_FOLDS = 8
@@ -86,7 +89,7 @@ def split(
     if sealed is None or all(run.id.is_among((sealed,)) for run in runs):
         sealed = next((unit for unit in reversed(units) if unit not in needed), units[-1])
     training = [run for run in runs if not run.id.is_among((sealed,))]
-    kept = tuple(run for run in runs if run.id.is_among((sealed,)))
+    kept = [run for run in runs if run.id.is_among((sealed,))]
     if not training:
         raise ConfigError(
             f"all {len(runs)} runs are called '{sealed}': none is left to fit. Give each recording "
@@ -96,7 +99,8 @@ def split(
         run = training[0]
         middle = len(run.t) // 2
         training = [_block(run, 1, 0, middle), _block(run, 2, middle, len(run.t))]
-    return Split(tuple(training), kept, sealed, _folds(training), units)
+    training, kept = _short(training), _short(kept)
+    return Split(tuple(training), tuple(kept), sealed, _folds(training), units)
 
 
 def with_ends_sealed(parts: Split, runs: Collection[str], processing: Processing) -> Split:
@@ -120,6 +124,21 @@ def with_ends_sealed(parts: Split, runs: Collection[str], processing: Processing
     return replace(parts, training=tuple(training), ends=tuple(ends))
 
 
+def _short(runs: Sequence[Run]) -> list[Run]:
+    """The same in parts of some minutes: what is made of a part at once must have room."""
+    found: list[Run] = []
+    for run in runs:
+        count = -(-len(run.t) // _MOST_SAMPLES)
+        edges = [round(i * len(run.t) / count) for i in range(count + 1)]
+        first = max(run.part.block or 1, 1 + sum(each.id == run.id for each in found))
+        found += (
+            [run]
+            if count == 1
+            else [_block(run, first + i, *ends) for i, ends in enumerate(pairwise(edges))]
+        )
+    return found
+
+
 def _from_start(run: Run) -> Run:
     """The run with its time counted from the start of its recording."""
     shift = run.t[0] - run.part.start if run.part.start else run.t[0]
@@ -139,7 +158,8 @@ def _folds(training: list[Run]) -> tuple[int, ...]:
 
 
 def _blocks(run: Run, block: float | None) -> Split:
-    length = block or min(max(run.duration / _BLOCKS, _SHORTEST), _LONGEST)
+    length = min(max(run.duration / _BLOCKS, _SHORTEST), _LONGEST)
+    length = block or max(length, run.duration / _MOST_BLOCKS)
     count = round(run.duration / length)
     if count < _EVERY:
         raise ConfigError(

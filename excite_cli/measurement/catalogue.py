@@ -1,6 +1,6 @@
 """Readers of measured files, and the one way from files to a `Dataset`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOption
 from excite_cli.measurement.run_identity import Origin
 from excite_cli.measurement.torque import SECONDS, check_joints, declared, to_joints
 from excite_cli.measurement.units import Limits
+from excite_cli.out_of_core import Spool, forget
 
 READERS: tuple[Reader, ...] = (Hdf5Reader(), CsvReader(), BagReader())
 _EPOCH = 1e6  # s: stamps beyond count from 1970, not from the start
@@ -68,7 +69,7 @@ def read_dataset(
     runs: list[Run] = []
     taken: set[str] = set()
     seen: set[str] = set()
-    covariates = DeclaredCovariates(spec.covariates)
+    covariates, spool = DeclaredCovariates(spec.covariates), Spool()
     for path, raws in _recordings(paths, options):
         seen.update(name for raw in raws for column in raw.columns.values() for name in column)
         named = _named(raws, path, taken)
@@ -81,25 +82,33 @@ def read_dataset(
             arranged.append(to_joints(run, spec, joint_names, turning))
             findings += more
         parts, more = _checked(path, arranged, spec, joint_names, known)
-        runs += parts
+        runs += [run.kept(spool) for run in parts]
         findings += more
+        forget()
     _check_all_met(spec.names, seen)
     findings += covariates.check()
     return Dataset(joint_names, tuple(runs), tuple(map(str, paths)), tuple(findings))
 
 
-def _recordings(paths: Sequence[Path], options: ReadOptions) -> list[tuple[Path, list[RawRun]]]:
-    """What the files hold; those with some channels of a recording are joined, the first's place.
+def _recordings(paths: Sequence[Path], options: ReadOptions) -> Iterator[tuple[Path, list[RawRun]]]:
+    """What the files hold, one after the other; those with some channels of a recording are joined.
 
-    Of one recording only: which file belongs to which of several cannot be known.
+    Of one recording only: which file belongs to which of several cannot be known. It takes the
+    place of the first.
     """
-    read = [(path, reader_for(path).read(path, options)) for path in paths]
-    parts = [(path, raw) for path, raws in read for raw in raws if is_part(raw)]
-    found = [(path, [raw for raw in raws if not is_part(raw)]) for path, raws in read]
+    parts: list[tuple[Path, RawRun]] = []
+    later: list[tuple[Path, list[RawRun]]] = []
+    for path in paths:
+        raws = reader_for(path).read(path, options)
+        parts += [(path, raw) for raw in raws if is_part(raw)]
+        whole = [raw for raw in raws if not is_part(raw)]
+        if parts:
+            later.append((path, whole))
+        elif whole:
+            yield path, whole
     if parts:
-        path, whole = joined(parts, options)
-        found[list(paths).index(path)][1].append(whole)
-    return [(path, raws) for path, raws in found if raws]
+        later[0][1].append(joined(parts, options)[1])
+    yield from ((path, raws) for path, raws in later if raws)
 
 
 def _checked(path: Path, runs: list[Run], *about: Any) -> tuple[list[Run], list[Finding]]:

@@ -5,12 +5,13 @@ configuration declares; nothing is dropped silently: `findings` says what was se
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.measurement.run_identity import Origin, Part, RunId
+from excite_cli.out_of_core import Spool
 from excite_cli.shown.record import Shown
 
 _BEFORE = 20.0  # s: longer ago is forgotten
@@ -90,11 +91,22 @@ class Run(Shown):
         """`valid`, or all true."""
         return np.ones(self.tau.shape, bool) if self.valid is None else self.valid
 
+    def kept(self, spool: Spool) -> "Run":
+        """The same run, its samples kept by the spool."""
+        own: dict[str, Any] = {}
+        for name in ("t", "q", "tau", "dq", "valid", "recorded"):
+            values = getattr(self, name)
+            own[name] = values if values is None else spool.keep(values)
+        for name in ("extra", "covariates"):
+            own[name] = {key: spool.keep(values) for key, values in getattr(self, name).items()}
+        return replace(self, **own)
+
     def cut(self, first: int, last: int, part: Part | None = None) -> "Run":
         """Samples [first, last); they are another `part` of the recording if that is given."""
         cut = slice(first, last)
-        before = self.q[:first]
-        if self.before is not None:
+        wanted = round(_BEFORE / self.step)
+        before = self.q[max(first - wanted, 0) : first]
+        if self.before is not None and len(before) < wanted:
             before = np.concatenate([self.before, before])
         return replace(
             self,
@@ -107,7 +119,7 @@ class Run(Shown):
             extra={key: value[cut] for key, value in self.extra.items()},
             covariates={name: value[cut] for name, value in self.covariates.items()},
             recorded=None if self.recorded is None else self.recorded[cut],
-            before=before[-round(_BEFORE / self.step) :],
+            before=before[-wanted:],
         )
 
 

@@ -78,7 +78,7 @@ def test_prediction_is_columns_times_parameters(robot: Robot, runs: list[Prepare
     for run, columns in zip(runs, regression.runs, strict=True):
         tau = torque(robot, phi, kinds, values, run, run.run)
         assert tau.shape == run.q.shape
-        modelled = columns.inertial @ phi + columns.effects @ values
+        modelled = columns.inertial @ (regression.base.mapping @ phi) + columns.effects @ values
         assert run.averaged_for_fit(tau) == pytest.approx(modelled, rel=1e-9, abs=1e-9)
 
 

@@ -50,11 +50,10 @@ def test_columns_times_parameters_are_the_torque(robot: Robot) -> None:
         )
         tau[:, 0] += 1.5 * run.v[:, 0]
         tau[:, 2] += 0.8 * np.tanh(run.v[:, 2] / 1e-3)
-        modelled = columns.inertial @ phi + columns.effects @ values
-        assert modelled == pytest.approx(run.averaged_for_fit(tau), rel=1e-9, abs=1e-9)
-        base = find_base_parameters(robot)
-        reduced = columns.inertial[:, :, base.selection] @ (base.mapping @ phi)
-        assert reduced == pytest.approx(columns.inertial @ phi, rel=1e-6, abs=1e-6)
+        modelled = columns.inertial @ (found.base.mapping @ phi) + columns.effects @ values
+        assert modelled == pytest.approx(run.averaged_for_fit(tau), rel=1e-6, abs=1e-6)
+        parameters = np.append(found.base.mapping @ phi, values)
+        assert columns.columns @ parameters == pytest.approx(modelled, rel=1e-12, abs=1e-12)
         assert columns.tau is run.tau_fit
         assert columns.usable is run.usable
 
