@@ -49,7 +49,7 @@ def absorbed(
     data = TrainingData(
         tuple(run.prepared for run in found.runs),
         (0, 1),
-        tuple(run.inertial[:, :, base.selection] for run in found.runs),
+        tuple(run.inertial for run in found.runs),
         tuple(run.tau for run in found.runs),
     )
     evidence = data.evidence(candidates, NoiseModel.white(np.ones(robot.n)))
