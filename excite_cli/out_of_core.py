@@ -21,7 +21,7 @@ from scipy.sparse import csr_matrix
 
 from excite_cli.errors import FileError
 
-ROOM = 96 * 2**20  # bytes of each spool that stay in memory
+ROOM = 32 * 2**20  # bytes of each spool that stay in memory
 _CHUNK = 64 * 2**20
 _ALIGNED = 64
 _GRANULE = mmap.ALLOCATIONGRANULARITY
