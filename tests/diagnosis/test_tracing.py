@@ -44,7 +44,9 @@ def answer_of(
         return ["run"]
 
     monkeypatch.setattr(LeftOut, "by", by)
-    monkeypatch.setattr(tracing, "ModelledRun", lambda *_: SimpleNamespace(take=lambda run, spool: None))
+    monkeypatch.setattr(
+        tracing, "ModelledRun", lambda *_: SimpleNamespace(take=lambda run, spool: None)
+    )
     start = Fit(name="declared", places=set(), effects=())
     monkeypatch.setattr(
         tracing,
