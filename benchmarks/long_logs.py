@@ -47,7 +47,8 @@ def recordings(folder: Path) -> list[Path]:
         if path.exists():
             continue
         motion = PlannedMotion(f"motion_{k}", trajectory(), coefficients)
-        settings = SimulationSettings(seed=k, rate=RATE, periods=PERIODS, noise_correlation=0.5)
+        # One seed is one robot; every recording has noise of its own, by its name.
+        settings = SimulationSettings(seed=1, rate=RATE, periods=PERIODS, noise_correlation=0.5)
         write_dataset(path, simulate(of.robot, [motion], settings, planted, declared).dataset, {})
     return found
 
