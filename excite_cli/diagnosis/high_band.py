@@ -34,6 +34,7 @@ _TWO_SD = 4.0  # of χ²
 _FILTERED = 0.2
 _REVERSAL = 0.15  # s around a reversal, whose friction is in all bands
 _AVERAGED = 0.08  # s, of what stands there instead: 1.0 times the noise, of 0.05 s 1.5 times
+_FAR, _NEXT_TO_NOTHING = 7.0, 1e-11  # deviations of that average, and the least of its weight
 _RESPONSE = 1.0  # s, after which a band's filter has forgotten an impulse
 _LEAST_SECONDS = 2.0
 _STRETCH, _FEWEST_STRETCHES = 0.5, 6  # s
@@ -74,7 +75,7 @@ def band_noise(
         sliding = good & (np.abs(v) > processing.moving_speed)
         seconds += sliding.sum(axis=0) * run.step
         left = run.tau - _at_recorded_rate(torque, run, fit)
-        series = [_bridged(x, good, run.step) for x in (run.tau, left)]
+        series = _bridged((run.tau, left), good, run.step)
         for k, band in enumerate(bands):
             kept = np.where(sliding, _kept(good, run.step, band), 0.0)
             counted[k] += kept.sum(axis=0) * run.step
@@ -115,19 +116,27 @@ def _near_reversal(v: Array, step: float) -> Mask:
     return np.stack([np.convolve(column, window, "same") for column in crossing.T], axis=1) > 0.5
 
 
-def _bridged(x: Array, good: Mask, step: float) -> Array:
+def _bridged(series: Sequence[Array], good: Mask, step: float) -> list[Array]:
     """Series (T, n) with the smooth average of what is around where it is not good.
 
     A jump there would ring in every band, and a line from one noisy sample to another adds noise.
     """
-    from scipy.ndimage import gaussian_filter1d  # takes a second to import
+    from scipy.signal import oaconvolve  # takes a second to import
 
     width = _AVERAGED / step
-    total, count = (
-        gaussian_filter1d(each, width, axis=0, mode="constant", truncate=8.0)
-        for each in (np.where(good, x, 0.0), good.astype(float))
-    )
-    return np.where(good, x, total / np.maximum(count, 1e-12))
+    half = round(_FAR * width)
+    window = np.exp(-0.5 * np.square(np.arange(-half, half + 1) / width))
+    window /= window.sum()
+
+    def around(x: Array) -> Array:
+        return np.stack([oaconvolve(column, window, "same") for column in x.T], axis=1)
+
+    count = around(good.astype(float))
+    near = count > _NEXT_TO_NOTHING
+    return [
+        np.where(good, x, np.where(near, around(np.where(good, x, 0.0)), 0.0) / (count + ~near))
+        for x in series
+    ]
 
 
 def _kept(good: Mask, step: float, band: tuple[float, float]) -> Array:

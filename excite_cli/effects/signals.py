@@ -40,12 +40,16 @@ class Signals:
 
     def every(self, step: int) -> "Signals":
         """Every `step`-th instant."""
-        at, body = slice(None, None, step), self.body
-        thin = RigidBody(body.robot, body.phi, body.q[at], body.v[at], body.a[at])
+        before = None if self.before is None else self.before[::-1][step - 1 :: step][::-1]
+        return replace(self.cut(slice(None, None, step)), before=before)
+
+    def cut(self, at: slice) -> "Signals":
+        """Some of the instants; nothing is known of before."""
+        body = self.body
+        some = RigidBody(body.robot, body.phi, body.q[at], body.v[at], body.a[at])
         series = {name: getattr(self, name)[at] for name in ("t", "q", "v", "a", "load", "torque")}
         others = {name: values[at] for name, values in self.covariates.items()}
-        before = None if self.before is None else self.before[::-1][step - 1 :: step][::-1]
-        return replace(self, **series, body=thin, covariates=others, before=before)
+        return replace(self, **series, body=some, covariates=others, before=None)
 
     def with_covariate(self, name: str) -> "Signals":
         """The same with that column of the log alone."""

@@ -82,15 +82,20 @@ def _refined(x: Array, known: NDArray[np.bool_], period: float) -> float:
     v, sure = np.zeros_like(x), np.zeros(len(x), bool)
     v[half:-half] = (x[2 * half :] - x[: -2 * half]) / (2 * half)
     sure[half:-half] = known[2 * half :] & known[half:-half] & known[: -2 * half]
+    v[~sure] = 0.0
+    every = known.all()
+    squares, own = (np.cumsum((v * y).sum(axis=1)) for y in (v, x))
     for step in range(_STEPS):
         above, below = 0.0, 0.0
         for k in _multiples(int((len(x) - 1) / period), step):
             lag = round(k * period)
-            both = sure[:-lag] & known[lag:]
-            slope = v[:-lag][both]
-            energy = float(np.square(slope).sum())
+            slope, last = v[:-lag], len(x) - lag - 1
+            energy, product = float(squares[last]), float(own[last])
+            if not every:
+                slope = slope * known[lag:, None]
+                energy, product = float(np.vdot(slope, slope)), float(np.vdot(slope, x[:-lag]))
             if energy > 0.0:
-                late = float((slope * (x[lag:][both] - x[:-lag][both])).sum()) / energy
+                late = (float(np.vdot(slope, x[lag:])) - product) / energy
                 above += energy * k * (lag - late)
                 below += energy * k * k
         if below == 0.0:

@@ -7,6 +7,7 @@ looks like a delay of T, at faster motion it is less, so both are tried.
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.measurement.dataset import Array, Finding, Run
 
@@ -61,17 +62,29 @@ def speed_lag(run: Run, longest: float = 0.1) -> float:
     if run.dq is None or reach < 2:
         return float("nan")
     v, dq = _scaled(run)
-    inner = slice(reach, count - reach)
     lags = np.arange(-reach, reach + 1)
-    shifted = (v[reach - k : count - reach - k] for k in lags)
+    dq[:reach] = dq[count - reach :] = 0.0
+    energy = np.concatenate([[0.0], np.cumsum(np.square(v).sum(axis=1))])
+    shifted_in = np.sqrt(np.maximum(energy[count - reach - lags] - energy[reach - lags], 0.0))
     # Over the norm of what is shifted in: largest where both are parallel, wherever it is cut.
-    match = np.array([(dq[inner] * x).sum() / max(np.linalg.norm(x), 1e-300) for x in shifted])
+    match = _products(dq, v, lags) / np.maximum(shifted_in, 1e-300)
     best = int(np.argmax(match))
     if best in (0, len(lags) - 1):
         return float("nan")  # beyond what is looked for
     left, middle, right = match[best - 1 : best + 2]
     bend = left - 2 * middle + right
     return float((lags[best] + (0.5 * (left - right) / bend if bend < 0 else 0.0)) * run.step)
+
+
+def _products(dq: Array, v: Array, lags: NDArray[np.intp]) -> Array:
+    """Σ dq_t v_{t−k} over samples and joints for every lag k; dq is zero as far from its ends."""
+    from scipy.fft import irfft, next_fast_len, rfft  # takes a second to import
+
+    size = next_fast_len(len(v), real=True)
+    total = np.zeros(size)
+    for one, other in zip(dq.T, v.T, strict=True):
+        total += irfft(rfft(one, size) * np.conj(rfft(other, size)), size)
+    return total[lags]
 
 
 def _scaled(run: Run) -> tuple[Array, Array]:

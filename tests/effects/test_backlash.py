@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.signal import butter, sosfiltfilt
 
+from excite_cli.effects import backlash
 from excite_cli.effects.backlash import Backlash, Flights
 from excite_cli.effects.base import Signals
 from excite_cli.robot.model import Array, Robot
@@ -119,4 +120,14 @@ def test_gap_is_found() -> None:
     signals, residual = _with_play(GAP)
     both = np.stack([np.zeros_like(residual), residual], axis=-1)
     (shape,) = Backlash.tuned(_robot(), (1,), [signals], [both])
+    assert shape["gap"] == pytest.approx(GAP, rel=0.1)
+
+
+def test_gap_is_found_in_the_middles_of_long_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
+    signals, residual = _with_play(GAP)
+    both = np.stack([np.zeros_like(residual), residual], axis=-1)
+    early = np.arange(len(both)) < len(both) // 4
+    both[early] = both[~early][: early.sum()]  # what has nothing to do with the motion there
+    monkeypatch.setattr(backlash, "_SEARCHED", len(both))
+    (shape,) = Backlash.tuned(_robot(), (1,), [signals, signals], [both, both])
     assert shape["gap"] == pytest.approx(GAP, rel=0.1)
