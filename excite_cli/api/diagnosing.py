@@ -28,6 +28,8 @@ from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import write_diagnosis
 from excite_cli.store.versions import versions
 from excite_cli.summary.diagnosis import diagnosis_answer as diagnosis_answer
+from excite_cli.workers.at_hand import at_hand
+from excite_cli.workers.base import Workers
 
 _HAVE_IT = (
     "What was found does not lower the error on sealed data. To have it in a config all the same: "
@@ -47,6 +49,7 @@ def diagnose(
     apply_unconfirmed: bool = False,
     smallest: bool = False,
     overwrite: bool = False,
+    workers: Workers | None = None,
     progress: Callable[[str, int], None] = lambda text, done: None,
     tell: Tell = log_note,
 ) -> Diagnosis:
@@ -55,7 +58,8 @@ def diagnose(
     `data` are measured data or their files. Written to `output` (HDF5) if that is given, and the
     config with what was found to `apply` (YAML); where the error on sealed data did not fall
     (`good` is false), that is written with `apply_unconfirmed` only. `smallest`: with the fewest
-    effects that are within one standard error of the best on runs left out.
+    effects that are within one standard error of the best on runs left out. `workers`
+    (`open_workers`) share the runs; every number is the same without.
 
     Returns
     -------
@@ -75,7 +79,7 @@ def diagnose(
     if smallest and apply is None:
         raise ConfigError("--smallest says nothing without --apply NEW.yaml.")
     inputs = inputs_of(problem, *sources_of(data))
-    with held({"output": output, "apply": apply}, overwrite, inputs):
+    with held({"output": output, "apply": apply}, overwrite, inputs), at_hand(workers):
         dataset = dataset_of(problem, data, tell)
         found = diagnose_dataset(
             problem.robot, robot_base(problem), dataset, problem.spec, sealed, progress

@@ -29,6 +29,8 @@ from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.fit_file import read_fit, write_fit
 from excite_cli.summary.identification import identification_answer as identification_answer
 from excite_cli.summary.load import load_answer as load_answer
+from excite_cli.workers.at_hand import at_hand
+from excite_cli.workers.base import Workers
 
 
 @checked()
@@ -42,13 +44,15 @@ def identify(
     mjcf: str | Path | None = None,
     parameters: str | Path | None = None,
     overwrite: bool = False,
+    workers: Workers | None = None,
     progress: Callable[[str, int], None] = lambda text, done: None,
     tell: Tell = log_note,
 ) -> Identification:
     """The parameters of the declared model: `excite identify`.
 
     `data` are measured data or their files. The fit is written to `output` (HDF5), the model to
-    `urdf`, `mjcf` and `parameters` (YAML), where these are given.
+    `urdf`, `mjcf` and `parameters` (YAML), where these are given. `workers` (`open_workers`) share
+    the runs; every number is the same without.
 
     Returns
     -------
@@ -64,7 +68,7 @@ def identify(
     """
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
     inputs = inputs_of(problem, *sources_of(data))
-    with held({"output": output, **models}, overwrite, inputs):
+    with held({"output": output, **models}, overwrite, inputs), at_hand(workers):
         dataset = dataset_of(problem, data, tell)
         suspicious = check_dataset(problem.robot, dataset, problem.spec, sealed)
         dataset = replace(dataset, findings=(*dataset.findings, *suspicious))

@@ -45,6 +45,8 @@ def diagnose(
             rich_help_panel=OUTPUT,
         ),
     ] = False,
+    workers: options.Workers = 1,
+    scheduler: options.Scheduler = None,
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,
     as_json: options.Json = False,
@@ -57,7 +59,8 @@ def diagnose(
     The declared model is fitted to all runs but the held-out (sealed) one; its residual is traced
     to named effects, with their size, certainty, and what these data cannot tell them from. The
     sealed run is used once, for the error before and after, and for the verdict on every effect. A
-    single run is cut into blocks, every third sealed.
+    single run is cut into blocks, every third sealed. --workers share the runs, with the same
+    numbers.
 
     Exit status 1: effects were found, but the error on the sealed run did not fall.
 
@@ -68,9 +71,14 @@ def diagnose(
     from excite_cli.api.diagnosing import diagnosis_answer
     from excite_cli.api.loading import load_case
     from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import working
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    with single_threaded(), terminal.live("diagnose", 10) as line:
+    with (
+        single_threaded(),
+        working(workers, scheduler, 1, terminal.tell) as place,
+        terminal.live("diagnose", 10) as line,
+    ):
         found = diagnose_data(
             load_case(config, overrides or ()),
             data,
@@ -80,6 +88,7 @@ def diagnose(
             apply_unconfirmed=apply_unconfirmed,
             smallest=smallest,
             overwrite=overwrite,
+            workers=place,
             progress=line,
             tell=terminal.tell,
         )

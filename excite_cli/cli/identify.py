@@ -51,6 +51,8 @@ def identify(
         str | None,
         typer.Option("--link", help="Link that carries the payload. Default: the last one."),
     ] = None,
+    workers: options.Workers = 1,
+    scheduler: options.Scheduler = None,
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,
     as_json: options.Json = False,
@@ -62,7 +64,7 @@ def identify(
 
     Base parameters and those of the declared effects are fitted to all runs but the held-out
     (sealed) one, on which the errors are measured. A single run is cut into blocks, of which every
-    third is sealed.
+    third is sealed. --workers share the runs, with the same numbers.
 
     With --only payload, mass, centre and inertia of what the robot carries are found from all runs,
     while a fit of the robot alone is known as well as it says. Exit status 1: no body has them.
@@ -76,6 +78,7 @@ def identify(
     from excite_cli.api.identifying import identify as identify_data
     from excite_cli.api.loading import load_case
     from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import working
     from excite_cli.errors import ConfigError
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
@@ -94,7 +97,11 @@ def identify(
         return
     if fit is not None or link is not None:
         raise ConfigError("--fit and --link belong to --only payload.")
-    with single_threaded(), terminal.live("identify") as line:
+    with (
+        single_threaded(),
+        working(workers, scheduler, 1, terminal.tell) as place,
+        terminal.live("identify") as line,
+    ):
         found = identify_data(
             load_case(config, overrides or ()),
             data,
@@ -104,6 +111,7 @@ def identify(
             mjcf=mjcf,
             parameters=parameters,
             overwrite=overwrite,
+            workers=place,
             progress=line,
             tell=terminal.tell,
         )

@@ -18,6 +18,8 @@ from excite_cli.identification.factors import Mask
 from excite_cli.identification.noise import Noise, noise_of
 from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 MOST_ENLARGED = 4.0
 
@@ -64,24 +66,13 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
     noises, meat, trace = [], np.zeros((p, p)), np.zeros(n)
     eaten, white, plain = np.zeros(n), np.zeros(p), 0
     parts, spool = [], Spool()
-    for run in runs:
-        residual = run.residual(x)
-        if run.weights is not None:
-            residual = residual * run.weights
-        noise = noise_of(residual, run.usable)
-        noises.append(noise)
-        columns = np.where(run.usable[..., None], run.columns, 0.0)
-        spread = noise.spread_back(columns) / np.square(sigma)[:, None]
-        parts.append((spool.keep(spread), noise))
-        own = np.diag(noise.innovation)
-        projected = spread @ inverse
-        eaten += own * np.einsum("tjp,tjp->j", projected, spread) * np.square(sigma)
-        variance = own * np.array([_gain(a) for a in noise.polynomials])
-        trace += variance * run.usable.sum(axis=0)
-        scores = (columns @ inverse) * (np.sqrt(variance) / np.square(sigma))[:, None]
-        white += np.square(scores).sum(axis=(0, 1))
+    for run, own in zip(runs, each(_part, (x, inverse, sigma), runs), strict=True):
+        noises.append(own.noise)
+        parts.append((spool.keep(own.spread), own.noise))
+        eaten += own.eaten
+        trace += own.trace
+        white += own.white
         plain += int(run.usable.sum())
-        forget()
     ratio = np.clip(eaten / np.maximum(trace, 1e-300), 0.0, 1.0 - 1.0 / MOST_ENLARGED)
     enlarged = np.sqrt(1.0 / (1.0 - ratio))
     for spread, noise in parts:
@@ -103,6 +94,38 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
     shares = shares[np.isfinite(shares)]
     samples = float(plain * np.median(shares)) if len(shares) else float("nan")
     return Covariance((matrix + matrix.T) / 2, tuple(noises), samples)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What a run adds: its noise, its columns spread by it (M, n, p), and sums."""
+
+    noise: Noise
+    spread: Array
+    eaten: Array
+    trace: Array
+    white: Array
+
+
+def _part(shared: tuple[Array, Array, Array], run: Rows, tell: Tell) -> _Part:
+    x, inverse, sigma = shared
+    residual = run.residual(x)
+    if run.weights is not None:
+        residual = residual * run.weights
+    noise = noise_of(residual, run.usable)
+    columns = np.where(run.usable[..., None], run.columns, 0.0)
+    spread = noise.spread_back(columns) / np.square(sigma)[:, None]
+    own = np.diag(noise.innovation)
+    projected = spread @ inverse
+    variance = own * np.array([_gain(a) for a in noise.polynomials])
+    scores = (columns @ inverse) * (np.sqrt(variance) / np.square(sigma))[:, None]
+    return _Part(
+        noise,
+        spread,
+        own * np.einsum("tjp,tjp->j", projected, spread) * np.square(sigma),
+        variance * run.usable.sum(axis=0),
+        np.square(scores).sum(axis=(0, 1)),
+    )
 
 
 def _gain(polynomial: Array) -> float:

@@ -9,7 +9,7 @@ Vandanjon & Gautier 2013, Brunot et al. 2018.) The instrumental-variable estimat
 regression on Z Π.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -20,9 +20,11 @@ from excite_cli.identification.covariance import Rows, estimate_covariance
 from excite_cli.identification.factors import run_factors, solve, stacked
 from excite_cli.identification.least_squares import factors_of, fit_rows
 from excite_cli.identification.periods import mean_of_other_periods, period_of
-from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.dataset import Dataset, Mask, Run
 from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 Source = Literal["reference", "periods", "none"]
 REFERENCE = "q_ref"
@@ -74,28 +76,34 @@ def instrument_dataset(dataset: Dataset) -> tuple[Dataset | None, Source, str]:
     if all(
         REFERENCE in run.extra and run.extra[REFERENCE].shape == run.q.shape for run in dataset.runs
     ):
-        return replace(dataset, runs=_moving_as(dataset.runs, _aligned)), "reference", ""
-    periods = {id(run): period_of(run.q) for run in dataset.runs}
-    if all(period is not None for period in periods.values()):
-        runs = _moving_as(
-            dataset.runs, lambda run: mean_of_other_periods(run.q, periods[id(run)] or 1)
-        )
-        return replace(dataset, runs=runs), "periods", ""
+        moved = each(_aligned, None, dataset.runs)
+        return replace(dataset, runs=_moving_as(dataset.runs, moved)), "reference", ""
+    positions = [run.q for run in dataset.runs]
+    periods = list(each(_period, None, positions))
+    if all(period is not None for period in periods):
+        moved = each(_other_periods, None, list(zip(positions, periods, strict=True)))
+        return replace(dataset, runs=_moving_as(dataset.runs, moved)), "periods", ""
     return None, "none", (
         "there is neither a reference motion (channel q_ref) nor a motion of two or more periods"
     )  # fmt: skip
 
 
-def _moving_as(runs: Sequence[Run], motion: Callable[[Run], Array]) -> tuple[Run, ...]:
+def _moving_as(runs: Sequence[Run], motions: Iterable[Array]) -> tuple[Run, ...]:
     """The runs with other positions."""
-    spool, found = Spool(), []
-    for run in runs:
-        found.append(replace(run, q=spool.keep(motion(run)), dq=None))
-        forget()
-    return tuple(found)
+    spool = Spool()
+    pairs = zip(runs, motions, strict=True)
+    return tuple(replace(run, q=spool.keep(q), dq=None) for run, q in pairs)
 
 
-def _aligned(run: Run) -> Array:
+def _period(shared: None, q: Array, tell: Tell) -> int | None:
+    return period_of(q)
+
+
+def _other_periods(shared: None, task: tuple[Array, int], tell: Tell) -> Array:
+    return mean_of_other_periods(*task)
+
+
+def _aligned(shared: None, run: Run, tell: Tell) -> Array:
     """Reference positions, shifted in time so that they lie best on the recorded ones."""
     reference, speed = run.extra[REFERENCE], np.gradient(run.q, run.step, axis=0)
     lead, shifted = np.zeros(run.q.shape[1]), reference
@@ -155,12 +163,15 @@ def hausman_test(
 
 def _triangle(runs: Sequence[Rows], instruments: Sequence[Array], noise: Array) -> Array:
     """R (·, 2p) of the usable rows [Z C] of all runs, divided by `noise`."""
-    factors = []
-    for run, instrument in zip(runs, instruments, strict=True):
-        both = np.concatenate([instrument, run.columns], axis=2)
-        factors.append(run_factors(both, np.zeros(run.tau.shape), run.usable))
-        forget()
-    return stacked(factors, noise)[:, :-1]
+    pairs = zip(runs, instruments, strict=True)
+    tasks = [(instrument, run.columns, run.usable) for run, instrument in pairs]
+    return stacked(list(each(_factors_of_both, None, tasks)), noise)[:, :-1]
+
+
+def _factors_of_both(shared: None, task: tuple[Array, Array, Mask], tell: Tell) -> Array:
+    instrument, columns, usable = task
+    both = np.concatenate([instrument, columns], axis=2)
+    return run_factors(both, np.zeros(usable.shape), usable)
 
 
 def _norms(x: Array) -> Array:

@@ -24,6 +24,8 @@ from excite_cli.identification.factors import (
 from excite_cli.identification.robust import huber_weights, robust_scale, within
 from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 Method = Literal["ols", "wls", "irls"]
 _ROUNDS, _SETTLED = 30, 1e-6
@@ -99,12 +101,20 @@ def factors_of(
     runs: Sequence[Rows], usable: Sequence[Mask] | None = None, weights: Sequence[Array] = ()
 ) -> list[Array]:
     """Factors (n, p+1, p+1) of every run; with other `usable` rows or `weights` if given."""
-    found = []
-    for k, run in enumerate(runs):
-        rows = run.usable if usable is None else usable[k]
-        found.append(run_factors(run.columns, run.tau, rows, weights[k] if weights else None))
-        forget()
-    return found
+    tasks = [
+        (
+            run.columns,
+            run.tau,
+            run.usable if usable is None else usable[k],
+            weights[k] if weights else None,
+        )
+        for k, run in enumerate(runs)
+    ]
+    return list(each(_factors, None, tasks))
+
+
+def _factors(shared: None, task: tuple[Array, Array, Mask, Array | None], tell: Tell) -> Array:
+    return run_factors(*task)
 
 
 def _without_dust(runs: Sequence[Rows], sizes: Array) -> Sequence[Rows]:

@@ -24,7 +24,8 @@ from excite_cli.identification.averages import apply, average_rows, reach, witho
 from excite_cli.identification.exact_period import exact_period
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
-from excite_cli.out_of_core import forget
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 _LONGEST = 600.0  # s of a run that are put together
 _AT_ONCE = 4096  # averages around instants between samples: four times as many on the way
@@ -85,11 +86,8 @@ def noise_floor(parts: Sequence[Run], processing: Processing) -> NoiseFloor | No
     Squares are added over the runs. None if no run holds two whole periods.
     """
     sums = np.zeros((4, parts[0].tau.shape[1]))
-    for run in _put_together(parts):
-        period = exact_period(run.q, run.known)
-        if period is not None:
-            sums += _sums(run, period, processing)
-        forget()
+    for own in each(_sums_of, processing, _put_together(parts)):
+        sums += own
     squares, freedom, shifted, phases = sums
     enough = phases >= _FEWEST
     if not enough.any():
@@ -101,16 +99,23 @@ def noise_floor(parts: Sequence[Run], processing: Processing) -> NoiseFloor | No
     return NoiseFloor(rms, misalignment)
 
 
-def _put_together(parts: Sequence[Run]) -> Iterator[_Whole]:
-    """Runs with gaps where their sealed blocks are; very long ones in pieces."""
+def _sums_of(processing: Processing, group: Sequence[Run], tell: Tell) -> Array:
+    """What the parts of a run add; nothing where it holds no two periods."""
+    run = _whole(group)
+    period = exact_period(run.q, run.known)
+    return np.zeros((4, run.tau.shape[1])) if period is None else _sums(run, period, processing)
+
+
+def _put_together(parts: Sequence[Run]) -> Iterator[list[Run]]:
+    """The parts of runs, which have gaps where their sealed blocks are; of long ones, pieces."""
     group: list[Run] = []
     for part in parts:
         joins = group and part.part.block and group[-1].id == part.id
         if group and not (joins and part.t[-1] - group[0].t[0] <= _LONGEST):
-            yield _whole(group)
+            yield group
             group = []
         group.append(part)
-    yield _whole(group)
+    yield group
 
 
 def _whole(group: Sequence[Run]) -> _Whole:

@@ -23,7 +23,9 @@ from excite_cli.identification.processing import Processing
 from excite_cli.identification.rounding import rounding_of
 from excite_cli.measurement.dataset import Array, Run
 from excite_cli.measurement.run_identity import RunId
-from excite_cli.out_of_core import Spool, forget
+from excite_cli.out_of_core import Spool
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 # Around a reversal a joint sticks: what its friction then is, only the torque itself knows.
 _STICKING = 0.02  # s
@@ -169,10 +171,13 @@ def prepare_all(
         See `prepare`.
     """
     spool, found = Spool(), []
-    for run in runs:
-        found.append(_kept(prepare(run, processing, left_out), spool))
-        forget()
+    for run in each(_prepared, (processing, left_out), runs):
+        found.append(_kept(run, spool))
     return found
+
+
+def _prepared(shared: tuple[Processing, LeftOut], run: Run, tell: Tell) -> PreparedRun:
+    return prepare(run, *shared)
 
 
 def _kept(run: PreparedRun, spool: Spool) -> PreparedRun:

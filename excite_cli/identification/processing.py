@@ -14,7 +14,8 @@ import numpy as np
 from excite_cli.config.data_spec import FilterSpec
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Array, Run
-from excite_cli.out_of_core import forget
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 # The signal has met its floor where the spectrum is below this multiple of it.
 ABOVE_FLOOR = 20.0
@@ -94,16 +95,18 @@ def choose_processing(
 
 def spectra(runs: Sequence[Run], fs: float) -> tuple[Array, Array]:
     """Mean spectrum of the positions (F, n) over the runs, on one grid of frequencies."""
-    from scipy.signal import welch  # takes a second to import
-
     length = min(min(len(run.t) for run in runs), max(64, int(5.0 * fs)))
     total, weight = np.zeros(1), 0.0
-    frequency = np.zeros(1)
-    for run in runs:
-        frequency, power = welch(run.q, fs, nperseg=length, axis=0, detrend="linear")
+    for run, power in zip(runs, each(_spectrum, (fs, length), [r.q for r in runs]), strict=True):
         total, weight = total + power * len(run.t), weight + len(run.t)
-        forget()
-    return frequency, total / weight
+    return np.asarray(np.fft.rfftfreq(length, 1.0 / fs)), total / weight
+
+
+def _spectrum(shared: tuple[float, int], q: Array, tell: Tell) -> Array:
+    from scipy.signal import welch  # takes a second to import
+
+    fs, length = shared
+    return np.asarray(welch(q, fs, nperseg=length, axis=0, detrend="linear")[1])
 
 
 def _bandwidth(frequency: Array, power: Array) -> float:

@@ -11,8 +11,10 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.out_of_core import Spool, forget
+from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 
 @dataclass(frozen=True)
@@ -109,21 +111,32 @@ def build_regression(
     With `values` of the effects, they see the torque of these as well.
     """
     found, spool = [], Spool()
-    for prepared in runs:
-        signals = signals_of(prepared, robot, phi)
-        if values is not None:
-            signals = with_effects(signals, effects, values)
-        inertial = signals.body.regressor[:, :, base.selection]
+    columns = each(_columns, (robot, base.selection, effects, phi, values), runs)
+    for prepared, (inertial, own) in zip(runs, columns, strict=True):
         found.append(
             RunColumns(
                 step=prepared.step,
-                inertial=spool.keep(prepared.averaged_for_fit(inertial)),
-                effects=spool.keep(prepared.averaged_for_fit(effect_columns(effects, signals))),
+                inertial=spool.keep(inertial),
+                effects=spool.keep(own),
                 tau=prepared.tau_fit,
                 usable=prepared.usable,
                 moving=prepared.moving,
                 prepared=prepared,
             )
         )
-        forget()
     return Regression(robot, base, tuple(effects), tuple(found))
+
+
+def _columns(
+    shared: tuple[Robot, NDArray[np.intp], Sequence[Effect], Array | None, Array | None],
+    prepared: PreparedRun,
+    tell: Tell,
+) -> tuple[Array, Array]:
+    """Averages of the regressor of the base parameters, and of the effects' columns."""
+    robot, selection, effects, phi, values = shared
+    signals = signals_of(prepared, robot, phi)
+    if values is not None:
+        signals = with_effects(signals, effects, values)
+    inertial = prepared.averaged_for_fit(signals.body.regressor[:, :, selection])
+    signals.body.forget()
+    return inertial, prepared.averaged_for_fit(effect_columns(effects, signals))

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,9 @@ from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOption
 from excite_cli.measurement.run_identity import Origin
 from excite_cli.measurement.torque import SECONDS, check_joints, declared, to_joints
 from excite_cli.measurement.units import Limits
-from excite_cli.out_of_core import Spool, forget
+from excite_cli.out_of_core import Spool
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 READERS: tuple[Reader, ...] = (Hdf5Reader(), CsvReader(), BagReader())
 _EPOCH = 1e6  # s: stamps beyond count from 1970, not from the start
@@ -70,21 +71,26 @@ def read_dataset(
     taken: set[str] = set()
     seen: set[str] = set()
     covariates, spool = DeclaredCovariates(spec.covariates), Spool()
-    for path, raws in _recordings(paths, options):
-        seen.update(name for raw in raws for column in raw.columns.values() for name in column)
-        named = _named(raws, path, taken)
-        arranged = []
-        for raw in named:
-            run, more = arrange(raw, joint_names, spec.names, str(path), spec.without_torque)
-            t, epoch = _seconds(raw, spec)
-            run = replace(run, t=t, epoch=epoch, origin=Origin(str(path), raw.place))
-            run = covariates.take(run, raw, spec.names)
-            arranged.append(to_joints(run, spec, joint_names, turning))
-            findings += more
-        parts, more = _checked(path, arranged, spec, joint_names, known)
+    noted: list[list[Finding]] = []
+
+    def arranged() -> Iterator[tuple[Path, list[Run]]]:
+        for path, raws in _recordings(paths, options):
+            seen.update(name for raw in raws for column in raw.columns.values() for name in column)
+            own, noticed = [], []
+            for raw in _named(raws, path, taken):
+                run, more = arrange(raw, joint_names, spec.names, str(path), spec.without_torque)
+                t, epoch = _seconds(raw, spec)
+                run = replace(run, t=t, epoch=epoch, origin=Origin(str(path), raw.place))
+                run = covariates.take(run, raw, spec.names)
+                own.append(to_joints(run, spec, joint_names, turning).kept(spool))
+                noticed += more
+            noted.append(noticed)
+            yield path, own
+
+    of_files = each(_checked, (spec, joint_names, known), arranged())
+    for number, (parts, more) in enumerate(of_files):
         runs += [run.kept(spool) for run in parts]
-        findings += more
-        forget()
+        findings += [*noted[number], *more]
     _check_all_met(spec.names, seen)
     findings += covariates.check()
     return Dataset(joint_names, tuple(runs), tuple(map(str, paths)), tuple(findings))
@@ -111,8 +117,13 @@ def _recordings(paths: Sequence[Path], options: ReadOptions) -> Iterator[tuple[P
     yield from ((path, raws) for path, raws in later if raws)
 
 
-def _checked(path: Path, runs: list[Run], *about: Any) -> tuple[list[Run], list[Finding]]:
+def _checked(
+    about: tuple[MeasurementSpec, tuple[str, ...], Limits],
+    task: tuple[Path, list[Run]],
+    tell: Tell,
+) -> tuple[list[Run], list[Finding]]:
     """The runs of a file, checked; errors name the file beside the run."""
+    path, runs = task
     try:
         return checked(runs, *about)
     except FileError as error:

@@ -13,11 +13,14 @@ import time
 from multiprocessing.connection import Connection
 from typing import Any
 
+from excite_cli.out_of_core import Spool
 from excite_cli.workers.base import Tell
+from excite_cli.workers.by_reference import packed
 from excite_cli.workers.travel import able_to_travel
 
 # Words of a task are passed on this often at most [s].
 _EVERY = 0.2
+_FULL = 2**28  # bytes of a file with answers
 
 
 def serve(descriptor: int, threads: int) -> None:
@@ -25,7 +28,7 @@ def serve(descriptor: int, threads: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is asked, and ends its workers
     connection = Connection(descriptor)
     threading.Thread(target=_end_with_parent, args=(descriptor,), daemon=True).start()
-    shared = _Shared()
+    shared, spool = _Shared(), Spool(0)
     try:
         connection.send(("ready", os.getpid()))
         while True:
@@ -33,7 +36,10 @@ def serve(descriptor: int, threads: int) -> None:
             if kind == "shared":
                 shared = _Shared(body)
             else:
-                connection.send_bytes(_answer(shared, body, threads, _teller(connection)))
+                # The parent has read the last answer by now; so a full file is its alone.
+                spool = spool if spool.size < _FULL else Spool(0)
+                answer, _held = _answer(shared, body, threads, _teller(connection), spool)
+                connection.send_bytes(answer)
     except (EOFError, OSError):
         os._exit(0)  # the parent is gone
 
@@ -55,14 +61,17 @@ class _Shared:
         return self._value
 
 
-def _answer(shared: _Shared, body: bytes, threads: int, tell: Tell) -> bytes:
-    """The message with what the task of `body` gives."""
+def _answer(
+    shared: _Shared, body: bytes, threads: int, tell: Tell, spool: Spool
+) -> tuple[bytes, Any]:
+    """The message with what the task of `body` gives, and that; large arrays of it in `spool`."""
     try:
         value = shared.value(threads)
         function, task = pickle.loads(body)
-        return pickle.dumps(("done", function(value, task, tell)), pickle.HIGHEST_PROTOCOL)
+        found = function(value, task, tell)
+        return packed(("done", found), spool), found
     except Exception as error:  # all of them are raised by the caller
-        return pickle.dumps(("failed", able_to_travel(error)))
+        return pickle.dumps(("failed", able_to_travel(error))), None
 
 
 def _teller(connection: Connection) -> Tell:

@@ -7,7 +7,6 @@ every worker has a socket of its own, so a death concerns the task that it was d
 import contextlib
 import json
 import os
-import pickle
 import socket
 import subprocess
 import sys
@@ -26,6 +25,7 @@ from excite_cli.workers.base import (
     Workers,
     unwatched,
 )
+from excite_cli.workers.by_reference import packed
 
 # The parent's path of imports comes first, so that a checkout finds itself; until it is set, `-P`
 # keeps the current folder out: a json.py that lies there is no part of us.
@@ -130,7 +130,7 @@ class Processes(Workers):
         """As `Workers.map`."""
         if not tasks:
             return []
-        blob = pickle.dumps(shared, pickle.HIGHEST_PROTOCOL)
+        blob = packed(shared)
         waiting = deque(range(len(tasks)))
         round_ = _Round(function, blob, tasks, watch, keep_failures, waiting)
         try:
@@ -172,7 +172,7 @@ class Processes(Workers):
         index = round_.waiting.popleft()
         worker.task = index
         round_.running += 1
-        body = pickle.dumps((round_.function, round_.tasks[index]), pickle.HIGHEST_PROTOCOL)
+        body = packed((round_.function, round_.tasks[index]))
         try:
             if worker.knows != round_.shared:
                 worker.connection.send(("shared", round_.shared))

@@ -1,0 +1,40 @@
+"""Messages between processes of one machine, in which large arrays are named and not copied.
+
+An array that lies in a file of this process (`out_of_core`) travels as the place in that file, and
+the other process maps it. What lies in memory and is large is written to such a file first.
+"""
+
+import io
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from excite_cli.out_of_core import Spool, attached, reference_to
+
+_LARGE = 2**18  # bytes
+POSSIBLE = Path("/proc/self/fd").is_dir()
+
+
+def packed(message: Any, spool: Spool | None = None) -> bytes:
+    """A pickle of `message`; with a `spool`, which is to live until it is read, of little size."""
+    if not POSSIBLE:
+        return pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
+    buffer = io.BytesIO()
+    _Packer(buffer, spool).dump(message)
+    return buffer.getvalue()
+
+
+class _Packer(pickle.Pickler):
+    def __init__(self, buffer: io.BytesIO, spool: Spool | None) -> None:
+        super().__init__(buffer, pickle.HIGHEST_PROTOCOL)
+        self._spool = spool
+
+    def reducer_override(self, value: Any) -> Any:
+        if type(value) is not np.ndarray or value.nbytes < _LARGE or value.dtype.hasobject:
+            return NotImplemented
+        if self._spool is not None:
+            value = self._spool.keep(value)
+        reference = reference_to(value)
+        return NotImplemented if reference is None else (attached, (reference,))
