@@ -13,6 +13,8 @@ from excite_cli.identification.identified_model import IdentifiedModel, Predicti
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace
 from excite_cli.robot.model import Array, Robot
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Played:
 
     def predictions(self, fitted: IdentifiedModel) -> list[Prediction]:
         """What a model says of every run."""
-        return [fitted.predicted(self.robot, run) for run in self.runs]
+        return list(each(_predicted, (self.robot, fitted), self.runs))
 
     def errors(self, predictions: Sequence[Prediction]) -> Errors:
         """Errors of predictions for all runs."""
@@ -38,6 +40,11 @@ class Played:
             torque_trace(run, new.load, new.torque, old.torque, sealed)
             for run, old, new in zip(self.runs, before, after, strict=True)
         )
+
+
+def _predicted(shared: tuple[Robot, IdentifiedModel], run: PreparedRun, tell: Tell) -> Prediction:
+    robot, fitted = shared
+    return fitted.predicted(robot, run)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis.in_runs import SeenRuns, changes, effects_of_runs
@@ -18,8 +19,10 @@ from excite_cli.effects.placing import places_named
 from excite_cli.errors import ConfigError, ExciteWarning
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
-from excite_cli.out_of_core import Spool, forget
+from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 _TOGETHER = 16  # effects that are filtered at once
 
@@ -72,6 +75,7 @@ def possible_effects(
     if not seen.covariates:
         names = [name for name in names if not catalogue()[name].follows_covariate]
     known = {effect.place._replace(runs=()) for effect in declared}
+    searched = _searched([name for name in names if name not in spec.exclude], known, spec, seen)
     known_in_runs = {effect.place for effect in declared}
     found: list[tuple[Effect, int]] = []
     for name in names:
@@ -80,7 +84,7 @@ def possible_effects(
         kind = catalogue()[name]
         try:
             places = _places(kind, seen.robot, spec)
-            effects, tests = _of_kind(kind, places, known, seen)
+            effects, tests = _of_kind(kind, places, known, seen, searched)
             changed = changes(kind, known_in_runs, seen)
             if is_of_a_package(kind):
                 require_columns([*effects, *(each for each, _ in changed)], seen.signals)
@@ -126,11 +130,35 @@ def _places(kind: type[Effect], robot: Robot, spec: DiagnosisSpec) -> list[tuple
     return kind.places(robot)
 
 
+def _searched(
+    names: Sequence[str], known: Container[Place], spec: DiagnosisSpec, seen: SeenRuns
+) -> dict[Place, list[dict]]:
+    """Shapes of our own kinds that are searched in all runs, by place."""
+    kinds = [catalogue()[name] for name in names if not is_of_a_package(catalogue()[name])]
+    tasks = [
+        place
+        for kind in kinds
+        if kind.is_searched() and not (kind.per_run or kind.follows_covariate)
+        for joints in _places(kind, seen.robot, spec)
+        if (place := Place(kind.kind, joints)) not in known
+    ]
+    shared = seen.robot, seen.signals, seen.residuals
+    return dict(zip(tasks, each(_tuned, shared, tasks), strict=True))
+
+
+def _tuned(
+    shared: tuple[Robot, Sequence[Signals], Sequence[Array]], place: Place, tell: Tell
+) -> list[dict]:
+    robot, signals, residuals = shared
+    return catalogue()[place.kind].tuned(robot, place.joints, signals, residuals)
+
+
 def _of_kind(
     kind: type[Effect],
     places: Sequence[tuple[int, ...]],
     known: Container[Place],
     seen: SeenRuns,
+    searched: Mapping[Place, list[dict]],
 ) -> tuple[list[Effect], int]:
     """All effects of a kind at places that are not `known`, and how many tests they stand for."""
     effects: list[Effect] = []
@@ -150,7 +178,11 @@ def _of_kind(
                     effects += [kind(place, shape, covariate=name) for shape in shapes]
                     tests += kind.tests_of_grid(seen.robot, place, alone)
         else:
-            shapes = kind.tuned(seen.robot, place, seen.signals, seen.residuals)
+            at = Place(kind.kind, place)
+            if at in searched:
+                shapes = searched[at]
+            else:
+                shapes = kind.tuned(seen.robot, place, seen.signals, seen.residuals)
             effects += [kind(place, shape) for shape in shapes]
             tests += kind.tests_of_grid(seen.robot, place, seen.signals)
     return effects, tests
@@ -180,15 +212,14 @@ def with_columns(
         alike.setdefault(effect.rows(n), []).append(i)
     columns: list[list[Array]] = [[] for _ in effects]
     spool, shows, finite = Spool(), np.zeros(len(effects), bool), np.ones(len(effects), bool)
-    for signal, run in zip(signals, runs, strict=True):
-        for rows, members in alike.items():
-            blocks = _filtered([effects[i][0] for i in members], rows, signal, run)
-            for i, block in zip(members, blocks, strict=True):
-                columns[i].append(spool.keep(block))
-                shows[i] |= bool(np.abs(block).max(initial=0.0) > 0)
-                finite[i] &= bool(np.isfinite(block).all())
-        signal.body.forget()
-        forget()
+    shared = [effect for effect, _ in effects], alike
+    of_runs = each(_of_run, shared, zip(signals, runs, strict=True))
+    for run, (blocks, there, sound) in zip(runs, of_runs, strict=True):
+        for i, block in enumerate(blocks):
+            columns[i].append(_nothing(effects[i][0], run, n) if block is None else block)
+            columns[i][-1] = spool.keep(columns[i][-1])
+        shows |= there
+        finite &= sound
     return [
         Candidate(effect, effect.rows(n), tuple(blocks), tests)
         for (effect, tests), blocks, there in zip(effects, columns, shows & finite, strict=True)
@@ -196,13 +227,38 @@ def with_columns(
     ]
 
 
+def _of_run(
+    shared: tuple[Sequence[Effect], dict[tuple[int, ...], list[int]]],
+    task: tuple[Signals, PreparedRun],
+    tell: Tell,
+) -> tuple[list[Array | None], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Columns of all effects in one run, None of those that are not in it; not zero, finite."""
+    effects, alike = shared
+    signals, run = task
+    columns: list[Array | None] = [None for _ in effects]
+    shows, finite = np.zeros(len(effects), bool), np.ones(len(effects), bool)
+    for rows, members in alike.items():
+        blocks = _filtered([effects[i] for i in members], rows, signals, run)
+        for i, block in zip(members, blocks, strict=True):
+            columns[i] = block
+            if block is not None:
+                shows[i] = np.abs(block).max(initial=0.0) > 0
+                finite[i] = np.isfinite(block).all()
+    signals.body.forget()
+    return columns, shows, finite
+
+
+def _nothing(effect: Effect, run: PreparedRun, n: int) -> Array:
+    shape = run.averages.shape[0], len(effect.rows(n)), len(effect.parameters)
+    return np.broadcast_to(0.0, shape)
+
+
 def _filtered(
     effects: Sequence[Effect], rows: tuple[int, ...], signals: Signals, run: PreparedRun
-) -> list[Array]:
+) -> list[Array | None]:
     """Columns (M, len(rows), p) in one run of effects on the same rows, filtered together."""
     present = [i for i, effect in enumerate(effects) if effect.active(signals.run)]
-    size = run.averages.shape[0], len(rows)
-    found = [np.broadcast_to(0.0, (*size, len(effect.parameters))) for effect in effects]
+    found: list[Array | None] = [None for _ in effects]
     for some in _portions(present):
         columns = [effects[i].columns(signals) for i in some]
         ends = np.cumsum([block.shape[2] for block in columns])

@@ -22,6 +22,8 @@ from excite_cli.identification.averages import average_rows
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Mask, Run
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 _BANDS = ((8.0, 14.0), (14.0, 20.0), (20.0, 35.0), (35.0, 60.0), (60.0, 100.0))  # Hz
 _WHITE = 2  # of the bands give the level of white noise
@@ -69,21 +71,13 @@ def band_noise(
     energies, counted = np.zeros((2, len(bands), n)), np.zeros((len(bands), n))
     seconds = np.zeros(n)
     stretches: list[list[Array]] = [[] for _ in bands[:_WHITE]]
-    for run, fit, torque in zip(recorded, prepared, predicted, strict=True):
-        v = np.stack([np.interp(run.t, fit.t, column) for column in fit.v.T], axis=1)
-        good = run.usable() & np.isfinite(run.tau) & ~_near_reversal(v, run.step)
-        sliding = good & (np.abs(v) > processing.moving_speed)
-        seconds += sliding.sum(axis=0) * run.step
-        left = run.tau - _at_recorded_rate(torque, run, fit)
-        series = _bridged((run.tau, left), good, run.step)
-        for k, band in enumerate(bands):
-            kept = np.where(sliding, _kept(good, run.step, band), 0.0)
-            counted[k] += kept.sum(axis=0) * run.step
-            squares = [np.square(_passed(x, run.step, band)) for x in series]
-            for energy, square in zip(energies, squares, strict=True):
-                energy[k] += np.where(sliding, square, 0.0).sum(axis=0) * run.step
-            if k < _WHITE:
-                stretches[k].append(_stretches(np.minimum(*squares), kept, run.step))
+    runs = zip(recorded, prepared, predicted, strict=True)
+    for own in each(_of_run, (bands, processing.moving_speed), runs):
+        seconds += own.seconds
+        counted += own.counted
+        energies += own.energies
+        for series, some in zip(stretches, own.stretches, strict=True):
+            series.append(some)
     energy = energies.min(axis=0)
     usual = np.stack([_usual(np.concatenate(own)) for own in stretches])
     known = seconds > _LEAST_SECONDS
@@ -105,6 +99,45 @@ def band_noise(
         white[j] = np.sqrt(gain * _left(flat, _CORNERS[-1], processing))
         coloured[j] = max(white[j], np.sqrt(gain * _left(level, corner, processing)))
     return BandNoise(white, coloured)
+
+
+@dataclass(frozen=True)
+class _Bands:
+    """What a run adds: `seconds` (n,) of sliding, of every band `counted` (B, n), `energies` of the
+    torque and of what is left (2, B, n), and powers of `stretches` of the first."""
+
+    seconds: Array
+    counted: Array
+    energies: Array
+    stretches: list[Array]
+
+
+def _of_run(
+    shared: tuple[Sequence[tuple[float, float]], float],
+    task: tuple[Run, PreparedRun, Array],
+    tell: Tell,
+) -> _Bands:
+    bands, moving_speed = shared
+    run, fit, torque = task
+    v = np.stack([np.interp(run.t, fit.t, column) for column in fit.v.T], axis=1)
+    good = run.usable() & np.isfinite(run.tau) & ~_near_reversal(v, run.step)
+    sliding = good & (np.abs(v) > moving_speed)
+    left = run.tau - _at_recorded_rate(torque, run, fit)
+    series = _bridged((run.tau, left), good, run.step)
+    counted, energies, stretches = [], [], []
+    for k, band in enumerate(bands):
+        kept = np.where(sliding, _kept(good, run.step, band), 0.0)
+        counted.append(kept.sum(axis=0) * run.step)
+        squares = [np.square(_passed(x, run.step, band)) for x in series]
+        energies.append([np.where(sliding, x, 0.0).sum(axis=0) * run.step for x in squares])
+        if k < _WHITE:
+            stretches.append(_stretches(np.minimum(*squares), kept, run.step))
+    return _Bands(
+        sliding.sum(axis=0) * run.step,
+        np.array(counted),
+        np.array(energies).transpose(1, 0, 2),
+        stretches,
+    )
 
 
 def _near_reversal(v: Array, step: float) -> Mask:

@@ -13,6 +13,8 @@ from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import effect_columns, seen_of, with_effects
 from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 
 class ModelledRun:
@@ -21,20 +23,14 @@ class ModelledRun:
     These are all standard parameters beside a prior, and the base parameters' columns without.
     """
 
-    def __init__(self, model: Model, run: PreparedRun, spool: Spool) -> None:
+    def __init__(self, model: Model, run: PreparedRun, inertial: Array) -> None:
         self.model = model
         self._body = RigidBody(model.robot, standard_parameters(model.robot), run.q, run.v, run.a)
-        self.take(run, spool)
+        self.take(run, inertial)
 
-    def take(self, run: PreparedRun, spool: Spool) -> None:
-        """The same motion with other averages; `spool` keeps the columns."""
-        self.run = run
-        columns = self._body.regressor
-        if self.model.prior is None:
-            columns = columns[:, :, self.model.base.selection]
-        self.inertial = spool.keep(run.averaged_for_fit(columns))
-        self._body.forget()
-        forget()
+    def take(self, run: PreparedRun, inertial: Array) -> None:
+        """The same motion with other averages, and the columns with these."""
+        self.run, self.inertial = run, inertial
 
     def signals(self, phi: Array, effects: Sequence[Effect], values: Array) -> Signals:
         """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
@@ -46,6 +42,20 @@ class ModelledRun:
             run = self.run
             self._body = RigidBody(self.model.robot, phi, run.q, run.v, run.a)
         return self._body
+
+
+def inertial_columns(model: Model, runs: Sequence[PreparedRun]) -> list[Array]:
+    """Averages (M, n, k) of the inertial columns of every run."""
+    spool = Spool()
+    return [spool.keep(columns) for columns in each(_inertial, model, runs)]
+
+
+def _inertial(model: Model, run: PreparedRun, tell: Tell) -> Array:
+    phi = standard_parameters(model.robot)
+    columns = RigidBody(model.robot, phi, run.q, run.v, run.a).regressor
+    if model.prior is None:
+        columns = columns[:, :, model.base.selection]
+    return run.averaged_for_fit(columns)
 
 
 def training_data(

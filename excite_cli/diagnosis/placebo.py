@@ -14,9 +14,11 @@ from scipy.stats import chi2
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.training import TrainingData
+from excite_cli.diagnosis.training import Columns, Shown, TrainingData
 from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 _SHIFTS = 6
 _SEED = 20261121
@@ -64,30 +66,58 @@ def placebo_gains(
     factor = white.factor(chosen)
     gains = []
     residuals = data.residuals(candidates, chosen, white.solve(chosen))
-    for joint in range(data.n):
-        local = [c for c in candidates if c.rows == (joint,) and c.width == 1]
-        if not local:
-            continue
-        parts, spool = [], Spool()
-        for part, run in enumerate(data.runs):
-            usable = run.usable[:, joint]
-            own = noise.whitened(data.columns(candidates, chosen, part, joint), joint, usable)
-            rest = noise.whitened(residuals[part][:, joint], joint, usable)
-            columns = np.stack([c.columns[part][:, 0, 0] for c in local], axis=1)
-            parts.append((spool.keep(columns), spool.keep(own), rest, usable))
-            forget()
-        for _ in range(_SHIFTS):
-            cross = np.zeros((len(at), len(local)))
-            square, product = np.zeros(len(local)), np.zeros(len(local))
-            for columns, own, rest, usable in parts:
-                shift = int(rng.integers(len(columns) // 4, max(3 * len(columns) // 4, 2)))
-                moved = noise.whitened(np.roll(columns, shift, axis=0), joint, usable)
-                cross += own.T @ moved
-                square += np.sum(moved**2, axis=0)
-                product += rest @ moved
-                forget()
+    local = [[c for c in candidates if c.rows == (j,) and c.width == 1] for j in range(data.n)]
+    joints = [joint for joint in range(data.n) if local[joint]]
+    sizes = [len(each) for each in data.tau]
+    tasks = [
+        (
+            joint,
+            [Shown(c.rows, c.columns, c.width) for c in local[joint]],
+            [
+                [int(rng.integers(size // 4, max(3 * size // 4, 2))) for size in sizes]
+                for _ in range(_SHIFTS)
+            ],
+        )
+        for joint in joints
+    ]
+    taken = [candidates[i] for i in chosen]
+    shared = data, [Shown(c.rows, c.columns, c.width) for c in taken], noise, residuals
+    for products in each(_products, shared, tasks):
+        for cross, square, product in products:
             cross /= white.norms[at][:, None]
             left = square - np.einsum("ik,ik->k", cross, factor.solve(cross))
             good = left > 1e-2 * square
             gains += list(product[good] ** 2 / left[good])
     return np.array(gains)
+
+
+def _products(
+    shared: tuple[TrainingData, Sequence[Columns], NoiseModel, Sequence[Array]],
+    task: tuple[int, Sequence[Columns], Sequence[Sequence[int]]],
+    tell: Tell,
+) -> list[tuple[Array, Array, Array]]:
+    """Of the columns of one joint, shifted: products with the model (k, L), with themselves (L,),
+    and with the residual (L,), for every set of `shifts` of the parts."""
+    data, taken, noise, residuals = shared
+    joint, local, shifts = task
+    parts, spool = [], Spool()
+    for part, run in enumerate(data.runs):
+        usable = run.usable[:, joint]
+        columns = data.columns(taken, range(len(taken)), part, joint)
+        own = noise.whitened(columns, joint, usable)
+        rest = noise.whitened(residuals[part][:, joint], joint, usable)
+        columns = np.stack([c.columns[part][:, 0, 0] for c in local], axis=1)
+        parts.append((spool.keep(columns), spool.keep(own), rest, usable))
+        forget()
+    found = []
+    for of_parts in shifts:
+        cross = np.zeros((parts[0][1].shape[1], len(local)))
+        square, product = np.zeros(len(local)), np.zeros(len(local))
+        for shift, (columns, own, rest, usable) in zip(of_parts, parts, strict=True):
+            moved = noise.whitened(np.roll(columns, shift, axis=0), joint, usable)
+            cross += own.T @ moved
+            square += np.sum(moved**2, axis=0)
+            product += rest @ moved
+            forget()
+        found.append((cross, square, product))
+    return found

@@ -18,7 +18,7 @@ from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
-from excite_cli.diagnosis.modelled_run import ModelledRun, training_data
+from excite_cli.diagnosis.modelled_run import ModelledRun, inertial_columns, training_data
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import placebos_of
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
@@ -30,7 +30,6 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.seen import Seen
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array
 
 _PASSES = 6
@@ -78,8 +77,10 @@ def trace(
     `start`: effects found in more of the same data; all numbers are fitted to these data alone.
     """
     left_out = LeftOut.by((*model.declared, *start))
-    spool = Spool()
-    bodies = [ModelledRun(model, run, spool) for run in prepared(left_out)]
+    runs = prepared(left_out)
+    columns = inertial_columns(model, runs)
+    bodies = [ModelledRun(model, *each) for each in zip(runs, columns, strict=True)]
+    del runs, columns  # the next ones take their place
     fit = _first_fit(model, folds, bodies, start)
     first = _LENIENT if start else 0
     passes: list[_Pass] = []
@@ -87,9 +88,10 @@ def trace(
     def take(wanted: LeftOut) -> None:
         nonlocal left_out
         if wanted != left_out:
-            spool = Spool()
-            for body, run in zip(bodies, prepared(wanted), strict=True):
-                body.take(run, spool)
+            runs = prepared(wanted)
+            columns = inertial_columns(model, runs)
+            for body, run, own in zip(bodies, runs, columns, strict=True):
+                body.take(run, own)
             left_out = wanted
 
     traced: Traced | None = None
@@ -225,7 +227,7 @@ def _one_pass(
         # Likewise the runs of what is in some of them only, or changes with time or a column.
         plain_kinds = np.repeat(
             [
-                not (effect.is_searched or effect.runs or effect.changes_of)
+                not (effect.is_searched() or effect.runs or effect.changes_of)
                 and "time" not in effect.function_of
                 for effect in effects
             ],

@@ -140,6 +140,15 @@ class TrainingData:
         return found
 
 
+@dataclass(frozen=True)
+class Shown:
+    """Columns as they are, whoever made them."""
+
+    rows: tuple[int, ...]
+    columns: tuple[Array, ...]
+    width: int
+
+
 def _sides(t: Array) -> NDArray[np.bool_]:
     span = float(t[-1] - t[0])
     block = max(min(_BLOCK, span / _FEWEST_BLOCKS), 1e-12)

@@ -6,6 +6,7 @@ computed once, at first use.
 """
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -53,6 +54,12 @@ class RigidBody:
         self.robot, self.phi = robot, np.asarray(phi, dtype=float)
         self.q, self.v, self.a = q, v, a
         self._given = model
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what can be computed again."""
+        derived = ("regressor", "_derivatives", "gravity_axes", "_model", "_given")
+        own = {key: value for key, value in self.__dict__.items() if key not in derived}
+        return {**own, "_given": None}
 
     @cached_property
     def _model(self) -> pin.Model:

@@ -41,9 +41,9 @@ _FINE = 2e-3  # s, the step in which flights are followed
 _CHUNK = 256  # samples that are looked at first for the end of a flight
 _NOTHING = 1e-12  # of the residual energy
 _PORTION = 2**17  # values of columns that are searched at once
-# Samples in which the gap is searched, the middles of all parts: ten minutes at 100 Hz. What is
+# Samples in which the gap is searched, the middles of all parts: minutes at 50 to 100 Hz. What is
 # found there is tested on all of them, and changed by `finer_steps`.
-_SEARCHED = 60_000
+_SEARCHED = 20_000
 
 
 class Backlash(Effect):

@@ -180,10 +180,10 @@ class Effect(ABC):
         every = self.is_change and self.tier == Tier.EVERY_ROBOT
         return (*self.refines, self.kind) if every else self.refines
 
-    @property
-    def is_searched(self) -> bool:
+    @classmethod
+    def is_searched(cls) -> bool:
         """Whether its shapes are searched on what is left of a torque (`tuned`)."""
-        return type(self).tuned.__func__ is not Effect.tuned.__func__  # type: ignore[attr-defined]
+        return cls.tuned.__func__ is not Effect.tuned.__func__  # type: ignore[attr-defined]
 
     @property
     def asked_for(self) -> Tier:

@@ -13,7 +13,8 @@ import numpy as np
 
 from excite_cli.out_of_core import Spool, attached, reference_to
 
-_LARGE = 2**18  # bytes
+# Bytes of an array that is written to a file, and of one that lies in one already.
+_LARGE, _WORTH_NAMING = 2**18, 2**12
 POSSIBLE = Path("/proc/self/fd").is_dir()
 
 
@@ -32,9 +33,9 @@ class _Packer(pickle.Pickler):
         self._spool = spool
 
     def reducer_override(self, value: Any) -> Any:
-        if type(value) is not np.ndarray or value.nbytes < _LARGE or value.dtype.hasobject:
+        if type(value) is not np.ndarray or value.nbytes < _WORTH_NAMING or value.dtype.hasobject:
             return NotImplemented
-        if self._spool is not None:
+        if self._spool is not None and value.nbytes >= _LARGE:
             value = self._spool.keep(value)
         reference = reference_to(value)
         return NotImplemented if reference is None else (attached, (reference,))

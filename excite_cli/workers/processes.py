@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
+from excite_cli.out_of_core import Spool
 from excite_cli.workers.base import (
     LOSSES,
     Function,
@@ -78,6 +79,7 @@ class _Round:
     watch: Watch
     keep_failures: bool
     waiting: deque[int]
+    spool: Spool
     results: dict[int, Any] = field(default_factory=dict)
     failures: dict[int, Exception] = field(default_factory=dict)
     losses: dict[int, int] = field(default_factory=dict)
@@ -130,9 +132,10 @@ class Processes(Workers):
         """As `Workers.map`."""
         if not tasks:
             return []
-        blob = packed(shared)
+        spool = Spool(0)
+        blob = packed(shared, spool)
         waiting = deque(range(len(tasks)))
-        round_ = _Round(function, blob, tasks, watch, keep_failures, waiting)
+        round_ = _Round(function, blob, tasks, watch, keep_failures, waiting, spool)
         try:
             while len(self._workers) < min(self._count, len(tasks)):
                 self._workers.append(_Worker(self._threads))
@@ -172,7 +175,7 @@ class Processes(Workers):
         index = round_.waiting.popleft()
         worker.task = index
         round_.running += 1
-        body = packed((round_.function, round_.tasks[index]))
+        body = packed((round_.function, round_.tasks[index]), round_.spool)
         try:
             if worker.knows != round_.shared:
                 worker.connection.send(("shared", round_.shared))

@@ -45,7 +45,7 @@ def answer_of(
 
     monkeypatch.setattr(LeftOut, "by", by)
     monkeypatch.setattr(
-        tracing, "ModelledRun", lambda *_: SimpleNamespace(take=lambda run, spool: None)
+        tracing, "ModelledRun", lambda *_: SimpleNamespace(take=lambda run, columns: None)
     )
     start = Fit(name="declared", places=set(), effects=())
     monkeypatch.setattr(
@@ -53,6 +53,7 @@ def answer_of(
         "_first_fit",
         lambda *given: fit_of(None, SimpleNamespace(name=known)) if given[-1] else start,
     )
+    monkeypatch.setattr(tracing, "inertial_columns", lambda model, runs: [None for _ in runs])
     monkeypatch.setattr(tracing, "fit_of", fit_of)
     monkeypatch.setattr(tracing, "_one_pass", one_pass)
     monkeypatch.setattr(tracing, "_left_out", lambda traced: errors[traced.attempt])

@@ -6,10 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from excite_cli import identify, load_problem, plan, simulate
 from excite_cli.errors import ConfigError, MissingExtraError, NoAdmissibleMotionError
 from excite_cli.workers.base import News
 from excite_cli.workers.cluster import Cluster, ClusterError
 from excite_cli.workers.environment import Environment, environment
+from tests.api.conftest import SMOKE
+from tests.api.test_on_disk import same
 from tests.workers import work
 
 distributed = pytest.importorskip("distributed")
@@ -84,3 +87,10 @@ def test_a_missing_library_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(MissingExtraError, match=r"excite-cli\[cluster\]"):
         Cluster("tcp://127.0.0.1:9")
+
+
+def test_runs_are_identified_on_a_cluster_as_here(cluster: Cluster, tmp_path: Path) -> None:
+    problem = load_problem(SMOKE, ["optimizer.max_iterations=5", "sequence.motions=2"])
+    data = tmp_path / "data.h5"
+    simulate(problem, plan(problem), output=data)
+    assert same(identify(problem, data), identify(problem, data, workers=cluster))

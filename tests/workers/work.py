@@ -7,6 +7,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.workers.base import Tell
 
@@ -83,3 +86,15 @@ def threads(shared: Any, task: int, tell: Tell) -> list[int]:
 
     np.linalg.qr(np.eye(3))
     return [each["num_threads"] for each in threadpool_info()]
+
+
+def table(size: int, factor: float, tell: Tell) -> NDArray[np.float64]:
+    return factor * np.arange(float(size))
+
+
+def doubled(shared: None, values: NDArray[np.float64], tell: Tell) -> NDArray[np.float64]:
+    return 2.0 * values
+
+
+def second_half(shared: None, values: NDArray[np.float64], tell: Tell) -> NDArray[np.float64]:
+    return values[len(values) // 2 :]
