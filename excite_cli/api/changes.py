@@ -5,7 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.outputs import held
+from excite_cli.api.paths import page_path
+from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError, FileError
+from excite_cli.report.page import render
+from excite_cli.report.trend_page import trend_page
 from excite_cli.scoring.changes import Changes, Snapshot, changes_of
 from excite_cli.scoring.snapshots import of_diagnosis, of_fit, of_score
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
@@ -16,13 +21,18 @@ from excite_cli.summary.changes import changes_answer as changes_answer
 
 @checked()
 def compare(
-    files: Sequence[str | Path], covariates: Mapping[str, Sequence[float]] | None = None
+    files: Sequence[str | Path],
+    covariates: Mapping[str, Sequence[float]] | None = None,
+    *,
+    output: str | Path | None = None,
+    overwrite: bool = False,
 ) -> Changes:
     """What changed between the days of fits, diagnoses or scores: `excite compare`.
 
     `files` of one kind and one robot, in order of time (sorted by their stamps if all have some).
     `covariates`: further columns with a value per file, as {"temp": [21.0, …]}; those that the
     files know themselves are means of `measurement.covariates`. Their influence is taken out.
+    `output`: a page (HTML) with friction and the rest of every joint over the days.
 
     Returns
     -------
@@ -34,8 +44,20 @@ def compare(
     ------
     FileError, ConfigError
         A file cannot be read, is of another kind or robot; there are fewer than two days; columns
-        do not fit.
+        do not fit; `output` is no name of a page, or exists.
     """
+    page = None if output is None else page_path(output)
+    with held({"output": page}, overwrite, [Path(each) for each in files]):
+        found = _compared(files, covariates)
+        if page is not None:
+            text = render(trend_page(found, f"{len(found.days)} days of a robot"))
+            write_text_atomically(page, text)
+        return found
+
+
+def _compared(
+    files: Sequence[str | Path], covariates: Mapping[str, Sequence[float]] | None
+) -> Changes:
     if not files:
         raise ConfigError("compare: give two files or more: fits, diagnoses or scores.")
     paths = [Path(each) for each in files]

@@ -20,6 +20,19 @@ def existing(path: str | Path) -> Path:
     return Path(path)
 
 
+def page_path(path: str | Path, hint: str = "") -> Path:
+    """The path of a page that may be written.
+
+    Raises
+    ------
+    FileError
+        Its name is not that of a page.
+    """
+    if Path(path).suffix.lower() not in (".html", ".htm") and not Path(path).is_dir():
+        raise FileError(f"-o {path}: a report is a page, NAME.html.{hint}")
+    return Path(path)
+
+
 def paths_in(*given: object) -> list[Path]:
     """Those of `given` that are files, also in lists, and the files that data were read from."""
     listed = [x for each in given for x in (each if isinstance(each, list | tuple) else [each])]

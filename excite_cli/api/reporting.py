@@ -6,7 +6,7 @@ from pathlib import Path
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import paths_in
+from excite_cli.api.paths import page_path, paths_in
 from excite_cli.api.rebuilt import rebuilt_problem
 from excite_cli.api.report_figures import write_figures
 from excite_cli.api.report_files import Told, read_files
@@ -77,9 +77,8 @@ def write_report(
     page = Path(output) if output is not None else None
     if page is None and figures is None:
         page = Path(f"{paths[0].stem}-report.html")
-    if page is not None and page.suffix.lower() not in (".html", ".htm") and not page.is_dir():
-        hint = " Figures and PDF are written by --figures."
-        raise FileError(f"-o {page}: a report is a page, NAME.html.{hint}")
+    if page is not None:
+        page = page_path(page, " Figures and PDF are written by --figures.")
     with held({"output": page}, overwrite, paths_in(paths, config)):
         told = read_files(paths)
         problems = {

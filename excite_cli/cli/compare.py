@@ -7,6 +7,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.help_page import OUTPUT
 from excite_cli.errors import ConfigError
 
 
@@ -27,6 +28,17 @@ def compare(
             help="A column to take out, with a value per file; those of the logs are known.",
         ),
     ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="NAME.html",
+            help="A page with the friction of every joint over the days.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
@@ -40,7 +52,7 @@ def compare(
     run is a day; of fits and diagnoses, give two or more: january.h5 february.h5 march.h5.
 
     Examples:
-      excite compare week.h5
+      excite compare week.h5 -o week.html
     """
     from excite_cli.api.changes import changes_answer
     from excite_cli.api.changes import compare as compare_files
@@ -48,8 +60,10 @@ def compare(
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with single_threaded():
-        found = compare_files(files, dict(map(_column, covariate or ())))
-    terminal.show(changes_answer(found))
+        found = compare_files(
+            files, dict(map(_column, covariate or ())), output=output, overwrite=overwrite
+        )
+    terminal.show(changes_answer(found, output))
 
 
 def _column(text: str) -> tuple[str, list[float]]:

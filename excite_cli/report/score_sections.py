@@ -28,8 +28,8 @@ def score_figures(score: Score) -> tuple[KeyFigure, ...]:
 def score_sections(score: Score) -> tuple[Section, ...]:
     """Ratios over the runs, the runs with their reasons, and the joints."""
     sections = [
-        Section("runs", "Runs", (_table(runs_table(score)),)),
-        Section("joints", "Joints", (_table(joints_table(score)),)),
+        Section("runs", "Runs", (table_of(runs_table(score)),)),
+        Section("joints", "Joints", (table_of(joints_table(score)),)),
     ]
     if score.made is not None and len(score.runs) > 1:
         sections.insert(0, Section("ratios", "Residual over the runs", (Charts((_plot(score),)),)))
@@ -60,7 +60,7 @@ def _plot(score: Score) -> Plot:
     )
 
 
-def _table(shown: ShownTable) -> Table:
+def table_of(shown: ShownTable) -> Table:
     """A table of the terminal, on the page."""
     places = {name: k for k, name in enumerate(shown.columns)}
     told = {places[name] for name in (*shown.left, *shown.words)}

@@ -34,7 +34,8 @@ _FREE = 3  # degrees of freedom that must be left to take a column out
 class Known:
     """A value with its standard deviation and unit; `joint` that it belongs to, if one.
 
-    `may_lack`: an effect that is looked for; where it was not found, it is zero.
+    `may_lack`: an effect that is looked for; where it was not found, it is zero. `quantity`: what
+    joints have alike, in words; `friction` whether that is friction.
     """
 
     value: float
@@ -42,6 +43,8 @@ class Known:
     unit: str = ""
     joint: str = ""
     may_lack: bool = False
+    quantity: str = ""
+    friction: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,8 @@ class Change:
     values: tuple[float, ...]
     stds: tuple[float, ...]
     taken_out: dict[str, float] = field(default_factory=dict)
+    quantity: str = ""
+    friction: bool = False
 
     @property
     def significant(self) -> bool:
@@ -153,6 +158,7 @@ def _change(
         float(min(1.0, p * (count - 1) * family)), snapshots[int(own[m])].name,
         tuple(map(float, y)), tuple(map(float, std)),
         {key: float(solved[1 + i]) for i, key in enumerate(columns) if beside.shape[1] > 1},
+        one.quantity, one.friction,
     )  # fmt: skip
 
 

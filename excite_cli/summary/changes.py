@@ -1,6 +1,7 @@
 """What changed between days, in sentences, a table and as data."""
 
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
 from excite_cli.identification.fit_words import with_deviation
@@ -8,18 +9,29 @@ from excite_cli.scoring.changes import Change, Changes
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.written import files_in_words
 
 _SHOWN = 12  # rows at least, changed or not
 _TOLD = 4
 
 
-def changes_answer(found: Changes) -> Answer:
-    """What `excite compare` answers."""
-    return Answer(tuple(changes_parts(found)), changes_data(found))
+def changes_answer(found: Changes, page: str | Path | None = None) -> Answer:
+    """What `excite compare` answers; `page` was written."""
+    files = {} if page is None else {"page": str(page)}
+    parts = (*changes_parts(found), *files_in_words(files))
+    return Answer(parts, {**changes_data(found), **files})
 
 
 def changes_parts(found: Changes) -> Parts:
     """A sentence, and the parameters, the surest change first."""
+    table = changes_table(found)
+    left = len(found.changes) - len(table.rows)
+    rest = [f"{left} more parameters did not change significantly."] if left else []
+    return [*sentences(found), table, *rest]
+
+
+def changes_table(found: Changes) -> Table:
+    """The parameters that changed, and some that did not."""
     shown = found.changes[: max(_SHOWN, len(found.significant))]
     rows = tuple(
         (
@@ -33,19 +45,13 @@ def changes_parts(found: Changes) -> Parts:
         )
         for change in shown
     )
-    left = len(found.changes) - len(shown)
-    rest = [f"{left} more parameters did not change significantly."] if left else []
-    return [
-        *sentences(found),
-        Table(
-            "Changes (± one standard deviation of the change; p corrected for parameters and days)",
-            ("parameter", "before", "after", "unit", "since", "p", "verdict"),
-            rows,
-            left=("parameter", "unit", "since", "verdict"),
-            bold=tuple(k for k, change in enumerate(shown) if change.significant),
-        ),
-        *rest,
-    ]
+    return Table(
+        "Changes (± one standard deviation of the change; p corrected for parameters and days)",
+        ("parameter", "before", "after", "unit", "since", "p", "verdict"),
+        rows,
+        left=("parameter", "unit", "since", "verdict"),
+        bold=tuple(k for k, change in enumerate(shown) if change.significant),
+    )
 
 
 def sentences(found: Changes) -> list[str]:

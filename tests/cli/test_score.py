@@ -106,7 +106,9 @@ def test_friction_that_grew_is_named_with_its_size_and_since_when(days: Days) ->
     assert changed[0]["since"] == "dry_fit"
     assert changed[0]["before"] == pytest.approx(2.0, rel=0.03)
     assert changed[0]["after"] == pytest.approx(6.0, rel=0.03)
-    shown = days.program("compare", days.fit, "dry_fit.h5").stdout
+    shown = days.program("compare", days.fit, "dry_fit.h5", "-o", "days.html").stdout
+    assert "Written: days.html (page)" in shown
+    assert "Friction of the joints" in (days.program.folder / "days.html").read_text("utf-8")
     assert "coulomb_friction.coulomb[elbow] rose from 2" in shown
 
 
@@ -169,6 +171,7 @@ def test_workers_share_the_files_and_one_that_cannot_be_read_is_left_out(days: D
         (("compare", "fit.h5", "none.h5"), "There is no file none.h5"),
         (("compare", "fit.h5", "fit.h5", "--covariate", "temp=20"), "1 values for 2 days"),
         (("compare", "fit.h5", "fit.h5", "--covariate", "temp"), "give a name and numbers"),
+        (("compare", "fit.h5", "fit.h5", "-o", "x.pdf"), "a report is a page, NAME.html"),
     ],
 )
 def test_bad_requests(days: Days, arguments: tuple[str, ...], told: str) -> None:
