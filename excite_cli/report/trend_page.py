@@ -5,7 +5,7 @@ Friction comes first; a point has a whisker of two standard deviations to each s
 
 import numpy as np
 
-from excite_cli.report.chart import Colour
+from excite_cli.report.chart import Colour, limits_about
 from excite_cli.report.page import Charts, KeyFigure, Page, Section
 from excite_cli.report.plot import Panel, Plot, Series
 from excite_cli.report.score_sections import table_of
@@ -54,13 +54,17 @@ def _by_quantity(changes: Changes) -> tuple[list[list[Change]], list[list[Change
 def _plot(changes: Changes, own: list[Change]) -> Plot:
     axis, x = _days(changes)
     unit = f" [{own[0].unit}]" if own[0].unit not in ("", "1") else ""
+    most = len(_COLOURS)
+    ends = [_ends(each) for each in own]
+    shown = [x for both in ends for x in np.concatenate(both).tolist() if np.isfinite(x)]
     panels = tuple(
         Panel(
             f"{own[0].quantity}{unit}",
-            tuple(_series(each, _COLOURS[k]) for k, each in enumerate(own[at : at + 6])),
+            tuple(_series(each, _COLOURS[k]) for k, each in enumerate(own[at : at + most])),
+            limits_about(shown or [0.0]),
             height=220,
         )
-        for at in range(0, len(own), len(_COLOURS))
+        for at in range(0, len(own), most)
     )
     changed = [f"{each.joint} since {each.since}" for each in own if each.significant]
     told = ", ".join(changed) or "none"
@@ -77,8 +81,13 @@ def _plot(changes: Changes, own: list[Change]) -> Plot:
 
 
 def _series(change: Change, colour: Colour) -> Series:
+    return Series(change.joint, np.array(change.values), colour, "joined", *_ends(change))
+
+
+def _ends(change: Change) -> tuple[Array, Array]:
+    """Ends of the whiskers."""
     y, std = np.array(change.values), np.array(change.stds)
-    return Series(change.joint, y, colour, "joined", y - 2.0 * std, y + 2.0 * std)
+    return y - 2.0 * std, y + 2.0 * std
 
 
 def _days(changes: Changes) -> tuple[str, Array]:

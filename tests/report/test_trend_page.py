@@ -57,6 +57,9 @@ def test_every_joint_is_drawn_over_the_days_with_its_whiskers_friction_first() -
     assert series[2].low is not None
     assert np.allclose(series[2].y - series[2].low, 0.02)
     assert "joint_3 since month_5" in friction.alternative
+    for panel in friction.panels:
+        assert panel.span is not None
+        assert panel.span[0] < 0.98 < 2.02 < panel.span[1], "whiskers of all joints, one scale"
     assert max(len(panel.series) for panel in friction.panels) <= 6, "no colour twice in a panel"
 
 
