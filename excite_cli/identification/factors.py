@@ -6,7 +6,7 @@ weight per joint, or one run left out, costs nothing in samples. The condition n
 squared, as it would be with normal equations.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from excite_cli.robot.model import Array
 Mask = NDArray[np.bool_]
 # Directions weaker than this, with columns of unit norm, are not seen by the data.
 BLIND = 1e-9
+_MOST_KEPT = 128
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,16 @@ def run_factors(columns: Array, tau: Array, usable: Mask, weights: Array | None 
     if len(rows) < width:
         rows = np.concatenate([rows, np.zeros((width - len(rows), *rows.shape[1:]))])
     return triangle_of(rows.transpose(1, 0, 2))
+
+
+def together(factors: Iterable[Array]) -> list[Array]:
+    """The same factors (n, q, q), those of many runs made one: memory does not grow with them."""
+    kept: list[Array] = []
+    for factor in factors:
+        kept.append(factor)
+        if len(kept) == _MOST_KEPT:
+            kept = [triangle_of(np.concatenate(kept, axis=1))]
+    return kept
 
 
 def stacked(factors: Sequence[Array], sigma: Array, extra: Array | None = None) -> Array:

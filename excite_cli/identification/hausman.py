@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from excite_cli.identification.covariance import Rows, estimate_covariance
-from excite_cli.identification.factors import run_factors, solve, stacked
+from excite_cli.identification.factors import run_factors, solve, stacked, together
 from excite_cli.identification.least_squares import factors_of, fit_rows
 from excite_cli.identification.periods import mean_of_other_periods, period_of
 from excite_cli.measurement.dataset import Dataset, Mask, Run
@@ -165,7 +165,7 @@ def _triangle(runs: Sequence[Rows], instruments: Sequence[Array], noise: Array) 
     """R (·, 2p) of the usable rows [Z C] of all runs, divided by `noise`."""
     pairs = zip(runs, instruments, strict=True)
     tasks = [(instrument, run.columns, run.usable) for run, instrument in pairs]
-    return stacked(list(each(_factors_of_both, None, tasks)), noise)[:, :-1]
+    return stacked(together(each(_factors_of_both, None, tasks)), noise)[:, :-1]
 
 
 def _factors_of_both(shared: None, task: tuple[Array, Array, Mask], tell: Tell) -> Array:

@@ -20,6 +20,7 @@ from excite_cli.identification.factors import (
     run_factors,
     solve,
     stacked,
+    together,
 )
 from excite_cli.identification.robust import huber_weights, robust_scale, within
 from excite_cli.out_of_core import Spool, forget
@@ -100,7 +101,7 @@ def fit_rows(
 def factors_of(
     runs: Sequence[Rows], usable: Sequence[Mask] | None = None, weights: Sequence[Array] = ()
 ) -> list[Array]:
-    """Factors (n, p+1, p+1) of every run; with other `usable` rows or `weights` if given."""
+    """Factors (n, p+1, p+1) of runs, `together`; with other `usable` rows or `weights` if given."""
     tasks = [
         (
             run.columns,
@@ -110,7 +111,7 @@ def factors_of(
         )
         for k, run in enumerate(runs)
     ]
-    return list(each(_factors, None, tasks))
+    return together(each(_factors, None, tasks))
 
 
 def _factors(shared: None, task: tuple[Array, Array, Mask, Array | None], tell: Tell) -> Array:
