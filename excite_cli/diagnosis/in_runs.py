@@ -9,6 +9,7 @@ set that data tell.
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -43,10 +44,19 @@ class SeenRuns:
     runs: Sequence[str]
     states: States = field(default_factory=dict)
 
+    @cached_property
+    def _by_name(self) -> dict[str, list[int]]:
+        """Indices of parts by whatever their runs are called."""
+        found: dict[str, list[int]] = {}
+        for i, s in enumerate(self.signals):
+            for name in {s.run.name, s.run.key}:
+                found.setdefault(name, []).append(i)
+        return found
+
     @property
     def trained(self) -> list[str]:
         """Names of the runs that parts belong to."""
-        return [run for run in self.runs if any(s.run.is_among((run,)) for s in self.signals)]
+        return [run for run in self.runs if run in self._by_name]
 
     @property
     def covariates(self) -> list[str]:
@@ -55,7 +65,7 @@ class SeenRuns:
 
     def parts_of(self, runs: Collection[str]) -> list[int]:
         """Indices of the parts of some runs."""
-        return [i for i, s in enumerate(self.signals) if s.run.is_among(runs)]
+        return sorted({i for run in runs for i in self._by_name.get(run, ())})
 
     def evidence(self, effect: Effect, units: Sequence[Runs], positive: bool) -> RunEvidence:
         """What columns of the effect say in each of the `units`."""

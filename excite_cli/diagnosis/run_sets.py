@@ -58,12 +58,26 @@ class RunEvidence:
         whole = np.ones((1, self.runs), bool)
         return self.energy(sets) + self.energy(~sets) - self.energy(whole)
 
+    def toggled(self, chosen: Mask) -> Array:
+        """E(S) of all sets that differ from `chosen` (R,) in one run, by that run (R,)."""
+        sign = np.where(chosen, -1.0, 1.0)
+        gram, cross = self._sums(np.array([chosen, ~chosen]))
+        steps = sign[:, None, None] * self.grams, sign[:, None] * self.cross
+        with_ = gram[0] + steps[0], cross[0] + steps[1]
+        without = gram[1] - steps[0], cross[1] - steps[1]
+        whole = self.energy(np.ones((1, self.runs), bool))
+        return _energy(*with_) + _energy(*without) - whole
+
     def _sums(self, sets: Mask) -> tuple[Array, Array]:
         member = sets.astype(float)
         gram = np.tensordot(member, self.grams, axes=1)
         at = np.arange(gram.shape[1])
         gram[:, at, at] += _RIDGE * np.diag(self.grams.sum(axis=0)) + 1e-300
         return gram, member @ self.cross
+
+
+def _energy(gram: Array, cross: Array) -> Array:
+    return np.einsum("sp,sp->s", np.linalg.solve(gram, cross[:, :, None])[:, :, 0], cross)
 
 
 def evidence_by_run(
@@ -132,12 +146,14 @@ def _improved(found: RunEvidence, chosen: Mask) -> Mask:
     """Runs are taken in or out, one at a time, while that explains more."""
     best = found.explained(chosen[None])[0]
     for _ in range(found.runs):
-        moves = chosen ^ np.eye(found.runs, dtype=bool)
-        moves = moves[moves.any(axis=1) & ~moves.all(axis=1)]
-        scores = found.explained(moves)
-        if not len(scores) or scores.max() <= best * (1.0 + 1e-9):
+        scores = found.toggled(chosen)
+        if chosen.sum() == 1:
+            scores[chosen] = -np.inf  # no run or all runs: no set
+        if (~chosen).sum() == 1:
+            scores[~chosen] = -np.inf
+        if scores.max() <= best * (1.0 + 1e-9):
             return chosen
-        best, chosen = scores.max(), moves[np.argmax(scores)]
+        best, chosen = scores.max(), chosen ^ (np.arange(found.runs) == np.argmax(scores))
     return chosen
 
 

@@ -81,3 +81,14 @@ def test_one_run_tells_nothing() -> None:
 
 def test_tests_grow_with_the_runs() -> None:
     assert [sets_looked_at(n) for n in (1, 2, 10)] == [1, 4, 28]
+
+
+def test_sets_that_differ_in_one_run_are_weighed_as_each_alone() -> None:
+    rng = np.random.default_rng(3)
+    columns = [rng.normal(size=(40, 2, 3)) for _ in range(9)]
+    residuals = [rng.normal(size=(40, 2)) for _ in range(9)]
+    found = evidence_by_run(columns, residuals, range(9), False)
+    for _ in range(5):
+        chosen = rng.random(9) > 0.5
+        sets = chosen ^ np.eye(9, dtype=bool)
+        assert np.allclose(found.toggled(chosen), found.explained(sets), rtol=1e-9)
