@@ -10,6 +10,7 @@ import hashlib
 import logging
 import pickle
 import threading
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import dataclass
@@ -102,13 +103,15 @@ class Cluster(Workers):
             return []
         blob = pickle.dumps(shared, pickle.HIGHEST_PROTOCOL)
         digest = hashlib.sha256(blob).hexdigest()
-        held = self._client.submit(_as_it_is, blob, pure=False)
-        futures = [
-            self._client.submit(
-                _do, digest, held, function, task, self._threads, environment(), pure=False
-            )
-            for task in tasks
-        ]
+        with warnings.catch_warnings():  # recordings are large, and travel once
+            warnings.filterwarnings("ignore", "Sending large graph")
+            held = self._client.submit(_as_it_is, blob, pure=False)
+            futures = [
+                self._client.submit(
+                    _do, digest, held, function, task, self._threads, environment(), pure=False
+                )
+                for task in tasks
+            ]
         place = {future.key: index for index, future in enumerate(futures)}
         done = 0
         try:
