@@ -21,6 +21,8 @@ from excite_cli.robot.model import Array
 
 MOST = 6  # sets that become candidates
 _LEAST = 25.0  # what a set must explain, in units of the squared median of what is left
+# Of a climb; among a thousand runs of noise it would go on for hundreds, to no end.
+_MOST_STEPS = 60
 _RIDGE = 1e-9
 _CLIMBS = 3  # best sets that are improved run by run
 
@@ -145,7 +147,7 @@ def _ranked(found: RunEvidence, sets: Mask) -> Mask:
 def _improved(found: RunEvidence, chosen: Mask) -> Mask:
     """Runs are taken in or out, one at a time, while that explains more."""
     best = found.explained(chosen[None])[0]
-    for _ in range(found.runs):
+    for _ in range(min(found.runs, _MOST_STEPS)):
         scores = found.toggled(chosen)
         if chosen.sum() == 1:
             scores[chosen] = -np.inf  # no run or all runs: no set
