@@ -12,6 +12,9 @@ import mmap
 import os
 import tempfile
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -23,6 +26,7 @@ from scipy.sparse import csr_matrix
 from excite_cli.errors import FileError
 
 ROOM = 32 * 2**20  # bytes of each spool that stay in memory
+_SMALL = 4096  # bytes of an array that stays there, whatever the room
 _CHUNK = 64 * 2**20
 _ALIGNED = 64
 _GRANULE = mmap.ALLOCATIONGRANULARITY
@@ -73,10 +77,24 @@ _files: "weakref.WeakValueDictionary[tuple[int, int], _File]" = weakref.WeakValu
 _parts: "weakref.WeakValueDictionary[tuple[int, ...], mmap.mmap]" = weakref.WeakValueDictionary()
 
 
+_room: ContextVar[int | None] = ContextVar("room of spools", default=None)
+
+
+@contextmanager
+def room_of_spools(room: int | None) -> Iterator[None]:
+    """Within the block, bytes of each spool that stay in memory (None: `ROOM`)."""
+    before = _room.set(room)
+    try:
+        yield
+    finally:
+        _room.reset(before)
+
+
 class Spool:
     """Keeps arrays: the first ones where they are, those beyond `room` bytes on disk."""
 
     def __init__(self, room: int | None = None) -> None:
+        room = _room.get() if room is None else room
         self._left = ROOM if room is None else room
         self._file: _File | None = None
         self._size = 0
@@ -89,8 +107,9 @@ class Spool:
             return values
         if _part_of(values) is not None:
             return values  # on disk already
-        if self._left >= values.nbytes or not hasattr(os, "pwrite"):
-            self._left -= values.nbytes
+        small = values.nbytes < _SMALL
+        if small or self._left >= values.nbytes or not hasattr(os, "pwrite"):
+            self._left -= 0 if small else values.nbytes
             return values
         self._left = 0
         return self._on_disk(np.ascontiguousarray(values))

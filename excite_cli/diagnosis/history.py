@@ -10,6 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from excite_cli.robot.model import Array
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 _WIDTHS = (0.05, 0.15, 0.4)  # of the amplitude
 
@@ -19,10 +21,10 @@ def histories(signals: Sequence[Array]) -> list[Array]:
     low = np.min([x.min(axis=0) for x in signals], axis=0)
     high = np.max([x.max(axis=0) for x in signals], axis=0)
     radii = 0.5 * (high - low)[:, None] * np.array(_WIDTHS)
-    return [_within_play(x, radii) for x in signals]
+    return list(each(_within_play, radii, signals))
 
 
-def _within_play(x: Array, radii: Array) -> Array:
+def _within_play(radii: Array, x: Array, tell: Tell) -> Array:
     """x − play(x), (T, n, widths), from the middle of the play."""
     shown = np.empty((*x.shape, radii.shape[1]))
     now = np.repeat(x[0][:, None], radii.shape[1], axis=1)

@@ -73,7 +73,7 @@ def training_data(
             tau = tau - inertial @ model.prior.mean
         effects = run.averaged_for_fit(effect_columns(model.declared, signal))
         declared.append(spool.keep(np.concatenate([inertial, effects], axis=2)))
-        torques.append(tau)
+        torques.append(spool.keep(tau))
         forget()
     precision = None
     if model.prior is not None:

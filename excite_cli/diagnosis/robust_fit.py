@@ -5,15 +5,18 @@ min(1, c σ / |residual|) per sample, σ the joint's noise by its median absolut
 at reversals and blows do not pull friction and inertias.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.cholesky import Cholesky
-from excite_cli.diagnosis.training import TrainingData
+from excite_cli.diagnosis.training import JointRows, TrainingData
 from excite_cli.out_of_core import forget
 from excite_cli.robot.model import Array
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 _HUBER = 1.345
 _ROUNDS = 8
@@ -42,17 +45,6 @@ def robust_solve(
     return x
 
 
-def _rows(
-    data: TrainingData, candidates: Sequence[Candidate], chosen: Sequence[int], joint: int
-) -> Iterator[tuple[Array, Array]]:
-    """Columns (rows, k) and torque (rows,) of the usable samples of a joint, part by part."""
-    for part, run in enumerate(data.runs):
-        usable = run.usable[:, joint]
-        columns = data.columns(candidates, chosen, part, joint)[usable]
-        yield columns, data.tau[part][usable, joint]
-        forget()
-
-
 def _solve(
     data: TrainingData,
     candidates: Sequence[Candidate],
@@ -62,13 +54,14 @@ def _solve(
 ) -> Array:
     size = data.declared[0].shape[2] + sum(candidates[i].width for i in chosen)
     normal, rhs = np.zeros((size, size)), np.zeros(size)
-    for joint, (own, s) in enumerate(zip(weights, sigma, strict=True)):
-        done = 0
-        for columns, tau in _rows(data, candidates, chosen, joint):
-            weighted = columns * (own[done : done + len(tau)] / s**2)[:, None]
-            normal += weighted.T @ columns
-            rhs += weighted.T @ tau
-            done += len(tau)
+    there = [candidates[i] for i in chosen]
+    tasks = (
+        (data.rows_of(there, joint), own / s**2)
+        for joint, (own, s) in enumerate(zip(weights, sigma, strict=True))
+    )
+    for at, own, product in each(_weighted, None, tasks):
+        normal[np.ix_(at, at)] += own
+        rhs[at] += product
     if data.prior_precision is not None:
         at = np.arange(len(data.prior_precision))
         normal[at, at] += data.prior_precision
@@ -77,3 +70,21 @@ def _solve(
     unit = normal / np.outer(scale, scale)
     unit[np.diag_indices(size)] += 1e-11
     return Cholesky(unit).solve(rhs / scale) / scale
+
+
+def _weighted(
+    shared: None, task: tuple[JointRows, Array], tell: Tell
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Which columns show in a joint's rows, and their weighted products (A, A) and (A,)."""
+    rows, weights = task
+    size, done = len(rows.active), 0
+    normal, rhs = np.zeros((size, size)), np.zeros(size)
+    for blocks, usable in zip(rows.blocks, rows.usable, strict=True):
+        x = np.concatenate(blocks, axis=1)[usable]
+        columns = x[:, :-1]
+        weighted = columns * weights[done : done + len(x), None]
+        normal += weighted.T @ columns
+        rhs += weighted.T @ x[:, -1]
+        done += len(x)
+        forget()
+    return rows.active, normal, rhs

@@ -15,6 +15,8 @@ from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.out_of_core import forget
 from excite_cli.robot.model import Array
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 # Blocks of a run whose samples are fitted and judged in turn; short runs have four at least.
 _BLOCK = 1.0  # s
@@ -87,11 +89,9 @@ class TrainingData:
         they were made with, which come first here too.
         """
         known = known or {}
-        starts = self.declared[0].shape[2] + np.cumsum([0, *(c.width for c in candidates)])
-        grams = [
-            known[joint] if joint in known else self.gram(candidates, noise, joint)
-            for joint in range(self.n)
-        ]
+        starts = self._starts(candidates)
+        made = self.grams(candidates, noise, [j for j in range(self.n) if j not in known])
+        grams = [known[joint] if joint in known else made[joint] for joint in range(self.n)]
         return Evidence(
             Grams(grams, int(starts[-1]) + 1),
             int(starts[0]),
@@ -100,26 +100,37 @@ class TrainingData:
             self.prior_precision,
         )
 
-    def gram(self, candidates: Sequence[Columns], noise: NoiseModel, joint: int) -> JointGram:
-        """Gram matrices of the whitened rows of one joint."""
-        fixed = self.declared[0].shape[2]
-        starts = fixed + np.cumsum([0, *(c.width for c in candidates)])
-        touching = [i for i, c in enumerate(candidates) if joint in c.rows]
-        active = np.concatenate(
-            [np.arange(fixed), *(np.arange(starts[i], starts[i + 1]) for i in touching)]
-        ).astype(np.intp)
-        whole = np.zeros((max(self.folds) + 1, len(active) + 1, len(active) + 1))
-        first = np.zeros_like(whole)
-        for part, fold in enumerate(self.folds):
-            columns = self.columns(candidates, touching, part, joint)
-            x = np.hstack([columns, self.tau[part][:, joint, None]])
-            usable = self.runs[part].usable[:, joint]
-            white = noise.whitened(x, joint, usable)
-            whole[fold] += white.T @ white
-            rows = white[~self.sides[part][usable]]
-            first[fold] += rows.T @ rows
-            forget()
-        return JointGram(active, whole, first)
+    def grams(
+        self, candidates: Sequence[Columns], noise: NoiseModel, joints: Sequence[int]
+    ) -> dict[int, JointGram]:
+        """Gram matrices of the whitened rows of some joints."""
+        tasks = (self.rows_of(candidates, joint) for joint in joints)
+        return dict(zip(joints, each(_gram, (self.folds, noise), tasks), strict=True))
+
+    def _starts(self, candidates: Sequence[Columns]) -> NDArray[np.intp]:
+        """Where the columns of every candidate begin among all, and where the last ones end."""
+        return self.declared[0].shape[2] + np.cumsum([0, *(c.width for c in candidates)])
+
+    def rows_of(self, candidates: Sequence[Columns], joint: int) -> "JointRows":
+        """What shows in the rows of one joint of the declared model and the candidates."""
+        starts = self._starts(candidates)
+        there = [i for i, c in enumerate(candidates) if joint in c.rows]
+        touching = [candidates[i] for i in there]
+        active = [np.arange(starts[0]), *(np.arange(*starts[i : i + 2]) for i in there)]
+        return JointRows(
+            joint,
+            np.concatenate(active).astype(np.intp),
+            [
+                [
+                    self.declared[part][:, joint],
+                    *(c.columns[part][:, c.rows.index(joint)] for c in touching),
+                    self.tau[part][:, joint, None],
+                ]
+                for part in range(len(self.runs))
+            ],
+            [run.usable[:, joint] for run in self.runs],
+            self.sides,
+        )
 
     def residuals(
         self, candidates: Sequence[Columns], chosen: Sequence[int], parameters: Array
@@ -138,6 +149,33 @@ class TrainingData:
             found.append(residual)
             forget()
         return found
+
+
+@dataclass(frozen=True)
+class JointRows:
+    """Rows of one joint: `active` (A,) says which columns, and of every part there are blocks of
+    them (M, k), the torque last; which samples are usable, and on which side of their fold."""
+
+    joint: int
+    active: NDArray[np.intp]
+    blocks: Sequence[Sequence[Array]]
+    usable: Sequence[NDArray[np.bool_]]
+    sides: Sequence[NDArray[np.bool_]]
+
+
+def _gram(shared: tuple[Sequence[int], NoiseModel], rows: JointRows, tell: Tell) -> JointGram:
+    """Gram matrices of the whitened rows of one joint."""
+    folds, noise = shared
+    size = len(rows.active) + 1
+    whole = np.zeros((max(folds) + 1, size, size))
+    first = np.zeros_like(whole)
+    for fold, blocks, usable, side in zip(folds, rows.blocks, rows.usable, rows.sides, strict=True):
+        white = noise.whitened(np.concatenate(blocks, axis=1), rows.joint, usable)
+        whole[fold] += white.T @ white
+        own = white[~side[usable]]
+        first[fold] += own.T @ own
+        forget()
+    return JointGram(rows.active, whole, first)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ came from (hysteresis), and declared columns of the log, in each direction of mo
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -21,10 +21,12 @@ from excite_cli.diagnosis.history import histories
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.records import Unexplained
 from excite_cli.diagnosis.traces import Dependence
-from excite_cli.diagnosis.training import Columns, TrainingData
+from excite_cli.diagnosis.training import Columns, Shown, TrainingData
 from excite_cli.effects.base import Signals
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 _MOST_NAMED = 3
 # Of 260 simulated campaigns, eight had less told, three of them of robots without defects, and all
@@ -52,22 +54,18 @@ def unexplained_structure(
     kept: list[Columns] = [candidates[i] for i in chosen]
     past = _Past.of(signals)
     spool = Spool()
-    features = [
-        _features(data, signals, past, joint, joint_names, spool) for joint in range(data.n)
-    ]
+    shown = (data, signals, past, joint_names)
+    features = [_kept(spool, own) for own in each(_features, shown, range(data.n))]
     found: dict[int, Unexplained] = {}
     shares: Array | None = None
     plain_noise = NoiseModel.white(noise.sigma)
     while len(found) < data.n:
         known = _Known(
-            {joint: data.gram(kept, plain_noise, joint) for joint in range(data.n)},
-            {joint: data.gram(kept, noise, joint) for joint in range(data.n)},
+            data.grams(kept, plain_noise, range(data.n)), data.grams(kept, noise, range(data.n))
         )
-        structures = [
-            _structure(data, kept, features[joint], noise, known, rules)
-            for joint in range(data.n)
-            if joint not in found
-        ]
+        open_ = [features[joint] for joint in range(data.n) if joint not in found]
+        of_model = (data, [Shown(c.rows, c.columns, c.width) for c in kept], noise, known, rules)
+        structures = list(each(_structure, of_model, open_))
         if shares is None:  # nothing but the effects that were found is in the model yet
             shares = np.stack([each.shares for each in structures])
         strongest = max(filter(_is_told, structures), key=lambda each: each.score, default=None)
@@ -139,13 +137,9 @@ class _Past:
 
 
 def _features(
-    data: TrainingData,
-    signals: Sequence[Signals],
-    past: _Past,
-    joint: int,
-    joint_names: Sequence[str],
-    spool: Spool,
+    shared: tuple[TrainingData, Sequence[Signals], _Past, Sequence[str]], joint: int, tell: Tell
 ) -> list[Feature]:
+    data, signals, past, joint_names = shared
     covariates, columns = _quantities(data, signals, joint, joint_names)
     own = joint_names[joint]
     for covariate, series in (
@@ -160,20 +154,22 @@ def _features(
             )
         )
     return [
-        Feature(covariate, (joint,), tuple(map(spool.keep, blocks)))
+        Feature(covariate, (joint,), tuple(blocks))
         for covariate, blocks in zip(covariates, columns, strict=True)
     ]
 
 
+def _kept(spool: Spool, features: Sequence[Feature]) -> list[Feature]:
+    return [replace(each, columns=tuple(map(spool.keep, each.columns))) for each in features]
+
+
 def _structure(
-    data: TrainingData,
-    kept: Sequence[Columns],
+    shared: tuple[TrainingData, Sequence[Columns], NoiseModel, _Known, tuple[float, float, float]],
     features: list[Feature],
-    noise: NoiseModel,
-    known: _Known,
-    rules: tuple[float, float, float],
+    tell: Tell,
 ) -> _Structure:
     """Add the features of one joint to the model with those `kept`, while they pass."""
+    data, kept, noise, known, rules = shared
     joint = features[0].rows[0]
     pool: list[Columns] = [*kept, *features]
     plain_others, others = _without(known.plain, joint), _without(known.white, joint)

@@ -16,7 +16,7 @@ from scipy.sparse import csr_matrix
 
 from excite_cli.identification.factors import Mask
 from excite_cli.identification.noise import Noise, noise_of
-from excite_cli.out_of_core import Spool, forget
+from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
@@ -75,13 +75,8 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
         plain += int(run.usable.sum())
     ratio = np.clip(eaten / np.maximum(trace, 1e-300), 0.0, 1.0 - 1.0 / MOST_ENLARGED)
     enlarged = np.sqrt(1.0 / (1.0 - ratio))
-    for spread, noise in parts:
-        covariance = noise.innovation * np.outer(enlarged, enlarged)
-        values, vectors = np.linalg.eigh(covariance)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        mixed = np.einsum("tjp,jk->tkp", spread, root).reshape(-1, p)
-        meat += mixed.T @ mixed
-        forget()
+    for own in each(_meat, enlarged, parts):
+        meat += own
     for run in runs:
         for j, rounding in enumerate(run.rounding):
             if rounding is not None:
@@ -105,6 +100,16 @@ class _Part:
     eaten: Array
     trace: Array
     white: Array
+
+
+def _meat(enlarged: Array, part: tuple[Array, Noise], tell: Tell) -> Array:
+    """What a run adds to the sandwich's inside (p, p)."""
+    spread, noise = part
+    covariance = noise.innovation * np.outer(enlarged, enlarged)
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    mixed = np.einsum("tjp,jk->tkp", spread, root).reshape(-1, spread.shape[2])
+    return np.asarray(mixed.T @ mixed)
 
 
 def _part(shared: tuple[Array, Array, Array], run: Rows, tell: Tell) -> _Part:

@@ -14,7 +14,7 @@ import numpy as np
 from excite_cli.config.data_spec import IdentificationSpec
 from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
-from excite_cli.effects.base import Effect, Parameter, Signals, Value
+from excite_cli.effects.base import Effect, Parameter, Value
 from excite_cli.effects.parameter import unit_of_slider
 from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
 from excite_cli.identification.consistent_spread import consistent_near_prior
@@ -25,6 +25,7 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.implausible_links import marked
 from excite_cli.identification.least_squares import LinearFit, fit_rows
 from excite_cli.identification.link_changes import LinkChange, inertial_covariance, link_changes
+from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.prior import InertialPrior, inertial_prior
 from excite_cli.identification.regression import (
     Regression,
@@ -33,9 +34,11 @@ from excite_cli.identification.regression import (
     signals_of,
     with_effects,
 )
-from excite_cli.out_of_core import Spool, forget
-from excite_cli.robot.model import Array
+from excite_cli.out_of_core import Spool
+from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.record import Shown
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 # A parameter is identifiable if the data fix it to this share of its value or usual size.
 _FIXED = 0.5
@@ -124,13 +127,8 @@ class Fit(Shown):
 
 
 def all_rows(runs: Sequence[RunColumns]) -> list[Rows]:
-    """Rows of every run for the least-squares fit, those of many on disk."""
-    spool, found = Spool(), []
-    for run in runs:
-        columns = spool.keep(run.columns)
-        found.append(Rows(columns, run.tau, run.usable, rounding=run.prepared.rounding))
-        forget()
-    return found
+    """Rows of every run for the least-squares fit."""
+    return [Rows(run.columns, run.tau, run.usable, rounding=run.prepared.rounding) for run in runs]
 
 
 def fit(
@@ -225,14 +223,23 @@ def follows_model(regression: Regression) -> bool:
 
 def rebuilt(regression: Regression, phi: Array, values: Array) -> Regression:
     """The effects' columns again, with the rigid body at `phi` and effects of `values`."""
-    runs, spool = [], Spool()
-    for run in regression.runs:
-        signals: Signals = signals_of(run.prepared, regression.robot, phi)
-        signals = with_effects(signals, regression.effects, values)
-        columns = effect_columns(regression.effects, signals)
-        runs.append(replace(run, effects=spool.keep(run.prepared.averaged_for_fit(columns))))
-        forget()
-    return replace(regression, runs=tuple(runs))
+    spool, shared = Spool(), (regression.robot, regression.effects, phi, values)
+    made = each(_again, shared, [(run.prepared, run.inertial) for run in regression.runs])
+    runs = zip(regression.runs, made, strict=True)
+    return replace(
+        regression, runs=tuple(replace(run, columns=spool.keep(own)) for run, own in runs)
+    )
+
+
+def _again(
+    shared: tuple[Robot, Sequence[Effect], Array, Array],
+    task: tuple[PreparedRun, Array],
+    tell: Tell,
+) -> Array:
+    (robot, effects, phi, values), (prepared, inertial) = shared, task
+    signals = with_effects(signals_of(prepared, robot, phi), effects, values)
+    own = prepared.averaged_for_fit(effect_columns(effects, signals))
+    return np.concatenate([inertial, own], axis=2)
 
 
 def _record(

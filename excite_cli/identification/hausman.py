@@ -11,7 +11,7 @@ regression on Z Π.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.special import fdtrc
@@ -21,10 +21,10 @@ from excite_cli.identification.factors import run_factors, solve, stacked, toget
 from excite_cli.identification.least_squares import factors_of, fit_rows
 from excite_cli.identification.periods import mean_of_other_periods, period_of
 from excite_cli.measurement.dataset import Dataset, Mask, Run
-from excite_cli.out_of_core import Spool, forget
+from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array
 from excite_cli.workers.at_hand import each
-from excite_cli.workers.base import Tell
+from excite_cli.workers.base import Function, Tell
 
 Source = Literal["reference", "periods", "none"]
 REFERENCE = "q_ref"
@@ -135,13 +135,7 @@ def hausman_test(
         return not_testable("the instruments repeat the columns without any noise")
     turn = directions[kept].T / values[kept] / _norms(c)[:, None]  # V turn: orthonormal columns
     turn *= np.sqrt(sum(int(run.usable.sum()) for run in runs))
-    augmented, spool = [], Spool()
-    for run, instrument in zip(runs, instruments, strict=True):
-        left_over = (run.columns - instrument @ first_stage) @ turn
-        columns = spool.keep(np.concatenate([run.columns, left_over], axis=2))
-        augmented.append(Rows(columns, run.tau, run.usable))
-        forget()
-    fitted = fit_rows(augmented, "wls")
+    fitted = fit_rows(_with(_augmented, (first_stage, turn), runs, instruments), "wls")
     extra = int(kept.sum())
     if not fitted.seen[p:].all():
         return not_testable("the parts of the columns that the instruments miss are not separate")
@@ -159,6 +153,27 @@ def hausman_test(
         bias=bias,
         bias_std=bias_std,
     )
+
+
+def _with(
+    columns: Function, shared: Any, runs: Sequence[Rows], instruments: Sequence[Array]
+) -> list[Rows]:
+    """The runs with the columns that are made of theirs and of the instruments."""
+    spool = Spool()
+    tasks = [(run.columns, own) for run, own in zip(runs, instruments, strict=True)]
+    made = each(columns, shared, tasks)
+    return [Rows(spool.keep(own), run.tau, run.usable) for run, own in zip(runs, made, strict=True)]
+
+
+def _augmented(shared: tuple[Array, Array], task: tuple[Array, Array], tell: Tell) -> Array:
+    """Columns, and what the instruments miss of them."""
+    (first_stage, turn), (columns, instrument) = shared, task
+    return np.concatenate([columns, (columns - instrument @ first_stage) @ turn], axis=2)
+
+
+def _projected(first_stage: Array, task: tuple[Array, Array], tell: Tell) -> Array:
+    """What the instruments tell of the columns."""
+    return np.asarray(task[1] @ first_stage)
 
 
 def _triangle(runs: Sequence[Rows], instruments: Sequence[Array], noise: Array) -> Array:
@@ -183,10 +198,7 @@ def _bias(
     runs: Sequence[Rows], instruments: Sequence[Array], first_stage: Array, noise: Array
 ) -> tuple[Array, Array]:
     """Least squares less instrumental variables (p,), and the latter's standard deviation."""
-    projected, spool = [], Spool()
-    for run, instrument in zip(runs, instruments, strict=True):
-        projected.append(Rows(spool.keep(instrument @ first_stage), run.tau, run.usable))
-        forget()
+    projected = _with(_projected, first_stage, runs, instruments)
     plain, second = (solve(stacked(factors_of(group), noise)) for group in (runs, projected))
     covariance = estimate_covariance(projected, second.x, second.inverse, noise)
     return plain.x - second.x, np.sqrt(np.diag(covariance.matrix))

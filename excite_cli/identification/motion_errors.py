@@ -19,6 +19,8 @@ import numpy as np
 from excite_cli.identification.processing import ABOVE_FLOOR, HIGHEST_BY_RATE, Processing, spectra
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.resolution import lattice_step
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 # Relative errors of speed and acceleration that are told. What is lost is lost in the same way all
 # the time, and inertias and friction are off by as much; what counts add is noise, and makes
@@ -43,7 +45,7 @@ def motion_errors(runs: Sequence[Run], processing: Processing) -> MotionErrors:
     fs = processing.recorded_rate
     cutoff = processing.position_cutoff or fs / 2
     n = runs[0].q.shape[1]
-    counts = np.array([lattice_step(np.concatenate([r.q[:, j] for r in runs])) for j in range(n)])
+    counts = np.array(list(each(_counts, [run.q for run in runs], range(n))))
     frequency, power = spectra(runs, fs)
     motion = _of_motion(frequency, power, fs)
     f = frequency[:, None]
@@ -61,6 +63,10 @@ def motion_errors(runs: Sequence[Run], processing: Processing) -> MotionErrors:
     ])  # fmt: skip
     width = frequency[1] - frequency[0]
     return MotionErrors(counts, _root(added, total * width), _root(gone, total))
+
+
+def _counts(positions: Sequence[Array], joint: int, tell: Tell) -> float:
+    return lattice_step(np.concatenate([q[:, joint] for q in positions]))
 
 
 def _of_motion(frequency: Array, power: Array, fs: float) -> Array:

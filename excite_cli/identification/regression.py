@@ -27,17 +27,22 @@ class RunColumns:
     """
 
     step: float
-    inertial: Array
-    effects: Array
+    columns: Array
+    rank: int
     tau: Array
     usable: NDArray[np.bool_]
     moving: NDArray[np.bool_]
     prepared: PreparedRun
 
     @property
-    def columns(self) -> Array:
-        """All columns (M, n, r + k): base parameters, then effects."""
-        return np.concatenate([self.inertial, self.effects], axis=2)
+    def inertial(self) -> Array:
+        """Columns (M, n, r) of the base parameters."""
+        return self.columns[:, :, : self.rank]
+
+    @property
+    def effects(self) -> Array:
+        """Columns (M, n, k) of the effects."""
+        return self.columns[:, :, self.rank :]
 
 
 @dataclass(frozen=True)
@@ -112,12 +117,12 @@ def build_regression(
     """
     found, spool = [], Spool()
     columns = each(_columns, (robot, base.selection, effects, phi, values), runs)
-    for prepared, (inertial, own) in zip(runs, columns, strict=True):
+    for prepared, own in zip(runs, columns, strict=True):
         found.append(
             RunColumns(
                 step=prepared.step,
-                inertial=spool.keep(inertial),
-                effects=spool.keep(own),
+                columns=spool.keep(own),
+                rank=len(base.selection),
                 tau=prepared.tau_fit,
                 usable=prepared.usable,
                 moving=prepared.moving,
@@ -131,7 +136,7 @@ def _columns(
     shared: tuple[Robot, NDArray[np.intp], Sequence[Effect], Array | None, Array | None],
     prepared: PreparedRun,
     tell: Tell,
-) -> tuple[Array, Array]:
+) -> Array:
     """Averages of the regressor of the base parameters, and of the effects' columns."""
     robot, selection, effects, phi, values = shared
     signals = signals_of(prepared, robot, phi)
@@ -139,4 +144,5 @@ def _columns(
         signals = with_effects(signals, effects, values)
     inertial = prepared.averaged_for_fit(signals.body.regressor[:, :, selection])
     signals.body.forget()
-    return inertial, prepared.averaged_for_fit(effect_columns(effects, signals))
+    own = prepared.averaged_for_fit(effect_columns(effects, signals))
+    return np.concatenate([inertial, own], axis=2)

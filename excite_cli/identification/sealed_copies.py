@@ -18,7 +18,8 @@ from excite_cli.errors import FileError
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.row_hashes import row_hashes
-from excite_cli.out_of_core import forget
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 Hashes = NDArray[np.uint64]
 _WINDOW = 32  # samples: beyond chance even for one joint with a coarse encoder
@@ -41,16 +42,20 @@ def refuse_sealed_copies(parts: Split) -> None:
         return
     there = np.zeros(len(wanted), bool)
     most, source = 0, parts.training[0]
-    for run in parts.training:
-        own = np.isin(wanted, _hashed(_changing(run)))
+    of_runs = each(_held, wanted, parts.training)
+    for run, own in zip(parts.training, of_runs, strict=True):
         if (count := int(np.count_nonzero(own))) > most:
             most, source = count, run
         there |= own
-        forget()
     if there.mean() > _MOST:
         found = wanted[there]
         copies = [np.count_nonzero(np.isin(own, found)) for own in sealed]
         raise FileError(_told(parts.sealed[int(np.argmax(copies))], source, float(there.mean())))
+
+
+def _held(wanted: Hashes, run: Run, tell: Tell) -> NDArray[np.bool_]:
+    """Which of the `wanted` windows a run holds."""
+    return np.isin(wanted, _hashed(_changing(run)))
 
 
 def _told(sealed: Run, source: Run, share: float) -> str:

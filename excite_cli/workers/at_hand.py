@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
-from excite_cli.out_of_core import forget
+from excite_cli.out_of_core import forget, room_of_spools
 from excite_cli.workers.base import Function, Workers
 
 _place: ContextVar[Workers | None] = ContextVar("workers at hand", default=None)
@@ -17,9 +17,13 @@ _place: ContextVar[Workers | None] = ContextVar("workers at hand", default=None)
 @contextmanager
 def at_hand(place: Workers | None) -> Iterator[None]:
     """Share tasks among the workers of `place` within the block; None: do them here."""
+    if place is not None:
+        place.begin()
     before = _place.set(place)
     try:
-        yield
+        # What lies on disk can be named to another process; what is in memory is written each time.
+        with room_of_spools(0 if place is not None and place.reads_our_files else None):
+            yield
     finally:
         _place.reset(before)
 
@@ -27,7 +31,7 @@ def at_hand(place: Workers | None) -> Iterator[None]:
 def each(function: Function, shared: Any, tasks: Iterable[Any]) -> Iterator[Any]:
     """`function(shared, task, tell)` of every task, in their order.
 
-    Here they are taken and done one after the other, each when its result is asked for; what lies
+    A task is taken when there is somebody to do it; here, when its result is asked for. What lies
     on disk is forgotten in between.
     """
     place = _place.get()
@@ -36,7 +40,7 @@ def each(function: Function, shared: Any, tasks: Iterable[Any]) -> Iterator[Any]
             yield function(shared, task, _silent)
             forget()
         return
-    for result in place.map(function, shared, list(tasks)):
+    for result in place.map(function, shared, tasks):
         yield result
         forget()
 

@@ -7,7 +7,7 @@ done, nor whether one is done twice because a worker was lost.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
@@ -62,7 +62,7 @@ class Workers(ABC):
         self,
         function: Function,
         shared: Any,
-        tasks: Sequence[Any],
+        tasks: Iterable[Any],
         watch: Watch = unwatched,
         *,
         keep_failures: bool = False,
@@ -78,6 +78,14 @@ class Workers(ABC):
         LostWorkersError
             A task takes its worker with it each time, or workers cannot be started.
         """
+
+    @property
+    def reads_our_files(self) -> bool:
+        """Whether what lies on the disk of this process is named to the workers and not copied."""
+        return False
+
+    def begin(self) -> None:  # noqa: B027 - most need not
+        """Make ready for the first tasks, where that takes a while; not needed."""
 
     @abstractmethod
     def close(self) -> None:

@@ -35,6 +35,8 @@ class _Packer(pickle.Pickler):
     def reducer_override(self, value: Any) -> Any:
         if type(value) is not np.ndarray or value.nbytes < _WORTH_NAMING or value.dtype.hasobject:
             return NotImplemented
+        if not any(value.strides):  # one value, repeated
+            return np.broadcast_to, (value.flat[0], value.shape)
         if self._spool is not None and value.nbytes >= _LARGE:
             value = self._spool.keep(value)
         reference = reference_to(value)

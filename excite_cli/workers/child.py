@@ -10,6 +10,9 @@ import select
 import signal
 import threading
 import time
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import import_module
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -23,14 +26,20 @@ _EVERY = 0.2
 _FULL = 2**28  # bytes of a file with answers
 
 
-def serve(descriptor: int, threads: int) -> None:
-    """Do tasks that come over the socket `descriptor`; linear algebra uses `threads`."""
+def serve(descriptor: int, threads: int, modules: Sequence[str] = ()) -> None:
+    """Do tasks that come over the socket `descriptor`; linear algebra uses `threads`.
+
+    `modules` are what the parent had imported: most of the time that the first task would take.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is asked, and ends its workers
     connection = Connection(descriptor)
     threading.Thread(target=_end_with_parent, args=(descriptor,), daemon=True).start()
     shared, spool = _Shared(), Spool(0)
     try:
         connection.send(("ready", os.getpid()))
+        for name in modules:
+            with suppress(Exception):  # whoever needs it meets that again
+                import_module(name)
         while True:
             kind, body = connection.recv()
             if kind == "shared":

@@ -11,7 +11,7 @@ import logging
 import pickle
 import threading
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from functools import cache
@@ -91,7 +91,7 @@ class Cluster(Workers):
         self,
         function: Function,
         shared: Any,
-        tasks: Sequence[Any],
+        tasks: Iterable[Any],
         watch: Watch = unwatched,
         *,
         keep_failures: bool = False,
@@ -99,6 +99,7 @@ class Cluster(Workers):
         """As `Workers.map`; words of tasks are not told."""
         from distributed import as_completed
 
+        tasks = list(tasks)
         if not tasks:
             return []
         blob = pickle.dumps(shared, pickle.HIGHEST_PROTOCOL)

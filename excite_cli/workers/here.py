@@ -1,6 +1,6 @@
 """The default: tasks are done one after the other in this process."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 from excite_cli.workers.base import Function, News, Watch, Workers, unwatched
@@ -18,13 +18,13 @@ class Here(Workers):
         self,
         function: Function,
         shared: Any,
-        tasks: Sequence[Any],
+        tasks: Iterable[Any],
         watch: Watch = unwatched,
         *,
         keep_failures: bool = False,
     ) -> list[Any]:
         """As `Workers.map`."""
-        results: list[Any] = []
+        tasks, results = list(tasks), []
         total = len(tasks)
         for index, task in enumerate(tasks):
 

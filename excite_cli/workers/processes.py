@@ -11,7 +11,7 @@ import socket
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from typing import Any
@@ -26,14 +26,16 @@ from excite_cli.workers.base import (
     Workers,
     unwatched,
 )
-from excite_cli.workers.by_reference import packed
+from excite_cli.workers.by_reference import POSSIBLE, packed
 
 # The parent's path of imports comes first, so that a checkout finds itself; until it is set, `-P`
 # keeps the current folder out: a json.py that lies there is no part of us.
 _BOOT = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[3]); "
-    "from excite_cli.workers.child import serve; serve(int(sys.argv[1]), int(sys.argv[2]))"
+    "from excite_cli.workers.child import serve; "
+    "serve(int(sys.argv[1]), int(sys.argv[2]), json.loads(sys.argv[4]))"
 )
+_OURS, _NOT_NEEDED = "excite_cli.", "excite_cli.cli."
 _THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _PATIENCE = 1.0  # [s] that a worker has to end
 
@@ -45,8 +47,9 @@ class _Worker:
         ours, theirs = socket.socketpair()
         with ours, theirs:
             descriptor, path = theirs.fileno(), json.dumps(sys.path)
+            modules = json.dumps([name for name in sys.modules if _of_tasks(name)])
             self.process = subprocess.Popen(
-                [sys.executable, "-P", "-c", _BOOT, str(descriptor), str(threads), path],
+                [sys.executable, "-P", "-c", _BOOT, str(descriptor), str(threads), path, modules],
                 pass_fds=[descriptor],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # stdout is the answer of the command
@@ -75,18 +78,22 @@ class _Round:
 
     function: Function
     shared: bytes
-    tasks: Sequence[Any]
+    source: Iterator[Any]
+    total: int | None
     watch: Watch
     keep_failures: bool
-    waiting: deque[int]
     spool: Spool
+    tasks: list[Any] = field(default_factory=list)
+    waiting: deque[int] = field(default_factory=deque)
     results: dict[int, Any] = field(default_factory=dict)
     failures: dict[int, Exception] = field(default_factory=dict)
     losses: dict[int, int] = field(default_factory=dict)
     running: int = 0
+    ended: bool = False
 
     def tell(self, index: int, word: Any = None, result: Any = None) -> None:
-        self.watch(News(len(self.results), self.running, len(self.tasks), index, word, result))
+        total = len(self.tasks) if self.total is None else self.total
+        self.watch(News(len(self.results), self.running, total, index, word, result))
 
     def done(self, index: int, result: Any) -> None:
         """Keep a result, and tell."""
@@ -100,6 +107,21 @@ class _Round:
         else:
             self.failures[index] = error
             self.waiting = deque(each for each in self.waiting if each < index)
+            self.ended = True
+
+    def take(self) -> int | None:
+        """The next task, taken from the source when a worker is there to do it."""
+        if self.waiting:
+            return self.waiting.popleft()
+        if self.ended:
+            return None
+        try:
+            self.tasks.append(next(self.source))
+        except StopIteration:
+            self.ended = True
+            return None
+        self.ended = len(self.tasks) == self.total
+        return len(self.tasks) - 1
 
 
 class Processes(Workers):
@@ -124,24 +146,24 @@ class Processes(Workers):
         self,
         function: Function,
         shared: Any,
-        tasks: Sequence[Any],
+        tasks: Iterable[Any],
         watch: Watch = unwatched,
         *,
         keep_failures: bool = False,
     ) -> list[Any]:
-        """As `Workers.map`."""
-        if not tasks:
+        """As `Workers.map`; the next of `tasks` is taken when a worker is there to do it."""
+        total = len(tasks) if isinstance(tasks, Sized) else None
+        if total == 0:
             return []
         spool = Spool(0)
-        blob = packed(shared, spool)
-        waiting = deque(range(len(tasks)))
-        round_ = _Round(function, blob, tasks, watch, keep_failures, waiting, spool)
+        round_ = _Round(
+            function, packed(shared, spool), iter(tasks), total, watch, keep_failures, spool
+        )
         try:
-            while len(self._workers) < min(self._count, len(tasks)):
-                self._workers.append(_Worker(self._threads))
+            self._start(self._count if total is None else total)
             for worker in list(self._workers):
                 self._hand_out(worker, round_)
-            while round_.waiting or self._awaited(round_):
+            while self._awaited(round_):
                 for connection in wait([worker.connection for worker in self._workers]):
                     worker = next(w for w in self._workers if w.connection is connection)
                     self._listen(worker, round_)
@@ -151,7 +173,20 @@ class Processes(Workers):
         if round_.failures:
             self._drop_running()
             raise round_.failures[min(round_.failures)]
-        return [round_.results[index] for index in range(len(tasks))]
+        return [round_.results[index] for index in range(len(round_.tasks))]
+
+    @property
+    def reads_our_files(self) -> bool:
+        """Where the system has /proc."""
+        return POSSIBLE
+
+    def begin(self) -> None:
+        """Start the processes."""
+        self._start(self._count)
+
+    def _start(self, needed: int) -> None:
+        while len(self._workers) < min(self._count, needed):
+            self._workers.append(_Worker(self._threads))
 
     def close(self) -> None:
         """End all processes."""
@@ -159,7 +194,9 @@ class Processes(Workers):
         self._workers = []
 
     def _awaited(self, round_: _Round) -> bool:
-        """Whether a task runs whose end matters: after a failure, only those before it do."""
+        """Whether a task is open whose end matters: after a failure, only those before it do."""
+        if round_.waiting or not round_.ended:
+            return True
         first = min(round_.failures, default=len(round_.tasks))
         return any(worker.task is not None and worker.task < first for worker in self._workers)
 
@@ -170,9 +207,8 @@ class Processes(Workers):
 
     def _hand_out(self, worker: _Worker, round_: _Round) -> None:
         """Send the next task to a worker that is ready and idle."""
-        if not worker.ready or worker.task is not None or not round_.waiting:
+        if not worker.ready or worker.task is not None or (index := round_.take()) is None:
             return
-        index = round_.waiting.popleft()
         worker.task = index
         round_.running += 1
         body = packed((round_.function, round_.tasks[index]), round_.spool)
@@ -237,6 +273,11 @@ class Processes(Workers):
                     "without --workers, or take fewer."
                 )
         self._workers[self._workers.index(worker)] = _Worker(self._threads)
+
+
+def _of_tasks(module: str) -> bool:
+    """Whether a module may be needed for tasks, so that a worker imports it before they come."""
+    return module.startswith(_OURS) and not module.startswith(_NOT_NEEDED)
 
 
 def _end(workers: Sequence[_Worker]) -> None:

@@ -52,7 +52,7 @@ def test_joints_that_are_known_need_not_be_summed_again() -> None:
     first = [c for c in candidates if c.rows != (0,)]
     assert own
     assert first
-    known = {1: data.gram(first, noise, 1)}
+    known = data.grams(first, noise, [1])
     found = data.evidence([*first, *own], noise, known)
     anew = data.evidence([*first, *own], noise)
     assert np.array_equal(found.grams.by_fold(), anew.grams.by_fold())
