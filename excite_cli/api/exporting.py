@@ -8,12 +8,13 @@ from pathlib import Path
 from excite_cli.api.arguments import checked
 from excite_cli.api.entering import Start, durations_of
 from excite_cli.api.exported_chains import ExportedChain, Wanted, chains_of
-from excite_cli.api.models import for_simulators, write_model, write_models
+from excite_cli.api.models import for_simulators, write_exported, write_model, write_models
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import existing
+from excite_cli.api.paths import existing, paths_in
 from excite_cli.claim import claim, leave
 from excite_cli.config.inputs import files_of_config
 from excite_cli.errors import ConfigError, FileError, nearest
+from excite_cli.export.c_model import c_model
 from excite_cli.export.motion_exporter import MotionExporter
 from excite_cli.export.motion_rosbag2 import is_bag
 from excite_cli.export.motions import MOTION_EXPORTERS
@@ -24,6 +25,7 @@ from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.model_file import is_text, read_model
+from excite_cli.store.thresholds_file import read_thresholds
 
 # Formats of identified models, and the suffixes of their files.
 MODELS = {"urdf": ".urdf", "mjcf": ".xml", "yaml": ".yaml", "c": ".c"}
@@ -70,6 +72,7 @@ def export_file(
     periods: int = 1,
     slow: float | None = None,
     start: Start | None = None,
+    thresholds: str | Path | None = None,
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Exported:
@@ -85,6 +88,8 @@ def export_file(
     all are equal up to the end. They are played `periods` times, slowed down until speeds and
     accelerations keep the share `slow` of their limits, and with `start` (position by joint [rad,
     m], the others at robot.posture) entered from rest there and left for it again.
+
+    `thresholds` (JSON of `excite score --thresholds`) make a model in C a collision detector, too.
 
     Raises
     ------
@@ -111,8 +116,11 @@ def export_file(
         raise FileError(
             f"{path} is {what}: it cannot be exported as {format}. Its formats: {', '.join(own)}."
         )
+    if thresholds is not None and format != "c":
+        raise ConfigError(f"--thresholds: only a model in C holds them, not {format}.")
     if format in MODELS:
-        return _export_model(path, format, target, overwrite, tell)
+        limits = None if thresholds is None else existing(thresholds)
+        return _export_model(path, format, target, limits, overwrite, tell)
     exporter = MOTION_EXPORTERS[format]
     chains = chains_of(path, Wanted(chosen, periods, slow, start), tell)
     paths = _paths(path, target, exporter, [each.name for each in chains])
@@ -198,7 +206,12 @@ def _held(paths: list[Path], exporter: MotionExporter, overwrite: bool) -> Itera
 
 
 def _export_model(
-    file: Path, format: str, output: Path | None, overwrite: bool, tell: Tell
+    file: Path,
+    format: str,
+    output: Path | None,
+    thresholds: Path | None,
+    overwrite: bool,
+    tell: Tell,
 ) -> Exported:
     """A fit, a diagnosis or a config with its numbers as URDF, MJCF, YAML or C.
 
@@ -206,16 +219,17 @@ def _export_model(
     for what was found; C is the model that the table of errors belongs to.
     """
     path = output or Path(f"{file.stem}{MODELS[format]}")
-    with held({"output": path}, overwrite, (file,)):
+    with held({"output": path}, overwrite, (file, *paths_in(thresholds))):
         stored = read_model(file)
         config = file if stored.what in ("config", "urdf") else None
         own = files_of_config(stored.spec, stored.folder, config)
         refuse_inputs_as_outputs({"--output": path}, (*own, *stored.sources))
-        if format != "yaml":
-            model = stored.model
-            notes: tuple[str, ...] = ()
-            if format != "c":
-                model, notes = for_simulators(stored, format)
+        if format == "c":
+            names = stored.robot.joint_names
+            limits = None if thresholds is None else read_thresholds(thresholds, names)
+            write_exported(c_model(stored.robot, stored.model, "", limits), path, tell)
+        elif format != "yaml":
+            model, notes = for_simulators(stored, format)
             for note in notes:
                 tell(Note(Level.NOTE, f"{path}: {note}"))
             write_model(stored.robot, model, format, path, tell)

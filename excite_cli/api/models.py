@@ -5,7 +5,6 @@ from pathlib import Path
 
 from excite_cli.atomic import write_text_atomically
 from excite_cli.export import mjcf, urdf
-from excite_cli.export.c_model import c_model
 from excite_cli.export.exported import ModelText
 from excite_cli.export.parameters import parameters_yaml
 from excite_cli.identification.fit import Fit
@@ -19,7 +18,6 @@ from excite_cli.store.model_file import consistent_model
 _WRITERS: dict[str, Callable[[Robot, IdentifiedModel], ModelText]] = {
     "urdf": urdf.updated_urdf,
     "mjcf": mjcf.mjcf,
-    "c": c_model,
 }
 
 
@@ -54,8 +52,12 @@ def for_simulators(stored: StoredModel, kind: str) -> tuple[IdentifiedModel, tup
 
 
 def write_model(robot: Robot, model: IdentifiedModel, kind: str, path: Path, tell: Tell) -> None:
-    """Write a model as `kind`: `urdf`, `mjcf` or `c`; what that cannot hold is reported."""
-    exported = _WRITERS[kind](robot, model)
+    """Write a model as `kind`: `urdf` or `mjcf`; what that cannot hold is reported."""
+    write_exported(_WRITERS[kind](robot, model), path, tell)
+
+
+def write_exported(exported: ModelText, path: Path, tell: Tell) -> None:
+    """Write a model's text, and report what is not in it."""
     write_text_atomically(path, exported.text)
     for note in exported.notes:
         tell(Note(Level.NOTE, f"{path}: {note}"))

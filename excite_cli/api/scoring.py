@@ -1,6 +1,5 @@
 """Stored models against new data: `excite score`."""
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -11,7 +10,6 @@ from excite_cli.api.loading import Case, load_data, tell_findings
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import refuse_twice
-from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.identification.split import split, whole
 from excite_cli.identification.torque_trace import torque_units
@@ -21,6 +19,7 @@ from excite_cli.scoring.score import Scorer, together
 from excite_cli.scoring.thresholds import Residual, Thresholds, thresholds_of
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.score_file import write_score
+from excite_cli.store.thresholds_file import write_thresholds
 from excite_cli.summary.score import score_answer as score_answer
 from excite_cli.workers.base import News, Workers
 from excite_cli.workers.base import Tell as WorkersTell
@@ -179,7 +178,7 @@ def thresholds(
                 runs += scorer.residuals(parts)
         found = thresholds_of(stored.robot.joint_names, runs, false_alarms, time_constant)
         if output is not None:
-            write_text_atomically(Path(output), json.dumps(found.as_data(), indent=1) + "\n")
+            write_thresholds(Path(output), found)
         return found
 
 

@@ -68,6 +68,14 @@ def export(
             help="The posture of --entry [rad, m]; joints not named are at robot.posture.",
         ),
     ] = None,
+    thresholds: Annotated[
+        Path | None,
+        typer.Option(
+            "--thresholds",
+            metavar="FILE.json",
+            help="Those of score --thresholds: c has a collision detector with them.",
+        ),
+    ] = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -90,6 +98,7 @@ def export(
       excite export ur10.h5 --format csv --motion 1 --slow 0.3 -o slow.csv
       excite export fit.h5 --format mjcf -o identified.xml
       excite export diagnosis.h5 --format c -o arm.c
+      excite export diagnosis.h5 --format c --thresholds thresholds.json -o arm.c
     """
     from excite_cli.api.exporting import export_answer, export_file
     from excite_cli.api.threads import single_threaded
@@ -106,6 +115,7 @@ def export(
             periods=periods,
             slow=slow,
             start=start_from(posture, entry),
+            thresholds=thresholds,
             overwrite=overwrite,
             tell=terminal.tell,
         )

@@ -43,36 +43,35 @@ class NoiseModel:
         return cls(tuple(np.zeros(0) for _ in sigma), np.asarray(sigma, dtype=float))
 
     def whitened(self, x: Array, joint: int, usable: NDArray[np.bool_]) -> Array:
-        """The usable rows (K, …) of x (M, …), a run's rows of one joint, with unit innovations.
+        """The usable rows (K, …) of x (M, …), a run's rows of one joint, with unit innovations."""
+        return self.whitening(joint, usable)(x)
+
+    def whitening(self, joint: int, usable: NDArray[np.bool_]) -> "Whitening":
+        """How the usable rows of a run's columns of one joint are whitened.
 
         Of each what those of the p rows before it that are usable do not predict. Where a joint
         stands there are gaps; without the rows after them a motion that often turns round would
         keep a third of its samples, and nothing of what happens at reversals.
         """
-        x, coefficients = np.asarray(x, dtype=float), self.coefficients[joint]
-        order, at = len(coefficients), np.flatnonzero(usable)
-        rest = x.copy()
-        for k, c in enumerate(coefficients, 1):  # lfilter goes column by column
-            rest[k:] -= c * x[: max(len(x) - k, 0)]
-        before = np.zeros((len(x), order), dtype=bool)
+        order, at = len(self.coefficients[joint]), np.flatnonzero(usable)
+        before = np.zeros((len(usable), order), dtype=bool)
         for k in range(1, order + 1):
             before[k:, k - 1] = usable[:-k]
-        rest, before = rest[at], before[at]
+        before = before[at]
         spread = np.full(len(at), self.sigma[joint])
         broken = np.flatnonzero(~before.all(axis=1))
-        patterns, which = np.unique(before[broken], axis=0, return_inverse=True)
-        for pattern, rows in zip(
-            patterns, (broken[which.ravel() == k] for k in range(len(patterns))), strict=True
-        ):
-            lags = np.flatnonzero(pattern) + 1
+        # As numbers: rows of truth values are slow to compare.
+        packed = np.packbits(before[broken], axis=1)
+        numbers = packed @ (256 ** np.arange(packed.shape[1]))
+        after = []
+        for number in np.unique(numbers).tolist():
+            rows = broken[numbers == number]
+            lags = np.flatnonzero(before[rows[0]]) + 1
             by, spread[rows] = self._predictor(joint, lags)
-            rest[rows] = x[at[rows]] - sum(
-                c * x[at[rows] - k] for k, c in zip(lags, by, strict=True)
-            )
+            after.append((rows, lags, by))
         if self.after_gaps is not None:
             spread[self.follow_gaps(usable)] *= self.after_gaps[joint]
-        rest /= spread.reshape(-1, *np.ones(x.ndim - 1, dtype=int))
-        return rest
+        return Whitening(self.coefficients[joint], at, tuple(after), spread)
 
     def follow_gaps(self, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Which of the usable rows (K,) follow a gap, or the start, within the highest order."""
@@ -83,6 +82,17 @@ class NoiseModel:
 
     def _predictor(self, joint: int, lags: NDArray[np.intp]) -> tuple[Array, float]:
         """Coefficients of the samples at these lags, and the standard deviation of what is left."""
+        key = joint, lags.tobytes()
+        if key not in self._predictors:
+            self._predictors[key] = self._predictor_of(joint, lags)
+        return self._predictors[key]
+
+    @cached_property
+    def _predictors(self) -> dict[tuple[int, bytes], tuple[Array, float]]:
+        """Many runs have the same gaps."""
+        return {}
+
+    def _predictor_of(self, joint: int, lags: NDArray[np.intp]) -> tuple[Array, float]:
         covariances = self._autocovariances[joint]
         if not len(lags):
             return np.zeros(0), float(np.sqrt(covariances[0]))
@@ -113,6 +123,34 @@ class NoiseModel:
             lfilter([1.0], np.concatenate([[1.0], -c]), impulse) for c in self.coefficients
         ]
         return self.sigma * np.sqrt(np.sum(np.square(responses), axis=1))
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """The rows `at` (K,) that are usable and the `spread` (K,) that innovations have there.
+
+    `coefficients` (p,) predict them; `after`: rows that follow a gap, the lags that there are
+    before them, and the coefficients of these.
+    """
+
+    coefficients: Array
+    at: NDArray[np.intp]
+    after: tuple[tuple[NDArray[np.intp], NDArray[np.intp], Array], ...]
+    spread: Array
+
+    def __call__(self, x: Array) -> Array:
+        """The usable rows (K, …) of x (M, …), with unit innovations."""
+        x = np.asarray(x, dtype=float)
+        rest = x.copy()
+        for k, c in enumerate(self.coefficients, 1):  # lfilter goes column by column
+            rest[k:] -= c * x[: max(len(x) - k, 0)]
+        rest = rest[self.at]
+        for rows, lags, by in self.after:
+            rest[rows] = x[self.at[rows]] - sum(
+                c * x[self.at[rows] - k] for k, c in zip(lags, by, strict=True)
+            )
+        rest /= self.spread.reshape(-1, *np.ones(x.ndim - 1, dtype=int))
+        return rest
 
 
 def fit_noise(residuals: Sequence[Array], usable: Sequence[NDArray[np.bool_]]) -> NoiseModel:

@@ -102,19 +102,18 @@ def _products(
     joint, local, shifts = task
     parts, spool = [], Spool()
     for part, run in enumerate(data.runs):
-        usable = run.usable[:, joint]
         columns = data.columns(taken, range(len(taken)), part, joint)
-        own = noise.whitened(columns, joint, usable)
-        rest = noise.whitened(residuals[part][:, joint], joint, usable)
+        whiten = noise.whitening(joint, run.usable[:, joint])
+        own, rest = whiten(columns), whiten(residuals[part][:, joint])
         columns = np.stack([c.columns[part][:, 0, 0] for c in local], axis=1)
-        parts.append((spool.keep(columns), spool.keep(own), rest, usable))
+        parts.append((spool.keep(columns), spool.keep(own), rest, whiten))
         forget()
     found = []
     for of_parts in shifts:
         cross = np.zeros((parts[0][1].shape[1], len(local)))
         square, product = np.zeros(len(local)), np.zeros(len(local))
-        for shift, (columns, own, rest, usable) in zip(of_parts, parts, strict=True):
-            moved = noise.whitened(np.roll(columns, shift, axis=0), joint, usable)
+        for shift, (columns, own, rest, whiten) in zip(of_parts, parts, strict=True):
+            moved = whiten(np.roll(columns, shift, axis=0))
             cross += own.T @ moved
             square += np.sum(moved**2, axis=0)
             product += rest @ moved

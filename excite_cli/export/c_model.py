@@ -10,16 +10,26 @@ import numpy as np
 from excite_cli.effects.base import Effect
 from excite_cli.effects.c_code import reals
 from excite_cli.effects.sign import WIDTH
+from excite_cli.export.detector_in_c import detector_in_c
 from excite_cli.export.exported import ModelText, in_words
 from excite_cli.identification.identified_model import IdentifiedModel, Series
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, tree_of
+from excite_cli.scoring.thresholds import Thresholds
 
 _TESTED, _STEP, _SEED = 24, 0.01, 20170529
 
 
-def c_model(robot: Robot, model: IdentifiedModel, made: str = "") -> ModelText:
-    """The C file, and what it leaves out; `made`: where the model comes from, in a few words."""
+def c_model(
+    robot: Robot,
+    model: IdentifiedModel,
+    made: str = "",
+    thresholds: Thresholds | None = None,
+) -> ModelText:
+    """The C file, and what it leaves out; `made`: where the model comes from, in a few words.
+
+    With `thresholds` a collision detector is in it.
+    """
     kept = model.without(model.of_single_runs)
     columns = tuple(dict.fromkeys(each.covariate for each in kept.effects if each.covariate))
     codes = [(effect, effect.in_c(values, columns)) for effect, values in kept.by_effect]
@@ -48,6 +58,7 @@ def c_model(robot: Robot, model: IdentifiedModel, made: str = "") -> ModelText:
         "TREE": _tree(tree),
         "BODIES": _bodies(kept.phi, tree),
         "LOADED": _bodies(kept.phi + kept.carried(robot.n), tree),
+        "DETECTOR": "" if thresholds is None else detector_in_c(thresholds, _TESTED, _STEP),
         "GRAVITY": reals(tree.gravity),
         "ROBOT_EFFECTS": _code(codes, defects=False),
         "DEFECTS": _code(codes, defects=True),

@@ -8,6 +8,7 @@
  * excite_series    torque at all instants of a recorded series, as the program's error table has it
  * excite_load      torque of the rigid bodies alone
  * excite_self_test largest deviation from recorded torques, relative to the largest of them
+ * excite_detect    whether a residual says collision (where thresholds were given)
  *
  * All arrays have EXCITE_JOINTS entries per instant, in this order:
 @JOINTS@
@@ -506,6 +507,7 @@ real excite_self_test(void)
     return worst / largest;
 }
 
+@DETECTOR@
 #ifdef EXCITE_MAIN
 #include <stdio.h>
 #include <time.h>
@@ -514,7 +516,10 @@ real excite_self_test(void)
 #endif
 int main(void)
 {
-    const real worst = excite_self_test();
+    real worst = excite_self_test();
+#ifdef EXCITE_DETECTOR
+    worst = fmax(worst, excite_detector_self_test());
+#endif
     const long calls = EXCITE_CALLS;
     excite_memory memory;
     real tau[N], sum = 0;

@@ -19,7 +19,7 @@ from scipy.optimize import nnls
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import Array
 
-_REVERSAL = 0.05  # rad/s: friction is known least below
+REVERSAL = 0.05  # rad/s: friction is known least below
 _HOUR = 3600.0
 _FEWEST = 30  # seconds of sound data
 _LEAST = 1e-3  # of the mean square: no speed or load is without any residual
@@ -64,7 +64,7 @@ class Thresholds:
         """Plain values for files and JSON, with the formula."""
         return {
             "formula": "level * sqrt(c[0] + c[1]*speed^2 + c[2]*load^2 + "
-            f"c[3]*exp(-(speed/{_REVERSAL})^2)) of the residual behind a first-order low pass",
+            f"c[3]*exp(-(speed/{REVERSAL})^2)) of the residual behind a first-order low pass",
             "time_constant": self.time_constant,
             "false_alarms_per_hour": self.false_alarms,
             "joints": {
@@ -133,7 +133,7 @@ def low_pass(x: Array, step: float, time_constant: float) -> Array:
 
 
 def _columns(speed: Array, load: Array) -> Array:
-    reversal = np.exp(-np.square(speed / _REVERSAL))
+    reversal = np.exp(-np.square(speed / REVERSAL))
     return np.stack([np.ones_like(speed), speed**2, load**2, reversal], axis=-1)
 
 

@@ -1,6 +1,7 @@
 """`excite score` and `excite compare` as a user runs them, on simulated data of the smoke arm."""
 
 import json
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -142,6 +143,22 @@ def test_thresholds_hold_for_sound_runs_and_not_for_a_load(days: Days) -> None:
     assert told["false_alarms_per_hour"] == 1.0
     assert set(told["joints"]["elbow"]) == {"c", "level"}
     assert all(joint["level"] > 1.0 for joint in told["joints"].values())
+    to_c = ("export", days.fit, "--format", "c", "--thresholds", "limits.json")
+    made = days.program(*to_c, "-o", "detector.c")
+    assert made.returncode == 0, made.stderr
+    build = ["cc", "-O2", "-DEXCITE_MAIN", "detector.c", "-lm", "-o", "arm"]
+    subprocess.run(build, cwd=days.program.folder, check=True)
+    subprocess.run(["./arm"], cwd=days.program.folder, check=True)
+    broken = days.program.folder / "detector.c"
+    text = broken.read_text()
+    level = repr(told["joints"]["elbow"]["level"])
+    assert level in text
+    broken.write_text(text.replace(level, repr(1.01 * float(level))))
+    subprocess.run(build, cwd=days.program.folder, check=True)
+    assert subprocess.run(["./arm"], cwd=days.program.folder).returncode == 1
+    refused = days.program("export", days.fit, "--format", "urdf", "--thresholds", "limits.json")
+    assert refused.returncode == 2
+    assert "only a model in C holds them" in refused.stderr
 
 
 def test_workers_share_the_files_and_one_that_cannot_be_read_is_left_out(days: Days) -> None:
