@@ -16,6 +16,7 @@ from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.scoring.records import Score, ScoredRun
 from excite_cli.scoring.score import Scorer, together
+from excite_cli.scoring.shift import Shift, shift_of, with_shift
 from excite_cli.scoring.thresholds import Residual, Thresholds, thresholds_of
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.score_file import write_score
@@ -62,19 +63,33 @@ def score(
     paths = [] if isinstance(data, Dataset) else _paths(data)
     refuse_twice(paths)
     with held({"output": output}, overwrite, (stored.path, *paths)):
-        if isinstance(data, Dataset):
-            done: list[_Scored | Exception] = [_scored(given, data, "", sealed, single=True)]
-        else:
-            shared = (str(stored.path), sealed, len(paths) == 1)
+
+        def scored(worse: Shift | None, files: Sequence[Path]) -> list[_Scored | Exception]:
+            if isinstance(data, Dataset):
+                return [_scored(given, data, "", sealed, True, worse)]
+            shared = (str(stored.path), sealed, len(paths) == 1, worse)
 
             def watch(news: News) -> None:
                 progress(f"{news.done} of {news.total} files", news.done)
 
             place = workers or Here()
-            done = place.map(score_file, shared, [*map(str, paths)], watch, keep_failures=True)
-        runs, findings = _gathered(done, [*map(str, paths)], tell)
+            return place.map(score_file, shared, [*map(str, files)], watch, keep_failures=True)
+
+        runs, findings = _gathered(scored(None, paths), [*map(str, paths)], tell)
         if not runs:
             raise FileError("no run is long enough to be scored: record longer ones.")
+        shift = shift_of(runs, stored.robot.joint_names)
+        if shift is not None:
+            later = {runs[k].file for k in shift.later}
+            again = [
+                run
+                for each in scored(shift, [path for path in paths if str(path) in later])
+                if not isinstance(each, Exception)
+                for run in each[0]
+            ]
+            runs, noticed = with_shift(runs, shift, again)
+            tell_findings(noticed, tell)
+            findings += noticed
         found = Score(
             str(stored.path),
             stored.what,
@@ -98,12 +113,17 @@ def score(
 _Scored = tuple[list[ScoredRun], list[Finding]]
 
 
-def score_file(shared: tuple[str, bool, bool], path: str, tell: WorkersTell) -> _Scored:
-    """Scores of the runs of one file, for workers; `shared`: the model's file, sealed, only one."""
-    model, sealed, single = shared
+def score_file(
+    shared: tuple[str, bool, bool, Shift | None], path: str, tell: WorkersTell
+) -> _Scored:
+    """Scores of the runs of one file, for workers.
+
+    `shared`: the model's file, sealed, only one, and what was seen of its runs before.
+    """
+    model, sealed, single, worse = shared
     given = _known_model(model, Path(model).stat().st_mtime_ns)
     case = Case(given.made.spec, given.made.folder, given.made.robot)
-    return _scored(given, load_data(case, path, lambda note: None), path, sealed, single)
+    return _scored(given, load_data(case, path, lambda note: None), path, sealed, single, worse)
 
 
 @lru_cache(maxsize=1)
@@ -112,13 +132,20 @@ def _known_model(path: str, stamp: int) -> Model:
     return load_model(path)
 
 
-def _scored(model: Model, data: Dataset, path: str, sealed: bool, single: bool) -> _Scored:
+def _scored(
+    model: Model,
+    data: Dataset,
+    path: str,
+    sealed: bool,
+    single: bool,
+    worse: Shift | None = None,
+) -> _Scored:
     scorer, runs, findings = Scorer(model.made), [], list(data.findings)
     own = recordings_of(data, model.made.sealed_run if sealed else None, model)
     for name, parts in own.items():
         label = name if single else f"{Path(path).stem}: {name}"
         try:
-            runs.append(scorer.of(parts, path or ", ".join(data.sources), label))
+            runs.append(scorer.of(parts, path or ", ".join(data.sources), label, worse))
         except FileError as short:
             findings.append(Finding("not scored", "warning", str(short), name))
     return runs, findings

@@ -24,6 +24,8 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.place import Place
 from excite_cli.identification.declared_states import States, declared_sets
 from excite_cli.robot.model import Array, Robot
+from excite_cli.workers.at_hand import each
+from excite_cli.workers.base import Tell
 
 _CHANGES = 3  # sets of runs in which one joint's friction, offset or gain may have changed
 _LOOKED_AT = 1000  # samples of a part, at most, from which the runs of an effect are told
@@ -67,11 +69,18 @@ class SeenRuns:
         """Indices of the parts of some runs."""
         return sorted({i for run in runs for i in self._by_name.get(run, ())})
 
+    def only(self, run: str) -> "SeenRuns":
+        """The parts of one run."""
+        own = self.parts_of((run,))
+        return SeenRuns(
+            self.robot, [self.signals[i] for i in own], [self.residuals[i] for i in own], (run,)
+        )
+
     def evidence(self, effect: Effect, units: Sequence[Runs], positive: bool) -> RunEvidence:
         """What columns of the effect say in each of the `units`."""
         rows = list(effect.rows(self.robot.n))
         parts = [(i, k) for k, runs in enumerate(units) for i in self.parts_of(runs)]
-        thin = [max(1, len(s.t) // _LOOKED_AT) for s in self.signals]
+        thin = {i: max(1, len(self.signals[i].t) // _LOOKED_AT) for i, _ in parts}
         return evidence_by_run(
             [effect.columns(self.signals[i].every(thin[i])) for i, _ in parts],
             [self.residuals[i][:: thin[i], rows] for i, _ in parts],
@@ -134,13 +143,23 @@ def _shaped(
     kind: type[Effect], place: tuple[int, ...], seen: SeenRuns, runs: Sequence[str]
 ) -> list[Effect]:
     """The runs and shapes that explain most of the residual, a few of all."""
-    found: list[tuple[float, Effect]] = []
-    for run in runs:
-        own = seen.parts_of((run,))
-        signals, residuals = [seen.signals[i] for i in own], [seen.residuals[i] for i in own]
-        for shape in kind.tuned(seen.robot, place, signals, residuals):
-            effect = kind(place, shape, (run,))
-            explained = seen.evidence(effect, [(run,)], False).energy(np.ones((1, 1), bool))
-            found.append((float(explained[0]), effect))
-    found.sort(key=lambda each: -each[0])
+    found = [
+        (energy, kind(place, shape, (run,)))
+        for run, own in zip(runs, each(_of_run, (kind, place), map(seen.only, runs)), strict=True)
+        for energy, shape in own
+    ]
+    found.sort(key=lambda pair: -pair[0])
     return [effect for _, effect in found[:MOST]]
+
+
+def _of_run(
+    about: tuple[type[Effect], tuple[int, ...]], seen: SeenRuns, tell: Tell
+) -> list[tuple[float, dict]]:
+    """Shapes in one run, with the energy that each explains there."""
+    kind, place = about
+    found = []
+    for shape in kind.tuned(seen.robot, place, seen.signals, seen.residuals):
+        effect = kind(place, shape, tuple(seen.runs))
+        explained = seen.evidence(effect, [tuple(seen.runs)], False).energy(np.ones((1, 1), bool))
+        found.append((float(explained[0]), shape))
+    return found

@@ -17,6 +17,7 @@ from excite_cli.robot.model import Array
 from excite_cli.scoring.allowance import Allowance, allowance_of, blocks_of
 from excite_cli.scoring.reason import reasons_of
 from excite_cli.scoring.records import Reason, ScoredRun
+from excite_cli.scoring.shift import Shift
 from excite_cli.scoring.thresholds import Residual
 
 _SAME_RATE = 0.01
@@ -29,8 +30,12 @@ class Scorer:
         self.stored, self.allowance = stored, allowance_of(stored)
         self._correlated = _correlated(stored)
 
-    def of(self, runs: Sequence[Run], file: str, name: str = "") -> ScoredRun:
+    def of(
+        self, runs: Sequence[Run], file: str, name: str = "", worse: Shift | None = None
+    ) -> ScoredRun:
         """Score of the parts of one recording, taken together.
+
+        Runs that are `worse` than those before are judged by what those were.
 
         Raises
         ------
@@ -56,7 +61,7 @@ class Scorer:
         )
         if self.allowance is None:
             return found
-        return self._judged(found, prepared, predictions, model, self.allowance)
+        return self._judged(found, prepared, predictions, model, self.allowance, worse)
 
     def residuals(self, runs: Sequence[Run]) -> list[Residual]:
         """Unfiltered residuals of the parts of a recording, as a detector sees them."""
@@ -116,6 +121,7 @@ class Scorer:
         predictions: Sequence[Prediction],
         model: IdentifiedModel,
         allowance: Allowance,
+        worse: Shift | None,
     ) -> ScoredRun:
         robot, names = self.stored.robot, self.stored.robot.joint_names
         rms = _by_name(found.error.rms, names)
@@ -135,11 +141,16 @@ class Scorer:
         peak = np.sqrt(np.nanmax(np.vstack([blocks, np.zeros(robot.n)]), axis=0)) / allowed
         with np.errstate(invalid="ignore"):
             beyond = (ratio > allowance.most(len(blocks))) | (peak > allowance.most_of_a_block)
+        if worse is not None:
+            beyond |= np.isin(names, worse.joints)
         left = tuple(name for name, out in zip(names, beyond, strict=True) if out)
         reasons: tuple[Reason, ...] = ()
         if left:
             longest = max(prepared, key=lambda run: len(run.t))
             known = np.where(np.isfinite(allowed), allowed, np.nanmedian(allowed))
+            if worse is not None:
+                usual = _by_name(worse.usual, names)
+                known = known * np.where(usual > 0.0, usual, 1.0)
             reasons = reasons_of(robot, model, longest, known, self._correlated)
         return replace(
             found,
