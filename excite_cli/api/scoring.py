@@ -80,7 +80,7 @@ def score(
             raise FileError("no run is long enough to be scored: record longer ones.")
         shift = shift_of(runs, stored.robot.joint_names)
         if shift is not None:
-            later = {runs[k].file for k in shift.later}
+            later = {runs[k].file for k in shift.runs}
             again = [
                 run
                 for each in scored(shift, [path for path in paths if str(path) in later])

@@ -13,7 +13,6 @@ from math import comb
 import numpy as np
 
 from excite_cli.measurement.dataset import Finding
-from excite_cli.robot.model import Array
 from excite_cli.scoring.records import ScoredRun
 
 _CHANCE = 0.05
@@ -23,13 +22,13 @@ _APART = 1.1  # of the largest before, that the smallest from then on is
 
 @dataclass(frozen=True)
 class Shift:
-    """From the run `first` (an index) on runs are worse on some `joints`; no alarm yet: `later`.
+    """From the run `first` (an index) on all `runs` (indices) are worse on some `joints`.
 
     `usual`: median ratio of every joint in the runs before; `times` worse is the worst joint.
     """
 
     first: int
-    later: tuple[int, ...]
+    runs: tuple[int, ...]
     joints: tuple[str, ...]
     usual: dict[str, float]
     times: float
@@ -43,32 +42,35 @@ def shift_of(runs: Sequence[ScoredRun], joint_names: Sequence[str]) -> Shift | N
     judged = [k for k in order if runs[k].ratio]
     quiet = np.array([not runs[k].alarm for k in judged])
     ratios = np.array([[runs[k].ratio[name] for name in joint_names] for k in judged])
-    best: Shift | None = None
-    for cut in range(1, len(judged)):
+    cuts = range(1, len(judged))
+    ways = {
+        cut: comb(int(quiet[:cut].sum()) + len(judged) - cut, len(judged) - cut) for cut in cuts
+    }
+    best: tuple[float, Shift] | None = None
+    for cut in cuts:
+        # By chance as unlikely a cut would be there, at any place.
+        chance = sum(1.0 / each for each in ways.values() if each >= ways[cut])
+        if len(joint_names) * chance >= _CHANCE or not quiet[:cut].any():
+            continue
         before, after = ratios[:cut][quiet[:cut]], ratios[cut:]
-        if not (len(before) and quiet[cut:].any()):
-            continue
-        ways = comb(len(before) + len(after), len(after))
-        if len(joint_names) * (len(judged) - 1) / ways >= _CHANCE:
-            continue
-        times = _worse(before, after)
-        if times.max() > (best.times if best else 0.0):
-            best = Shift(
-                judged[cut],
-                tuple(k for k in judged[cut:] if not runs[k].alarm),
-                tuple(name for name, x in zip(joint_names, times, strict=True) if x),
-                dict(zip(joint_names, np.median(before, axis=0).tolist(), strict=True)),
-                float(times.max()),
+        with np.errstate(invalid="ignore", divide="ignore"):
+            times = np.median(after, axis=0) / np.median(before, axis=0)
+            apart = after.min(axis=0) / before.max(axis=0)
+        worse = (times > _WORSE) & (apart > _APART)
+        if worse.any() and (best is None or apart[worse].max() > best[0]):
+            best = (
+                float(apart[worse].max()),
+                Shift(
+                    judged[cut],
+                    tuple(judged[cut:]),
+                    tuple(name for name, x in zip(joint_names, worse, strict=True) if x),
+                    dict(zip(joint_names, np.median(before, axis=0).tolist(), strict=True)),
+                    float(times[worse].max()),
+                ),
             )
-    return best
-
-
-def _worse(before: Array, after: Array) -> Array:
-    """How many times worse joints (n,) are after than before, in ratios (runs, n); 0 if not."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        times = np.median(after, axis=0) / np.median(before, axis=0)
-        worse = (times > _WORSE) & (after.min(axis=0) > _APART * before.max(axis=0))
-    return np.where(worse, times, 0.0)
+    if best is None or all(runs[k].alarm for k in best[1].runs):
+        return None
+    return best[1]
 
 
 def with_shift(
@@ -80,7 +82,7 @@ def with_shift(
     as well be another motion, and no alarm.
     """
     of_name = {(run.file, run.name): run for run in again}
-    later = {k: of_name[runs[k].file, runs[k].name] for k in shift.later}
+    later = {k: of_name[runs[k].file, runs[k].name] for k in shift.runs}
     reasons = Counter(_first(run) for run in later.values() if run.reasons)
     what, count = reasons.most_common(1)[0] if reasons else (None, 0)
     joints, since = ", ".join(shift.joints), runs[shift.first].name
@@ -92,12 +94,11 @@ def with_shift(
         text = f"{told}; nothing that all of these runs have explains it. Did the motion change?"
         return list(runs), [Finding("worse_since", "warning", text, since, shift.joints)]
     named = [
-        later[k] if k in later and later[k].reasons and _first(later[k]) == what else run
+        later[k] if not run.alarm and k in later and _first(later[k]) == what else run
         for k, run in enumerate(runs)
     ]
     return named, [Finding("worse_since", "warning", told, since, shift.joints)]
 
 
-def _first(run: ScoredRun) -> tuple[str, tuple[str, ...]]:
-    effect = run.reasons[0].effect
-    return effect.kind, effect.joints
+def _first(run: ScoredRun) -> tuple[str, tuple[str, ...]] | None:
+    return (run.reasons[0].effect.kind, run.reasons[0].effect.joints) if run.reasons else None

@@ -32,7 +32,7 @@ def reason(joint: str) -> Reason:
 def test_the_joint_and_the_run_are_seen() -> None:
     found = shift_of(runs(1.5, 16), NAMES)
     assert found is not None
-    assert (found.first, found.joints, found.later) == (16, ("c",), (16, 17, 18, 19))
+    assert (found.first, found.joints, found.runs) == (16, ("c",), (16, 17, 18, 19))
     assert found.times == pytest.approx(1.5, rel=0.1)
     assert found.usual["c"] == pytest.approx(1.0, abs=0.05)
 
@@ -43,7 +43,10 @@ def test_alarms_before_do_not_count_and_alarms_after_do() -> None:
     given[18:] = [replace(each, left=("c",)) for each in given[18:]]
     found = shift_of(given, NAMES)
     assert found is not None
-    assert (found.first, found.later) == (16, (16, 17))
+    assert (found.first, found.runs) == (16, (16, 17, 18, 19))
+    assert (
+        shift_of([*given[:16], *(replace(each, left=("c",)) for each in given[16:])], NAMES) is None
+    )
 
 
 def test_the_time_of_recording_is_the_order() -> None:
@@ -56,7 +59,7 @@ def test_the_time_of_recording_is_the_order() -> None:
     assert shift_of([replace(each, epoch=None) for each in mixed], NAMES) is None
 
 
-@pytest.mark.parametrize(("worse", "since"), [(1.1, 16), (1.5, 19), (1.0, 10), (0.6, 10)])
+@pytest.mark.parametrize(("worse", "since"), [(1.1, 16), (1.5, 18), (1.0, 10), (0.6, 10)])
 def test_what_is_small_short_or_better_is_none(worse: float, since: int) -> None:
     assert shift_of(runs(worse, since), NAMES) is None
 
@@ -77,6 +80,8 @@ def test_a_common_reason_makes_alarms_and_none_makes_a_question() -> None:
     found, findings = with_shift(given, shift, again)
     assert [each.alarm for each in found] == [False] * 16 + [True, False, True, True]
     assert findings[0].text.startswith("since run 16 the error of c is 1.5 times that of the runs")
+    loud = [*given[:18], *(replace(each, left=("c",)) for each in given[18:])]
+    assert with_shift(loud, shift, again)[0][18:] == loud[18:]
     other = [replace(each, reasons=(reason("abcd"[k]),)) for k, each in enumerate(again)]
     found, findings = with_shift(given, shift, other)
     assert found == given
