@@ -8,7 +8,7 @@ import pytest
 from scipy.sparse import random_array
 
 from excite_cli.errors import FileError
-from excite_cli.out_of_core import Spool, forget
+from excite_cli.out_of_core import Spool, forget, room_of_spools
 
 
 def resident() -> int:
@@ -22,8 +22,8 @@ def test_the_first_arrays_stay_and_the_others_come_back_from_disk() -> None:
     first = rng.normal(size=(10, 10))
     assert spool.keep(first) is first
     given = [
-        rng.normal(size=(300, 7)), rng.normal(size=(7, 40)).T, rng.normal(size=(9, 8))[:, ::3],
-        rng.random(50) > 0.5, np.arange(5, dtype=np.uint64), np.zeros((0, 3)),
+        rng.normal(size=(300, 7)), rng.normal(size=(70, 40)).T, rng.normal(size=(900, 8))[:, ::3],
+        rng.random(5000) > 0.5, np.arange(600, dtype=np.uint64), np.zeros((0, 3)),
     ]  # fmt: skip
     kept = [spool.keep(each) for each in given]
     forget()
@@ -33,6 +33,8 @@ def test_the_first_arrays_stay_and_the_others_come_back_from_disk() -> None:
         assert np.array_equal(found, own)
     with pytest.raises(ValueError, match="read-only"):
         kept[0][0, 0] = 1.0
+    small = rng.normal(size=(5, 7))
+    assert spool.keep(small) is small
 
 
 def test_what_is_repeated_takes_no_room() -> None:
@@ -58,6 +60,14 @@ def test_memory_is_given_back() -> None:
     assert resident() - before > 150e6
     forget()
     assert resident() - before < 20e6
+
+
+def test_the_room_of_spools_can_be_said_for_a_while() -> None:
+    values = np.ones(1000)
+    with room_of_spools(0):
+        assert Spool().keep(values) is not values
+        assert Spool(room=10_000).keep(values) is values
+    assert Spool().keep(values) is values
 
 
 def test_no_file_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -98,7 +98,6 @@ def export(
       excite export ur10.h5 --format csv --motion 1 --slow 0.3 -o slow.csv
       excite export fit.h5 --format mjcf -o identified.xml
       excite export diagnosis.h5 --format c -o arm.c
-      excite export diagnosis.h5 --format c --thresholds thresholds.json -o arm.c
     """
     from excite_cli.api.exporting import export_answer, export_file
     from excite_cli.api.threads import single_threaded

@@ -37,6 +37,14 @@ def test_what_lies_in_memory_goes_to_a_file_only_if_it_is_large() -> None:
         assert np.array_equal(given, found)
 
 
+def test_a_repeated_value_travels_as_one() -> None:
+    given = np.broadcast_to(2.5, (30_000, 7, 4))
+    for each in (given, given[5:, 1]):
+        message = packed(each, Spool(room=0))
+        assert len(message) < 1000
+        assert np.array_equal(pickle.loads(message), each)
+
+
 def test_large_results_of_a_process_outlive_it() -> None:
     with Processes(2) as workers:
         found = workers.map(work.table, 100_000, [1.0, 2.0, 3.0])

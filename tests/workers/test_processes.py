@@ -52,6 +52,39 @@ def test_results_come_in_the_order_of_the_tasks(workers: Workers) -> None:
     assert workers.map(work.square, 10, []) == []
 
 
+def test_tasks_are_taken_when_somebody_is_there_to_do_them(two: Processes) -> None:
+    heard: list[News] = []
+    ahead: list[int] = []
+
+    def tasks() -> Iterator[int]:
+        for task in range(6):
+            ahead.append(task - sum(news.result is not None for news in heard))
+            yield task
+
+    assert two.map(work.square, 0, tasks(), heard.append) == [0, 1, 4, 9, 16, 25]
+    assert max(ahead) <= 2
+    assert two.map(work.square, 0, iter(())) == []
+
+
+def test_what_the_source_of_tasks_raises_is_raised() -> None:
+    def tasks() -> Iterator[int]:
+        yield 1
+        raise ConfigError("no second task")
+
+    with Processes(2) as workers:
+        with pytest.raises(ConfigError, match="no second task"):
+            workers.map(work.square, 0, tasks())
+        assert workers.map(work.square, 0, [2, 3]) == [4, 9]
+
+
+def test_workers_begin_ahead_with_what_the_parent_has_imported() -> None:
+    with Processes(2) as workers:
+        workers.begin()
+        assert len(workers.pids) == 2
+        found = workers.map(work.imported, "excite_cli.workers.processes", [0])
+        assert found == [True]
+
+
 def test_everything_is_told(workers: Workers) -> None:
     heard: list[News] = []
     workers.map(work.square, 0, [5, 6, 7], heard.append)

@@ -98,3 +98,8 @@ def doubled(shared: None, values: NDArray[np.float64], tell: Tell) -> NDArray[np
 
 def second_half(shared: None, values: NDArray[np.float64], tell: Tell) -> NDArray[np.float64]:
     return values[len(values) // 2 :]
+
+
+def imported(shared: str, task: int, tell: Tell) -> bool:
+    """Whether a module is there that no task needs."""
+    return shared in sys.modules
