@@ -11,8 +11,8 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import effect_columns, seen_of, with_effects
-from excite_cli.out_of_core import Spool, forget
-from excite_cli.robot.model import Array
+from excite_cli.out_of_core import Spool
+from excite_cli.robot.model import Array, Robot
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 
@@ -36,12 +36,37 @@ class ModelledRun:
         """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
         return with_effects(seen_of(self.run, self._at(phi)), effects, values)
 
+    def lacks_load(self, phi: Array) -> bool:
+        """Whether the rigid body's torque at φ is still to be computed."""
+        return "load" not in self._at(phi).__dict__
+
+    def take_load(self, phi: Array, load: Array) -> None:
+        """The rigid body's torque (T, n) at φ, from who computed it."""
+        self._at(phi).load = load
+
     def _at(self, phi: Array) -> RigidBody:
         """The rigid body at φ; the last one is kept, with all that was computed of it."""
         if not np.array_equal(phi, self._body.phi):
             run = self.run
             self._body = RigidBody(self.model.robot, phi, run.q, run.v, run.a)
         return self._body
+
+
+def signals_of_all(
+    bodies: Sequence[ModelledRun], phi: Array, effects: Sequence[Effect], values: Array
+) -> list[Signals]:
+    """As `ModelledRun.signals` of every run."""
+    lacking, spool = [body for body in bodies if body.lacks_load(phi)], Spool()
+    if lacking:
+        loads = each(_load, (lacking[0].model.robot, phi), (body.run for body in lacking))
+        for body, load in zip(lacking, loads, strict=True):
+            body.take_load(phi, spool.keep(load))
+    return [body.signals(phi, effects, values) for body in bodies]
+
+
+def _load(shared: tuple[Robot, Array], run: PreparedRun, tell: Tell) -> Array:
+    robot, phi = shared
+    return RigidBody(robot, phi, run.q, run.v, run.a).load
 
 
 def inertial_columns(model: Model, runs: Sequence[PreparedRun]) -> list[Array]:
@@ -65,18 +90,28 @@ def training_data(
     signals: Sequence[Signals],
 ) -> TrainingData:
     """Columns of the declared model and torque of every part; `folds` are left out together."""
-    declared, torques, spool = [], [], Spool()
-    for body, signal in zip(modelled, signals, strict=True):
-        run = body.run
-        inertial, tau = body.inertial, run.tau_fit
-        if model.prior is not None:
-            tau = tau - inertial @ model.prior.mean
-        effects = run.averaged_for_fit(effect_columns(model.declared, signal))
-        declared.append(spool.keep(np.concatenate([inertial, effects], axis=2)))
-        torques.append(spool.keep(tau))
-        forget()
+    spool = Spool()
+    tasks = ((body.run, body.inertial, s) for body, s in zip(modelled, signals, strict=True))
+    mean = None if model.prior is None else model.prior.mean
+    parts = [
+        (spool.keep(columns), spool.keep(tau))
+        for columns, tau in each(_declared, (model.declared, mean), tasks)
+    ]
     precision = None
     if model.prior is not None:
         precision = np.concatenate([model.prior.precision, np.zeros(model.declared_width)])
     runs = tuple(body.run for body in modelled)
-    return TrainingData(runs, tuple(folds), tuple(declared), tuple(torques), precision)
+    declared, torques = zip(*parts, strict=True)
+    return TrainingData(runs, tuple(folds), declared, torques, precision)
+
+
+def _declared(
+    shared: tuple[Sequence[Effect], Array | None],
+    task: tuple[PreparedRun, Array, Signals],
+    tell: Tell,
+) -> tuple[Array, Array]:
+    """Inertial columns and those of the declared effects, and torque less that of the prior."""
+    (effects, mean), (run, inertial, signals) = shared, task
+    tau = run.tau_fit if mean is None else run.tau_fit - inertial @ mean
+    own = run.averaged_for_fit(effect_columns(effects, signals))
+    return np.concatenate([inertial, own], axis=2), tau

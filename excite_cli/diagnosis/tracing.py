@@ -18,7 +18,12 @@ from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
-from excite_cli.diagnosis.modelled_run import ModelledRun, inertial_columns, training_data
+from excite_cli.diagnosis.modelled_run import (
+    ModelledRun,
+    inertial_columns,
+    signals_of_all,
+    training_data,
+)
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import placebos_of
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
@@ -166,7 +171,7 @@ def _first_fit(
     values = np.zeros(sum(len(effect.parameters) for effect in known))
     levels = np.ones(model.robot.n)
     for _ in range(3):
-        signals = [body.signals(phi, known, values) for body in bodies]
+        signals = signals_of_all(bodies, phi, known, values)
         data = training_data(model, folds, bodies, signals)
         found = with_columns([(effect, 1) for effect in effects], signals, data.runs)
         chosen = range(len(found))
@@ -219,7 +224,7 @@ def _one_pass(
 ) -> Traced:
     """Columns and noise as the last fit says, then a search from the declared model."""
     effects = (*model.declared, *fit.effects)
-    signals = [body.signals(fit.phi, effects, fit.values) for body in bodies]
+    signals = signals_of_all(bodies, fit.phi, effects, fit.values)
     data = training_data(model, folds, bodies, signals)
     candidates: list[Candidate] = []
     if spec.rounds:
