@@ -82,7 +82,7 @@ def with_shift(
     as well be another motion, and no alarm.
     """
     of_name = {(run.file, run.name): run for run in again}
-    later = {k: of_name[runs[k].file, runs[k].name] for k in shift.runs}
+    later = {k: of_name.get((runs[k].file, runs[k].name), runs[k]) for k in shift.runs}
     reasons = Counter(_first(run) for run in later.values() if run.reasons)
     what, count = reasons.most_common(1)[0] if reasons else (None, 0)
     joints, since = ", ".join(shift.joints), runs[shift.first].name

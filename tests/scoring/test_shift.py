@@ -82,6 +82,8 @@ def test_a_common_reason_makes_alarms_and_none_makes_a_question() -> None:
     assert findings[0].text.startswith("since run 16 the error of c is 1.5 times that of the runs")
     loud = [*given[:18], *(replace(each, left=("c",)) for each in given[18:])]
     assert with_shift(loud, shift, again)[0][18:] == loud[18:]
+    lost, _ = with_shift(given, shift, [again[0], *again[2:]])  # a file that is gone by now
+    assert [each.alarm for each in lost[15:]] == [False, True, False, True, True]
     other = [replace(each, reasons=(reason("abcd"[k]),)) for k, each in enumerate(again)]
     found, findings = with_shift(given, shift, other)
     assert found == given
