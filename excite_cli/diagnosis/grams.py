@@ -29,6 +29,12 @@ class JointGram:
     first: Array
 
 
+def joined(pieces: Sequence[JointGram]) -> JointGram:
+    """One of several, each of some of the folds: the others are zero in it."""
+    whole, first = (sum(getattr(piece, name) for piece in pieces) for name in ("whole", "first"))
+    return JointGram(pieces[0].active, np.asarray(whole), np.asarray(first))
+
+
 class Grams:
     """Gram matrices (F, K, K) of all columns, of any joints' rows; torque is the last column."""
 

@@ -69,21 +69,33 @@ def placebo_gains(
     local = [[c for c in candidates if c.rows == (j,) and c.width == 1] for j in range(data.n)]
     joints = [joint for joint in range(data.n) if local[joint]]
     sizes = [len(each) for each in data.tau]
+    shifts = {
+        joint: [
+            [int(rng.integers(size // 4, max(3 * size // 4, 2))) for size in sizes]
+            for _ in range(_SHIFTS)
+        ]
+        for joint in joints
+    }
+    # Two tasks a joint, as for the Gram matrices.
+    halves = [half for half in np.array_split(np.arange(len(sizes)), 2) if len(half)]
     tasks = [
         (
             joint,
             [Shown(c.rows, c.columns, c.width) for c in local[joint]],
-            [
-                [int(rng.integers(size // 4, max(3 * size // 4, 2))) for size in sizes]
-                for _ in range(_SHIFTS)
-            ],
+            half,
+            [[of_parts[part] for part in half] for of_parts in shifts[joint]],
         )
         for joint in joints
+        for half in halves
     ]
     taken = [candidates[i] for i in chosen]
     shared = data, [Shown(c.rows, c.columns, c.width) for c in taken], noise, residuals
-    for products in each(_products, shared, tasks):
-        for cross, square, product in products:
+    made = each(_products, shared, tasks)
+    for _ in joints:
+        for of_halves in zip(*(next(made) for _ in halves), strict=True):
+            cross, square, product = (
+                np.add.reduce(terms) for terms in zip(*of_halves, strict=True)
+            )
             cross /= white.norms[at][:, None]
             left = square - np.einsum("ik,ik->k", cross, factor.solve(cross))
             good = left > 1e-2 * square
@@ -93,15 +105,16 @@ def placebo_gains(
 
 def _products(
     shared: tuple[TrainingData, Sequence[Columns], NoiseModel, Sequence[Array]],
-    task: tuple[int, Sequence[Columns], Sequence[Sequence[int]]],
+    task: tuple[int, Sequence[Columns], Sequence[int], Sequence[Sequence[int]]],
     tell: Tell,
 ) -> list[tuple[Array, Array, Array]]:
     """Of the columns of one joint, shifted: products with the model (k, L), with themselves (L,),
-    and with the residual (L,), for every set of `shifts` of the parts."""
+    and with the residual (L,), for every set of `shifts` of some parts."""
     data, taken, noise, residuals = shared
-    joint, local, shifts = task
+    joint, local, of_parts, shifts = task
     parts, spool = [], Spool()
-    for part, run in enumerate(data.runs):
+    for part in of_parts:
+        run = data.runs[part]
         columns = data.columns(taken, range(len(taken)), part, joint)
         whiten = noise.whitening(joint, run.usable[:, joint])
         own, rest = whiten(columns), whiten(residuals[part][:, joint])
@@ -109,10 +122,10 @@ def _products(
         parts.append((spool.keep(columns), spool.keep(own), rest, whiten))
         forget()
     found = []
-    for of_parts in shifts:
+    for moves in shifts:
         cross = np.zeros((parts[0][1].shape[1], len(local)))
         square, product = np.zeros(len(local)), np.zeros(len(local))
-        for shift, (columns, own, rest, whiten) in zip(of_parts, parts, strict=True):
+        for shift, (columns, own, rest, whiten) in zip(moves, parts, strict=True):
             moved = whiten(np.roll(columns, shift, axis=0))
             cross += own.T @ moved
             square += np.sum(moved**2, axis=0)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.diagnosis.evidence import Evidence
-from excite_cli.diagnosis.grams import Grams, JointGram
+from excite_cli.diagnosis.grams import Grams, JointGram, joined
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.out_of_core import forget
@@ -104,15 +104,28 @@ class TrainingData:
         self, candidates: Sequence[Columns], noise: NoiseModel, joints: Sequence[int]
     ) -> dict[int, JointGram]:
         """Gram matrices of the whitened rows of some joints."""
-        tasks = (self.rows_of(candidates, joint) for joint in joints)
-        return dict(zip(joints, each(_gram, (self.folds, noise), tasks), strict=True))
+        # Two tasks a joint: an odd number of joints would leave the last of two workers alone.
+        halves = _halves(self.folds)
+        tasks = (
+            (self.rows_of(candidates, joint, parts), [self.folds[part] for part in parts])
+            for joint in joints
+            for parts in halves
+        )
+        found = each(_gram, (max(self.folds) + 1, noise), tasks)
+        return {joint: joined([next(found) for _ in halves]) for joint in joints}
 
     def _starts(self, candidates: Sequence[Columns]) -> NDArray[np.intp]:
         """Where the columns of every candidate begin among all, and where the last ones end."""
         return self.declared[0].shape[2] + np.cumsum([0, *(c.width for c in candidates)])
 
-    def rows_of(self, candidates: Sequence[Columns], joint: int) -> "JointRows":
-        """What shows in the rows of one joint of the declared model and the candidates."""
+    def rows_of(
+        self, candidates: Sequence[Columns], joint: int, parts: Sequence[int] | None = None
+    ) -> "JointRows":
+        """What shows in the rows of one joint of the declared model and the candidates.
+
+        Of all parts, or those given.
+        """
+        parts = range(len(self.runs)) if parts is None else parts
         starts = self._starts(candidates)
         there = [i for i, c in enumerate(candidates) if joint in c.rows]
         touching = [candidates[i] for i in there]
@@ -126,29 +139,24 @@ class TrainingData:
                     *(c.columns[part][:, c.rows.index(joint)] for c in touching),
                     self.tau[part][:, joint, None],
                 ]
-                for part in range(len(self.runs))
+                for part in parts
             ],
-            [run.usable[:, joint] for run in self.runs],
-            self.sides,
+            [self.runs[part].usable[:, joint] for part in parts],
+            [self.sides[part] for part in parts],
         )
 
     def residuals(
         self, candidates: Sequence[Columns], chosen: Sequence[int], parameters: Array
     ) -> list[Array]:
         """τ − model (M, n) of every part."""
-        found = []
-        fixed = self.declared[0].shape[2]
-        for part, tau in enumerate(self.tau):
-            residual = tau - self.declared[part] @ parameters[:fixed]
-            at = fixed
-            for i in chosen:
-                candidate = candidates[i]
-                values = parameters[at : at + candidate.width]
-                residual[:, list(candidate.rows)] -= candidate.columns[part] @ values
-                at += candidate.width
-            found.append(residual)
-            forget()
-        return found
+        taken = [candidates[i] for i in chosen]
+        ends = np.cumsum([0, self.declared[0].shape[2], *(c.width for c in taken)])
+        shared = [c.rows for c in taken], [parameters[a:b] for a, b in pairwise(ends)]
+        tasks = (
+            (tau, self.declared[part], [c.columns[part] for c in taken])
+            for part, tau in enumerate(self.tau)
+        )
+        return list(each(_residual, shared, tasks))
 
 
 @dataclass(frozen=True)
@@ -163,19 +171,45 @@ class JointRows:
     sides: Sequence[NDArray[np.bool_]]
 
 
-def _gram(shared: tuple[Sequence[int], NoiseModel], rows: JointRows, tell: Tell) -> JointGram:
-    """Gram matrices of the whitened rows of one joint."""
+def _gram(
+    shared: tuple[int, NoiseModel], task: tuple[JointRows, Sequence[int]], tell: Tell
+) -> JointGram:
+    """Gram matrices of the whitened rows of one joint, of parts of the folds that are told."""
     folds, noise = shared
+    rows, of_parts = task
     size = len(rows.active) + 1
-    whole = np.zeros((max(folds) + 1, size, size))
+    whole = np.zeros((folds, size, size))
     first = np.zeros_like(whole)
-    for fold, blocks, usable, side in zip(folds, rows.blocks, rows.usable, rows.sides, strict=True):
+    for fold, blocks, usable, side in zip(
+        of_parts, rows.blocks, rows.usable, rows.sides, strict=True
+    ):
         white = noise.whitened(np.concatenate(blocks, axis=1), rows.joint, usable)
         whole[fold] += white.T @ white
         own = white[~side[usable]]
         first[fold] += own.T @ own
         forget()
     return JointGram(rows.active, whole, first)
+
+
+def _halves(folds: Sequence[int]) -> list[list[int]]:
+    """Parts of the lower and of the upper half of the folds; one list where there is one fold."""
+    half = (max(folds) + 1) // 2
+    sides = [[part for part, fold in enumerate(folds) if (fold < half) == low] for low in (1, 0)]
+    return [side for side in sides if side]
+
+
+def _residual(
+    shared: tuple[Sequence[tuple[int, ...]], Sequence[Array]],
+    task: tuple[Array, Array, Sequence[Array]],
+    tell: Tell,
+) -> Array:
+    """τ − model (M, n) of one part; the first of the parameters are of the declared columns."""
+    rows_of, (own, *others) = shared
+    tau, declared, blocks = task
+    residual = tau - declared @ own
+    for rows, columns, values in zip(rows_of, blocks, others, strict=True):
+        residual[:, list(rows)] -= columns @ values
+    return np.asarray(residual)
 
 
 @dataclass(frozen=True)

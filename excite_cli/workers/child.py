@@ -19,6 +19,7 @@ from typing import Any
 from excite_cli.out_of_core import Spool
 from excite_cli.workers.base import Tell
 from excite_cli.workers.by_reference import packed
+from excite_cli.workers.kept_memory import keep_memory
 from excite_cli.workers.travel import able_to_travel
 
 # Words of a task are passed on this often at most [s].
@@ -32,6 +33,7 @@ def serve(descriptor: int, threads: int, modules: Sequence[str] = ()) -> None:
     `modules` are what the parent had imported: most of the time that the first task would take.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is asked, and ends its workers
+    keep_memory()
     connection = Connection(descriptor)
     threading.Thread(target=_end_with_parent, args=(descriptor,), daemon=True).start()
     shared, spool = _Shared(), Spool(0)

@@ -5,7 +5,6 @@ a task, so that it too is made again where it was lost.
 """
 
 import asyncio
-import ctypes
 import hashlib
 import logging
 import pickle
@@ -14,7 +13,6 @@ import warnings
 from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 from excite_cli.errors import ExciteError, MissingExtraError
@@ -27,12 +25,12 @@ from excite_cli.workers.base import (
     unwatched,
 )
 from excite_cli.workers.environment import Environment, environment
+from excite_cli.workers.kept_memory import keep_memory
 from excite_cli.workers.travel import able_to_travel
 
 _ANSWER, _FIRST_WORKER = 5.0, 10.0  # [s] to wait for the scheduler, and for a worker
 _FAMILIAR = ("tcp://", "tls://", "ws://", "wss://", "inproc://", "ucx://")
 _TALKATIVE = ("", ".client", ".core", ".comm", ".utils")
-_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # options of glibc's mallopt
 # What a worker's thread has unpickled last: threads must not share a problem.
 _held = threading.local()
 
@@ -223,7 +221,7 @@ def _do(
     """One task, in a worker of the cluster."""
     from threadpoolctl import threadpool_limits
 
-    _keep_memory()
+    keep_memory()
     try:
         differs = asked.against(environment())  # workers may have come later
         if differs:
@@ -234,21 +232,6 @@ def _do(
             return "done", function(_held.shared, task, lambda word: None)
     except Exception as error:  # all of them are raised by the caller
         return "failed", able_to_travel(error)
-
-
-@cache
-def _keep_memory() -> None:
-    """Let this process keep what it frees, up to 128 MB, once.
-
-    dask starts workers with MALLOC_TRIM_THRESHOLD_=65536, so that every array goes back to the
-    system as soon as it is freed; with the small arrays of a start that takes half as long again.
-    """
-    try:
-        set_option = ctypes.CDLL(None).mallopt
-    except (AttributeError, OSError):  # another C library than glibc
-        return
-    set_option(_TRIM_THRESHOLD, 128 * 2**20)
-    set_option(_MMAP_THRESHOLD, 32 * 2**20)
 
 
 def _own_address() -> str:
