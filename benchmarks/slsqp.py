@@ -101,7 +101,12 @@ class ScipySlsqp(Solver):
     name = "slsqp"
 
     def solve(
-        self, task: MotionTask, x: Array, effort: Effort, report: ProgressCallback
+        self,
+        task: MotionTask,
+        x: Array,
+        effort: Effort,
+        report: ProgressCallback,
+        memory: Array | None = None,
     ) -> Outcome:
         """Minimise one continuation step after the other from the admissible `x`."""
         return _Run(task, effort, report).all_stages(x)
@@ -137,7 +142,7 @@ class _Run:
 
     def all_stages(self, x: Array) -> Outcome:
         steps = self.task.problem.criterion.continuation()
-        steps = steps[-1:] if self.effort.polish else steps
+        steps = steps[-1:] if self.effort.first else steps
         status = Status.CONVERGED
         self.reached = x
         try:

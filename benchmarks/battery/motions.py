@@ -14,7 +14,7 @@ import numpy as np
 
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
-from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.dynamics.base_parameters import BaseParameters, base_parameters_as_given
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.simulation.planned_motion import PlannedMotion
@@ -44,7 +44,9 @@ def arm(name: str) -> Arm:
     path = CONFIGS / f"{name}.yaml"
     spec = load_spec(path, [])
     robot = build_robot(spec.robot, path.parent)
-    return Arm(name, robot, find_base_parameters(robot), spec)
+    # Columns as LAPACK takes them: the pool is ordered by their condition number, and motions stay
+    # those of earlier runs of the battery.
+    return Arm(name, robot, base_parameters_as_given(robot), spec)
 
 
 @cache

@@ -174,6 +174,8 @@ def load_data(
     if problem.spec.measurement.gravity == "subtracted":
         data = with_gravity(robot, data)
     tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs_in_words(data)}"))
+    if isinstance(problem, Case) and problem.base.note:  # a problem has told it
+        tell(Note(Level.NOTE, problem.base.note))
     tell_findings(data.findings, tell)
     return data
 

@@ -72,9 +72,13 @@ class OptimizerSpec(Section):
     }
 
     max_seconds: Positive = Field(30.0, description="per start of a motion")
-    max_iterations: Integer = Field(400, ge=1, le=100_000, description="per start of a motion")
+    max_iterations: Integer = Field(1000, ge=1, le=100_000, description="per start of a motion")
     restarts: Integer = Field(
-        1, ge=1, le=10_000, description="starts tried per motion, the best kept"
+        2,
+        ge=1,
+        le=10_000,
+        description="starts tried per motion; the better half goes on after three stages of the "
+        "search, a quarter of those after four",
     )
     tolerance: Positive = Field(
         1e-3, description="change of the (logarithmic) criterion over 8 iterations that ends a run"

@@ -5,9 +5,11 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, StrictBool, Tag, model_validator
 
 from excite_cli.config.section import (
+    ControlPoints,
     Duration,
     Finite,
     Frequency,
+    Harmonics,
     Integer,
     Positive,
     Samples,
@@ -22,7 +24,11 @@ class FourierSpec(Section):
     """Fourier series of Eq. 50."""
 
     family: Literal["fourier"] = Field("fourier", description="periodic")
-    harmonics: Integer = Field(5, ge=1, le=100, description="N")
+    harmonics: Harmonics | None = Field(
+        None,
+        description="N; default: up to 1.5 Hz as far as accelerations allow, at most 12, fewer "
+        "where many joints move",
+    )
     base_frequency: Frequency = Field(0.785398, description="ω [rad/s]")
     at_rest: StrictBool = Field(False, description="no velocity or acceleration at start and end")
     start: Posture | None = Field(
@@ -33,7 +39,7 @@ class FourierSpec(Section):
 
     @model_validator(mode="after")
     def _enough_harmonics(self) -> "FourierSpec":
-        if self.at_rest and self.harmonics < 3:
+        if self.at_rest and self.harmonics is not None and self.harmonics < 3:
             raise ValueError("at_rest needs at least 3 harmonics")
         if self.start is not None and not self.at_rest:
             raise ValueError("start needs at_rest: true")
@@ -45,7 +51,9 @@ class BSplineSpec(Section):
 
     family: Literal["bspline"] = Field(description="from a start to an end")
     duration: Duration = Field(description="[s]")
-    control_points: Integer = Field(12, ge=4, le=500, description="per joint")
+    control_points: ControlPoints | None = Field(
+        None, description="per joint; default: as many as harmonics would be free"
+    )
     degree: Integer = Field(5, ge=3, le=9, description="of its polynomial pieces")
     at_rest: StrictBool = Field(True, description="no velocity or acceleration at start and end")
     start: Posture | None = Field(
@@ -58,7 +66,7 @@ class BSplineSpec(Section):
     @model_validator(mode="after")
     def _enough_points(self) -> "BSplineSpec":
         needed = self.degree + 1 + (4 if self.at_rest else 0)
-        if self.control_points < needed:
+        if self.control_points is not None and self.control_points < needed:
             raise ValueError(f"degree {self.degree} needs at least {needed} control points")
         if (self.start is not None or self.end is not None) and not self.at_rest:
             raise ValueError("start and end need at_rest: true")
@@ -81,7 +89,7 @@ class GridSpec(Section):
 class SamplingSpec(Section):
     """Instants at which cost and constraints are evaluated.
 
-    By default they cover the whole trajectory: the cost with 40 samples (or two per coefficient),
+    By default they cover the whole trajectory: the cost with 40 samples (or four per coefficient),
     the constraints every 0.02 s (at least 100, at most 1000 samples).
     """
 

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# p of the smooth stand-ins of a criterion with corners, one after the other.
+SHARPNESS = (4.0, 16.0, 64.0, 256.0, 1024.0)
+
 
 class Criterion(ABC):
     """Minimised function of the singular values, in descending order."""

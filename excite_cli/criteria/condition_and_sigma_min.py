@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.criteria.base import Array, Criterion
+from excite_cli.criteria.base import SHARPNESS, Array, Criterion
 from excite_cli.criteria.sigma_min import SmoothSigmaMin
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
 
@@ -37,7 +37,7 @@ class ConditionAndSigmaMin(Criterion):
 
     def continuation(self) -> tuple[Criterion, ...]:
         """Smooth forms with rising p."""
-        return tuple(SmoothConditionAndSigmaMin(p) for p in (4.0, 16.0, 64.0))
+        return tuple(SmoothConditionAndSigmaMin(p) for p in SHARPNESS)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from excite_cli.criteria.base import Array, Criterion
+from excite_cli.criteria.base import SHARPNESS, Array, Criterion
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
 
 
@@ -30,4 +30,4 @@ class ConditionNumber(Criterion):
 
     def continuation(self) -> tuple[Criterion, ...]:
         """Smooth forms with rising p."""
-        return tuple(SmoothConditionNumber(p) for p in (4.0, 16.0, 64.0))
+        return tuple(SmoothConditionNumber(p) for p in SHARPNESS)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp, softmax
 
-from excite_cli.criteria.base import Array, Criterion
+from excite_cli.criteria.base import SHARPNESS, Array, Criterion
 
 
 class SigmaMin(Criterion):
@@ -30,7 +30,7 @@ class SigmaMin(Criterion):
 
     def continuation(self) -> tuple[Criterion, ...]:
         """Smooth forms with rising p."""
-        return tuple(SmoothSigmaMin(p) for p in (4.0, 16.0, 64.0))
+        return tuple(SmoothSigmaMin(p) for p in SHARPNESS)
 
 
 @dataclass(frozen=True)

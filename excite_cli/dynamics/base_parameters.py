@@ -11,12 +11,13 @@ The result is checked on a second random draw. The draw has its own fixed seed, 
 on a robot uses the same base parameters and stacks of earlier runs fit.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lstsq, qr
 
+from excite_cli.dynamics.near_right_angles import nearly_right, squared
 from excite_cli.dynamics.regressor import Regressor, standard_parameter_names
 from excite_cli.errors import RobotError
 from excite_cli.robot.model import Array, Robot
@@ -33,6 +34,10 @@ class BaseParameters:
     `selection` (r,) column indices; `mapping` (r, P): φ_B = mapping φ; `residual` the largest
     relative error of Y φ − Y_B φ_B on states not used to find them; `gap` the ratio of the last
     kept to the first dropped pivot.
+
+    `tilted`: joints (or base_orientation) turned by nearly right angles that would show further
+    parameters, `hidden` of them, which are treated as not identifiable; the figures are then those
+    of right angles, and `exact` is what the angles as given would show.
     """
 
     selection: NDArray[np.intp]
@@ -40,6 +45,9 @@ class BaseParameters:
     names: tuple[str, ...]
     residual: float
     gap: float
+    tilted: tuple[str, ...] = ()
+    hidden: int = 0
+    exact: "BaseParameters | None" = None
 
     @property
     def rank(self) -> int:
@@ -51,11 +59,26 @@ class BaseParameters:
 
         Every mass that is grouped into others is one, the kept parameters make up for it.
         """
+        if self.exact is not None:
+            return self.exact.silent_direction()
         direction = np.zeros(self.mapping.shape[1])
         direction[::10] = 1.0
         direction[self.selection] = 0.0
         direction[self.selection] = -self.mapping @ direction
         return direction
+
+    @property
+    def note(self) -> str:
+        """What nearly right angles would show, in words; empty where there are none."""
+        if not self.tilted:
+            return ""
+        angles = "angles that are" if len(self.tilted) > 1 else "an angle that is"
+        return (
+            f"{', '.join(self.tilted)}: turned by {angles} right but for decimals, which show "
+            f"{self.hidden} more base parameter{'s' if self.hidden > 1 else ''} by less than a "
+            f"thousandth; treated as not identifiable. Write pi/2 in full (1.5707963267948966) to "
+            "be rid of this note."
+        )
 
     def in_words(self, digits: int = 3) -> tuple[str, ...]:
         """For every base parameter the standard parameters it groups, `m[a] + 0.4·mz[b] …`."""
@@ -64,6 +87,45 @@ class BaseParameters:
 
 def find_base_parameters(robot: Robot, samples: int | None = None) -> BaseParameters:
     """Base parameters of `robot` for the measured rows and moved joints.
+
+    What shows only because right angles were rounded does not count (`near_right_angles`).
+
+    Raises
+    ------
+    RobotError
+        The second draw contradicts the first (the rank is not decided), or nothing is identifiable.
+    """
+    tilted = nearly_right(robot)
+    right = base_parameters_as_given(squared(robot), samples)
+    if not tilted:  # columns that are equally long but for rounding are then taken in one order
+        return base_parameters_as_given(robot, samples, right.selection)
+    try:
+        given = base_parameters_as_given(robot, samples)
+        if given.rank == right.rank:
+            return base_parameters_as_given(robot, samples, right.selection)
+    except RobotError:
+        return replace(right, tilted=tilted)
+    causes = [name for name in tilted if _rank_of(squared(robot, but=name), samples) != right.rank]
+    return replace(
+        right, tilted=tuple(causes) or tilted, hidden=given.rank - right.rank, exact=given
+    )
+
+
+def _rank_of(robot: Robot, samples: int | None) -> int | None:
+    try:
+        return base_parameters_as_given(robot, samples).rank
+    except RobotError:
+        return None
+
+
+def base_parameters_as_given(
+    robot: Robot,
+    samples: int | None = None,
+    chosen: NDArray[np.intp] | None = None,
+) -> BaseParameters:
+    """Base parameters of the robot as it is, also those that show by decimals of angles only.
+
+    The columns are those that are `chosen`, if there are any.
 
     Raises
     ------
@@ -86,6 +148,8 @@ def find_base_parameters(robot: Robot, samples: int | None = None) -> BaseParame
     raw = qr(first[:, alive], mode="r", pivoting=True)[1]
     order = min((order, raw), key=lambda o: np.linalg.cond(first[:, alive[o[:rank]]]))
     kept, grouped = alive[order[:rank]], alive[order[rank:]]
+    if chosen is not None:
+        rank, kept, grouped = len(chosen), chosen, np.setdiff1d(alive, chosen)
     weights = np.zeros((rank, len(grouped)))
     if len(grouped):
         weights = lstsq(first[:, kept], first[:, grouped])[0]

@@ -1,6 +1,7 @@
 """One admissible motion: the best of its starts, judged."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from excite_cli.constraints.base import Array
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import verdicts, worst_margins
 from excite_cli.excitation.base_motion import base_motion
+from excite_cli.excitation.dense_grid import dense_condition_number
 from excite_cli.excitation.given_start import start_from
 from excite_cli.excitation.motion import Motion, Outcome
 from excite_cli.excitation.one_start import FoundMotion, OneStart, Search, solve_start
@@ -79,6 +81,7 @@ def generate_motion(
         evaluations=outcome.evaluations,
         margins=worst_margins(problem, coefficients),
         certified=_certified(problem, coefficients),
+        dense_condition_number=dense_condition_number(problem, stack, coefficients),
         note="; ".join(filter(None, [moved_note(task, start), told, cut])),
     )
 
@@ -100,20 +103,20 @@ def _best_of_starts(
 ) -> tuple[Outcome, str]:
     """The outcome with the lowest criterion, with iterations and evaluations of all starts.
 
-    Also what to report of it. Of equal ones the first is taken, so that it does not matter who
-    was ready first. A start that fails is passed over; the last error is raised only if all fail.
+    Also what to report of it. Starts are told apart early (successive halving): after some stages
+    the better half goes on, then a quarter of it to the end. Of equal ones the first is taken, so
+    that it does not matter who was ready first. A start that fails is passed over; the last error
+    is raised only if all fail. A `first` motion is gone on with, and begun with anew as well.
     """
     restarts = task.problem.spec.optimizer.restarts
-    tasks = [
-        OneStart(task.stack, start, (*seed, number), first if number == 0 else None)
-        for number in range(restarts)
-    ]
-    watch = followed(report, task.problem, restarts)
-    ended = workers.map(solve_start, Search(task.problem, solver), tasks, watch)
-    found = [each for each in ended if isinstance(each, FoundMotion)]
-    if not found:
-        raise ended[-1]
-    best = min(found, key=_rank).outcome
+    tasks = [OneStart(task.stack, start, (*seed, number)) for number in range(restarts)]
+    if first is not None:
+        tasks[0] = replace(tasks[0], first=first, begin=solver.polish)
+        if restarts > 1:
+            tasks[1] = replace(tasks[1], first=first)
+    search = Search(task.problem, solver)
+    ended, found = _told_apart(search, tasks, report, workers)
+    best = min(ended, key=_rank).outcome
     cut = sum(each.outcome.status is Status.TIME_LIMIT for each in found)
     told = ""
     if cut and best.status is not Status.TIME_LIMIT:
@@ -129,6 +132,55 @@ def _best_of_starts(
         ),
         told,
     )
+
+
+def _told_apart(
+    search: Search, tasks: Sequence[OneStart], report: ProgressCallback, workers: Workers
+) -> tuple[list[FoundMotion], list[FoundMotion]]:
+    """Starts that were gone on with to the end, and the last that is known of every one.
+
+    Raises
+    ------
+    NoAdmissibleMotionError
+        None of them led anywhere.
+    """
+    error = NoAdmissibleMotionError("No start was made.")
+    last: dict[int, FoundMotion] = {}
+
+    def best(count: int) -> list[int]:
+        return sorted(sorted(last, key=lambda k: (_rank(last[k]), k))[:count])
+
+    def go_on(numbers: Sequence[int], until: int | None) -> None:
+        nonlocal error
+        going = [k for k in numbers if k not in last or last[k].stages is not None]
+        if not going:
+            return
+        asked = [_task(tasks[k], last.get(k), until) for k in going]
+        watch = followed(report, search.problem, len(going))
+        for k, result in zip(going, workers.map(solve_start, search, asked, watch), strict=True):
+            last.pop(k, None)
+            if isinstance(result, FoundMotion):
+                last[k] = result
+            else:
+                error = result
+
+    alive = list(range(len(tasks)))
+    for number, stages in enumerate(search.solver.told_apart if len(tasks) > 1 else ()):
+        go_on(alive, stages)
+        alive = best(max(2, -(-len(alive) // 2)) if number == 0 else -(-len(alive) // 4))
+    go_on(alive, None)
+    while last and all(found.stages is not None for found in last.values()):
+        go_on(best(1), None)  # those that were gone on with led nowhere
+    if not last:
+        raise error
+    ended = [last[k] for k in sorted(last) if last[k].stages is None]
+    return ended, list(last.values())
+
+
+def _task(task: OneStart, found: FoundMotion | None, until: int | None) -> OneStart:
+    """The task up to `until`, where it does not begin later."""
+    late = found is None and until is not None and task.begin >= until
+    return replace(task, found=found, until=None if late else until)
 
 
 def _rank(found: FoundMotion) -> float:

@@ -4,7 +4,7 @@ It depends on its arguments only, and these can be pickled: it may be done by an
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,26 +32,34 @@ class Search:
 
 
 @dataclass(frozen=True)
+class FoundMotion:
+    """What a start led to: the criterion of that, what is reported of it, how long it took [s].
+
+    After `stages` of the solver; None: it has ended.
+    """
+
+    value: float
+    figure: Figure
+    outcome: Outcome
+    seconds: float
+    stages: int | None = None
+
+
+@dataclass(frozen=True)
 class OneStart:
     """What to begin with: earlier data, the motion to draw about, (seed, index, number).
 
-    With `first` (size,) nothing is drawn, the search begins there.
+    With `first` (size,) nothing is drawn: the search begins there, with the stage `begin`. With
+    `found` it goes on from there. It is done up to the stage `until` (excluded; None: to the end).
     """
 
     stack: Stack
     start: Start
     seed: tuple[int, int, int]
     first: Array | None = None
-
-
-@dataclass(frozen=True)
-class FoundMotion:
-    """What a start led to: the criterion of that, what is reported of it, how long it took [s]."""
-
-    value: float
-    figure: Figure
-    outcome: Outcome
-    seconds: float
+    begin: int = 0
+    found: FoundMotion | None = None
+    until: int | None = None
 
 
 def solve_start(
@@ -60,18 +68,55 @@ def solve_start(
     """What the start leads to; an error is returned, since one failure does not end the others."""
     problem, solver = search.problem, search.solver
     began = time.perf_counter()
-    spec = problem.spec.optimizer
-    effort = Effort(spec.max_iterations, spec.max_seconds, spec.tolerance)
     run = MotionTask(problem, task.stack)
     try:
-        x = task.first if task.first is not None else random_start(run, task.start, task.seed)
-        outcome = solver.solve(run, x, effort, report)
-        outcome = kept_between_instants(run, solver, task.start, outcome, effort, report)
+        outcome = _solved(run, solver, task, report)
+        ended = task.until is None or outcome.status.is_limit
+        if ended:
+            effort = _effort(problem, task, 0)
+            outcome = kept_between_instants(run, solver, task.start, outcome, effort, report)
+            outcome = replace(outcome, last=None, memory=None)
     except NoAdmissibleMotionError as error:
         return NoAdmissibleMotionError(str(error))
     spectrum = run.objective.spectrum(run.objective.block(run.coefficients(outcome.x)))
     value = problem.criterion.value(spectrum.sigma)
-    return FoundMotion(value, spectrum.figure, outcome, time.perf_counter() - began)
+    seconds = time.perf_counter() - began + (task.found.seconds if task.found else 0.0)
+    return FoundMotion(
+        value, spectrum.figure, outcome, seconds, stages=None if ended else task.until
+    )
+
+
+def _solved(run: MotionTask, solver: Solver, task: OneStart, report: ProgressCallback) -> Outcome:
+    """The outcome after the stages that are asked for, with the iterations of all before."""
+    found = task.found
+    if found is None:
+        x = task.first if task.first is not None else random_start(run, task.start, task.seed)
+        return solver.solve(run, x, _effort(run.problem, task, task.begin), report)
+    before = found.outcome
+    assert before.last is not None
+    effort = _effort(run.problem, task, found.stages or 0)
+    outcome = solver.solve(run, before.last, effort, _after(before, report), before.memory)
+    value = run.objective.value(run.coefficients(outcome.x), run.problem.criterion)
+    return replace(
+        outcome,
+        x=outcome.x if value <= found.value else before.x,
+        iterations=before.iterations + outcome.iterations,
+        evaluations=before.evaluations + outcome.evaluations,
+    )
+
+
+def _effort(problem: Problem, task: OneStart, first: int) -> Effort:
+    """What is left of the effort that the config allows a start."""
+    spec = problem.spec.optimizer
+    iterations, seconds = spec.max_iterations, spec.max_seconds
+    if task.found is not None:
+        iterations -= task.found.outcome.iterations
+        seconds -= task.found.seconds
+    return Effort(max(iterations, 0), max(seconds, 0.0), spec.tolerance, first, task.until)
+
+
+def _after(before: Outcome, report: ProgressCallback) -> ProgressCallback:
+    return lambda told: report(replace(told, iteration=told.iteration + before.iterations))
 
 
 def kept_between_instants(
@@ -105,7 +150,7 @@ def kept_between_instants(
             max_iterations=max(10, effort.max_iterations // 8),
             max_seconds=max(1.0, effort.max_seconds / 4 - (time.perf_counter() - began)),
             tolerance=effort.tolerance,
-            polish=True,
+            first=solver.polish,
         )
         again = solver.solve(tighter, inside, short, report)
         outcome = Outcome(

@@ -32,6 +32,7 @@ from excite_cli.robot.model import Robot, build_robot
 from excite_cli.shown.record import Shown
 from excite_cli.trajectory.base import Basis, Trajectory
 from excite_cli.trajectory.catalogue import build_trajectory
+from excite_cli.trajectory.freedom import with_freedom
 
 
 @dataclass(frozen=True, repr=False)
@@ -116,6 +117,7 @@ def build_problem(
         What the spec asks for does not fit the robot.
     """
     robot = build_robot(spec.robot, relative_to)
+    spec = _with_freedom(spec, robot)
     trajectory = build_trajectory(spec.trajectory)
     spec = with_sampling(spec, trajectory)
     cost, grid = instants(spec.sampling.cost), instants(spec.sampling.constraints)
@@ -157,6 +159,13 @@ def build_problem(
     return on_fine_grid(problem) if extension.fine else problem
 
 
+def _with_freedom(spec: Spec, robot: Robot) -> Spec:
+    bounds, limits = spec.constraints.joint_limits, robot.limits.acceleration
+    if bounds is not None and bounds.acceleration is not None:
+        limits = np.minimum(limits, bounds.acceleration)
+    return spec.model_copy(update={"trajectory": with_freedom(spec.trajectory, limits)})
+
+
 def _uncertainty(
     spec: Spec, robot: Robot, base: BaseParameters, fit: FitKnowledge | None
 ) -> InertiaUncertainty | None:
@@ -169,7 +178,11 @@ def _uncertainty(
 
 def on_fine_grid(problem: Problem) -> Problem:
     """The problem with its cost on the constraint grid, every motion counting as much as before."""
-    fine = problem.constraint_basis
+    return with_cost_on(problem, problem.constraint_basis)
+
+
+def with_cost_on(problem: Problem, fine: Basis) -> Problem:
+    """The problem with its cost on the instants of `fine`, a motion counting as much as before."""
     share = np.sqrt(len(problem.cost_basis.times) / len(fine.times))
     weighting = problem.weighting
     weighted = replace(

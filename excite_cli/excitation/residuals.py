@@ -9,6 +9,7 @@ weighted sums over thousands of rows collapse to one matrix product per pair of 
 Σ_t (b_t b_tᵀ) ⊗ G_t.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -69,18 +70,27 @@ class GridProducts:
         joints = np.arange(weights.shape[1])
         hessian[joints, :, joints, :] += blocks.transpose(2, 0, 1)
 
-    def add_curvature(self, hessian: Array, i: int, j: int, weights: Array) -> None:
-        """Add Σ_t (b_t^i b_t^jᵀ) ⊗ G_t, weights G (T, n, n), to `hessian` (n, K, n, K)."""
-        k, n = self.size, weights.shape[1]
-        if i == j:  # symmetric in the basis and in the joints: a quarter of the products
-            low, high = np.tril_indices(n)
-            blocks = weights[:, low, high].T @ self.squares[i, i]
-            blocks = blocks[_unfolded(n)][:, :, _unfolded(k)]
+    def add_curvature(self, hessian: Array, weights: Mapping[tuple[int, int], Array]) -> None:
+        """Add Σ_t (b_t^i b_t^jᵀ) ⊗ G_t to `hessian` (n, K, n, K), of every pair of orders i ≤ j.
+
+        weights: G (T, n, n) per pair. What stands beside the diagonal counts on both sides.
+        """
+        k, n = self.size, hessian.shape[0]
+        low, high = np.tril_indices(n)
+        even = [pair for pair in weights if pair[0] == pair[1]]
+        mixed = [pair for pair in weights if pair[0] != pair[1]]
+        if even:  # symmetric in the basis and in the joints: a quarter of the products
+            blocks = sum(weights[pair][:, low, high].T @ self.squares[pair] for pair in even)
+            blocks = np.asarray(blocks)[_unfolded(n)][:, :, _unfolded(k)]
             hessian += blocks.transpose(0, 2, 1, 3)
-            return
-        blocks = (self.squares[i, j].T @ weights.reshape(self.samples, -1)).reshape(k, k, n, n)
-        hessian += blocks.transpose(2, 0, 3, 1)
-        hessian += blocks.transpose(3, 1, 2, 0)
+        if mixed:
+            flat = sum(
+                weights[pair].reshape(self.samples, -1).T @ self.squares[pair] for pair in mixed
+            )
+            blocks = np.ascontiguousarray(
+                np.asarray(flat).reshape(n, n, k, k).transpose(0, 2, 1, 3)
+            ).reshape(n * k, n * k)
+            hessian += (blocks + blocks.T).reshape(n, k, n, k)
 
 
 @cache

@@ -7,6 +7,7 @@ from pathlib import Path
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.errors import FileError
+from excite_cli.excitation.dense_grid import dense_condition_number
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressCallback
 from excite_cli.excitation.result import Result, matches
@@ -142,6 +143,7 @@ def _judged(step: Step, model: Problem, stack: Stack) -> Step:
         step.motion,
         condition_number=objective.own_condition_number(alpha),
         stacked_condition_number=objective.stacked_condition_number(alpha),
+        dense_condition_number=dense_condition_number(model, stack, alpha),
     )
     return Step(motion, stack.with_rows(objective.block(alpha)))
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.proposal.limits import JointPlan
+from excite_cli.trajectory.freedom import harmonics_for
 
 _SHORTEST, _LONGEST = 10.0, 20.0
 # How far the slowest joint should come either way: this share of half of its range, at most.
 _SHARE, _FAR, _FAR_SLIDE = 0.5, 0.8, 0.1
 # Forty instants to a period of the highest harmonic; what lies between them is proved.
-_HARMONICS, _INSTANTS = 5, 200
+_INSTANTS = 200
 
 
 @dataclass(frozen=True)
@@ -42,4 +43,5 @@ def choose_pace(joints: Sequence[JointPlan]) -> Pace:
     slowest = int(np.argmax(needed))
     duration = float(math.ceil(min(max(needed[slowest], _SHORTEST), _LONGEST)))
     usual = needed[slowest] <= _SHORTEST
-    return Pace(duration, _HARMONICS, _INSTANTS, None if usual else joints[slowest].name)
+    harmonics = harmonics_for(duration, np.array([joint.acceleration for joint in joints]))
+    return Pace(duration, harmonics, _INSTANTS, None if usual else joints[slowest].name)

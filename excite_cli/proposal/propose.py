@@ -26,7 +26,7 @@ from excite_cli.shown.record import Shown
 
 _TORQUE_SHARE = 0.8
 _MARGIN = 0.01
-_FEW, _MANY = 10, 20
+_SECONDS = 60.0
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def _draft(
         },
         "sampling": {"constraints": {"samples": pace.constraint_samples}},
         "constraints": constraints,
-        "optimizer": _effort(len(joints)),
+        "optimizer": {"max_seconds": _SECONDS},
         "sequence": {"motions": 1},
         "seed": 1,
     }
@@ -176,9 +176,7 @@ def _draft(
         else f"so that {pace.slowest}, the slowest joint, can use its range"
     )
     comments["trajectory",] = f"{pace.duration:g} s, {why}"
-    comments["optimizer",] = (
-        "about a minute at most; more iterations and restarts: 3 find better motions"
-    )
+    comments["optimizer",] = "per start of a motion; restarts: 8 may find better motions"
     comments["sequence",] = "each further motion is planned on top of the earlier ones"
     return tree, comments
 
@@ -211,12 +209,6 @@ def _inside(others: dict[str, float], facts: UrdfSurvey) -> dict[str, float]:
         for name, value in others.items()
         if name in own and own[name].lower <= value <= own[name].upper
     }
-
-
-def _effort(joints: int) -> Tree:
-    """How long to search: about a minute for the largest robots."""
-    iterations = 200 if joints <= _FEW else 150 if joints <= _MANY else 120
-    return {"max_iterations": iterations, "max_seconds": 60.0}
 
 
 def _require_inertias(facts: UrdfSurvey, source: str) -> None:

@@ -122,6 +122,8 @@ def _write_motion(group: Any, motion: Motion, problem: Problem) -> None:
             ),
         }
     )  # fmt: skip
+    if motion.dense_condition_number is not None:
+        group.attrs["dense_condition_number"] = motion.dense_condition_number
 
 
 def read_result(path: Path) -> Result:
@@ -239,4 +241,9 @@ def _read_motion(group: Any, index: int, shape: tuple[int, int]) -> Motion:
         evaluations=checked.count(attributes, "evaluations"),
         margins=checked.record(attributes["margins"], dict[str, Worst]),
         certified=checked.record(attributes.get("certified", "{}"), dict[str, bool]),
+        dense_condition_number=(
+            checked.condition(attributes, "dense_condition_number")
+            if "dense_condition_number" in attributes
+            else None
+        ),
     )

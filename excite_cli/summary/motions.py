@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from excite_cli.diagnosis.next_motion import NextMotion
+from excite_cli.excitation.dense_grid import flattered
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Status
@@ -46,14 +47,20 @@ def motion_table(motions: Sequence[Motion]) -> Table:
             str(motion.index),
             f"{motion.condition_number:.2f}",
             f"{motion.stacked_condition_number:.2f}",
+            _dense(motion),
             motion.status if motion.improved else f"{motion.status}; no improvement",
             str(motion.iterations),
             f"{motion.seconds:.1f}",
         )
         for motion in motions
     )
-    names = ("motion", "own", "stacked", "status", "iterations", "seconds")
+    names = ("motion", "own", "stacked", "dense", "status", "iterations", "seconds")
     return Table("Condition numbers", names, rows, left=("status",))
+
+
+def _dense(motion: Motion) -> str:
+    dense = motion.dense_condition_number
+    return "–" if dense is None else f"{dense:.2f}"
 
 
 def margin_table(motions: Sequence[Motion]) -> Table:
@@ -87,6 +94,8 @@ def motion_sentence(motion: Motion) -> str:
     note = "" if motion.improved else "; it brings no improvement"
     note += "; raise optimizer.max_seconds" if motion.status is Status.TIME_LIMIT else ""
     note += f"; {motion.note}" if motion.note else ""
+    if flattered(motion.stacked_condition_number, motion.dense_condition_number):
+        note += f"; {_dense(motion)} between its samples: take more of sampling.cost"
     if motion.certified:
         loose = [name for name, proved in motion.certified.items() if not proved]
         told = "all constraints proved at every instant"
@@ -104,6 +113,7 @@ def motion_data(motion: Motion) -> dict[str, Any]:
         "index": motion.index,
         "condition_number": motion.condition_number,
         "stacked_condition_number": motion.stacked_condition_number,
+        "dense_condition_number": motion.dense_condition_number,
         "improved": motion.improved,
         "status": motion.status,
         "note": motion.note,

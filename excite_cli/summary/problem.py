@@ -22,6 +22,8 @@ def problem_notes(problem: Problem) -> Iterator[Note]:
         f"{robot.name}: {robot.n} joints, {problem.base.rank} {_of(problem)}{effects}, "
         f"{problem.variables} variables; criterion: {criterion.kind}"
     )
+    if problem.base.note:
+        yield Note(Level.NOTE, problem.base.note)
     names = ", ".join(_counted_name(constraint) for constraint in problem.constraints) or "none"
     yield _said(f"constraints: {names}")
     yield _detail(

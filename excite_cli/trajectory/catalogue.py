@@ -7,7 +7,9 @@ from excite_cli.trajectory.fourier import FourierTrajectory
 
 
 def build_trajectory(spec: FourierSpec | BSplineSpec) -> Trajectory:
-    """The trajectory family that `spec` asks for."""
+    """The trajectory family that `spec` asks for, with its number of coefficients filled in."""
     if isinstance(spec, FourierSpec):
+        assert spec.harmonics is not None
         return FourierTrajectory(spec.harmonics, spec.base_frequency, spec.at_rest)
+    assert spec.control_points is not None
     return BSplineTrajectory(spec.duration, spec.control_points, spec.degree, spec.at_rest)

@@ -8,10 +8,12 @@ from excite_cli.config.spec import Spec
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.sampling import instants, with_sampling
 from excite_cli.trajectory.catalogue import build_trajectory
+from excite_cli.trajectory.freedom import with_freedom
 
 
 def _filled(text: str) -> Spec:
     spec = parse_spec(f"robot: {{urdf: a}}\n{text}")
+    spec = spec.model_copy(update={"trajectory": with_freedom(spec.trajectory, np.full(2, 10.0))})
     return with_sampling(spec, build_trajectory(spec.trajectory))
 
 

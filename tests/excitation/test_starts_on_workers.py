@@ -166,7 +166,7 @@ def test_what_is_not_a_number_is_never_the_best(
     from excite_cli.excitation.task import MotionTask
 
     x = MotionTask(problem).variables(alone[0].coefficients)
-    motion = _best(problem, [_found(np.nan, 0.5 * x), _found(9.0, x)], alone)
+    motion = _best(problem, [_found(np.nan, 0.5 * x), *[_found(9.0, x)] * 2], alone)
     assert np.array_equal(motion.coefficients, MotionTask(problem).coefficients(x))
 
 
@@ -204,7 +204,7 @@ def test_whatever_a_problem_holds_can_travel(settings: list[str]) -> None:
 
 
 def test_progress_of_one_start_is_told_as_it_is() -> None:
-    single = _problem("sequence.motions=1")
+    single = _problem("sequence.motions=1", "optimizer.restarts=1")
     told: list[Progress] = []
     _motions(single, Here(), told)
     assert told

@@ -73,7 +73,7 @@ def test_many_wrong_places_are_told_in_part(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["cost", "constraints"])
 def test_grids_that_fill_the_memory(grid: str, name: str, tmp_path: Path) -> None:
     def built(path: Path) -> None:
-        spec = load_spec(path, [f"sampling.{name}={grid}"])
+        spec = load_spec(path, [f"sampling.{name}={grid}", "trajectory.harmonics=5"])
         with_sampling(spec, build_trajectory(spec.trajectory))
 
     assert f"sampling.{name}" in refused(built, CONFIG)

@@ -13,22 +13,36 @@ from excite_cli.excitation.task import MotionTask
 class Effort:
     """When a solver stops: iterations, seconds, change of the criterion at which it has converged.
 
-    With `polish` the start is nearly optimal: only the last stage of the continuation is run.
+    Of the stages of its continuation those from `first` on are run, up to `last` (excluded; None:
+    to the end).
     """
 
     max_iterations: int
     max_seconds: float
     tolerance: float
-    polish: bool = False
+    first: int = 0
+    last: int | None = None
 
 
 class Solver(ABC):
     """A way to minimise the criterion of a `MotionTask` within its residuals."""
 
     name: str
+    told_apart: tuple[int, ...] = ()
+    """After how many stages it shows which starts are worth going on with."""
+    polish: int = 0
+    """The stage from which to go on with a motion that is nearly optimal."""
 
     @abstractmethod
     def solve(
-        self, task: MotionTask, x: Array, effort: Effort, report: ProgressCallback
+        self,
+        task: MotionTask,
+        x: Array,
+        effort: Effort,
+        report: ProgressCallback,
+        memory: Array | None = None,
     ) -> Outcome:
-        """Improve the admissible point `x` (size,); what is returned is admissible too."""
+        """Improve the admissible point `x` (size,); what is returned is admissible too.
+
+        `memory`: that of the outcome that it goes on from.
+        """

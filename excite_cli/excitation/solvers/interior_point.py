@@ -7,9 +7,12 @@ off anywhere.
     b(c) = −log u + (u − 1) − (u − 1)²/2,  u = c/ĉ < 1,    b = 0 beyond ĉ
 
 is a logarithmic barrier that ends at ĉ with two continuous derivatives: only near rows count, the
-others need no derivative at all. The Hessian is B + μ/T Σ b''(c_i) ∇c_i ∇c_iᵀ, with B a damped
-BFGS estimate for the criterion alone, while the barrier's part, which changes fast, is exact but
-for the curvature of the constraints. Its sums over thousands of rows collapse because a row at
+others need no derivative at all. The Hessian is B + μ/T Σ b''(c_i) ∇c_i ∇c_iᵀ: the barrier's part,
+which changes fast, is exact but for the curvature of the constraints, and B is a damped BFGS
+estimate for the criterion and that curvature, from differences of the gradient of
+f + Σ λ_i c_i with the newer λ_i = μ/T b'(c_i). (With B for the criterion alone, motions got stuck
+where a constraint bends along the way: Panda ended at 7.6, 16.6 and 20.9 from seeds that give 7.1,
+7.9 and 7.6.) The barrier's sums over thousands of rows collapse because a row at
 one instant is a Kronecker product of a basis row and a joint-space gradient (`residuals`), so an
 iteration costs one Cholesky factor of the number of variables, and no quadratic program.
 """
@@ -18,6 +21,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from excite_cli.constraints.base import Array
@@ -40,13 +44,22 @@ from excite_cli.excitation.task import MotionTask
 
 # μ and the share of the criterion's continuation for each stage, and when a stage is done: the
 # merit fell by less than this over the last `_WINDOW` iterations (never less than the tolerance).
+# The last two stages took TALOS' arms from 5.68 to 5.20, where more of them found nothing.
 _STAGES = ((1.0, 0, 5e-2), (0.3, 0, 2e-2), (0.1, 0, 1e-2), (0.03, 1, 5e-3), (0.01, 1, 2e-3),
-           (0.003, 2, 0.0))  # fmt: skip
+           (0.003, 2, 1e-3), (0.001, 3, 5e-4), (0.0003, 4, 0.0))  # fmt: skip
 _WINDOW = 8
 _REACH_LINEAR, _REACH_OTHER = 0.5, REACH
 _SUFFICIENT = 1e-4
 _HALVINGS, _SHIFTS = 14, 20
 _TO_BOUNDARY = 0.98
+
+
+@dataclass(frozen=True)
+class _Near:
+    """Gradients of a constraint that is not linear, where its residuals (T, m) are `near`."""
+
+    near: NDArray[np.bool_]
+    rows: Rows
 
 
 @dataclass(frozen=True)
@@ -66,32 +79,49 @@ class InteriorPoint(Solver):
     """Primal barrier with falling μ; see the module."""
 
     name = "interior_point"
+    # Rank correlation of the figure with that at the end, over seeds: 0.07 to 0.98 after three
+    # stages (Panda 0.98, UR10 0.07), 0.71 to 1.00 after four.
+    told_apart = (3, 4)
+    polish = 5
 
     def solve(
-        self, task: MotionTask, x: Array, effort: Effort, report: ProgressCallback
+        self,
+        task: MotionTask,
+        x: Array,
+        effort: Effort,
+        report: ProgressCallback,
+        memory: Array | None = None,
     ) -> Outcome:
-        """Run all stages from the strictly admissible `x`."""
-        return _Run(task, effort, report).all_stages(x)
+        """Run the stages of `effort` from the strictly admissible `x`."""
+        return _Run(task, effort, report, memory).stages(x)
 
 
 class _Run:
-    def __init__(self, task: MotionTask, effort: Effort, report: ProgressCallback) -> None:
+    def __init__(
+        self,
+        task: MotionTask,
+        effort: Effort,
+        report: ProgressCallback,
+        memory: Array | None = None,
+    ) -> None:
         self.task, self.effort, self.report = task, effort, report
         self.began = time.perf_counter()
         self.iterations = 0
         self.best_x: Array | None = None
         self.best = float("inf")
-        self.hessian: Array | None = None
+        self.hessian = memory
+        self.sized = memory is not None
+        self.before: tuple[_Point, dict[int, _Near]] | None = None
         self.reach = [
             _REACH_OTHER if c.linear is None else _REACH_LINEAR for c in task.problem.constraints
         ]
         self.samples = task.residuals.grid.samples
 
-    def all_stages(self, x: Array) -> Outcome:
+    def stages(self, x: Array) -> Outcome:
         steps = self.task.problem.criterion.continuation()
         status = Status.CONVERGED
-        first = len(_STAGES) - 1 if self.effort.polish else 0
-        for number, (mu, step, change) in enumerate(_STAGES[first:], start=first):
+        wanted = list(enumerate(_STAGES))[self.effort.first : self.effort.last]
+        for number, (mu, step, change) in wanted:
             criterion = steps[min(step, len(steps) - 1)]
             change = max(change, self.effort.tolerance)
             stage = Stage(number + 1, len(_STAGES), mu)
@@ -99,7 +129,7 @@ class _Run:
             if status.is_limit:
                 break
         assert self.best_x is not None
-        return Outcome(self.best_x, status, self.iterations, self.task.evaluations)
+        return Outcome(self.best_x, status, self.iterations, self.task.evaluations, x, self.hessian)
 
     def stage(
         self, x: Array, criterion: Criterion, mu: float, change: float, stage: Stage
@@ -111,6 +141,7 @@ class _Run:
                 "parameters. Give it more coefficients or wider limits."
             )
         self.remember(point)
+        self.before = None
         merits = [point.merit]
         while True:
             if self.iterations >= self.effort.max_iterations:
@@ -120,7 +151,6 @@ class _Run:
             found = self.iterate(point, criterion, mu)
             if found is None:
                 return point.x, Status.STALLED
-            self.update(found.x - point.x, found.gradient - point.gradient)
             point = found
             self.iterations += 1
             self.remember(point)
@@ -156,8 +186,11 @@ class _Run:
 
     def iterate(self, point: _Point, criterion: Criterion, mu: float) -> _Point | None:
         """One Newton step with a backtracking search that stays inside; None if it fails."""
-        barrier_gradient, curvature = self.barrier_derivatives(point, mu)
+        barrier_gradient, curvature, near = self.barrier_derivatives(point, mu)
         gradient = point.gradient + barrier_gradient
+        if self.before is not None:
+            self.learn(*self.before, point, near, mu)
+        self.before = point, near
         if self.hessian is None:
             size = np.linalg.norm(point.gradient) + 1e-12
             self.hessian = self.task.metric * size
@@ -188,12 +221,18 @@ class _Run:
                 step = min(step, _TO_BOUNDARY * float((value[closing] / rate[closing]).min()))
         return step
 
-    def barrier_derivatives(self, point: _Point, mu: float) -> tuple[Array, Array]:
-        """Gradient (size,) and Gauss–Newton Hessian (size, size) of the barrier."""
+    def barrier_derivatives(
+        self, point: _Point, mu: float
+    ) -> tuple[Array, Array, dict[int, _Near]]:
+        """Gradient (size,) and Gauss–Newton Hessian (size, size) of the barrier.
+
+        Also the gradients of the constraints that are not linear, by their index.
+        """
         task, grid = self.task, self.task.residuals.grid
         gradient = np.zeros((task.k, task.n))
         hessian = np.zeros((task.n, task.k, task.n, task.k))
         bends: dict[tuple[int, int], Array] = {}
+        found: dict[int, _Near] = {}
         for index, constraint in enumerate(task.problem.constraints):
             value, reach = point.values[index], self.reach[index]
             weight = mu / self.samples
@@ -211,17 +250,38 @@ class _Run:
             if not near.any():
                 continue
             rows: Rows = task.residuals.rows(point.states, index, near)
+            found[index] = _Near(near, rows)
             grid.add_gradient(gradient, summed_per_instant(rows, first, self.samples))
             for pair, squares in squared_per_instant(rows, second, self.samples).items():
                 bends[pair] = bends[pair] + squares if pair in bends else squares
-        for (i, j), squares in bends.items():
-            grid.add_curvature(hessian, i, j, squares)
-        return task.flat(gradient), hessian.reshape(task.size, task.size)
+        grid.add_curvature(hessian, bends)
+        return task.flat(gradient), hessian.reshape(task.size, task.size), found
+
+    def learn(
+        self,
+        old: _Point,
+        old_near: dict[int, _Near],
+        new: _Point,
+        new_near: dict[int, _Near],
+        mu: float,
+    ) -> None:
+        """Update the Hessian's estimate by the step from `old` to `new`."""
+        task, grid = self.task, self.task.residuals.grid
+        bent = np.zeros((task.k, task.n))
+        for index in old_near.keys() & new_near.keys():
+            both = old_near[index].near & new_near[index].near
+            pull = np.where(both, mu / self.samples, 0.0)
+            pull[both] *= _first(new.values[index][both], self.reach[index])
+            for sign, there in ((1.0, new_near[index]), (-1.0, old_near[index])):
+                parts = summed_per_instant(there.rows, sign * pull[there.near], self.samples)
+                grid.add_gradient(bent, parts)
+        self.update(new.x - old.x, new.gradient - old.gradient + task.flat(bent))
 
     def update(self, step: Array, change: Array) -> None:
-        """Powell-damped BFGS update of the criterion's Hessian; the first also sets its size."""
+        """Powell-damped BFGS update of the estimate; the first also sets its size."""
         assert self.hessian is not None
-        if self.iterations == 0:
+        if not self.sized:
+            self.sized = True
             size = float(step @ change) / float(step @ self.task.metric @ step)
             if size > 0:
                 self.hessian = self.task.metric * size
