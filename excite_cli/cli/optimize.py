@@ -59,6 +59,10 @@ def optimize(
             "--starts", min=1, help="Starts per motion, the best kept; optimizer.restarts."
         ),
     ] = None,
+    efficiency: Annotated[
+        bool,
+        typer.Option("--efficiency", help="Also the share of what free states could tell."),
+    ] = False,
     seed: options.Seed = None,
     overrides: options.Set = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue an existing file.")] = False,
@@ -81,14 +85,15 @@ def optimize(
     With --for payload the motion is the shortest that tells mass, centre and inertia of what the
     robot carries, beside a fit of the robot alone; its config is written beside the result (.yaml).
 
-    With --starts each motion is the best of many starts, which --workers processes or a dask
-    cluster share; the result is the same to the last digit whoever does them.
+    With --starts each motion is the best of many starts, told apart early, which --workers
+    processes or a dask cluster share; the result is the same to the last digit whoever does them.
 
     Examples:
       excite optimize ur10.yaml -o ur10.h5
       excite optimize ur10.yaml -o ur10.h5 --motions 3 --resume
       excite optimize ur10.yaml -o quick.h5 --set optimizer.max_iterations=20
       excite optimize ur10.yaml -o best.h5 --starts 4 --workers 2
+      excite optimize ur10.yaml -o ur10.h5 --efficiency
       excite optimize ur10.yaml -o more.h5 --prior ur10.h5
       excite optimize ur10.yaml -o next.h5 --after diagnosis.h5
       excite optimize ur10.yaml -o load.h5 --for payload --fit fit.h5
@@ -140,7 +145,7 @@ def optimize(
                 workers=place,
                 tell=terminal.tell,
             )
-    terminal.show(plan_answer(planned, result, str(path)))
+    terminal.show(plan_answer(planned, result, str(path), efficiency))
 
 
 def _refuse_beside_payload(fit: Path | None, other: object, motions: int | None) -> None:

@@ -28,6 +28,7 @@ CriterionKind = Literal[
     "log_det",
     "sigma_min",
     "trace_inverse",
+    "torque_deviation",
     "condition_and_sigma_min",
 ]
 

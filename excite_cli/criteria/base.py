@@ -19,6 +19,8 @@ class Criterion(ABC):
     """Minimised function of the singular values, in descending order."""
 
     name: str
+    of_torques: bool = False
+    """Whether σ is of columns combined by the torque that they make at random states."""
     compares_columns: bool = False
     """Whether it is about columns beside each other, so that one alone says nothing."""
 

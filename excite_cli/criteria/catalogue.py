@@ -9,6 +9,7 @@ from excite_cli.criteria.condition_number import ConditionNumber
 from excite_cli.criteria.log_det import LogDet
 from excite_cli.criteria.sigma_min import SigmaMin
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
+from excite_cli.criteria.torque_deviation import TorqueDeviation
 from excite_cli.criteria.trace_inverse import TraceInverse
 from excite_cli.errors import ConfigError, nearest
 
@@ -18,6 +19,7 @@ CRITERIA: dict[str, Callable[[CriterionSpec], Criterion]] = {
     "log_det": lambda spec: LogDet(),
     "sigma_min": lambda spec: SigmaMin(),
     "trace_inverse": lambda spec: TraceInverse(),
+    "torque_deviation": lambda spec: TorqueDeviation(),
     "condition_and_sigma_min": lambda spec: ConditionAndSigmaMin(),
 }
 

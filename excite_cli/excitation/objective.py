@@ -35,10 +35,14 @@ _NEGLIGIBLE = 1e-12
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Singular values (r,) in descending order and right singular vectors (r, r) as columns."""
+    """Singular values (r,) in descending order and right singular vectors (r, r) as columns.
+
+    `of_torques`: they are of C T, and `right` is T V: C right = U diag(σ) there as well.
+    """
 
     sigma: Array
     right: Array
+    of_torques: bool = False
 
     @property
     def condition_number(self) -> float:
@@ -48,6 +52,8 @@ class Spectrum:
     @property
     def figure(self) -> Figure:
         """What a solver improves."""
+        if self.of_torques:
+            return Figure(Measure.TORQUE_DEVIATION, float(np.sqrt(np.sum(self.sigma**-2.0))))
         return Figure(Measure.CONDITION_NUMBER, self.condition_number)
 
 
@@ -65,7 +71,9 @@ class Objective:
         basis: Basis,
         stack: Stack | None = None,
         extension: Extension | None = None,
+        metric: Array | None = None,
     ) -> None:
+        self.metric = metric
         self.robot, self.base, self.weighting, self.basis = robot, base, weighting, basis
         self.extension = extension if extension is not None and extension.effects else None
         self._effects = self.extension.columns() if self.extension else None
@@ -105,19 +113,27 @@ class Objective:
         return np.outer(self.weighting.rows, self.extension.scales)
 
     def spectrum(self, block: Array) -> Spectrum:
-        """Singular values and right vectors of [C_0; block]."""
-        gram = block.T @ block
-        gram += self._gram_0
+        """Singular values and right vectors of [C_0; block], combined by the metric if any."""
+        if self.metric is None:
+            return self._spectrum(block.T @ block + self._gram_0, block)
+        gram = self.metric.T @ (block.T @ block + self._gram_0) @ self.metric
+        found = self._spectrum(gram, block, self.metric)
+        return Spectrum(found.sigma, self.metric @ found.right, of_torques=True)
+
+    def _spectrum(self, gram: Array, block: Array, metric: Array | None = None) -> Spectrum:
         squares, right, info = lapack.dsyevd(gram)
         if info == 0 and squares[0] > squares[-1] / GRAM_LIMIT**2:
             return Spectrum(np.sqrt(squares[::-1]), right[:, ::-1])
-        triangle = qr(np.vstack([self.stack.factor, block]), mode="r")[0][: block.shape[1]]
+        rows = np.vstack([self.stack.factor, block])
+        rows = rows if metric is None else rows @ metric
+        triangle = qr(rows, mode="r")[0][: block.shape[1]]
         _, sigma, turned = np.linalg.svd(triangle)
         return Spectrum(sigma, turned.T)
 
     def earlier(self) -> Array:
         """What the criterion is a function of, for the earlier data alone."""
-        return singular_values(self.stack.factor)
+        factor = self.stack.factor
+        return singular_values(factor if self.metric is None else factor @ self.metric)
 
     def own_condition_number(self, coefficients: Array) -> float:
         """Condition number of this motion alone, cond(C^(i)) of Table I."""
@@ -125,7 +141,8 @@ class Objective:
 
     def stacked_condition_number(self, coefficients: Array) -> float:
         """Condition number with all earlier data, cond(C) of Table I."""
-        return self.spectrum(self.block(coefficients)).condition_number
+        block = self.block(coefficients)
+        return self._spectrum(block.T @ block + self._gram_0, block).condition_number
 
     def value(self, coefficients: Array, criterion: Criterion) -> float:
         """Criterion alone."""

@@ -25,6 +25,7 @@ from excite_cli.excitation.boundary import Boundary, build_boundary
 from excite_cli.excitation.discrimination import Discrimination, Separation
 from excite_cli.excitation.extension import Extension, extend
 from excite_cli.excitation.objective import Objective
+from excite_cli.excitation.reference_states import reference_rows, torque_metric
 from excite_cli.excitation.sampling import instants, with_sampling
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting, build_weighting
@@ -57,6 +58,7 @@ class Problem(Shown):
     kinematics: BatchKinematics
     extension: Extension
     separation: Separation | None = None
+    metric: Array | None = None
     folder: Path = Path()
     file: Path | None = None
 
@@ -84,7 +86,7 @@ class Problem(Shown):
         """The cost of one motion on top of `stack`."""
         parts = (self.robot, self.base, self.weighting, self.cost_basis, stack, self.extension)
         if self.separation is None:
-            return Objective(*parts)
+            return Objective(*parts, metric=self.metric)
         return Discrimination(*parts, separation=self.separation)
 
     def states(self, coefficients: Array, basis: Basis | None = None) -> States:
@@ -154,16 +156,30 @@ def build_problem(
         constraint_basis=trajectory.basis(grid),
         kinematics=BatchKinematics(robot),
         extension=extension,
+        metric=_metric(spec, robot, base, weighting, extension) if criterion.of_torques else None,
         folder=(relative_to or Path()).resolve(),
     )
     return on_fine_grid(problem) if extension.fine else problem
 
 
 def _with_freedom(spec: Spec, robot: Robot) -> Spec:
+    trajectory = with_freedom(spec.trajectory, acceleration_bounds(spec, robot))
+    return spec.model_copy(update={"trajectory": trajectory})
+
+
+def acceleration_bounds(spec: Spec, robot: Robot) -> Array:
+    """Bounds (n,) on the accelerations of joints, infinite where there is none."""
     bounds, limits = spec.constraints.joint_limits, robot.limits.acceleration
-    if bounds is not None and bounds.acceleration is not None:
-        limits = np.minimum(limits, bounds.acceleration)
-    return spec.model_copy(update={"trajectory": with_freedom(spec.trajectory, limits)})
+    if bounds is None or bounds.acceleration is None:
+        return limits
+    return np.asarray(np.minimum(limits, bounds.acceleration))
+
+
+def _metric(
+    spec: Spec, robot: Robot, base: BaseParameters, weighting: Weighting, extension: Extension
+) -> Array:
+    rows = reference_rows(robot, base, acceleration_bounds(spec, robot), weighting.rows)
+    return torque_metric(rows, np.concatenate([weighting.columns, extension.scales]))
 
 
 def _uncertainty(

@@ -28,6 +28,7 @@ class Measure(StrEnum):
 
     CONDITION_NUMBER = "condition_number"
     DIVERGENCE = "divergence"
+    TORQUE_DEVIATION = "torque_deviation"
 
 
 @dataclass(frozen=True)

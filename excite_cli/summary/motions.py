@@ -3,8 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.excitation.dense_grid import flattered
+from excite_cli.excitation.invariant import Invariants, design_for, invariants
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Status
@@ -17,8 +20,14 @@ from excite_cli.summary.problem import problem_parts
 from excite_cli.trajectory.chain import Segment
 
 
-def plan_answer(planned: Problem | NextMotion, result: Result, output: str) -> Answer:
-    """What `excite optimize` answers: the motions, and what they are expected to tell apart."""
+def plan_answer(
+    planned: Problem | NextMotion, result: Result, output: str, efficiency: bool = False
+) -> Answer:
+    """What `excite optimize` answers: the motions, and what they are expected to tell apart.
+
+    With `efficiency` also their share of the information that freely chosen states could have,
+    which takes seconds.
+    """
     following = planned if isinstance(planned, NextMotion) else None
     model = planned.model if isinstance(planned, NextMotion) else planned
     parts: Parts = [*result_parts(result), output]
@@ -27,6 +36,10 @@ def plan_answer(planned: Problem | NextMotion, result: Result, output: str) -> A
         "criterion": criterion_data(model),
         "output": output,
     }
+    if model.spec.criterion.of == "robot" and result.motions:
+        found = invariants(model, result.stack, design_for(model) if efficiency else None)
+        data.update(invariants_data(found))
+        parts.insert(-1, invariants_in_words(found))
     if following is not None:
         outlook = following.outlook([m.coefficients for m in result.motions])
         data["next_experiment"] = outlook
@@ -38,6 +51,30 @@ def plan_answer(planned: Problem | NextMotion, result: Result, output: str) -> A
 def result_parts(result: Result) -> Parts:
     """Condition numbers, and margins where something was asked to be kept."""
     return _tables(result.motions)
+
+
+def invariants_in_words(found: Invariants) -> str:
+    """Figures that are the same whichever columns are called base parameters."""
+    words = (
+        "Whatever is called base parameters: torques at random states within the limits are "
+        f"predicted to {found.torque_deviation:.2g} of the noise of one sample (RMS)"
+    )
+    if found.efficiency is None or found.slack is None:
+        return f"{words}."
+    low = found.efficiency * np.exp(-found.slack)
+    return (
+        f"{words}, and an instant holds {100 * low:.2g} to {100 * found.efficiency:.2g} % of the "
+        "information that freely chosen states could have (D-efficiency)."
+    )
+
+
+def invariants_data(found: Invariants) -> dict[str, Any]:
+    """The same for `--json`; `efficiency` is at most too high by the factor exp(slack)."""
+    return {
+        "torque_deviation": found.torque_deviation,
+        "efficiency": found.efficiency,
+        "efficiency_slack": found.slack,
+    }
 
 
 def motion_table(motions: Sequence[Motion]) -> Table:
