@@ -75,7 +75,7 @@ class OptimizerSpec(Section):
     max_seconds: Positive = Field(30.0, description="per start of a motion")
     max_iterations: Integer = Field(1000, ge=1, le=100_000, description="per start of a motion")
     restarts: Integer = Field(
-        2,
+        4,
         ge=1,
         le=10_000,
         description="starts tried per motion; the better half goes on after three stages of the "

@@ -176,7 +176,7 @@ def _draft(
         else f"so that {pace.slowest}, the slowest joint, can use its range"
     )
     comments["trajectory",] = f"{pace.duration:g} s, {why}"
-    comments["optimizer",] = "per start of a motion; restarts: 8 may find better motions"
+    comments["optimizer",] = "per start of a motion; restarts: 16 may find better motions"
     comments["sequence",] = "each further motion is planned on top of the earlier ones"
     return tree, comments
 
