@@ -64,4 +64,4 @@ def check(
                 progress=lambda done, total: line(f"motion {done + 1}/{total}", done, total),
                 tell=terminal.tell,
             )
-    terminal.show(check_answer(found, str(file)))
+    terminal.show(check_answer(found, str(file), problem))

@@ -93,7 +93,7 @@ def optimize(
       excite optimize ur10.yaml -o ur10.h5 --motions 3 --resume
       excite optimize ur10.yaml -o quick.h5 --set optimizer.max_iterations=20
       excite optimize ur10.yaml -o best.h5 --starts 4 --workers 2
-      excite optimize ur10.yaml -o ur10.h5 --efficiency
+      excite optimize ur10.yaml -o judged.h5 --efficiency
       excite optimize ur10.yaml -o more.h5 --prior ur10.h5
       excite optimize ur10.yaml -o next.h5 --after diagnosis.h5
       excite optimize ur10.yaml -o load.h5 --for payload --fit fit.h5

@@ -161,7 +161,8 @@ def simulate(
     Examples:
       excite simulate ur10.yaml ur10.h5 -o measured.h5 \\
           --effect load_dependent_friction@elbow_joint=0.06
-      excite simulate ur10.yaml ur10.h5 -o loaded.h5 \\
+      excite simulate ur10.yaml ur10.h5 -o loaded.h5 --effect payload@all=1.5
+      excite simulate ur10.yaml ur10.h5 -o mixed.h5 \\
           --effect coulomb_friction@elbow_joint,wrist_1_joint=2 \\
           --effect 'payload@all=1.5;runs:motion_2'
       excite simulate ur10.yaml ur10.h5 -o warm.h5 --repeat 4 --pause 300 \\

@@ -13,7 +13,7 @@ class Outcome:
     """What a solver returns: the best admissible point it saw, as free variables x.
 
     With `last` (where it was when it stopped) and `memory` (its estimate of the curvature) it can
-    go on.
+    go on. `way`: points that it came by, each with more room to the limits than the next.
     """
 
     x: Array
@@ -22,6 +22,7 @@ class Outcome:
     evaluations: int
     last: Array | None = None
     memory: Array | None = None
+    way: tuple[Array, ...] = ()
 
 
 @dataclass(frozen=True, repr=False)

@@ -75,7 +75,7 @@ def solve_start(
         if ended:
             effort = _effort(problem, task, 0)
             outcome = kept_between_instants(run, solver, task.start, outcome, effort, report)
-            outcome = replace(outcome, last=None, memory=None)
+            outcome = replace(outcome, last=None, memory=None, way=())
     except NoAdmissibleMotionError as error:
         return NoAdmissibleMotionError(str(error))
     spectrum = run.objective.spectrum(run.objective.block(run.coefficients(outcome.x)))
@@ -102,6 +102,7 @@ def _solved(run: MotionTask, solver: Solver, task: OneStart, report: ProgressCal
         x=outcome.x if value <= found.value else before.x,
         iterations=before.iterations + outcome.iterations,
         evaluations=before.evaluations + outcome.evaluations,
+        way=(*before.way, *outcome.way),
     )
 
 
@@ -130,8 +131,8 @@ def kept_between_instants(
     """The outcome, corrected until every constraint is proved between the instants.
 
     Where a margin is negative (without certificates: at controller rate) the guard of that column
-    is raised by it, and the solver goes on from the nearest point towards the base motion that has
-    the new guards.
+    is raised by it, and the solver goes on from the nearest point that has the new guards, on the
+    way back that it came by, or else to the base motion.
     """
     problem = task.problem
     began = time.perf_counter()
@@ -145,7 +146,7 @@ def kept_between_instants(
             guard + _GUARD_GROWTH * lack for guard, lack in zip(task.guards, lacking, strict=True)
         ]
         tighter = task.with_guards(guards)
-        inside = _drawn_inside(tighter, outcome.x, start)
+        inside = _drawn_inside(tighter, outcome, start)
         short = Effort(
             max_iterations=max(10, effort.max_iterations // 8),
             max_seconds=max(1.0, effort.max_seconds / 4 - (time.perf_counter() - began)),
@@ -158,6 +159,7 @@ def kept_between_instants(
             again.status if again.status is Status.TIME_LIMIT else outcome.status,
             outcome.iterations + again.iterations,
             outcome.evaluations + again.evaluations,
+            way=outcome.way,
         )
         task = tighter
     raise NoAdmissibleMotionError(
@@ -166,12 +168,19 @@ def kept_between_instants(
     )
 
 
-def _drawn_inside(task: MotionTask, x: Array, start: Start) -> Array:
-    """The point nearest to x on the way to the base motion whose residuals are all positive."""
-    for share in np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 60)]):
-        candidate = x + share * (start.base - x)
-        if all(value.min() > 0 for value in task.values(task.states(candidate))):
-            return candidate
+def _drawn_inside(task: MotionTask, outcome: Outcome, start: Start) -> Array:
+    """A point near the outcome whose residuals are all positive.
+
+    Points that the solver came by are near and have more room; the straight way to standing still
+    may lead through limits nearly to its end, and what is found there shows nothing (two of four
+    seeds of a humanoid on its feet).
+    """
+    x = outcome.x
+    for anchor in (*reversed(outcome.way), start.base):
+        for share in np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 30)]):
+            candidate = x + share * (anchor - x)
+            if all(value.min() > 0 for value in task.values(task.states(candidate))):
+                return np.asarray(candidate)
     raise NoAdmissibleMotionError(
         "Nothing about the start has room any more once the motion is kept clear between instants. "
         "Take a smaller sampling.constraints.step."

@@ -4,17 +4,19 @@ from typing import Any
 
 from excite_cli.excitation.inspection import Inspection
 from excite_cli.excitation.inspections import Inspections
+from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.words import standing_in_words
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.margins import worst_data
+from excite_cli.summary.pairs import pairs_data, pairs_in_words
 
 _CAPTION = "A margin is what is left beyond what the config asks to keep."
 
 
-def check_answer(found: Inspections, file: str) -> Answer:
-    """What `excite check` answers about the motions of `file`."""
+def check_answer(found: Inspections, file: str, problem: Problem) -> Answer:
+    """What `excite check` answers about the motions of `file`, within the limits of `problem`."""
     data = {
         "file": file,
         "ok": not found.violations,
@@ -22,8 +24,11 @@ def check_answer(found: Inspections, file: str) -> Answer:
         "rate": found.look.rate,
         "random": found.look.random,
         "slow": found.slow,
+        "pairs": pairs_data(problem),
     }
-    return Answer(tuple(inspections_parts(found)), data, good=not found.violations)
+    parts = inspections_parts(found)
+    parts[-1:-1] = pairs_in_words(problem)
+    return Answer(tuple(parts), data, good=not found.violations)
 
 
 def inspections_parts(found: Inspections) -> Parts:

@@ -16,6 +16,7 @@ from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.margins import worst_data
+from excite_cli.summary.pairs import pairs_data, pairs_in_words
 from excite_cli.summary.problem import problem_parts
 from excite_cli.trajectory.chain import Segment
 
@@ -34,8 +35,10 @@ def plan_answer(
     data = {
         "motions": [motion_data(m) for m in result.motions],
         "criterion": criterion_data(model),
+        "pairs": pairs_data(model),
         "output": output,
     }
+    parts[-1:-1] = pairs_in_words(model)
     if model.spec.criterion.of == "robot" and result.motions:
         found = invariants(model, result.stack, design_for(model) if efficiency else None)
         data.update(invariants_data(found))

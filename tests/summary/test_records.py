@@ -136,9 +136,11 @@ def test_answers_are_json(problem: Problem, result: Result) -> None:
     compared = compare_random(problem, result, candidates=2, seconds=0)
     answers: list[Answer] = [
         plan_answer(problem, result, "arm.h5"),
-        check_answer(found, "arm.h5"),
+        check_answer(found, "arm.h5", problem),
         comparison_answer(compared, None),
     ]
     for answer in answers:
         assert json.loads(json.dumps(answer.data)).keys() == answer.data.keys()
         assert answer.good
+    assert answers[1].data["pairs"]["kept_apart"] == 7
+    assert answers[1].data["pairs"]["not_kept_apart"] == []

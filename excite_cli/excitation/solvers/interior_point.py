@@ -120,16 +120,20 @@ class _Run:
     def stages(self, x: Array) -> Outcome:
         steps = self.task.problem.criterion.continuation()
         status = Status.CONVERGED
+        way: list[Array] = []
         wanted = list(enumerate(_STAGES))[self.effort.first : self.effort.last]
         for number, (mu, step, change) in wanted:
             criterion = steps[min(step, len(steps) - 1)]
             change = max(change, self.effort.tolerance)
             stage = Stage(number + 1, len(_STAGES), mu)
             x, status = self.stage(x, criterion, mu, change, stage)
+            way.append(x)
             if status.is_limit:
                 break
         assert self.best_x is not None
-        return Outcome(self.best_x, status, self.iterations, self.task.evaluations, x, self.hessian)
+        return Outcome(
+            self.best_x, status, self.iterations, self.task.evaluations, x, self.hessian, tuple(way)
+        )
 
     def stage(
         self, x: Array, criterion: Criterion, mu: float, change: float, stage: Stage
