@@ -9,8 +9,10 @@ from excite_cli.config.load import load_spec
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.given_start import start_from
+from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.planned_prior import planned_stack
 from excite_cli.excitation.problem import build_problem
+from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.start import random_start
 from excite_cli.excitation.task import MotionTask
 from excite_cli.trajectory.bspline import BSplineTrajectory
@@ -107,3 +109,27 @@ def test_a_planned_motion_is_stacked_as_the_motion_that_it_is() -> None:
     wanted = block.T @ block
     assert stack.factor.T @ stack.factor == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max())
     assert words == "6 s of motion, 60 samples every 0.1 s (as the cost grid)"
+
+
+@pytest.mark.parametrize("restarts", [1, 3])
+def test_a_good_motion_is_gone_on_with(restarts: int) -> None:
+    """The search does not begin at a high barrier with it, which would make it a random start."""
+    problem = build_problem(
+        load_spec(CONFIG, ["sequence.motions=1", f"optimizer.restarts={restarts}"]), CONFIG.parent
+    )
+
+    def planned(starts: list[Segment]) -> Motion:
+        told = continue_run(
+            problem,
+            new_result(problem, [], {}),
+            lambda index: lambda progress: None,
+            lambda step, result: None,
+            starts=starts,
+        )
+        return told.motions[0]
+
+    first = planned([])
+    again = planned([Segment("first", problem.trajectory, first.coefficients)])
+    assert again.condition_number < 1.02 * first.condition_number
+    if restarts == 1:
+        assert again.iterations < 0.8 * first.iterations
