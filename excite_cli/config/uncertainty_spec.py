@@ -6,15 +6,18 @@ from excite_cli.config.section import NonNegative, Positive, Section
 
 
 class BodyUncertaintySpec(Section):
-    """Bounds on the ten parameters of a body, as a box around those of the URDF.
+    """Bounds on mass, centre of mass and inertia of a body, around those of the URDF.
 
-    With m the mass of the body: |δm| ≤ mass·m, |δ(m c_k)| ≤ m·center_of_mass + mass·|m c_k|, and
-    |δI_kl| ≤ inertia·(I_kk + I_ll)/2 about the joint frame.
+    The mass is m₀(1 ± mass), the centre c₀ ± center_of_mass along each axis, and the inertia about
+    the centre of mass I_kl ± inertia·(I_kk + I_ll)/2. All such bodies are within the box of the ten
+    parameters about the joint frame for which limits are kept.
     """
 
     mass: NonNegative = Field(0.1, description="share of the mass")
     center_of_mass: NonNegative = Field(0.01, description="[m] along each axis")
-    inertia: NonNegative = Field(0.1, description="share of the moments of inertia")
+    inertia: NonNegative = Field(
+        0.1, description="share of the moments of inertia about the centre"
+    )
 
 
 class UncertaintySpec(BodyUncertaintySpec):

@@ -304,12 +304,53 @@ def box(spec: UncertaintySpec, robot: Robot) -> Array:
 
 
 def half_widths(ten: Array, bound: BodyUncertaintySpec) -> Array:
-    """ρ (10,) of one body with parameters `ten` (10,)."""
-    mass, moments = abs(float(ten[0])), np.abs(ten[[4, 6, 9]])
-    pairs = (0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)
-    inertia = [bound.inertia * (moments[k] + moments[j]) / 2 for k, j in pairs]
-    first = mass * bound.center_of_mass + bound.mass * np.abs(ten[1:4])
-    return np.concatenate([[bound.mass * mass], first, inertia])
+    """ρ (10,) of one body with parameters `ten` (10,): the least box that holds all such bodies.
+
+    m ∈ m₀(1 ± μ), c ∈ c₀ ± δ, inertia about the centre ± ι; then δ(m c) and the parallel axis
+    m (|c|² 1 − c cᵀ) have products of two and three uncertain numbers, taken by intervals.
+    """
+    mass = abs(float(ten[0]))
+    center = ten[1:4] / ten[0] if mass > 0 else np.zeros(3)
+    low, high = max(1.0 - bound.mass, 0.0) * mass, (1.0 + bound.mass) * mass
+    shift = bound.center_of_mass
+    squares = np.array(
+        [np.maximum(np.abs(center) - shift, 0.0) ** 2, (np.abs(center) + shift) ** 2]
+    )
+    first = high * shift + bound.mass * mass * np.abs(center)
+    axis = _second_moment(center)
+    about = np.abs(np.diag(_matrix(ten[4:]) - mass * (np.trace(axis) * np.eye(3) - axis)))
+    widths = []
+    for k, j in _PAIRS:
+        own = bound.inertia * (about[k] + about[j]) / 2
+        if k == j:
+            others = [i for i in range(3) if i != k]
+            least, most = (squares[side, others].sum() for side in (0, 1))
+            nominal = float(np.square(center[others]).sum())
+            parallel = max(high * most - mass * nominal, mass * nominal - low * least)
+        else:
+            ends = [
+                (center[k] + a * shift) * (center[j] + b * shift) for a in (-1, 1) for b in (-1, 1)
+            ]
+            products = [m * end for m in (low, high) for end in ends]
+            parallel = max(abs(product - mass * center[k] * center[j]) for product in products)
+        sure = bound.mass == bound.center_of_mass == 0.0  # or rounding would be left
+        widths.append(own + (0.0 if sure else parallel))
+    return np.concatenate([[bound.mass * mass], first, widths])
+
+
+_PAIRS = (0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)  # order of Ixx, Ixy, Iyy, Ixz, Iyz, Izz
+
+
+def _second_moment(center: Array) -> Array:
+    return np.asarray(np.outer(center, center))
+
+
+def _matrix(six: Array) -> Array:
+    """The symmetric matrix (3, 3) of Ixx, Ixy, Iyy, Ixz, Iyz, Izz."""
+    found = np.zeros((3, 3))
+    for value, (k, j) in zip(six, _PAIRS, strict=True):
+        found[k, j] = found[j, k] = value
+    return found
 
 
 def _known(robot: Robot, base: BaseParameters, fit: FitKnowledge) -> tuple[Array, Array, Array]:
