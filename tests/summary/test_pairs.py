@@ -1,12 +1,19 @@
 """Verdicts say of how many pairs they speak, and which are left out."""
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
 from excite_cli.api.loading import load_problem
 from excite_cli.geometry.reasons import Why
-from excite_cli.summary.pairs import kept_apart, pairs_data, pairs_in_words, unjudged
+from excite_cli.summary.pairs import (
+    kept_apart,
+    not_guarded,
+    pairs_data,
+    pairs_in_words,
+    unjudged,
+)
 
 SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 
@@ -45,3 +52,20 @@ def test_a_payload_of_impossible_size_is_not_passed_over(radius: float) -> None:
     told = " ".join(pairs_in_words(problem))
     assert "payload" in told
     assert "always in contact" in told
+
+
+def test_links_without_shapes_are_told(tmp_path: Path) -> None:
+    text = (SMOKE.parents[1] / "data" / "smoke_arm.urdf").read_text(encoding="utf-8")
+    root = ElementTree.fromstring(text)
+    for link in root.findall("link"):
+        if link.get("name") == "forearm":
+            for shape in link.findall("collision"):
+                link.remove(shape)
+    (tmp_path / "arm.urdf").write_text(ElementTree.tostring(root, encoding="unicode"))
+    problem = load_problem(SMOKE, [f"robot.urdf={tmp_path / 'arm.urdf'}"])
+    assert not_guarded(problem) == ["elbow"]
+    told = pairs_in_words(problem)
+    assert "NOT GUARDED: what moves with elbow (forearm" in told[0]
+    assert "speak of" in told[1]
+    assert pairs_data(problem)["not_guarded"] == ["elbow"]
+    assert pairs_data(load_problem(SMOKE))["not_guarded"] == []
