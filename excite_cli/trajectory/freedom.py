@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from excite_cli.config.trajectory_spec import BSplineSpec, FourierSpec
-from excite_cli.robot.model import Array
+from excite_cli.trajectory.base import Array
 
 # Below the first resonances of arms and the cutoffs of their controllers.
 _FASTEST = 1.5  # Hz
