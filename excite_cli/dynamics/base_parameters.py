@@ -73,11 +73,12 @@ class BaseParameters:
         if not self.tilted:
             return ""
         angles = "angles that are" if len(self.tilted) > 1 else "an angle that is"
+        count = f"{self.hidden} more" if self.hidden else "some more"
         return (
             f"{', '.join(self.tilted)}: turned by {angles} right but for decimals, which show "
-            f"{self.hidden} more base parameter{'s' if self.hidden > 1 else ''} by less than a "
-            f"thousandth; treated as not identifiable. Write pi/2 in full (1.5707963267948966) to "
-            "be rid of this note."
+            f"{count} base parameter{'' if self.hidden == 1 else 's'} by rounding alone; treated "
+            "as not identifiable. Write multiples of pi/2 in full (1.5707963267948966) to be rid "
+            "of this note."
         )
 
     def in_words(self, digits: int = 3) -> tuple[str, ...]:

@@ -317,8 +317,8 @@ def half_widths(ten: Array, bound: BodyUncertaintySpec) -> Array:
         [np.maximum(np.abs(center) - shift, 0.0) ** 2, (np.abs(center) + shift) ** 2]
     )
     first = high * shift + bound.mass * mass * np.abs(center)
-    axis = _second_moment(center)
-    about = np.abs(np.diag(_matrix(ten[4:]) - mass * (np.trace(axis) * np.eye(3) - axis)))
+    parallel_axis = mass * (center @ center - np.square(center))
+    about = np.abs(ten[[4, 6, 9]] - parallel_axis)
     widths = []
     for k, j in _PAIRS:
         own = bound.inertia * (about[k] + about[j]) / 2
@@ -339,18 +339,6 @@ def half_widths(ten: Array, bound: BodyUncertaintySpec) -> Array:
 
 
 _PAIRS = (0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)  # order of Ixx, Ixy, Iyy, Ixz, Iyz, Izz
-
-
-def _second_moment(center: Array) -> Array:
-    return np.asarray(np.outer(center, center))
-
-
-def _matrix(six: Array) -> Array:
-    """The symmetric matrix (3, 3) of Ixx, Ixy, Iyy, Ixz, Iyz, Izz."""
-    found = np.zeros((3, 3))
-    for value, (k, j) in zip(six, _PAIRS, strict=True):
-        found[k, j] = found[j, k] = value
-    return found
 
 
 def _known(robot: Robot, base: BaseParameters, fit: FitKnowledge) -> tuple[Array, Array, Array]:

@@ -29,8 +29,8 @@ _MOVED, _TRIES = 60, 12
 class FreeDesign:
     """Information (r, r) of one instant, and by how much the best could exceed it.
 
-    `slack`: max d / r − 1 over all states that were tried; det M^(1/r) of any design over them is
-    at most exp(slack) times that of this one (log det is concave).
+    `slack`: max d / r − 1 over its own states and those tried last; det M^(1/r) of any design over
+    them is at most exp(slack) times that of this one (log det is concave).
     """
 
     information: Array
@@ -70,15 +70,13 @@ def free_design(
         used = weights > _UNUSED
         states, y, weights = states[used], y[used], weights[used] / weights[used].sum()
         information = _information(y, weights)
-        if round_ == _ROUNDS - 1:
-            break
         moved = _moved(rng, states, weights, lower, upper)
         there = rows_of(moved)
         gain = _sensitivity(there, information)
         slack = max(float(gain.max()), float(_sensitivity(y, information).max())) / base.rank - 1.0
         better = np.argsort(-gain)[: len(states)]
         better = better[gain[better] > base.rank]
-        if not len(better):
+        if round_ == _ROUNDS - 1 or not len(better):
             break
         share = 0.1 / len(better)
         states = np.concatenate([states, moved[better]])
