@@ -32,6 +32,9 @@ NEAR = 0.02  # [m] pairs that stay farther apart are summarised
 _ALWAYS = 0.99  # share of random postures in contact
 _SAMPLES = 200
 _BLOCK = 4000
+_BESIDE, _MOST_SPARE = 8, 0.004  # instants, [m]
+_LENGTHS = (64, 8)  # instants that are cleared at once
+_SELDOM = 10  # of the instants, for pairs that touch at the posture
 _ROUNDING = 1e-6  # [m] that coal's answer may be off
 _SPARE = 0.002  # [m]
 
@@ -41,7 +44,8 @@ class MeshGap:
     """The least distance [m] of the meshes of two links along a motion.
 
     index: of the instant where it occurs; touching: instants at which the meshes touch; standing:
-    whether contact breaks the motion, else why it does not.
+    whether contact breaks the motion, else why it does not. What touches at the posture is looked at
+    at every tenth instant.
     """
 
     first: str
@@ -129,12 +133,18 @@ class MeshCheck:
         """The least distance of every pair that comes nearer than `near` [m] at q (T, n)."""
         running = [_Running(near) for _ in self.pairs]
         for begin in range(0, len(q), _BLOCK):
-            poses = Poses.of(self._robot, q[begin : begin + _BLOCK])
+            some = q[begin : begin + _BLOCK]
+            poses = Poses.of(self._robot, some)
+            stretches = [_Stretches(self._reach, some, poses, length) for length in _LENGTHS]
+            seldom = (begin + np.arange(len(some))) % _SELDOM == 0
             balls = ball_bounds(poses, self.meshes, self._indices(self.pairs))
             for p in np.flatnonzero(balls.min(axis=1) <= near):
-                self._follow(
-                    running[p], self.pairs[p], q[begin : begin + _BLOCK], poses, balls[p], begin
-                )
+                pair = self.pairs[p]
+                open_ = balls[p] <= running[p].limit
+                open_ = open_ & seldom if pair.standing is Standing.AT_POSTURE else open_
+                for stretch in stretches:
+                    open_ = stretch.left(self._both(pair), open_, running[p].limit)
+                self._follow(running[p], pair, some, poses, open_, begin)
         found = []
         for pair, state in zip(self.pairs, running, strict=True):
             if state.index >= 0:
@@ -205,7 +215,7 @@ class MeshCheck:
             if reach is not None:
                 moved[p] = reach[:, pair.first] + reach[:, pair.second]
             if turned is not None:
-                both = (self.meshes[pair.first], self.meshes[pair.second])
+                both = self._both(pair)
                 np.minimum(moved[p], turned.between(*both), out=moved[p])
         return moved
 
@@ -216,7 +226,7 @@ class MeshCheck:
 
         `bounds` (K,) are those of the balls, `needed` (K,) [m] what proves the pair apart.
         """
-        both = (self.meshes[pair.first], self.meshes[pair.second])
+        both = self._both(pair)
         bounds = np.maximum(bounds[at], hull_bounds(poses, both, at, needed[at]))
         meshes = self._meshes(pair.first, pair.second)
         for k in np.flatnonzero(bounds <= needed[at]).tolist():
@@ -225,11 +235,11 @@ class MeshCheck:
         return bounds
 
     def _follow(
-        self, state: "_Running", pair: MeshPair, q: Array, poses: Poses, balls: Array, begin: int
+        self, state: "_Running", pair: MeshPair, q: Array, poses: Poses, open_: Mask, begin: int
     ) -> None:
-        """Bring the least distance of a pair up to date with another block of instants."""
-        instants = np.flatnonzero(balls <= state.limit)
-        both = (self.meshes[pair.first], self.meshes[pair.second])
+        """Bring the least distance of a pair up to date with those of a block of instants."""
+        instants = np.flatnonzero(open_)
+        both = self._both(pair)
         bounds = hull_bounds(poses, both, instants, np.full(len(instants), state.limit))
         near = bounds <= state.limit
         instants, bounds = instants[near], np.maximum(bounds[near], 0.0)
@@ -248,9 +258,14 @@ class MeshCheck:
                 break
             if cleared[k]:
                 continue
-            slow = k + 1 < len(path) and path[k + 1] - path[k] < _SPARE / 2
             cap = max(state.limit - _ROUNDING, _ROUNDING)
-            distance = meshes.distance(poses, int(instants[k]), cap + _SPARE if slow else cap)
+            if state.least <= 0.0 and not pair.judged:  # how deep is of no interest
+                state.touching += meshes.touch(poses, int(instants[k]))
+                continue
+            # A distance a little beyond the cap costs more, and clears the instants beside it.
+            beside = path[min(k + _BESIDE, len(path) - 1)] - path[max(k - _BESIDE, 0)]
+            spare = min(beside / 2, _MOST_SPARE)
+            distance = meshes.distance(poses, int(instants[k]), cap + spare)
             if distance < cap:
                 state.add(distance, begin + int(instants[k]))
             # The distance changes by no more than the links move towards each other.
@@ -263,6 +278,9 @@ class MeshCheck:
         if (first, second) not in self._coal:
             self._coal[first, second] = PairMeshes(self.meshes[first], self.meshes[second])
         return self._coal[first, second]
+
+    def _both(self, pair: MeshPair) -> tuple[LinkMesh, LinkMesh]:
+        return self.meshes[pair.first], self.meshes[pair.second]
 
     @staticmethod
     def _indices(pairs: tuple[MeshPair, ...]) -> Indices:
@@ -299,6 +317,27 @@ class MeshCheck:
         for t in instants[hulls <= 0.0].tolist():
             touching[t] = meshes.touch(poses, t)
         return touching
+
+
+class _Stretches:
+    """The instants of q (T, n) in stretches of `length`, each judged by the one in its middle."""
+
+    def __init__(self, reach: RelativeReach, q: Array, poses: Poses, length: int) -> None:
+        first = np.arange(0, len(q), length)
+        self._stretch = np.arange(len(q)) // length
+        self._middles = np.minimum(first + length // 2, len(q) - 1)
+        change = np.abs(q - q[self._middles[self._stretch]])
+        self._poses = poses.at(self._middles)
+        self._reach = reach.at(self._poses, np.maximum.reduceat(change, first, axis=0))
+
+    def left(self, both: tuple[LinkMesh, LinkMesh], open_: Mask, limit: float) -> Mask:
+        """Those of the open instants in stretches where the links may come within `limit` [m]."""
+        asked = np.unique(self._stretch[open_])
+        moved = self._reach.between(*both)[asked]
+        apart = hull_bounds(self._poses, both, asked, limit + moved) - moved > limit
+        cleared = np.zeros(len(self._middles), dtype=bool)
+        cleared[asked[apart]] = True
+        return np.asarray(open_ & ~cleared[self._stretch])
 
 
 class _Running:
