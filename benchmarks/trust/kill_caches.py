@@ -10,15 +10,15 @@ import numpy as np
 
 from benchmarks.trust.kill_trial import Tally
 
-_KEY = "0" * 32
+_KEY, _OTHER = "0" * 32, "1" * 32
 _LONGEST = 0.15  # s
-_LEFT = re.compile(r"\.(capsules|meshes)-0+\.(json|npz)\.(lock|[a-z0-9_]{8}\.part)")
+_LEFT = re.compile(r"\.meshes-[01]+\.npz\.(lock|[a-z0-9_]{8}\.part)")
 
 
 def kill_caches(folder: Path, kills: int, seed: int) -> Tally:
     """Kill `kills` processes that write both caches in turn; what is read is whole or nothing."""
     from excite_cli.geometry.capsule_cache import store_capsules, stored_capsules
-    from excite_cli.geometry.table_cache import store_arrays, stored_arrays
+    from excite_cli.geometry.disk_cache import store_arrays, stored_arrays
     from excite_cli.robot.capsule import Capsule
 
     rng, tally = np.random.default_rng(seed), Tally()
@@ -31,16 +31,16 @@ def kill_caches(folder: Path, kills: int, seed: int) -> Tally:
         process = os.fork()
         if not process:
             while True:
-                store_capsules(_KEY, capsules)
+                store_capsules(_OTHER, capsules)
                 store_arrays(_KEY, arrays)
-                for each in inner.glob("[cm]*"):
+                for each in inner.glob("m*"):
                     each.unlink()
         time.sleep(float(rng.uniform(0.0, _LONGEST)))
         os.kill(process, signal.SIGKILL)
         os.waitpid(process, 0)
         tally.kills += 1
-        found, read = stored_capsules(_KEY), stored_arrays(_KEY)
-        paths = (inner / f"capsules-{_KEY}.json", inner / f"meshes-{_KEY}.npz")
+        found, read = stored_capsules(_OTHER), stored_arrays(_KEY)
+        paths = (inner / f"meshes-{_OTHER}.npz", inner / f"meshes-{_KEY}.npz")
         for path, content in zip(paths, (found, read), strict=True):
             if path.exists() and content is None:
                 tally.broken.append(f"{path.name} is broken")
@@ -61,10 +61,10 @@ def kill_caches(folder: Path, kills: int, seed: int) -> Tally:
         tally.writing += any(name.endswith(".part") for name in left)
         tally.broken += [f"{name} was left" for name in left if not _LEFT.fullmatch(name)]
     left = len(list(inner.glob(".*.part")))
-    store_capsules(_KEY, capsules)
+    store_capsules(_OTHER, capsules)
     store_arrays(_KEY, arrays)
     over = [each.name for each in inner.iterdir() if each.name.startswith(".")]
-    if over or stored_capsules(_KEY) is None or stored_arrays(_KEY) is None:
+    if over or stored_capsules(_OTHER) is None or stored_arrays(_KEY) is None:
         tally.broken.append(f"left after the last run: {', '.join(over)}")
     tally.swept, tally.finished = left, 1
     return tally

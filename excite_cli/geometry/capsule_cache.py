@@ -1,36 +1,23 @@
-"""Capsules on disk, so that a robot is fitted once.
-
-One JSON file per robot in the user's cache folder. A file that is missing, damaged or foreign is
-the same as none; a folder that cannot be written is no error.
-"""
+"""Fitted capsules on disk, under a key of all that decides the fit."""
 
 import hashlib
 import json
 import os
 from collections.abc import Collection, Iterable
-from pathlib import Path
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
 
-from excite_cli.atomic import write_text_atomically
-from excite_cli.errors import FileError
+from excite_cli.geometry.disk_cache import store_arrays, stored_arrays
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 
-_VERSION = 1  # raise when the fit changes
-
-
-def cache_folder() -> Path:
-    """Folder of the program's cache: `$XDG_CACHE_HOME/excite` or `~/.cache/excite`."""
-    given = os.environ.get("XDG_CACHE_HOME", "")
-    root = Path(given) if Path(given).is_absolute() else Path("~/.cache").expanduser()
-    return root / "excite"
+_VERSION = 2  # raise when the fit changes
 
 
 def capsule_key(robot: Robot, geometry: pin.GeometryModel, apart: Collection[str]) -> str:
-    """Hash of all that decides a fit: URDF, meshes on disk, where links sit on their joints."""
+    """Hash of all that decides a fit: URDF, content of meshes, where links sit on their joints."""
     digest = hashlib.sha256(f"{_VERSION}|{sorted(apart)}|{robot.description.sha256}".encode())
     for item in geometry.geometryObjects:
         frame = robot.model.frames[item.parentFrame]
@@ -38,50 +25,44 @@ def capsule_key(robot: Robot, geometry: pin.GeometryModel, apart: Collection[str
         digest.update(np.round(item.placement.homogeneous, 9).tobytes())
         if os.path.isfile(item.meshPath):
             state = os.stat(item.meshPath)
-            digest.update(f"|{state.st_size}|{state.st_mtime_ns}".encode())
+            digest.update(_content(item.meshPath, state.st_size, state.st_mtime_ns))
     return digest.hexdigest()
+
+
+@lru_cache(maxsize=1024)
+def _content(path: str, size: int, changed: int) -> bytes:
+    """Hash of a file; its size and time only say when a process has to read it again."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").digest()
 
 
 def stored_capsules(key: str) -> list[Capsule] | None:
     """Capsules stored under `key`, or None."""
+    found = stored_arrays(key)
+    if found is None:
+        return None
     try:
-        content = json.loads(_path(key).read_text(encoding="utf-8"))
-        if content["key"] != key:
-            return None
-        return [_capsule(record) for record in content["capsules"]]
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError, RecursionError):
+        columns = zip(*(found[name].tolist() for name in ("names", "joints")), strict=True)
+        named = [(*json.loads(text), joint) for text, joint in columns]
+        numbers = zip(found["starts"], found["ends"], found["radii"], strict=True)
+        return [
+            Capsule(name, joint, np.array(start), np.array(end), float(radius), tuple(links))
+            for (name, links, joint), (start, end, radius) in zip(named, numbers, strict=True)
+        ]
+    except (KeyError, TypeError, ValueError):  # no capsules of ours
         return None
 
 
 def store_capsules(key: str, capsules: Iterable[Capsule]) -> None:
-    """Write capsules under `key`, whole or not at all."""
-    records = [
+    """Keep capsules under `key`."""
+    all_ = list(capsules)
+    store_arrays(
+        key,
         {
-            "name": capsule.name,
-            "joint": capsule.joint,
-            "start": capsule.start.tolist(),
-            "end": capsule.end.tolist(),
-            "radius": capsule.radius,
-            "links": list(capsule.links),
-        }
-        for capsule in capsules
-    ]
-    text = json.dumps({"key": key, "capsules": records})
-    try:
-        write_text_atomically(_path(key), text)
-    except (FileError, RuntimeError):
-        return
-
-
-def _path(key: str) -> Path:
-    return cache_folder() / f"capsules-{key[:32]}.json"
-
-
-def _capsule(record: Any) -> Capsule:
-    start = np.array(record["start"], dtype=float)
-    end = np.array(record["end"], dtype=float)
-    radius = float(record["radius"])
-    if start.shape != (3,) or end.shape != (3,) or not np.isfinite([*start, *end, radius]).all():
-        raise ValueError("not a capsule")
-    links = tuple(str(link) for link in record["links"])
-    return Capsule(str(record["name"]), int(record["joint"]), start, end, radius, links)
+            "names": np.array([json.dumps([c.name, c.links]) for c in all_], dtype=np.str_),
+            "joints": np.array([c.joint for c in all_]),
+            "starts": np.array([c.start for c in all_]),
+            "ends": np.array([c.end for c in all_]),
+            "radii": np.array([c.radius for c in all_]),
+        },
+    )

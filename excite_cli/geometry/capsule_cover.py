@@ -14,6 +14,7 @@ from excite_cli.geometry.capsule_fit import (
     hull_points,
     minimum_volume_capsule,
     quick_capsule_volume,
+    segment_distances,
     sphere_points,
 )
 from excite_cli.geometry.link_shapes import LinkShape
@@ -118,15 +119,9 @@ def _bulge(fit: Fit, inside: tuple[Fit, ...]) -> float:
     start, end, radius = fit
     surface = np.vstack([start + radius * _SPHERE, end + radius * _SPHERE])
     surface = np.vstack([surface, (start + end) / 2 + radius * _SPHERE])
-    surface = surface[_distance(surface, start, end) > 0.99 * radius]
-    gaps = [_distance(surface, low, high) - r for low, high, r in inside]
+    surface = surface[segment_distances(surface, start, end) > 0.99 * radius]
+    gaps = [segment_distances(surface, low, high) - r for low, high, r in inside]
     return float(np.min(gaps, axis=0).max())
-
-
-def _distance(points: Array, start: Array, end: Array) -> Array:
-    along = end - start
-    share = np.clip((points - start) @ along / max(float(along @ along), 1e-18), 0.0, 1.0)
-    return np.linalg.norm(points - start - share[:, None] * along, axis=1)
 
 
 def _pieces(shape: LinkShape, fit: Fit) -> list[Fit]:
@@ -180,7 +175,7 @@ class _Outside:
         places, heights, room = self._sample
         inside = np.zeros(len(places), dtype=bool)
         for start, end, radius in cover:
-            inside |= _distance(places, start, end) <= radius
+            inside |= segment_distances(places, start, end) <= radius
         return room * float((heights + 0.01)[inside].sum())
 
 

@@ -196,7 +196,7 @@ def _refined(points: Array, capsule: tuple[Array, Array, float]) -> tuple[Array,
         if not np.isfinite(solution).all():
             break
         start, end, radius = solution[:3], solution[3:6], float(solution[6])
-        distance = _distances(points, start, end)
+        distance = segment_distances(points, start, end)
         repaired = _repair(points, start, end, radius)
         if capsule_volume(*repaired) < capsule_volume(*capsule):
             capsule = repaired
@@ -209,7 +209,7 @@ def _refined(points: Array, capsule: tuple[Array, Array, float]) -> tuple[Array,
 
 def _touching(points: Array, capsule: tuple[Array, Array, float], count: int = 40) -> NDArray:
     """Mask of the points nearest to the capsule's surface: those that a small change can touch."""
-    distance = _distances(points, capsule[0], capsule[1])
+    distance = segment_distances(points, capsule[0], capsule[1])
     mask = np.zeros(len(points), dtype=bool)
     mask[np.argsort(-distance)[:count]] = True
     mask[np.argmax(points @ sphere_points(30).T, axis=0)] = True
@@ -239,12 +239,13 @@ def _nearest(points: Array, start: Array, end: Array) -> tuple[Array, Array]:
     return share, points - start - share[:, None] * along
 
 
-def _distances(points: Array, start: Array, end: Array) -> Array:
+def segment_distances(points: Array, start: Array, end: Array) -> Array:
+    """Distances (N,) [m] of points (N, 3) from the segment from `start` to `end`, (3,) each."""
     return np.linalg.norm(_nearest(points, start, end)[1], axis=1)
 
 
 def _margins(x: Array, points: Array) -> Array:
-    return x[6] - _distances(points, x[:3], x[3:6])
+    return x[6] - segment_distances(points, x[:3], x[3:6])
 
 
 def _margins_jacobian(x: Array, points: Array) -> Array:

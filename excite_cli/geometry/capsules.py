@@ -14,11 +14,14 @@ from excite_cli.config.constraints_spec import CapsuleSpec, SelfCollisionSpec
 from excite_cli.errors import ConfigError, RobotError, nearest
 from excite_cli.geometry.capsule_cache import capsule_key, store_capsules, stored_capsules
 from excite_cli.geometry.capsule_cover import cover
-from excite_cli.geometry.link_shapes import collision_model, link_shapes
+from excite_cli.geometry.capsule_fit import segment_distances
+from excite_cli.geometry.link_shapes import collision_model, link_corners, link_shapes
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 
 __all__ = ["Capsule", "fit_capsules", "link_joints"]
+
+_INSIDE = 1e-9  # [m], rounding of a corner that a capsule touches
 
 
 def fit_capsules(
@@ -93,7 +96,20 @@ def _fitted(robot: Robot, apart: set[str]) -> list[Capsule]:
     geometry = collision_model(robot)
     key = capsule_key(robot, geometry, apart)
     capsules = stored_capsules(key)
-    if capsules is None:
+    if capsules is None or not _contained(robot, geometry, capsules):
         capsules = cover(link_shapes(robot, geometry), apart)
         store_capsules(key, capsules)
     return capsules
+
+
+def _contained(robot: Robot, geometry: pin.GeometryModel, capsules: list[Capsule]) -> bool:
+    """Whether every corner of every link lies in a capsule of that link.
+
+    What comes from disk is measured before proofs rest on it.
+    """
+    for link, joint, points in link_corners(robot, geometry):
+        of_link = [c for c in capsules if link in c.links and c.joint == joint]
+        depths = [c.radius - segment_distances(points, c.start, c.end) for c in of_link]
+        if not depths or np.max(depths, axis=0).min() < -_INSIDE:
+            return False
+    return True

@@ -6,6 +6,7 @@ kept so that a shape can be cut by a plane: the corners on one side and the plac
 cross it span all of the solid on that side.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -139,15 +140,27 @@ def _geometry(
 def link_shapes(robot: Robot, geometry: pin.GeometryModel) -> tuple[LinkShape, ...]:
     """One shape per link with collision geometry, ordered by joint."""
     shapes: dict[str, LinkShape] = {}
-    for item in geometry.geometryObjects:
-        link = str(robot.model.frames[item.parentFrame].name)
-        points = _corners(item, robot)
-        points = points @ item.placement.rotation.T + item.placement.translation
+    for item, link, points in _placed(robot, geometry):
         shape = LinkShape((link,), int(item.parentJoint), points, _edges(item.geometry, points))
         known = shapes.get(link)
         joined = known.joined(shape) if known is not None else shape
         shapes[link] = LinkShape((link,), joined.joint, joined.points, joined.edges)
     return tuple(sorted(shapes.values(), key=lambda shape: shape.joint))
+
+
+def link_corners(robot: Robot, geometry: pin.GeometryModel) -> Iterator[tuple[str, int, Array]]:
+    """Link, joint that carries it and corners (N, 3) [m] in the joint frame, of every shape."""
+    for item, link, points in _placed(robot, geometry):
+        yield link, int(item.parentJoint), points
+
+
+def _placed(
+    robot: Robot, geometry: pin.GeometryModel
+) -> Iterator[tuple[pin.GeometryObject, str, Array]]:
+    for item in geometry.geometryObjects:
+        link = str(robot.model.frames[item.parentFrame].name)
+        points = _corners(item, robot)
+        yield item, link, points @ item.placement.rotation.T + item.placement.translation
 
 
 def _corners(item: pin.GeometryObject, robot: Robot) -> Array:

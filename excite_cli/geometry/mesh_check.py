@@ -44,7 +44,7 @@ class MeshGap:
     """The least distance [m] of the meshes of two links along a motion.
 
     index: of the instant where it occurs; touching: instants at which the meshes touch; standing:
-    whether contact breaks the motion, else why it does not. What touches at the posture is looked at
+    whether contact breaks the motion, else why it does not. What touches at the posture is looked
     at every tenth instant.
     """
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from excite_cli.errors import RobotError
 from excite_cli.geometry.capsule_cache import capsule_key
+from excite_cli.geometry.disk_cache import store_arrays, stored_arrays
 from excite_cli.geometry.link_shapes import collision_model
 from excite_cli.geometry.reasons import LinksApart, Reason, Why
-from excite_cli.geometry.table_cache import store_arrays, stored_arrays
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 

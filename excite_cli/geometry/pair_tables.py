@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from excite_cli.errors import ConfigError
 from excite_cli.geometry.capsule_cache import capsule_key
 from excite_cli.geometry.collision_pairs import CollisionPairs
+from excite_cli.geometry.disk_cache import store_arrays, stored_arrays
 from excite_cli.geometry.hull_bounds import hull_bounds
 from excite_cli.geometry.link_meshes import LinkMesh, Poses, link_meshes
 from excite_cli.geometry.link_shapes import collision_model
@@ -25,7 +26,6 @@ from excite_cli.geometry.mesh_pairs import PairMeshes, joined_links, movable_pai
 from excite_cli.geometry.pair_distances import carried_bodies
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.geometry.reasons import NEVER
-from excite_cli.geometry.table_cache import store_arrays, stored_arrays
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 

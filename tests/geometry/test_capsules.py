@@ -1,4 +1,5 @@
-import json
+import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from excite_cli.config.constraints_spec import CapsuleSpec, SelfCollisionSpec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.geometry import capsules as module
+from excite_cli.geometry.capsule_cache import _content, capsule_key, store_capsules
 from excite_cli.geometry.capsules import fit_capsules, link_joints
 from excite_cli.geometry.link_shapes import collision_model, link_shapes
 from excite_cli.robot.model import build_robot
@@ -134,30 +136,105 @@ def test_primitives(tmp_path: Path, geometry: str, radius: float, length: float)
     np.testing.assert_allclose((capsule.start + capsule.end) / 2, [0.3, 0, 0], atol=2e-3)
 
 
-def test_cache_is_used_and_foreign_content_is_not(
+class Fits:
+    """Counts how often capsules are fitted, not read."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.count, self._real = 0, module.cover
+        monkeypatch.setattr(module, "cover", self._cover)
+
+    def _cover(self, *asked):
+        self.count += 1
+        return self._real(*asked)
+
+
+def the_box(tmp_path: Path):
+    return box_robot(
+        tmp_path, '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
+    )
+
+
+def test_cache_is_used_and_damaged_or_edited_content_is_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    collision = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
-    robot = box_robot(tmp_path, collision)
+    robot = the_box(tmp_path)
     first = fit_capsules(robot, SelfCollisionSpec())
-    (stored,) = (tmp_path / "excite").glob("capsules-*.json")
-    whole = stored.read_text()
+    (stored,) = (tmp_path / "excite").glob("meshes-*.npz")
+    whole = stored.read_bytes()
 
-    calls = []
-    real = module.cover
-    monkeypatch.setattr(module, "cover", lambda *a: calls.append(1) or real(*a))
+    fits = Fits(monkeypatch)
     again = fit_capsules(robot, SelfCollisionSpec())
-    assert not calls
+    assert not fits.count
     np.testing.assert_array_equal(again[0].start, first[0].start)
+    assert again[0].links == first[0].links
 
-    other_key = json.dumps({**json.loads(whole), "key": "other"})
-    for content in ("", "[]", "{", '{"key": 1}', whole.replace("radius", "r"), other_key):
-        stored.write_text(content)
-        calls.clear()
+    with np.load(stored) as content:
+        arrays = dict(content)
+    for content in (b"", whole[: len(whole) // 2], arrays | {"radii": arrays["radii"] / 2}):
+        stored.unlink()
+        if isinstance(content, bytes):
+            stored.write_bytes(content)
+        else:
+            np.savez_compressed(stored, **content)
+        fits.count = 0
         repaired = fit_capsules(robot, SelfCollisionSpec())
-        assert calls, content
+        assert fits.count == 1
         assert repaired[0].radius == first[0].radius
-    assert not list((tmp_path / "excite").glob(".capsules-*"))
+    assert not list((tmp_path / "excite").glob(".meshes-*"))
+
+
+def test_capsules_of_another_robot_are_not_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit_capsules(the_box(tmp_path), SelfCollisionSpec())
+    (stored,) = (tmp_path / "excite").glob("meshes-*.npz")
+    large = '<collision><geometry><box size="0.4 0.2 0.3"/></geometry></collision>'
+    robot = box_robot(tmp_path, large)
+    first = fit_capsules(robot, SelfCollisionSpec())
+    (own,) = set((tmp_path / "excite").glob("meshes-*.npz")) - {stored}
+    own.write_bytes(stored.read_bytes())
+    fits = Fits(monkeypatch)
+    assert fit_capsules(robot, SelfCollisionSpec())[0].radius == first[0].radius
+    assert fits.count == 1
+
+
+def test_stored_capsules_that_do_not_hold_the_link_are_fitted_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Even under a digest that is right: proofs rest on what was measured in this run."""
+    robot = the_box(tmp_path)
+    first = fit_capsules(robot, SelfCollisionSpec())
+    key = capsule_key(robot, collision_model(robot), ())
+    fits = Fits(monkeypatch)
+    small = [replace(capsule, radius=capsule.radius * 0.99) for capsule in first]
+    moved = [replace(capsule, joint=0) for capsule in first]
+    for forged in (small, moved, first[1:], []):
+        store_capsules(key, forged)
+        fits.count = 0
+        again = fit_capsules(robot, SelfCollisionSpec())
+        assert fits.count == 1
+        assert [(c.radius, c.joint) for c in again] == [(c.radius, c.joint) for c in first]
+
+
+def test_a_mesh_changed_in_place_is_fitted_anew(tmp_path: Path) -> None:
+    """With the size and the time of the file as before."""
+    mesh = tmp_path / "box.obj"
+
+    def written(size: float) -> float:
+        corners = [(x, y, z) for x in (0, size) for y in (0, 1.0) for z in (0, 1.0)]
+        faces = [(1, 2, 3), (2, 3, 4), (5, 6, 7), (6, 7, 8), (1, 2, 5), (2, 5, 6)]
+        lines = [f"v {x:.3f} {y:.3f} {z:.3f}" for x, y, z in corners]
+        mesh.write_text("\n".join(lines + [f"f {a} {b} {c}" for a, b, c in faces]) + "\n")
+        os.utime(mesh, (1e9, 1e9))
+        _content.cache_clear()  # of this process; the next one reads the file
+        shape = f'<collision><geometry><mesh filename="{mesh}"/></geometry></collision>'
+        (capsule,) = fit_capsules(box_robot(tmp_path, shape), SelfCollisionSpec())
+        return capsule.radius + float(np.linalg.norm(capsule.end - capsule.start)) / 2
+
+    small, size = written(1.0), mesh.stat().st_size
+    large = written(3.0)
+    assert mesh.stat().st_size == size
+    assert large > small + 0.5
 
 
 def test_cache_that_cannot_be_written_is_no_error(
