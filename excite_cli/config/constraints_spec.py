@@ -102,6 +102,11 @@ class SelfCollisionSpec(Section):
     capsules: Literal["auto"] | dict[str, CapsuleSpec] = Field(
         "auto", description="fitted to the URDF, with those named here (by link) replaced"
     )
+    shapes: Literal["collision", "visual"] = Field(
+        "collision",
+        description="what stands for the links; visual: the visual shapes of links that have no "
+        "collision shapes are taken too",
+    )
     margin: NonNegative = Field(0.01, description="distance kept [m]")
     by_meshes: tuple[tuple[str, str], ...] = Field(
         (),

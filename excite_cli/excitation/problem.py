@@ -118,7 +118,11 @@ def build_problem(
     ConfigError, RobotError
         What the spec asks for does not fit the robot.
     """
-    robot = build_robot(spec.robot, relative_to)
+    apart = spec.constraints.self_collision
+    robot = replace(
+        build_robot(spec.robot, relative_to),
+        visual_shapes=apart is not None and apart.shapes == "visual",
+    )
     spec = _with_freedom(spec, robot)
     trajectory = build_trajectory(spec.trajectory)
     spec = with_sampling(spec, trajectory)

@@ -18,6 +18,7 @@ from excite_cli.geometry.capsule_fit import segment_distances
 from excite_cli.geometry.link_shapes import collision_model, link_corners, link_shapes
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
+from excite_cli.robot.reach import check_size
 
 __all__ = ["Capsule", "fit_capsules", "link_joints"]
 
@@ -35,7 +36,7 @@ def fit_capsules(
     Raises
     ------
     ConfigError
-        `spec` names a link that the robot does not have.
+        `spec` names a link that the robot does not have, or gives a capsule larger than the robot.
     RobotError
         A mesh cannot be used, or the robot has no collision geometry.
     """
@@ -53,14 +54,17 @@ def fit_capsules(
         )
         for link, one in given.items()
     ]
+    for capsule in by_hand:
+        check_size(robot.model, capsule, f"constraints.self_collision.capsules.{capsule.name}")
     told = {link for pair in (*spec.ignore, *spec.by_meshes) for link in pair}
     alone = told | set(given) | set(apart)
     fitted = [c for c in _fitted(robot, alone & set(joints)) if c.links[0] not in given]
     if not fitted and not by_hand:
         raise RobotError(
             f"{robot.description.path.name} has no collision geometry, so distances cannot be "
-            "checked. Give capsules by link under constraints.self_collision.capsules, use a URDF "
-            "with <collision> elements, or drop constraints.self_collision and "
+            "checked. Take its visual shapes (constraints.self_collision.shapes: visual), "
+            "give capsules by link under constraints.self_collision.capsules, use a URDF with "
+            "<collision> elements, or drop constraints.self_collision and "
             "constraints.surroundings."
         )
     carried = [] if robot.payload is None else [robot.payload.capsule]

@@ -8,7 +8,7 @@ capsules can tell: where their capsules touch, the meshes themselves decide whet
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -146,10 +146,9 @@ def _by_sampling(
     wanted = {k: pairs[k] for k in np.flatnonzero(doubtful).tolist()}
     for k, reason in _by_meshes(robot, capsules, wanted, (q, distances), margin):
         reasons[k] = reason
-    for k, reason in _contacts(
-        robot, capsules, {k: pairs[k] for k in np.flatnonzero(always).tolist()}, q
-    ):
-        reasons[k] = reason
+    touch = {k: pairs[k] for k in np.flatnonzero(always).tolist()}
+    for k, reason in _contacts(robot, capsules, touch, q):
+        reasons[k] = replace(reason, distance=float(-distances[:, k].min()))
     return reasons
 
 

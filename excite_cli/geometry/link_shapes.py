@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 _RIM = 32  # corners of a rim that stands for a circle
 _BALL = 240  # corners of a polyhedron that stands for a sphere
-_latest: tuple[pin.Model, pin.GeometryModel] | None = None
+_latest: tuple[pin.Model, bool, pin.GeometryModel] | None = None
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,8 @@ def _outline(points: Array) -> NDArray[np.intp]:
 def collision_model(robot: Robot) -> pin.GeometryModel:
     """Collision geometry of the URDF, attached to the joints of `robot.model`.
 
-    It is shared, and not to be changed: a problem asks several times for that of one robot.
+    It is shared, and not to be changed: a problem asks several times for that of one robot. With
+    `robot.visual_shapes`, that of links without any is their visual geometry.
 
     Raises
     ------
@@ -109,11 +110,17 @@ def collision_model(robot: Robot) -> pin.GeometryModel:
         A mesh is missing, lies outside the robot's folders, or cannot be read.
     """
     global _latest
-    if _latest is None or _latest[0] is not robot.model:
+    if _latest is None or _latest[0] is not robot.model or _latest[1] != robot.visual_shapes:
         advice = " Repair the mesh, or drop constraints.self_collision."
         geometry = _geometry(robot, "collision", pin.GeometryType.COLLISION, advice)
-        _latest = robot.model, geometry
-    return _latest[1]
+        if robot.visual_shapes:
+            shown = _geometry(robot, "visual", pin.GeometryType.VISUAL, advice)
+            has = {item.parentFrame for item in geometry.geometryObjects}
+            for item in shown.geometryObjects:
+                if item.parentFrame not in has:
+                    geometry.addGeometryObject(item)
+        _latest = robot.model, robot.visual_shapes, geometry
+    return _latest[2]
 
 
 def visual_model(robot: Robot) -> pin.GeometryModel:

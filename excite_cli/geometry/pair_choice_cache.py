@@ -21,7 +21,7 @@ from excite_cli.geometry.reasons import LinksApart, Reason, Why
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 
-_VERSION = 2  # raise when the choice changes
+_VERSION = 3  # raise when the choice changes
 _REASONS = "reasons"
 
 

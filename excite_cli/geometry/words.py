@@ -34,19 +34,20 @@ def standing_in_words(standing: Standing) -> str:
 
 def reason_in_words(reason: Reason) -> str:
     """A reason with its figures: `never near (at least 0.12 m found)`."""
-    words = why_in_words(reason.why)
+    figures = []
+    if reason.distance is not None:
+        figures = [_FIGURES[reason.why].format(reason.distance)]
     if reason.apart:
         links = (f"{each.first} – {each.second} {each.percent}%" for each in reason.apart)
-        return f"{words} (meshes apart: {', '.join(links)})"
-    if reason.distance is None:
-        return words
-    return f"{words} ({_FIGURES[reason.why].format(reason.distance)})"
+        figures.append(f"meshes apart: {', '.join(links)}")
+    return why_in_words(reason.why) + (f" ({'; '.join(figures)})" if figures else "")
 
 
 _FIGURES = {
     Why.NEVER_NEAR: "at least {:.2f} m found",
     Why.MESHES_NEVER_NEAR: "at least {:.3f} m found",
     Why.ALWAYS_TOUCHING: "up to {:.3f} m deep",
+    Why.UNGUARDED: "up to {:.3f} m deep",
     Why.ALWAYS_NEAR: "at least {:.3f} m apart",
 }
 

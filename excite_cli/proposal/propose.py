@@ -81,6 +81,7 @@ def propose(request: Request) -> Proposal:
     joints = plan_limits(choice.chosen)
     if facts.has_shapes:
         check_mesh_paths(description)
+    visual = _visual_shapes(description, facts)
     notes = [f"not moved, {words}" for words in choice.in_words()]
     for name, folder in packages.items():
         notes.append(f"meshes of {name} are taken from {folder}")
@@ -88,9 +89,12 @@ def propose(request: Request) -> Proposal:
         joints, reference_posture(description, tuple(joint.name for joint in joints))
     )
     pace = choose_pace(joints)
-    tree, comments = _draft(request, dirs, facts, choice, joints, posture, pace)
+    tree, comments = _draft(request, dirs, facts, choice, joints, posture, pace, visual)
     settled = settle(tree, comments, request.folder)
-    if not facts.has_shapes:
+    if visual:
+        bare = ", ".join(facts.unguarded)
+        notes.append(f"no collision geometry moves with {bare}: the visual shapes are taken there")
+    elif not facts.has_shapes:
         notes.append(f"{source} has no collision geometry: self-collision is not checked")
     notes.append(f"posture: {settled.comments['robot', 'posture']}")
     notes.append(f"motion: {settled.comments['trajectory',]}")
@@ -122,6 +126,7 @@ def _draft(
     joints: tuple[JointPlan, ...],
     posture: FirstPosture,
     pace: Pace,
+    visual: bool,
 ) -> tuple[Tree, Comments]:
     """The config before its posture is known to be clear."""
     comments: Comments = {}
@@ -153,8 +158,9 @@ def _draft(
     if any(not math.isnan(joint.effort) for joint in joints):
         constraints["torque"] = {"scale": _TORQUE_SHARE}
         comments["constraints", "torque"] = "share of the effort limits, with the URDF's inertias"
-    if facts.has_shapes:
-        constraints["self_collision"] = {"capsules": "auto", "margin": _MARGIN}
+    if facts.has_shapes or visual:
+        shapes = {"shapes": "visual"} if visual else {}
+        constraints["self_collision"] = {"capsules": "auto", **shapes, "margin": _MARGIN}
         comments["constraints", "self_collision", "margin"] = "[m] between capsules"
     comments["constraints",] = "add surroundings: {floor: 0.0} and more; see docs/configuration.md"
     tree: Tree = {
@@ -179,6 +185,17 @@ def _draft(
     comments["optimizer",] = "per start of a motion; restarts: 16 may find better motions"
     comments["sequence",] = "each further motion is planned on top of the earlier ones"
     return tree, comments
+
+
+def _visual_shapes(description: RobotDescription, facts: UrdfSurvey) -> bool:
+    """Whether visual shapes have to stand for collision shapes, and can be read."""
+    if not facts.unguarded:
+        return False
+    try:
+        check_mesh_paths(description, "visual")
+    except RobotError:
+        return False
+    return True
 
 
 def _limits(joints: tuple[JointPlan, ...], comments: Comments) -> Tree:

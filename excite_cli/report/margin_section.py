@@ -9,12 +9,14 @@ from excite_cli.excitation.admissible import fine_margins
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
+from excite_cli.geometry.words import reason_in_words
 from excite_cli.proof.worst_margin import Worst
 from excite_cli.report.campaign import Campaign, in_figures
 from excite_cli.report.motion_section import drawn_motions, not_drawn
 from excite_cli.report.page import Block, Charts, Choice, KeyFigure, Section, Table, Text
 from excite_cli.report.plot import Panel, Plot, Series
 from excite_cli.robot.model import Array
+from excite_cli.summary.pairs import counted, unguarded_in_words, unjudged
 
 _POINTS = 400
 
@@ -54,6 +56,7 @@ def margin_section(campaign: Campaign) -> Section:
         (
             _verdict(result),
             worst_table(result, problem.constraints),
+            *_pairs(problem),
             *not_drawn(result.motions, shown),
             Choice("Motion", tuple(options)),
         ),
@@ -107,6 +110,18 @@ def _verdict(result: Result) -> Text:
             "bad",
         )
     return Text("Every constraint of every motion is proved to hold at every instant.", "good")
+
+
+def _pairs(problem: Problem) -> list[Block]:
+    """How many pairs of bodies the verdicts speak of, and all that they do not speak of."""
+    told: list[Block] = [Text(words, "bad") for words in unguarded_in_words(problem)]
+    told += [Text(words) for words in counted(problem)]
+    left = unjudged(problem)
+    if left:
+        rows = [(f"{pair.first} – {pair.second}", reason_in_words(pair.reason)) for pair in left]
+        title = "Pairs of bodies that are not kept apart"
+        told.append(Table(("pair", "why"), tuple(rows), title=title, wordy=frozenset({0, 1})))
+    return told
 
 
 def worst_table(result: Result, constraints: tuple[Constraint, ...]) -> Table:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from excite_cli.config.robot_spec import PayloadSpec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.reach import check_size
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ def payload_on(model: pin.Model, spec: PayloadSpec) -> Payload:
     Raises
     ------
     ConfigError
-        The link is unknown, or no body has such an inertia.
+        The link is unknown, no body has such an inertia, or the capsule is larger than the robot.
     """
     frames = {str(frame.name): frame for frame in model.frames if frame.type == pin.FrameType.BODY}
     if spec.link not in frames:
@@ -63,6 +64,7 @@ def payload_on(model: pin.Model, spec: PayloadSpec) -> Payload:
         links=(name,),
         by_hand=True,
     )
+    check_size(model, capsule, "robot.payload")
     return Payload(spec.link, capsule, np.array(placement.act(inertia).toDynamicParameters()))
 
 

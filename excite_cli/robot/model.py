@@ -53,7 +53,8 @@ class Robot:
 
     `rows` are the rows of the inverse dynamics that are measured; `moved` the velocity indices of
     the moved joints; `reference` the configuration (nq,) at which everything else stands. The
-    inertias of `model` include that of the `payload`; `description` knows nothing of it.
+    inertias of `model` include that of the `payload`; `description` knows nothing of it. With
+    `visual_shapes`, the visual shapes of links without collision shapes count as such.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Robot:
     base_orientation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     locked: dict[str, float] = field(default_factory=dict)
     payload: Payload | None = None
+    visual_shapes: bool = False
 
     @property
     def n(self) -> int:

@@ -46,13 +46,15 @@ class UrdfSurvey:
     """The movable joints in the order of the URDF, and what else a plan must know.
 
     mass: of all links [kg]; inertial_links: how many links have an <inertial>; has_shapes: whether
-    any link has collision geometry.
+    any link has collision geometry; unguarded: joints whose body has mass, no collision geometry,
+    and visual geometry that can stand for it.
     """
 
     joints: tuple[UrdfJoint, ...]
     mass: float
     inertial_links: int
     has_shapes: bool
+    unguarded: tuple[str, ...]
 
 
 class _Tree:
@@ -81,6 +83,35 @@ class _Tree:
                 if element.get("type") != "fixed":
                     names.append(element.get("name", ""))
         return mass, names
+
+    def unguarded(self, root: ElementTree.Element) -> tuple[str, ...]:
+        """Movable joints whose body has mass and visual geometry, but none for collisions."""
+        solid, shown = (
+            {
+                link.get("name", "")
+                for link in root.findall("link")
+                if link.findall(f"{kind}/geometry")
+            }
+            for kind in ("collision", "visual")
+        )
+        found = []
+        for element in self.joints:
+            body = self._body(_link(element, "child"))
+            mass = sum(self.masses.get(link, 0.0) for link in body)
+            if element.get("type") != "fixed" and mass > 0 and not body & solid and body & shown:
+                found.append(element.get("name", ""))
+        return tuple(found)
+
+    def _body(self, link: str) -> set[str]:
+        """`link` and all that is fixed to it."""
+        body, todo = set[str](), [link]
+        while todo:
+            at = todo.pop()
+            if at not in body:
+                body.add(at)
+                fixed = (e for e in self._children.get(at, []) if e.get("type") == "fixed")
+                todo += [_link(element, "child") for element in fixed]
+        return body
 
     def above(self, element: ElementTree.Element) -> list[str]:
         """Movable joints between the root and a joint."""
@@ -129,6 +160,7 @@ def survey(description: RobotDescription) -> UrdfSurvey:
         mass=total,
         inertial_links=len(root.findall("link/inertial")),
         has_shapes=bool(root.findall("link/collision/geometry")),
+        unguarded=tree.unguarded(root),
     )
 
 

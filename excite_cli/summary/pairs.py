@@ -43,25 +43,36 @@ def kept_apart(problem: Problem) -> int:
 
 
 def pairs_in_words(problem: Problem) -> list[str]:
-    """A sentence on the pairs, where any are judged or left out."""
-    kept, left, bare = kept_apart(problem), unjudged(problem), not_guarded(problem)
-    alarms = []
-    if bare:
-        links = links_by_joint(problem.robot)
-        told = ", ".join(f"{joint} ({', '.join(links[joint])})" for joint in bare)
-        alarms = [
-            f"NOT GUARDED: what moves with {told} has no collision geometry, so no verdict speaks "
-            "of it. Add <collision> to the URDF, or capsules of your own "
-            "(constraints.self_collision.capsules)."
-        ]
-    if not kept and not left:
-        return alarms
-    words = f"Verdicts speak of {kept} of {kept + len(left)} pairs of bodies"
-    if not left:
-        return [*alarms, f"{words}, all that could come near each other."]
+    """Sentences on the pairs, where any are judged or left out, and on bodies without shapes."""
+    left = unjudged(problem)
     told = "; ".join(dropped_in_words(pair) for pair in left[:_TOLD])
     more = f"; and {len(left) - _TOLD} more (--json has all)" if len(left) > _TOLD else ""
-    return [*alarms, f"{words}. Not kept apart: {told}{more}."]
+    names = f" Not kept apart: {told}{more}." if left else ""
+    return [*unguarded_in_words(problem), *(f"{each}{names}" for each in counted(problem))]
+
+
+def counted(problem: Problem) -> list[str]:
+    """How many pairs verdicts speak of, in one sentence; empty where there are none."""
+    kept, left = kept_apart(problem), len(unjudged(problem))
+    if not kept and not left:
+        return []
+    words = f"Verdicts speak of {kept} of {kept + left} pairs of bodies"
+    of = " of those that have shapes" if not_guarded(problem) else ""
+    return [f"{words}." if left else f"{words}, all{of} that could come near each other."]
+
+
+def unguarded_in_words(problem: Problem) -> list[str]:
+    """A sentence on the bodies that have no shapes; empty where all have."""
+    bare, links = not_guarded(problem), links_by_joint(problem.robot)
+    if not bare:
+        return []
+    told = ", ".join(f"{joint} ({', '.join(links[joint])})" for joint in bare)
+    return [
+        f"NOT GUARDED: what moves with {told} has no collision geometry, so no verdict speaks "
+        "of it. Add <collision> to the URDF, take the links' visual shapes "
+        "(constraints.self_collision.shapes: visual), or give capsules of your own "
+        "(constraints.self_collision.capsules)."
+    ]
 
 
 def pairs_data(problem: Problem) -> dict[str, Any]:

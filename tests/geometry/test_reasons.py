@@ -21,8 +21,8 @@ TOLD = [
     (Reason(Why.ALWAYS_TOUCHING, 0.0207), "always in contact (up to 0.021 m deep)"),
     (Reason(Why.ALWAYS_NEAR, 0.004), "always nearer than the margin (at least 0.004 m apart)"),
     (
-        Reason(Why.UNGUARDED, apart=APART),
-        "unguarded: capsules always overlap (meshes apart: base – arm 50%, "
+        Reason(Why.UNGUARDED, 0.05, APART),
+        "unguarded: capsules always overlap (up to 0.050 m deep; meshes apart: base – arm 50%, "
         "base – x – hand, left 100%)",
     ),
 ]

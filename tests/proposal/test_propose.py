@@ -15,6 +15,7 @@ from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
 from excite_cli.robot.reference_postures import reference_posture
 from excite_cli.robot.urdf_joints import survey
 from tests.proposal.robots import GOOD, arm, joint, link, written
+from tests.summary.two_arms import two_arms
 
 BOTTOM = 'lower="0" upper="2.5" velocity="3" effort="50"'
 
@@ -156,3 +157,10 @@ endloop
 endfacet
 endsolid a
 """
+
+
+def test_visual_shapes_stand_for_collision_shapes_that_are_missing(tmp_path: Path) -> None:
+    two_arms(tmp_path / "two.urdf")
+    found = propose(Request("two.urdf", tmp_path))
+    assert found.settled.tree["constraints"]["self_collision"]["shapes"] == "visual"
+    assert any("moves with left_1, left_2" in note and "visual" in note for note in found.notes)

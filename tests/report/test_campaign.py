@@ -1,10 +1,12 @@
 """What the page says about motions is what the result holds."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from excite_cli.api.loading import load_problem
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.criteria.base import singular_values
 from excite_cli.excitation.stack import Stack
@@ -21,6 +23,8 @@ from excite_cli.report.plot import Plot
 from excite_cli.report.weakest_section import weakest_section
 from tests.report.case import Case
 from tests.report.structure import Structure
+
+SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 
 
 @pytest.fixture
@@ -198,7 +202,7 @@ def test_what_is_not_proved_is_not_said_to_be(
     margins = {**motion.margins, "self_collision": worst}
     changed = replace(motion, certified=certified, margins=margins)
     other = replace(campaign, result=replace(campaign.result, motions=(changed,)))
-    (verdict,) = _of(Text, margin_section(other).blocks)
+    verdict, *_ = _of(Text, margin_section(other).blocks)
     assert isinstance(verdict, Text)
     assert words in verdict.text
     assert verdict.kind == kind
@@ -304,3 +308,15 @@ def test_without_limits_cards_speak_of_peaks(campaign: Campaign) -> None:
     assert "limits none to none" in cards.charts[0].alternative
     assert "nothing to keep away from" in _said(margin_section(free))
     assert margin_figures(free) == ()
+
+
+def test_the_margins_say_of_which_pairs_they_speak(campaign: Campaign) -> None:
+    assert "Verdicts speak of 7 of 7 pairs of bodies" in _said(margin_section(campaign))
+    config = "constraints.self_collision.ignore=[[base, wrist]]"
+    problem = load_problem(SMOKE, [config])
+    section = margin_section(replace(campaign, problem=problem))
+    said = _said(section)
+    assert "pairs of bodies." in said
+    assert "NOT GUARDED" not in said
+    table = _table(section, "not kept apart")
+    assert table.rows == (("base – wrist", "ignored in the config"),)

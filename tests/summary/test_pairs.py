@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from excite_cli.api.loading import load_problem
+from excite_cli.errors import ConfigError
 from excite_cli.geometry.reasons import Why
 from excite_cli.summary.pairs import (
     kept_apart,
@@ -14,6 +15,8 @@ from excite_cli.summary.pairs import (
     pairs_in_words,
     unjudged,
 )
+
+from .two_arms import two_arms
 
 SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 
@@ -42,16 +45,37 @@ def test_pairs_that_are_ignored_are_counted_and_named() -> None:
     assert data["not_kept_apart"][0]["why"] == "ignored"
 
 
-@pytest.mark.parametrize("radius", [1.0, 40.0])
-def test_a_payload_of_impossible_size_is_not_passed_over(radius: float) -> None:
-    payload = (
+def carrying(radius: float) -> str:
+    return (
         f"robot.payload={{link: wrist, mass: 1.0, center: [0, 0, 0.05], start: [0, 0, 0], "
         f"end: [0, 0, 0.1], radius: {radius}}}"
     )
-    problem = load_problem(SMOKE, [payload])
+
+
+def test_a_payload_that_always_touches_is_told_with_its_depth() -> None:
+    problem = load_problem(SMOKE, [carrying(1.0)])
     told = " ".join(pairs_in_words(problem))
-    assert "payload" in told
-    assert "always in contact" in told
+    (left,) = [pair for pair in unjudged(problem) if pair.first == "base"]
+    assert left.second == "payload"
+    assert f"base – payload: always in contact (up to {left.reason.distance:.3f} m deep)" in told
+    # The capsules overlap by their radii less the distance of their axes, at most 1.2 m here.
+    assert 0.1 < left.reason.distance < 1.2
+
+
+@pytest.mark.parametrize(
+    ("given", "where"),
+    [
+        (carrying(40.0), "robot.payload"),
+        (
+            "constraints.self_collision.capsules={wrist: {start: [0, 0, 0], end: [0, 0, 90], "
+            "radius: 0.05}}",
+            "constraints.self_collision.capsules.wrist",
+        ),
+    ],
+)
+def test_a_capsule_larger_than_the_robot_is_refused(given: str, where: str) -> None:
+    with pytest.raises(ConfigError, match=f"{where}: a .* m is larger than the whole robot"):
+        load_problem(SMOKE, [given])
 
 
 def test_links_without_shapes_are_told(tmp_path: Path) -> None:
@@ -69,3 +93,26 @@ def test_links_without_shapes_are_told(tmp_path: Path) -> None:
     assert "speak of" in told[1]
     assert pairs_data(problem)["not_guarded"] == ["elbow"]
     assert pairs_data(load_problem(SMOKE))["not_guarded"] == []
+
+
+def test_two_arms_with_shapes_on_their_last_links_only(tmp_path: Path) -> None:
+    """No verdict on the last links may be taken for one on the arms."""
+    urdf = two_arms(tmp_path / "two.urdf")
+    config = tmp_path / "two.yaml"
+    config.write_text(
+        f"robot: {{urdf: {urdf}}}\ntrajectory: {{family: fourier, base_frequency: 0.6}}\n"
+        "constraints: {self_collision: {}}\n"
+    )
+    bare = load_problem(config)
+    arms = [f"{side}_{k}" for side in ("left", "right") for k in range(1, 7)]
+    assert not_guarded(bare) == arms
+    assert kept_apart(bare) == 1
+    told = pairs_in_words(bare)
+    assert "NOT GUARDED: what moves with left_1 (left_link_1), left_2" in told[0]
+    assert told[1] == (
+        "Verdicts speak of 1 of 1 pairs of bodies, all of those that have shapes that could come "
+        "near each other."
+    )
+    shown = load_problem(config, ["constraints.self_collision.shapes=visual"])
+    assert not_guarded(shown) == []
+    assert kept_apart(shown) > 30
