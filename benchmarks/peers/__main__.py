@@ -3,10 +3,10 @@
     python -m benchmarks.peers --figaroh-python ENV/bin/python --markdown docs/peers_table.md
 
 Contestants take turns, seed by seed, each in a process of its own on one thread: FIGAROH with
-self-collision and without, this program with its exact gradient, with forward differences in its
-place, and without self-collision. Times are processor times, which other programs on the machine
-hardly change. Without FIGAROH the others run, by their own columns. docs/peers.md says how it is
-kept fair.
+self-collision and without, this program by FIGAROH's columns and by its own, with forward
+differences in place of its exact gradient, and without self-collision. Times are processor times,
+which other programs on the machine hardly change. Without FIGAROH the others run, by their own
+columns. docs/peers.md says how it is kept fair.
 """
 
 import argparse
@@ -18,13 +18,13 @@ from pathlib import Path
 
 from benchmarks.peers import figaroh_races, our_races
 from benchmarks.peers.judge import Judge
-from benchmarks.peers.race import Race
+from benchmarks.peers.race import Measure, Race
 from benchmarks.peers.table import Comparison, Entry, markdown, placed
 from benchmarks.problems import CONFIGS
 from excite_cli.atomic import write_text_atomically
 
 CONFIG = CONFIGS / "ur10_figaroh.yaml"
-_FOUND = "condition number {:.2f} after {:.1f} s"
+_FOUND = "best by FIGAROH's columns {:.2f}, by excite's {:.2f}, in {:.1f} s"
 
 
 def main() -> None:
@@ -63,18 +63,18 @@ def one_seed(
     entries = []
     if peer is not None:
         for self_collision in (True, False):
-            for race in peer.races(seed, self_collision, seconds):
+            for race in peer.races(seed, self_collision, seconds, judge.columns):
                 columns = race.columns
                 entries.append(_judged(judge, race, columns))
-    for gradient, self_collision in (("exact", True), ("differences", True), ("exact", False)):
-        race = our_races.race(judge, seed, gradient, self_collision, columns)
-        entries.append(_judged(judge, race, columns))
+    for name in our_races.CONTESTANTS:
+        entries.append(_judged(judge, our_races.race(judge, name, seed, columns), columns))
     return entries
 
 
 def _judged(judge: Judge, race: Race, columns: tuple[int, ...] | None) -> Entry:
-    told = "no motion" if not len(race.curve) else _FOUND.format(race.best, race.curve[-1, 1])
-    print(f"seed {race.seed}, {race.contestant}: {told}; {race.processor:.1f} s in all", flush=True)
+    last = (*(race.best(measure) for measure in Measure), race.processor)
+    told = _FOUND.format(*last) if len(race.curve) else f"no motion in {race.processor:.1f} s"
+    print(f"seed {race.seed}, {race.contestant}: {told}", flush=True)
     return Entry(race, judge.judge(race, columns))
 
 
@@ -82,8 +82,8 @@ def setting(judge: Judge, races: list[Race]) -> str:
     """Machine, versions and sizes, in sentences."""
     versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("pin", "numpy", "scipy"))
     chosen = {race.columns for race in races if race.columns is not None}
-    of_peer = {0: "FIGAROH not installed, our own columns", 1: "FIGAROH's columns"}.get(
-        len(chosen), "FIGAROH's columns, other ones from seed to seed"
+    of_peer = {0: "FIGAROH not installed, our own columns", 1: "FIGAROH's columns and ours"}.get(
+        len(chosen), "FIGAROH's columns, other ones from seed to seed, and ours"
     )
     free = judge.problem.boundary.free.shape[1] * judge.problem.robot.n
     return (

@@ -180,8 +180,9 @@ def judged(
     """
     problem = generator.problem
     assert problem is not None
-    kept, best = improving(problem, request["self_collision"])
-    claimed, best_claimed = improving(problem, False)
+    columns = request["columns"]
+    kept, best = improving(problem, request["self_collision"], columns)
+    claimed, best_claimed = improving(problem, False, columns)
     answer: dict[str, Any] = {
         "curve": kept,
         "claimed_curve": claimed,
@@ -209,22 +210,41 @@ def judged(
     return answer
 
 
-def improving(problem: TimedProblem, clear: bool) -> tuple[np.ndarray, np.ndarray | None]:
-    """Rows (wall, processor, value) of points that improve and keep FIGAROH's bounds; the last.
+def improving(
+    problem: TimedProblem, clear: bool, columns: list[int]
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Points that keep FIGAROH's bounds and improve by its columns or by `columns`; the best.
 
+    Rows are wall and processor time, and the condition number by either; best is by FIGAROH's.
     With `clear` the whole motion must be clear as FIGAROH checks it in the end (200 Hz, its
     margin); without, meshes are only looked at where its optimiser does.
     """
-    kept: list[tuple[float, float, float]] = []
-    best, lowest = None, np.inf
+    kept: list[tuple[float, float, float, float]] = []
+    best, lowest, lowest_other = None, np.inf, np.inf
     for wall, processor, value, x in problem.notes:
-        if value >= lowest or not problem._is_feasible(x, LENIENT):
+        if not problem._is_feasible(x, LENIENT):
+            continue
+        other = condition_number(problem, x, columns)
+        if value >= lowest and other >= lowest_other:
             continue
         if clear and not problem._is_collision_free(x):
             continue
-        kept.append((wall, processor, value))
-        lowest, best = value, x
-    return np.array(kept).reshape(-1, 3), best
+        kept.append((wall, processor, value, other))
+        lowest_other = min(lowest_other, other)
+        if value < lowest:
+            lowest, best = value, x
+    return np.array(kept).reshape(-1, 4), best
+
+
+def condition_number(problem: TimedProblem, x: np.ndarray, columns: list[int]) -> float:
+    """Of other columns of the regressor, by Pinocchio, over FIGAROH's own samples."""
+    model, found = problem.opt_traj.robot.model, states(problem, x, None)
+    data = model.createData()
+    rows = [
+        pin.computeJointTorqueRegressor(model, data, *state)[:, columns].copy()
+        for state in zip(found["q"], found["v"], found["a"], strict=True)
+    ]
+    return float(np.linalg.cond(np.vstack(rows)))
 
 
 def starts_clear(problem: TimedProblem) -> bool:

@@ -62,8 +62,12 @@ class Figaroh:
     python: Path
     description: RobotDescription
 
-    def races(self, seed: int, self_collision: bool, seconds: float) -> list[Race]:
+    def races(
+        self, seed: int, self_collision: bool, seconds: float, columns: tuple[int, ...]
+    ) -> list[Race]:
         """One segment from the random start of `seed`; at most `seconds` of processor time.
+
+        columns: those of the regressor that we call base parameters, for the second measure.
 
         With self-collision the same run counts twice: by what FIGAROH accepts, and taken at the
         word of its optimiser, which looks at the meshes at the ends of segments only.
@@ -76,6 +80,7 @@ class Figaroh:
             "self_collision": self_collision,
             "seed": seed,
             "seconds": seconds,
+            "columns": columns,
             "problem": PROBLEM | SCREEN,
             "trajectory": TRAJECTORY,
         }

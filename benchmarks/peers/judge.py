@@ -14,7 +14,9 @@ from excite_cli.constraints.base import Array
 from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.excitation.admissible import smallest_margins
+from excite_cli.excitation.invariant import invariants
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.stack import Stack
 from excite_cli.geometry.mesh_check import MeshCheck
 
 RATE = 1000.0
@@ -27,6 +29,7 @@ class Verdict:
     """A motion at 1 kHz: what it breaks (in words), share of samples in collision, both matrices.
 
     `largest`: share of the limit that is used, by kind; `gap`: least distance of meshes [m].
+    `deviation`: of predicted torques, in units of the noise of a sample, whatever the columns.
     """
 
     broken: tuple[str, ...]
@@ -35,6 +38,7 @@ class Verdict:
     largest: dict[str, float]
     by_figaroh: float
     by_excite: float
+    deviation: float
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,18 @@ class Judge:
         y = Regressor(self.problem.robot).evaluate(samples.q, samples.v, samples.a)
         return float(np.linalg.cond(y[:, :, chosen].reshape(-1, len(chosen))))
 
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """Columns of the regressor that this program calls base parameters."""
+        return tuple(self.problem.base.selection.tolist())
+
+    def deviation(self, samples: States) -> float:
+        """RMS deviation of a torque predicted at random states within the limits."""
+        y = Regressor(self.problem.robot).evaluate(samples.q, samples.v, samples.a)
+        block = y[:, :, self.problem.base.selection].reshape(-1, self.problem.base.rank)
+        stack = Stack.empty(self.problem.columns).with_rows(block * self.problem.column_scales)
+        return invariants(self.problem, stack).torque_deviation
+
     def judge(self, race: Race, columns: tuple[int, ...] | None) -> Verdict | None:
         """The contestant's best motion; None where it has none."""
         fine, samples = race.fine, race.samples
@@ -98,6 +114,7 @@ class Judge:
             used,
             self.condition_number(samples, columns),
             self.condition_number(samples, None),
+            self.deviation(samples),
         )
 
     def _used(self, fine: States) -> dict[str, float]:

@@ -10,7 +10,7 @@ the start and proving the result are on the clock.
 import json
 import sys
 import time
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -84,11 +84,12 @@ class DifferencedObjective(TimedObjective):
         return value, np.linalg.pinv(self.free).T @ slopes, spectrum
 
 
+@dataclass(frozen=True, repr=False)
 class TimedProblem(Problem):
     """A problem whose objectives write notes."""
 
-    clock: Clock
-    kind: type[TimedObjective]
+    clock: Clock = field(default_factory=Clock)
+    kind: type[TimedObjective] = TimedObjective
 
     def objective(self, stack: Stack | None = None) -> Objective:
         found = self.kind(
@@ -121,11 +122,8 @@ def with_columns(problem: Problem, selection: list[int]) -> Problem:
 
 def timed(problem: Problem, gradient: str, clock: Clock) -> TimedProblem:
     fields = {name: getattr(problem, name) for name in Problem.__dataclass_fields__}
-    found = TimedProblem(**fields)
-    object.__setattr__(found, "clock", clock)
     kind = DifferencedObjective if gradient == "differences" else TimedObjective
-    object.__setattr__(found, "kind", kind)
-    return found
+    return TimedProblem(**fields, clock=clock, kind=kind)
 
 
 def solve(request: dict[str, Any]) -> dict[str, Any]:

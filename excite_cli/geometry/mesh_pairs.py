@@ -51,20 +51,49 @@ class PairMeshes:
             for one in first.parts
             for other in second.parts
         ]
+        self._nearest: tuple[Array, Array] | None = None
 
     def distance(self, poses: Poses, instant: int, below: float = np.inf) -> float:
         """Distance of the meshes [m], or `below` where it is not less.
 
         Where they touch it is 0, or less for primitives: some depth, not the greatest. A cap saves
-        most of the work: coal leaves out what is farther than the least distance it has found.
+        most of the work, since coal leaves out what is farther than the least distance it has
+        found. The points that were nearest when last asked give one: they are on the meshes, so
+        that the distance is at most theirs, and between instants that follow each other hardly
+        less.
         """
-        least = min(below, _FAR)
+        least, apart = min(below, _FAR), self._last_nearest(poses, instant)
+        least = min(least, apart)
         for one, two, compute in self._parts:
             self._answer.clear()
             self._answer.min_distance = max(least, _TOUCH)
-            compute(*self._placed(poses, instant, one, two), self._request, self._answer)
-            least = min(least, self._answer.min_distance)
+            placed = self._placed(poses, instant, one, two)
+            compute(*placed, self._request, self._answer)
+            if self._answer.min_distance < least:
+                least = self._answer.min_distance
+                self._nearest = self._witness(poses, instant, least)
         return least
+
+    def _last_nearest(self, poses: Poses, instant: int) -> float:
+        """Distance [m] now of the points that were nearest before; infinite without any."""
+        if self._nearest is None:
+            return np.inf
+        first, second = (
+            poses.rotations[instant, mesh.joint] @ point + poses.translations[instant, mesh.joint]
+            for mesh, point in zip(self.meshes, self._nearest, strict=True)
+        )
+        return float(np.linalg.norm(second - first)) + _TOUCH
+
+    def _witness(self, poses: Poses, instant: int, distance: float) -> tuple[Array, Array] | None:
+        """The nearest points in the frames of their joints, if coal's lie at that distance."""
+        points = self._answer.getNearestPoint1(), self._answer.getNearestPoint2()
+        if not abs(float(np.linalg.norm(points[1] - points[0])) - distance) < _TOUCH:
+            return None
+        first, second = (
+            (point - poses.translations[instant, mesh.joint]) @ poses.rotations[instant, mesh.joint]
+            for mesh, point in zip(self.meshes, points, strict=True)
+        )
+        return first, second
 
     def touch(self, poses: Poses, instant: int) -> bool:
         """Whether the meshes touch; quicker than a distance."""

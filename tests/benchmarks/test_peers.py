@@ -7,15 +7,16 @@ import pytest
 
 from benchmarks.peers.figaroh_races import BLIND, CLEAR, LIMITS, find
 from benchmarks.peers.our_driver import Clock, timed, with_columns
-from benchmarks.peers.race import Race
-from benchmarks.peers.table import OURS, PART, Comparison, Entry, goals, markdown, placed
+from benchmarks.peers.our_races import OURS, OWN
+from benchmarks.peers.race import Measure, Race
+from benchmarks.peers.table import PART, Comparison, Entry, goals, markdown, placed
 from benchmarks.problems import motion, problem
 from excite_cli.excitation.problem import Problem
 
 
 def race(contestant: str, seed: int, *rows: tuple[float, float]) -> Race:
-    """A race whose curve has (processor time, condition number) and twice the wall time."""
-    curve = np.array([[2 * seconds, seconds, value] for seconds, value in rows]).reshape(-1, 3)
+    """A race of (processor time, condition number), twice that by our columns and in wall time."""
+    curve = np.array([[2 * t, t, value, 2 * value] for t, value in rows]).reshape(-1, 4)
     return Race(contestant, seed, curve, wall=120.0, processor=60.0, before=1.0)
 
 
@@ -52,6 +53,31 @@ def test_goal_is_met_from_twenty_times_on_and_missed_if_one_seed_never_arrives()
     last = goals(compared(theirs, quick, never)).splitlines()[2]
     assert "MISSED" in last
     assert "1 of 2" in last
+
+
+def test_every_measure_has_its_goals_and_its_contestant() -> None:
+    text = goals(
+        compared(
+            race(BLIND, 1, (40.0, 20.0)),
+            race(OURS, 1, (2.0, 20.0)),
+            race(OWN, 1, (1.0, 20.0), (3.0, 15.0)),
+        )
+    )
+    lines = text.splitlines()[2:]
+    assert [line.split(" | ")[0] for line in lines] == ["| FIGAROH's"] * 2 + ["| excite's"] * 2
+    assert "its best, 20.00 | 40 | 2.00 | 20 ×" in lines[0]
+    assert "its best, 40.00 | 40 | 1.00 | 40 ×" in lines[2]
+    assert "| 40.00 | 30.00 |" in lines[3]
+
+
+def test_a_curve_is_read_in_the_measure_that_is_asked_for() -> None:
+    curve = np.array([[1.0, 1.0, 30.0, 10.0], [2.0, 2.0, 20.0, 15.0]])
+    found = Race(OURS, 1, curve, wall=3.0, processor=3.0, before=0.0)
+    assert found.best(Measure.FIGAROH) == 20.0
+    assert found.best(Measure.EXCITE) == 10.0
+    assert found.reached(16.0, Measure.EXCITE) == (1.0, 1.0)
+    assert found.reached(20.0, Measure.FIGAROH) == (2.0, 2.0)
+    assert found.at(1.5, Measure.FIGAROH) == 30.0
 
 
 def test_table_says_that_a_contestant_found_nothing() -> None:
