@@ -33,12 +33,13 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 FAR = 0.02  # [m]
-_STEP, _MOST = 0.03, 97  # [rad or m] between nodes; nodes of one joint
+_GRIDS = ((0.06, 49), (0.03, 97))  # [rad or m] between nodes; most nodes of one joint
+_FINE = 0.0005  # [m] an error that asks for no finer grid
 _BEYOND = 2  # nodes beyond the limits, where an optimiser may stray
 _LEAST_SLOPE = 0.02  # [m/rad]
 _TRIALS = 400
-_VERSION = 3  # raise when the tables change
-_COARSE = 4  # nodes from one to the next of a first look,
+_VERSION = 4  # raise when the tables change
+_COARSE = 2  # nodes from one to the next of a first look,
 _DOUBT = 0.012  # [m] and what a distance may fall by between them
 
 
@@ -249,49 +250,85 @@ def _guarded(capsules: tuple[Capsule, ...], pairs: CollisionPairs) -> set[frozen
 def _table(
     robot: Robot, both: tuple[LinkMesh, LinkMesh], joints: Indices, kept: float
 ) -> PairTable | None:
-    """The table of one pair, or None where nothing is to be guarded."""
-    from scipy.ndimage import distance_transform_edt  # tables are stored
+    """The table of one pair, or None where nothing is to be guarded.
 
-    meshes = PairMeshes(*both)
-    lower, upper = robot.limits.ranges()
-    alone = len(joints) == 1
-    if alone and robot.n == 1:
+    Nodes are as far apart as the distances allow: the grid is refined where trials between nodes
+    say that it is too coarse.
+    """
+    if robot.n == 1:
         return None  # a table wants two axes; such a pair is left to the check of the meshes
+    meshes = PairMeshes(*both)
+    alone = len(joints) == 1
     if alone:  # the other axis of the table is any other joint, which changes nothing
         joints = np.append(joints, [k for k in range(robot.n) if k != joints[0]][:1])
-    grids = [_grid(float(lower[k]), float(upper[k])) for k in joints]
+    table = None
+    for step, most in _GRIDS:
+        grids = _grids(robot, joints, alone, step, most)
+        across = grids[1][:1] if alone else grids[1]
+        doubt = kept + _DOUBT
+        first_look = (grids[0][::_COARSE], across[::_COARSE])
+        seen = _distances(robot, both, meshes, _nodes(robot, joints, *first_look), doubt)
+        if seen.min() >= doubt:
+            return None
+        values = _distances(robot, both, meshes, _nodes(robot, joints, grids[0], across))
+        if values.min() > (kept if (step, most) == _GRIDS[-1] else kept + _DOUBT / _COARSE):
+            return None
+        values = np.broadcast_to(values.reshape(len(grids[0]), -1), tuple(map(len, grids)))
+        table = _tried(robot, both, meshes, _of_values(robot, both, joints, grids, values))
+        if table.error <= _FINE and values.min() <= kept:
+            break
+    return table
+
+
+def _grids(
+    robot: Robot, joints: Indices, alone: bool, step: float, most: int
+) -> tuple[Array, Array]:
+    """Nodes of both joints; of one that changes nothing four are enough."""
+    lower, upper = robot.limits.ranges()
+    first, second = (_grid(float(lower[k]), float(upper[k]), step, most) for k in joints)
     if alone:
-        grids[1] = np.linspace(float(lower[joints[1]]), float(upper[joints[1]]), 4)
-    first_look = (grids[0][::_COARSE], grids[1][:1] if alone else grids[1][::_COARSE])
-    seen = _distances(robot, both, meshes, _nodes(robot, joints, *first_look), kept + _DOUBT)
-    if seen.min() >= kept + _DOUBT:
-        return None
-    across = grids[1][:1] if alone else grids[1]
-    values = _distances(robot, both, meshes, _nodes(robot, joints, grids[0], across))
-    if values.min() > kept:
-        return None
-    values = np.broadcast_to(values.reshape(len(grids[0]), -1), (len(grids[0]), len(grids[1])))
+        second = np.linspace(float(lower[joints[1]]), float(upper[joints[1]]), 4)
+    return first, second
+
+
+def _of_values(
+    robot: Robot,
+    both: tuple[LinkMesh, LinkMesh],
+    joints: Indices,
+    grids: tuple[Array, Array],
+    values: Array,
+) -> PairTable:
+    """A table of distances at the nodes, gone on with where the meshes touch; not tried yet."""
+    from scipy.ndimage import distance_transform_edt  # tables are stored
+
     steps = [float(grid[1] - grid[0]) for grid in grids]
     slope = max(_LEAST_SLOPE, float(np.quantile(np.abs(np.gradient(values, *steps)), 0.95)))
     inside = values <= 0.0
     depth = distance_transform_edt(inside, sampling=steps)
-    table = PairTable(
+    return PairTable(
         both[0].link,
         both[1].link,
         (int(joints[0]), int(joints[1])),
-        (grids[0], grids[1]),
+        grids,
         np.where(inside, -slope * depth, values),
         error=0.0,
         touching=float(inside.mean()),
         turning=(_turns(robot, int(joints[0])), _turns(robot, int(joints[1]))),
     )
-    trials = _trials(table, lower[joints], upper[joints])
+
+
+def _tried(
+    robot: Robot, both: tuple[LinkMesh, LinkMesh], meshes: PairMeshes, table: PairTable
+) -> PairTable:
+    """The table with its error: the most by which it exceeds the true distance at trials."""
+    joints = np.array(table.joints)
+    lower, upper = (bounds[joints] for bounds in robot.limits.ranges())
+    trials = _trials(table, lower, upper)
     q = np.tile(robot.posture, (len(trials), 1))
     q[:, joints] = trials
     true = _distances(robot, both, meshes, q)
-    doubtful = true < FAR / 2
     over = table.distances(q) - np.maximum(true, 0.0)
-    return replace(table, error=float(np.max(over[doubtful], initial=0.0)))
+    return replace(table, error=float(np.max(over[true < FAR / 2], initial=0.0)))
 
 
 def _turns(robot: Robot, joint: int) -> bool:
@@ -314,10 +351,10 @@ def _trials(table: PairTable, low: Array, high: Array) -> Array:
     return np.clip(np.vstack([anywhere, middles]), low, high)
 
 
-def _grid(low: float, high: float) -> Array:
-    count = int(np.clip(np.ceil((high - low) / _STEP) + 1, 8, _MOST))
-    step = (high - low) / (count - 1)
-    return np.asarray(low + step * np.arange(-_BEYOND, count + _BEYOND), dtype=float)
+def _grid(low: float, high: float, step: float, most: int) -> Array:
+    count = int(np.clip(np.ceil((high - low) / step) + 1, 8, most))
+    own = (high - low) / (count - 1)
+    return np.asarray(low + own * np.arange(-_BEYOND, count + _BEYOND), dtype=float)
 
 
 def _nodes(robot: Robot, joints: Indices, one: Array, two: Array) -> Array:
