@@ -6,6 +6,7 @@ import pinocchio as pin
 from excite_cli.errors import ConfigError
 from excite_cli.robot.capsule import Capsule
 
+_LONGEST = 4.0  # times the reach: a pole or a beam may be longer than the robot that holds it
 _LEAST = 0.5  # [m] asked of no robot to be smaller: a URDF of one joint may have no length at all
 
 
@@ -28,20 +29,23 @@ def reach(model: pin.Model) -> float:
 
 
 def check_size(model: pin.Model, capsule: Capsule, where: str) -> None:
-    """Refuse a capsule larger than the whole robot: proofs would pass over it as always touching.
+    """Refuse a capsule out of all proportion: proofs would pass over it as always touching.
 
     Raises
     ------
     ConfigError
-        Its radius or length exceeds the robot's reach.
+        Its radius exceeds the robot's reach, or its length four times that.
     """
     most = max(reach(model), _LEAST)
     length = float(np.linalg.norm(capsule.end - capsule.start))
-    for what, size in (("radius", capsule.radius), ("distance of its ends", length)):
-        if size > most:
+    for what, size, allowed, why in (
+        ("radius", capsule.radius, most, "as far as the robot reaches"),
+        ("distance of its ends", length, _LONGEST * most, f"{_LONGEST:g} times the robot's reach"),
+    ):
+        if size > allowed:
             raise ConfigError(
-                f"{where}: a {what} of {size:g} m is larger than the whole robot, which reaches "
-                f"{most:.2g} m. Lengths are in metres."
+                f"{where}: a {what} of {size:g} m is larger than {allowed:.2g} m, {why}. Lengths "
+                "are in metres."
             )
 
 

@@ -74,7 +74,7 @@ def test_a_payload_that_always_touches_is_told_with_its_depth() -> None:
     ],
 )
 def test_a_capsule_larger_than_the_robot_is_refused(given: str, where: str) -> None:
-    with pytest.raises(ConfigError, match=f"{where}: a .* m is larger than the whole robot"):
+    with pytest.raises(ConfigError, match=f"{where}: a .* m is larger than .* reach"):
         load_problem(SMOKE, [given])
 
 
