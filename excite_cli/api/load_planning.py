@@ -12,7 +12,7 @@ from excite_cli.api.loading import Case, problem_of
 from excite_cli.api.outputs import held
 from excite_cli.api.planning import plan
 from excite_cli.config.load import spec_as_yaml
-from excite_cli.config.spec import FourierSpec, SamplingSpec, Spec
+from excite_cli.config.spec import FourierSpec, SamplingSpec, SequenceSpec, Spec
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
@@ -148,7 +148,7 @@ def _spec(spec: Spec, stored: StoredFit, link: str | None, duration: float) -> S
             "criterion": spec.criterion.model_copy(update=criterion),
             "trajectory": spec.trajectory.model_copy(update=pace),
             "sampling": SamplingSpec(),
-            "sequence": spec.sequence.model_copy(update={"motions": 1}),
+            "sequence": SequenceSpec(motions=1),
         }
     )
 

@@ -19,11 +19,12 @@ def iterations_of(spec: Spec) -> int:
 
 def start_line(show: Line, spec: Spec) -> Callable[[int, "Progress"], None]:
     """What `plan` reports to, shown with `show(text, iterations done)`."""
-    total, most = spec.sequence.motions, spec.optimizer.max_iterations
+    total, most = spec.sequence.most, spec.optimizer.max_iterations
+    of = "of" if spec.sequence.until is None else "of at most"
     best: dict[int, Best] = defaultdict(Best)
 
     def tell(index: int, progress: "Progress") -> None:
-        words = f"motion {index} of {total}: {best[index].words(progress)}, "
+        words = f"motion {index} {of} {total}: {best[index].words(progress)}, "
         starts = progress.starts
         if starts is None:
             show(f"{words}iteration {progress.iteration} of {most}", progress.iteration)

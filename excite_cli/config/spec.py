@@ -18,7 +18,7 @@ from excite_cli.config.data_spec import (
 )
 from excite_cli.config.identified_spec import IdentifiedSpec
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.config.section import Integer, Positive, Power, Section
+from excite_cli.config.section import Integer, Positive, Power, Section, Share
 from excite_cli.config.trajectory_spec import FourierSpec, SamplingSpec, TrajectorySpec
 from excite_cli.config.uncertainty_spec import UncertaintySpec
 
@@ -89,12 +89,48 @@ class OptimizerSpec(Section):
     )
 
 
+class UntilSpec(Section):
+    """What ends a sequence: every precision that is given is reached, or the time is spent.
+
+    Precision is that of all data, earlier ones (`--prior`) included. Both figures are the same
+    whichever columns are called base parameters.
+    """
+
+    torque_deviation: Positive | None = Field(
+        None,
+        description="standard deviation of torques predicted at random states within the limits "
+        "(RMS), in units of the noise of one sample",
+    )
+    efficiency: Share | None = Field(
+        None,
+        description="share of the information of an instant that freely chosen states could have",
+    )
+    duration: Positive | None = Field(
+        None, description="[s] of all motions; none begins that would exceed it"
+    )
+
+    @property
+    def precise(self) -> bool:
+        """Whether a precision is asked for."""
+        return self.torque_deviation is not None or self.efficiency is not None
+
+
 class SequenceSpec(Section):
     """Motions generated one after the other."""
 
-    motions: Integer = Field(
-        1, ge=1, le=1000, description="how many, each on top of all earlier ones"
+    motions: Integer | None = Field(
+        None,
+        ge=1,
+        le=1000,
+        description="how many, each on top of all earlier ones; with `until`: at most; default: 1, "
+        "with `until` 20",
     )
+    until: UntilSpec | None = Field(None, description="ends the sequence earlier")
+
+    @property
+    def most(self) -> int:
+        """Motions, or the most of them."""
+        return self.motions or (1 if self.until is None else 20)
 
 
 class Spec(Section):

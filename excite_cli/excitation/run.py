@@ -8,6 +8,7 @@ from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.dense_grid import dense_condition_number
+from excite_cli.excitation.ending import Ending
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressCallback
 from excite_cli.excitation.result import Result, matches
@@ -113,16 +114,23 @@ def continue_run(
     `optimizer.restarts` the starts of a motion are spread over `workers` (default: done here), to
     the same result.
 
+    With `sequence.until` they end with the motion that reaches it.
+
     Where `problem` separates effects, `model` is the problem that the result is kept for: the same
     without the rivals. Stack and condition numbers are then its own.
     """
     solver, seed = InteriorPoint(), problem.spec.seed
-    remaining = range(len(result.motions) + 1, problem.spec.sequence.motions + 1)
+    ending = Ending(model or problem)
+    remaining = range(len(result.motions) + 1, ending.most + 1)
     stack = _running(problem, result)
+    if ending.reached(result):
+        return result
     for step in generate_sequence(problem, solver, stack, remaining, seed, report, starts, workers):
         stored = step if model is None else _judged(step, model, result.stack)
         result = result.with_step(stored)
         on_motion(stored, result)
+        if ending.reached(result):
+            break
     return result
 
 

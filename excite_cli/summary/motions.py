@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from excite_cli.config.spec import UntilSpec
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.excitation.dense_grid import flattered
+from excite_cli.excitation.ending import Ending
 from excite_cli.excitation.invariant import Invariants, design_for, invariants
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
@@ -39,16 +41,55 @@ def plan_answer(
         "output": output,
     }
     parts[-1:-1] = pairs_in_words(model)
+    good, until = True, model.spec.sequence.until
     if model.spec.criterion.of == "robot" and result.motions:
-        found = invariants(model, result.stack, design_for(model) if efficiency else None)
+        judged = efficiency or (until is not None and until.efficiency is not None)
+        found = invariants(model, result.stack, design_for(model) if judged else None)
         data.update(invariants_data(found))
         parts.insert(-1, invariants_in_words(found))
+        if until is not None:
+            good = Ending(model).enough(found)
+            seconds = len(result.motions) * model.trajectory.duration
+            parts.insert(
+                -1 if good else 0, ending_in_words(until, found, seconds, good, not result.priors)
+            )
+            data["until"] = {"reached": good, "seconds": seconds}
     if following is not None:
         outlook = following.outlook([m.coefficients for m in result.motions])
         data["next_experiment"] = outlook
         if outlook["pairs"]:
             parts.insert(0, outlook_table(outlook))
-    return Answer(tuple(parts), data)
+    return Answer(tuple(parts), data, good)
+
+
+def ending_in_words(
+    until: UntilSpec, found: Invariants, seconds: float, good: bool, alone: bool = True
+) -> str:
+    """What `sequence.until` asks for, beside what motions of so many `seconds` in all have.
+
+    alone: there are no earlier data, so that more such motions tell as much as these.
+    """
+    total = f"{seconds:.4g} s of motion in all"
+    if not until.precise:
+        return f"{total}, of {until.duration:g} s that sequence.until.duration allows."
+    if good:
+        return f"sequence.until is reached with {total}."
+    lacking = []
+    most, least = until.torque_deviation, until.efficiency
+    if most is not None and found.torque_deviation > most:
+        needed = seconds * (found.torque_deviation / most) ** 2
+        told = f" (about {needed:.2g} s of motions like these would do)" if alone else ""
+        lacking.append(
+            f"torques are predicted to {found.torque_deviation:.2g} of the noise of one sample "
+            f"instead of {most:g}{told}"
+        )
+    if least is not None and found.efficiency is not None and found.efficiency < least:
+        lacking.append(
+            f"an instant holds {100 * found.efficiency:.2g} % of the information that freely "
+            f"chosen states could have instead of {100 * least:g} % (wider limits, or a trajectory "
+            "with more coefficients, may do)"
+        )
+    return f"sequence.until is NOT REACHED with {total}: {'; '.join(lacking)}."
 
 
 def result_parts(result: Result) -> Parts:
