@@ -13,6 +13,7 @@ from excite_cli.geometry.capsule_fit import (
     capsule_volume,
     hull_points,
     minimum_volume_capsule,
+    principal_axes,
     quick_capsule_volume,
     segment_distances,
     sphere_points,
@@ -220,7 +221,7 @@ def _best_cut(shape: LinkShape) -> list[LinkShape] | None:
 
 def _main_axes(points: Array) -> Array:
     """Axes of the joint frame, or the principal ones where the box along those is smaller."""
-    principal = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2]
+    principal = principal_axes(points)
     box, turned = np.ptp(points, axis=0).prod(), np.ptp(points @ principal.T, axis=0).prod()
     return principal if turned < 0.9 * box else np.eye(3)
 

@@ -128,9 +128,14 @@ def sphere_points(count: int) -> Array:
     return np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])
 
 
+def principal_axes(points: Array) -> Array:
+    """Principal axes (3, 3) of points (N, 3), one a row, the longest first."""
+    # Of fewer than three points only the full set has all three axes; of many it would be N by N.
+    return np.asarray(np.linalg.svd(points - points.mean(axis=0), full_matrices=len(points) < 3)[2])
+
+
 def _start_axes(points: Array, count: int) -> Array:
-    main = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2]
-    return np.vstack([main, np.eye(3), sphere_points(2 * count)[:count]])
+    return np.vstack([principal_axes(points), np.eye(3), sphere_points(2 * count)[:count]])
 
 
 def _crude_volumes(points: Array, axes: Array) -> tuple[Array, Array]:

@@ -5,22 +5,25 @@ where that wastes little room (the many small parts of a gripper); a link that o
 badly is cut across a main axis. Everything is in the frame of the joint that carries the link.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from excite_cli.config.constraints_spec import CapsuleSpec, SelfCollisionSpec
 from excite_cli.errors import ConfigError, RobotError, nearest
-from excite_cli.geometry.capsule_cache import capsule_key, store_capsules, stored_capsules
+from excite_cli.geometry.capsule_cache import cover_key, store_capsules, stored_capsules
 from excite_cli.geometry.capsule_cover import cover
 from excite_cli.geometry.capsule_fit import segment_distances
-from excite_cli.geometry.link_shapes import collision_model, link_corners, link_shapes
+from excite_cli.geometry.link_shapes import collision_model, link_shapes, placed_shapes
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 from excite_cli.robot.reach import check_size
 
 __all__ = ["Capsule", "fit_capsules", "link_joints"]
+
+Placed = tuple[pin.GeometryObject, str, NDArray[np.float64]]
 
 _INSIDE = 1e-9  # [m], rounding of a corner that a capsule touches
 
@@ -97,22 +100,34 @@ def _check_link(link: str, known: Collection[str], where: str) -> None:
 
 
 def _fitted(robot: Robot, apart: set[str]) -> list[Capsule]:
+    """Capsules joint by joint: stored ones where they hold all shapes, else fitted and stored."""
     geometry = collision_model(robot)
-    key = capsule_key(robot, geometry, apart)
-    capsules = stored_capsules(key)
-    if capsules is None or not _contained(robot, geometry, capsules):
-        capsules = cover(link_shapes(robot, geometry), apart)
-        store_capsules(key, capsules)
-    return capsules
+    shapes: dict[int, list[Placed]] = {}
+    for item, link, points in placed_shapes(robot, geometry):
+        shapes.setdefault(int(item.parentJoint), []).append((item, link, points))
+    found: dict[int, list[Capsule]] = {}
+    missing: dict[int, str] = {}
+    for joint, on_joint in sorted(shapes.items()):
+        key = cover_key(on_joint, apart)
+        capsules = stored_capsules(key, joint)
+        if capsules is None or not _contained(on_joint, capsules):
+            capsules, missing[joint] = [], key
+        found[joint] = capsules
+    if missing:
+        for capsule in cover(link_shapes(robot, geometry, missing), apart):
+            found[capsule.joint].append(capsule)
+        for joint, key in missing.items():
+            store_capsules(key, found[joint])
+    return [capsule for capsules in found.values() for capsule in capsules]
 
 
-def _contained(robot: Robot, geometry: pin.GeometryModel, capsules: list[Capsule]) -> bool:
-    """Whether every corner of every link lies in a capsule of that link.
+def _contained(shapes: Iterable[Placed], capsules: list[Capsule]) -> bool:
+    """Whether every corner of every shape lies in a capsule of its link.
 
     What comes from disk is measured before proofs rest on it.
     """
-    for link, joint, points in link_corners(robot, geometry):
-        of_link = [c for c in capsules if link in c.links and c.joint == joint]
+    for _, link, points in shapes:
+        of_link = [c for c in capsules if link in c.links]
         depths = [c.radius - segment_distances(points, c.start, c.end) for c in of_link]
         if not depths or np.max(depths, axis=0).min() < -_INSIDE:
             return False

@@ -208,8 +208,8 @@ def _contacts(
         for links in product(first.links, second.links):
             if links not in known:
                 one, other = links
-                gaps = [meshes.distance([one], [other], at) for at in some]
-                known[links] = float(np.mean(np.array(gaps) > 0.0))
+                touching = [meshes.touch([one], [other], at) for at in some]
+                known[links] = 1.0 - float(np.mean(touching))
             apart[links] = known[links]
         loose = tuple(
             LinksApart(*names, share) for names, share in apart.items() if share > 1 - _ALWAYS

@@ -13,11 +13,14 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from excite_cli.geometry.link_shapes import collision_model, link_shapes
+from excite_cli.geometry.capsule_fit import principal_axes
+from excite_cli.geometry.link_shapes import collision_model, placed_shapes
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]
 Part = tuple[pin.CollisionGeometry, Array, Array]
+# A problem asks several times for those of one robot, whose collision model is shared as well.
+_latest: tuple[pin.GeometryModel, tuple["LinkMesh", ...]] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,16 +51,22 @@ def link_meshes(robot: Robot) -> tuple[LinkMesh, ...]:
     RobotError
         A mesh cannot be used.
     """
+    global _latest
     geometry = collision_model(robot)
-    parts: dict[str, list[Part]] = {}
-    for item in geometry.geometryObjects:
-        link = str(robot.model.frames[item.parentFrame].name)
+    if _latest is not None and _latest[0] is geometry:
+        return _latest[1]
+    found: dict[tuple[str, int], tuple[list[Part], list[Array]]] = {}
+    for item, link, points in placed_shapes(robot, geometry):
+        parts, corners = found.setdefault((link, int(item.parentJoint)), ([], []))
         place = (np.array(item.placement.rotation), np.array(item.placement.translation))
-        parts.setdefault(link, []).append((item.geometry, *place))
-    return tuple(
-        _mesh(shape.links[0], shape.joint, tuple(parts[shape.links[0]]), shape.points)
-        for shape in link_shapes(robot, geometry)
+        parts.append((item.geometry, *place))
+        corners.append(points)
+    meshes = tuple(
+        _mesh(link, joint, tuple(parts), np.vstack(corners))
+        for (link, joint), (parts, corners) in sorted(found.items(), key=lambda one: one[0][1])
     )
+    _latest = geometry, meshes
+    return meshes
 
 
 def _mesh(
@@ -73,7 +82,7 @@ def _mesh(
     low, high = hull.min(axis=0), hull.max(axis=0)
     box = np.array(list(product(*zip(low, high, strict=True))))
     center = (low + high) / 2
-    axis = np.linalg.svd(hull - hull.mean(axis=0), full_matrices=True)[2][0]
+    axis = principal_axes(hull)[0]
     along, across = (hull - center) @ axis, (hull - center) - np.outer((hull - center) @ axis, axis)
     inside = float(np.linalg.norm(across, axis=1).max())
     ends = [min(along.min() + inside, 0.0), max(along.max() - inside, 0.0)]

@@ -6,7 +6,7 @@ kept so that a shape can be cut by a plane: the corners on one side and the plac
 cross it span all of the solid on that side.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -144,26 +144,26 @@ def _geometry(
         ) from error
 
 
-def link_shapes(robot: Robot, geometry: pin.GeometryModel) -> tuple[LinkShape, ...]:
-    """One shape per link with collision geometry, ordered by joint."""
+def link_shapes(
+    robot: Robot, geometry: pin.GeometryModel, joints: Collection[int] | None = None
+) -> tuple[LinkShape, ...]:
+    """One shape per link with collision geometry, ordered by joint; of some `joints` or of all."""
     shapes: dict[str, LinkShape] = {}
-    for item, link, points in _placed(robot, geometry):
-        shape = LinkShape((link,), int(item.parentJoint), points, _edges(item.geometry, points))
+    for item, link, points in placed_shapes(robot, geometry):
+        joint = int(item.parentJoint)
+        if joints is not None and joint not in joints:
+            continue
+        shape = LinkShape((link,), joint, points, _edges(item.geometry, points))
         known = shapes.get(link)
         joined = known.joined(shape) if known is not None else shape
         shapes[link] = LinkShape((link,), joined.joint, joined.points, joined.edges)
     return tuple(sorted(shapes.values(), key=lambda shape: shape.joint))
 
 
-def link_corners(robot: Robot, geometry: pin.GeometryModel) -> Iterator[tuple[str, int, Array]]:
-    """Link, joint that carries it and corners (N, 3) [m] in the joint frame, of every shape."""
-    for item, link, points in _placed(robot, geometry):
-        yield link, int(item.parentJoint), points
-
-
-def _placed(
+def placed_shapes(
     robot: Robot, geometry: pin.GeometryModel
 ) -> Iterator[tuple[pin.GeometryObject, str, Array]]:
+    """Every shape, its link, and its corners (N, 3) [m] in the frame of the joint."""
     for item in geometry.geometryObjects:
         link = str(robot.model.frames[item.parentFrame].name)
         points = _corners(item, robot)
@@ -210,7 +210,8 @@ def _edges(shape: object, points: Array) -> NDArray[np.intp]:
         except QhullError:  # flat or a point: nothing to cut
             triangles = np.zeros((0, 3), dtype=np.intp)
     sides = triangles.reshape(-1, 3)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    return np.unique(np.sort(sides, axis=1), axis=0)
+    sides = np.sort(sides, axis=1)
+    return sides[np.unique(sides[:, 0] * len(points) + sides[:, 1], return_index=True)[1]]
 
 
 def _ball() -> Array:

@@ -1,6 +1,7 @@
 """Distance of the true collision geometry of two groups of links: slow, for judging capsules."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import product
 
 import coal
 import numpy as np
@@ -13,6 +14,9 @@ from excite_cli.robot.model import Robot
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+Placed = tuple[pin.CollisionGeometry, coal.Transform3s]
+
+_LEAST_CAP = 1e-9  # [m]; what is capped at nothing is not looked at
 _FIRST_STEP, _LAST_STEP = 0.2, 0.01  # [rad or m]
 
 
@@ -34,19 +38,30 @@ class MeshDistances:
         """Whether all these links have collision geometry."""
         return all(link in self._items for link in links)
 
-    def distance(self, first: Iterable[str], second: Iterable[str], q: Array) -> float:
-        """Least distance [m] between two groups of links at moved-joint positions q (n,)."""
-        model = self._robot.model
-        pin.forwardKinematics(model, self._data, self._robot.configurations(q[None])[0])
-        least = np.inf
+    def distance(
+        self, first: Iterable[str], second: Iterable[str], q: Array, below: float = np.inf
+    ) -> float:
+        """Least distance [m] between two groups of links at moved-joint positions q (n,).
+
+        Or `below` where it is not less, which is sooner known.
+        """
+        least = below
         request, answer = coal.DistanceRequest(), coal.DistanceResult()
-        for joint, place, shape in self._of(first):
-            one = self._transform(joint, place)
-            for other_joint, other_place, other_shape in self._of(second):
-                two = self._transform(other_joint, other_place)
-                answer.clear()
-                least = min(least, coal.distance(shape, one, other_shape, two, request, answer))
+        for (shape, one), (other_shape, two) in self._placed(first, second, q):
+            answer.clear()
+            answer.min_distance = max(min(least, answer.min_distance), _LEAST_CAP)
+            coal.distance(shape, one, other_shape, two, request, answer)
+            least = min(least, answer.min_distance)
         return float(least)
+
+    def touch(self, first: Iterable[str], second: Iterable[str], q: Array) -> bool:
+        """Whether two groups of links touch at moved-joint positions q (n,)."""
+        request, answer = coal.CollisionRequest(), coal.CollisionResult()
+        for (shape, one), (other_shape, two) in self._placed(first, second, q):
+            answer.clear()
+            if coal.collide(shape, one, other_shape, two, request, answer):
+                return True
+        return False
 
     def least_distance(
         self,
@@ -61,13 +76,14 @@ class MeshDistances:
         Only joints numbered in `moved` are varied. Ends early at a distance below `stop`.
         """
         first, second = tuple(first), tuple(second)
-        found = []
+        found: list[float] = []
         for q in starts:
-            found.append(self.distance(first, second, q))
+            third = sorted(found)[2] if len(found) > 2 else np.inf
+            found.append(self.distance(first, second, q, below=third))
             if found[-1] < stop:
                 return found[-1]
         least = np.inf
-        for index in np.argsort(found)[:3]:
+        for index in np.argsort(found, kind="stable")[:3]:
             value = self._search((first, second), starts[index], moved, found[index], stop)
             least = min(least, value)
             if least < stop:
@@ -91,7 +107,7 @@ class MeshDistances:
                     trial[joint] = np.clip(
                         q[joint] + change, self._lower[joint], self._upper[joint]
                     )
-                    distance = self.distance(*links, trial)
+                    distance = self.distance(*links, trial, below=value)
                     if distance < value - 1e-6:
                         q, value, better = trial, distance, True
                         break
@@ -99,9 +115,16 @@ class MeshDistances:
                 step /= 2
         return value
 
-    def _of(self, links: Iterable[str]) -> list[tuple[int, pin.SE3, pin.CollisionGeometry]]:
-        return [entry for link in links for entry in self._items[link]]
+    def _placed(
+        self, first: Iterable[str], second: Iterable[str], q: Array
+    ) -> Iterator[tuple[Placed, Placed]]:
+        """All pairs of shapes of two groups of links, with where they stand."""
+        model = self._robot.model
+        pin.forwardKinematics(model, self._data, self._robot.configurations(q[None])[0])
+        return product(self._of(first), self._of(second))
 
-    def _transform(self, joint: int, place: pin.SE3) -> coal.Transform3s:
-        world = self._data.oMi[joint] * place if joint else place
-        return coal.Transform3s(world.rotation, world.translation)
+    def _of(self, links: Iterable[str]) -> Iterator[Placed]:
+        for link in links:
+            for joint, place, shape in self._items[link]:
+                world = self._data.oMi[joint] * place if joint else place
+                yield shape, coal.Transform3s(world.rotation, world.translation)

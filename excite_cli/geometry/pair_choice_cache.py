@@ -14,7 +14,7 @@ import coal
 import numpy as np
 
 from excite_cli.errors import RobotError
-from excite_cli.geometry.capsule_cache import capsule_key
+from excite_cli.geometry.capsule_cache import geometry_key
 from excite_cli.geometry.disk_cache import store_arrays, stored_arrays
 from excite_cli.geometry.link_shapes import collision_model
 from excite_cli.geometry.reasons import LinksApart, Reason, Why
@@ -35,7 +35,7 @@ def choice_key(
 ) -> str | None:
     """Hash of all that decides the choice; None where the meshes cannot be read."""
     try:
-        geometry = capsule_key(robot, collision_model(robot), ())
+        geometry = geometry_key(robot, collision_model(robot))
     except RobotError:
         return None
     asked = (geometry, robot.fingerprint(), pairs, margin, samples, seed, coal.__version__)

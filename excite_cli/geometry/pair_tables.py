@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.errors import ConfigError
-from excite_cli.geometry.capsule_cache import capsule_key
+from excite_cli.geometry.capsule_cache import geometry_key
 from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.disk_cache import store_arrays, stored_arrays
 from excite_cli.geometry.hull_bounds import hull_bounds
@@ -164,7 +164,7 @@ def require_tabled(
 
 def _key(robot: Robot, kept: float) -> str:
     """Hash of all that decides the table of any pair; the posture of the others does not."""
-    geometry = capsule_key(robot, collision_model(robot), ())
+    geometry = geometry_key(robot, collision_model(robot))
     digest = hashlib.sha256(f"{_VERSION}|{geometry}|{robot.fingerprint()}|{kept}".encode())
     for part in robot.limits.ranges():
         digest.update(part.tobytes())

@@ -9,9 +9,9 @@ from excite_cli.config.constraints_spec import CapsuleSpec, SelfCollisionSpec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.geometry import capsules as module
-from excite_cli.geometry.capsule_cache import _content, capsule_key, store_capsules
+from excite_cli.geometry.capsule_cache import _content, cover_key, store_capsules
 from excite_cli.geometry.capsules import fit_capsules, link_joints
-from excite_cli.geometry.link_shapes import collision_model, link_shapes
+from excite_cli.geometry.link_shapes import collision_model, link_shapes, placed_shapes
 from excite_cli.robot.model import build_robot
 
 from .fitted_robots import capsules_of, robot_of
@@ -204,11 +204,12 @@ def test_stored_capsules_that_do_not_hold_the_link_are_fitted_anew(
     """Even under a digest that is right: proofs rest on what was measured in this run."""
     robot = the_box(tmp_path)
     first = fit_capsules(robot, SelfCollisionSpec())
-    key = capsule_key(robot, collision_model(robot), ())
+    key = cover_key(placed_shapes(robot, collision_model(robot)), ())
     fits = Fits(monkeypatch)
     small = [replace(capsule, radius=capsule.radius * 0.99) for capsule in first]
-    moved = [replace(capsule, joint=0) for capsule in first]
-    for forged in (small, moved, first[1:], []):
+    moved = [replace(c, start=c.start + 1e-3, end=c.end + 1e-3) for c in first]
+    named = [replace(capsule, links=("other",)) for capsule in first]
+    for forged in (small, moved, named, first[1:], []):
         store_capsules(key, forged)
         fits.count = 0
         again = fit_capsules(robot, SelfCollisionSpec())
