@@ -25,6 +25,7 @@ from excite_cli.view.browser import Serving as Serving
 from excite_cli.view.browser import play_in_browser
 from excite_cli.view.pictures import View as View
 from excite_cli.view.pictures import frame_count, motion_gif, still_png
+from excite_cli.workers.base import Workers
 
 _SECONDS = 5.0  # of a GIF, unless the motion is shorter
 _GIF_SIZE = (640, 480)
@@ -99,6 +100,7 @@ def draw_motion(
     seconds: float | None = None,
     overwrite: bool = False,
     progress: Callable[[str, int, int], None] = lambda text, done, total: None,
+    workers: Workers | None = None,
     tell: Tell = log_note,
 ) -> Drawing:
     """Draw a motion without a display: `excite view --png`, `excite view --gif`.
@@ -107,7 +109,8 @@ def draw_motion(
     itself or to what stands around it; NAME.gif the whole motion, `seconds` long (by default its
     own length, 5 s at most), with `fps` frames per second. Of several motions the first is drawn.
     `motions`, `config` and `chosen` are those of `view_motions`; `look` says from where, how large,
-    and what is shown (PNG: 1280 x 960 pixels, GIF: 640 x 480).
+    and what is shown (PNG: 1280 x 960 pixels, GIF: 640 x 480). `workers` (`open_workers`) share the
+    frames of a GIF.
 
     Raises
     ------
@@ -135,7 +138,7 @@ def draw_motion(
         if film is None:
             content = still_png(problem, segment, look, time, saying(tell))
         else:
-            content = film.drawn(problem, segment, look, progress, tell)
+            content = film.drawn(problem, segment, look, progress, workers, tell)
         write_atomically(path, lambda temporary: _fill(temporary, content))
     return Drawing(
         path,
@@ -170,6 +173,7 @@ class _Film:
         segment: Segment,
         look: View | None,
         progress: Callable[[str, int, int], None],
+        workers: Workers | None,
         tell: Tell,
     ) -> bytes:
         return motion_gif(
@@ -180,6 +184,7 @@ class _Film:
             self.seconds,
             lambda text, done: progress(text, done, self.frames),
             saying(tell),
+            workers,
         )
 
 

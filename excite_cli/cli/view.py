@@ -86,6 +86,7 @@ def view(
         typer.Option("--open/--no-open", help="Open the browser. Default: from a terminal."),
     ] = None,
     overwrite: options.Overwrite = False,
+    workers: options.Workers = 1,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
@@ -107,6 +108,7 @@ def view(
     from excite_cli.api.showing import Answer
     from excite_cli.api.threads import single_threaded
     from excite_cli.api.viewing import Serving, View, draw_motion, drawing_answer, view_motions
+    from excite_cli.api.working import working
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     target = _target(png, gif)
@@ -133,7 +135,7 @@ def view(
             return
         pixels = _size(size or ("1280x960" if png is not None else "640x480"))
         look = View(pixels, azimuth, elevation, capsules, distance, mass, caption, ghosts)
-        with terminal.live("drawing") as line:
+        with working(workers, None, 1, terminal.tell) as place, terminal.live("drawing") as line:
             found = draw_motion(
                 file,
                 target,
@@ -146,6 +148,7 @@ def view(
                 seconds=duration,
                 overwrite=overwrite,
                 progress=line,
+                workers=place,
                 tell=terminal.tell,
             )
     terminal.show(drawing_answer(found))

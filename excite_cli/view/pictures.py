@@ -13,7 +13,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.chain import Segment
-from excite_cli.view.camera import fitted_camera
+from excite_cli.view.camera import Camera, fitted_camera
 from excite_cli.view.geometry import Colour
 from excite_cli.view.ground import PAPER
 from excite_cli.view.instants import Instants, instants_of
@@ -22,6 +22,8 @@ from excite_cli.view.rays import embree_part
 from excite_cli.view.scene import Scene, build_scene, outermost
 from excite_cli.view.studio import FINE, QUICK, Studio
 from excite_cli.view.translucent import CAPSULE, NEAREST, REGION
+from excite_cli.workers.base import News, Workers
+from excite_cli.workers.here import Here
 
 Told = Callable[[str, int], None]
 Said = Callable[[str], None]
@@ -101,10 +103,12 @@ def motion_gif(
     seconds: float,
     tell: Told = lambda text, done: None,
     say: Said = lambda text: None,
+    workers: Workers | None = None,
 ) -> bytes:
     """A motion as a GIF that repeats, `seconds` long: shorter than the motion means faster.
 
-    `tell` hears of every frame, `say` what cannot be shown as the URDF says it.
+    `tell` hears of every frame, `say` what cannot be shown as the URDF says it. `workers` share
+    the frames (default: drawn here).
 
     Raises
     ------
@@ -123,18 +127,47 @@ def motion_gif(
     camera = fitted_camera(
         _framed(scene, [scene.outline], instants), view.size, view.azimuth, view.elevation
     )
-    studio, marks = Studio(scene, camera, view.azimuth, QUICK), Marks(scene, camera)
-    pace = duration / seconds
+    place = workers or Here()
+    film = _Film(scene, camera, instants, view, duration, duration / seconds)
+    shares = [range(first, count, place.count) for first in range(min(place.count, count))]
+    drawn = [0] * len(shares)
+
+    def watch(news: News) -> None:
+        drawn[news.index] = len(shares[news.index]) if news.word is None else news.word
+        tell(f"frame {min(sum(drawn) + 1, count)}/{count}", sum(drawn))
+
+    found = place.map(_drawn, film, shares, watch)
+    pixels = dict(pair for share in found for pair in share)
+    fromarray = pillow_part("Image").fromarray
+    return _gif([fromarray(pixels[frame]) for frame in range(count)], frames_per_second)
+
+
+@dataclass(frozen=True)
+class _Film:
+    """What all frames of a GIF have in common."""
+
+    scene: Scene
+    camera: Camera
+    instants: Instants
+    view: View
+    duration: float
+    pace: float
+
+
+def _drawn(
+    film: _Film, frames: range, tell: Callable[[int], None]
+) -> list[tuple[int, NDArray[np.uint8]]]:
+    """Some frames of a GIF, each with its number; `tell` hears how many are done."""
+    scene, instants, view = film.scene, film.instants, film.view
+    studio, marks = Studio(scene, film.camera, view.azimuth, QUICK), Marks(scene, film.camera)
     images = []
-    for frame in range(count):
-        tell(f"frame {frame + 1}/{count}", frame)
-        capsules = _capsules(scene, instants, frame, view)
-        picture = studio.picture(instants.poses, frame, capsules)
-        caption = _moving_caption(instants, frame, duration, pace) if view.caption else ""
-        images.append(
-            marks.drawn(picture, instants, frame, view.distance, _mass(scene, view), caption)
-        )
-    return _gif(images, frames_per_second)
+    for done, frame in enumerate(frames):
+        tell(done)
+        picture = studio.picture(instants.poses, frame, _capsules(scene, instants, frame, view))
+        caption = _moving_caption(instants, frame, film) if view.caption else ""
+        image = marks.drawn(picture, instants, frame, view.distance, _mass(scene, view), caption)
+        images.append((frame, np.asarray(image)))
+    return images
 
 
 def frame_count(frames_per_second: float, seconds: float) -> int:
@@ -150,8 +183,8 @@ def _frame_times(segment: Segment, count: int) -> Array:
     return np.linspace(0.0, duration, count, endpoint=not closed)
 
 
-def _moving_caption(instants: Instants, frame: int, duration: float, pace: float) -> str:
-    words = caption_of(instants, frame, duration)
+def _moving_caption(instants: Instants, frame: int, film: _Film) -> str:
+    words, pace = caption_of(instants, frame, film.duration), film.pace
     return words if abs(pace - 1) < 0.02 else f"{words}, shown {pace:.2g} times as fast"
 
 

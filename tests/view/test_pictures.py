@@ -11,6 +11,7 @@ from excite_cli.trajectory.chain import Segment
 from excite_cli.view import pictures
 from excite_cli.view.pictures import View, motion_gif, still_png
 from excite_cli.view.studio import QUICK
+from excite_cli.workers.catalogue import open_workers
 
 pytest.importorskip("embreex")
 Image = pytest.importorskip("PIL.Image")
@@ -80,9 +81,21 @@ def test_a_gif_of_the_whole_motion(problem: Problem, segment: Segment) -> None:
     assert image.n_frames == 6
     assert image.info["duration"] == 100
     assert image.info["loop"] == 0
-    assert told == list(range(6))
+    assert told == list(range(7))
     frames = []
     for frame in range(6):
         image.seek(frame)
         frames.append(np.asarray(image.convert("RGB")).astype(float))
     assert all(np.abs(a - b).max() > 60 for a, b in pairwise(frames))
+
+
+def test_workers_draw_the_same_gif(problem: Problem, segment: Segment) -> None:
+    look = replace(SMALL, size=(64, 48), capsules=True)
+    told: list[int] = []
+    with open_workers(2) as workers:
+        shared = motion_gif(
+            problem, segment, look, 10, 0.5, lambda _, done: told.append(done), workers=workers
+        )
+    assert told == sorted(told)
+    assert told[-1] == 5
+    assert shared == motion_gif(problem, segment, look, 10, 0.5)
