@@ -113,8 +113,11 @@ def _begun(
     names = [name_of(prior, number) for number, prior in enumerate(priors, start=1)]
     earlier = [following.name, *names] if following else names
     if stored is not None and stored.exists():
-        found = resumed_result(model, read_result(stored), stored, [Path(n) for n in earlier])
-        tell(Note(Level.INFO, f"resuming after motion {len(found.motions)} of {stored}"))
+        read = read_result(stored)
+        found = resumed_result(model, read, stored, [Path(n) for n in earlier])
+        count, held = len(found.motions), len(read.motions)
+        anew = f"; motion {held}, which was interrupted, is made anew" if held > count else ""
+        tell(Note(Level.INFO, f"resuming after motion {count} of {stored}{anew}"))
         return found
     stacks: list[tuple[str, Result | Stack]] = []
     if following is not None:

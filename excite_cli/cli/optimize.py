@@ -85,6 +85,8 @@ def optimize(
     With --for payload the motion is the shortest that tells mass, centre and inertia of what the
     robot carries, beside a fit of the robot alone; its config is written beside the result (.yaml).
 
+    Ctrl-C stores the best motion so far, proved as well; --resume makes that one anew.
+
     With --starts each motion is the best of many starts, told apart early, which --workers
     processes or a dask cluster share; the result is the same to the last digit whoever does them.
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from types import FrameType
 
 _RESUMED = {
-    "optimize": "interrupted; every finished motion is in the file: see --resume.",
+    "optimize": "interrupted; what was found so far is in the file: see --resume.",
     "study": "interrupted; every finished case is in the folder: see --resume.",
 }
 _last = signal.SIGINT

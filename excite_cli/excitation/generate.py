@@ -13,7 +13,14 @@ from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.dense_grid import dense_condition_number
 from excite_cli.excitation.given_start import start_from
 from excite_cli.excitation.motion import Motion, Outcome
-from excite_cli.excitation.one_start import FoundMotion, OneStart, Search, solve_start
+from excite_cli.excitation.one_start import (
+    FoundMotion,
+    OneStart,
+    Search,
+    StoppedError,
+    interrupted,
+    solve_start,
+)
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressCallback, Status
 from excite_cli.excitation.solvers.base import Solver
@@ -22,7 +29,7 @@ from excite_cli.excitation.start import Start, moved_note
 from excite_cli.excitation.start_progress import followed
 from excite_cli.excitation.task import MotionTask
 from excite_cli.trajectory.chain import Segment
-from excite_cli.workers.base import Workers
+from excite_cli.workers.base import News, Workers
 from excite_cli.workers.here import Here
 
 # Beyond this condition number some parameters do not show at all.
@@ -107,6 +114,7 @@ def _best_of_starts(
     the better half goes on, then a quarter of it to the end. Of equal ones the first is taken, so
     that it does not matter who was ready first. A start that fails is passed over; the last error
     is raised only if all fail. A `first` motion is gone on with, and begun with anew as well.
+    Where the search is interrupted, the outcome is the best so far.
     """
     restarts = task.problem.spec.optimizer.restarts
     tasks = [OneStart(task.stack, start, (*seed, number)) for number in range(restarts)]
@@ -146,6 +154,7 @@ def _told_apart(
     """
     error = NoAdmissibleMotionError("No start was made.")
     last: dict[int, FoundMotion] = {}
+    known: dict[int, FoundMotion] = {}
 
     def best(count: int) -> list[int]:
         return sorted(sorted(last, key=lambda k: (_rank(last[k]), k))[:count])
@@ -156,7 +165,13 @@ def _told_apart(
         if not going:
             return
         asked = [_task(tasks[k], last.get(k), until) for k in going]
-        watch = followed(report, search.problem, len(going))
+        follow = followed(report, search.problem, len(going))
+
+        def watch(news: News) -> None:
+            if isinstance(news.result, FoundMotion):
+                known[going[news.index]] = news.result
+            follow(news)
+
         for k, result in zip(going, workers.map(solve_start, search, asked, watch), strict=True):
             last.pop(k, None)
             if isinstance(result, FoundMotion):
@@ -164,13 +179,23 @@ def _told_apart(
             else:
                 error = result
 
-    alive = list(range(len(tasks)))
-    for number, stages in enumerate(search.solver.told_apart if len(tasks) > 1 else ()):
-        go_on(alive, stages)
-        alive = best(max(2, -(-len(alive) // 2)) if number == 0 else -(-len(alive) // 4))
-    go_on(alive, None)
-    while last and all(found.stages is not None for found in last.values()):
-        go_on(best(1), None)  # those that were gone on with led nowhere
+    try:
+        alive = list(range(len(tasks)))
+        for number, stages in enumerate(search.solver.told_apart if len(tasks) > 1 else ()):
+            go_on(alive, stages)
+            alive = best(max(2, -(-len(alive) // 2)) if number == 0 else -(-len(alive) // 4))
+        go_on(alive, None)
+        while last and all(found.stages is not None for found in last.values()):
+            go_on(best(1), None)  # those that were gone on with led nowhere
+    except KeyboardInterrupt as stop:
+        so_far = [*known.values(), *([stop.found] if isinstance(stop, StoppedError) else [])]
+        if not so_far:
+            raise
+        try:
+            found = interrupted(search, tasks[0], min(so_far, key=_rank))
+        except NoAdmissibleMotionError:
+            raise stop from None
+        return [found], [*known.values(), found]
     if not last:
         raise error
     ended = [last[k] for k in sorted(last) if last[k].stages is None]

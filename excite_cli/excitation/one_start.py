@@ -14,7 +14,7 @@ from excite_cli.excitation.admissible import lacking_margins
 from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Figure, ProgressCallback, Status
-from excite_cli.excitation.solvers.base import Effort, Solver
+from excite_cli.excitation.solvers.base import CutShortError, Effort, Solver
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import Start, random_start
 from excite_cli.excitation.task import MotionTask
@@ -62,6 +62,14 @@ class OneStart:
     until: int | None = None
 
 
+class StoppedError(KeyboardInterrupt):
+    """Ctrl-C while a start is done; `found` is what it had led to, not corrected yet."""
+
+    def __init__(self, found: FoundMotion) -> None:
+        super().__init__()
+        self.found = found
+
+
 def solve_start(
     search: Search, task: OneStart, report: ProgressCallback
 ) -> FoundMotion | NoAdmissibleMotionError:
@@ -70,7 +78,10 @@ def solve_start(
     began = time.perf_counter()
     run = MotionTask(problem, task.stack)
     try:
-        outcome = _solved(run, solver, task, report)
+        try:
+            outcome = _solved(run, solver, task, report)
+        except CutShortError as stop:
+            raise StoppedError(_found(run, task, stop.outcome, began, stages=0)) from None
         ended = task.until is None or outcome.status.is_limit
         if ended:
             effort = _effort(problem, task, 0)
@@ -78,12 +89,35 @@ def solve_start(
             outcome = replace(outcome, last=None, memory=None, way=())
     except NoAdmissibleMotionError as error:
         return NoAdmissibleMotionError(str(error))
+    return _found(run, task, outcome, began, None if ended else task.until)
+
+
+def interrupted(search: Search, task: OneStart, found: FoundMotion) -> FoundMotion:
+    """What a start has led to when the search is interrupted, corrected as at its end.
+
+    Raises
+    ------
+    NoAdmissibleMotionError
+        It cannot be kept admissible between the instants.
+    """
+    began, run = time.perf_counter(), MotionTask(search.problem, task.stack)
+    outcome = found.outcome
+    if found.stages is not None:
+        effort = _effort(search.problem, task, 0)
+        outcome = kept_between_instants(
+            run, search.solver, task.start, outcome, effort, lambda told: None
+        )
+    outcome = replace(outcome, status=Status.INTERRUPTED, last=None, memory=None, way=())
+    return _found(run, replace(task, found=found), outcome, began, None)
+
+
+def _found(
+    run: MotionTask, task: OneStart, outcome: Outcome, began: float, stages: int | None
+) -> FoundMotion:
     spectrum = run.objective.spectrum(run.objective.block(run.coefficients(outcome.x)))
-    value = problem.criterion.value(spectrum.sigma)
+    value = run.problem.criterion.value(spectrum.sigma)
     seconds = time.perf_counter() - began + (task.found.seconds if task.found else 0.0)
-    return FoundMotion(
-        value, spectrum.figure, outcome, seconds, stages=None if ended else task.until
-    )
+    return FoundMotion(value, spectrum.figure, outcome, seconds, stages)
 
 
 def _solved(run: MotionTask, solver: Solver, task: OneStart, report: ProgressCallback) -> Outcome:

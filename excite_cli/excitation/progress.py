@@ -12,6 +12,7 @@ class Status(StrEnum):
     ITERATION_LIMIT = "iteration limit"
     TIME_LIMIT = "time limit"
     STALLED = "stalled"
+    INTERRUPTED = "interrupted"
 
     def __repr__(self) -> str:
         """As a text: lists of them are read by people."""

@@ -10,7 +10,7 @@ from excite_cli.errors import FileError
 from excite_cli.excitation.dense_grid import dense_condition_number
 from excite_cli.excitation.ending import Ending
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.progress import ProgressCallback
+from excite_cli.excitation.progress import ProgressCallback, Status
 from excite_cli.excitation.result import Result, matches
 from excite_cli.excitation.sequence import Step, generate_sequence
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
@@ -96,7 +96,18 @@ def resumed_result(
             f"--resume: {path} was made with another config (different: {', '.join(keys)}). "
             "Resume with the config it was made with, or give another -o."
         )
-    return replace(result, config=spec_as_yaml(problem.spec))
+    return replace(_finished(problem, result), config=spec_as_yaml(problem.spec))
+
+
+def _finished(problem: Problem, result: Result) -> Result:
+    """The result without a last motion that was interrupted: that one is made anew."""
+    motions = result.motions
+    if not motions or motions[-1].status is not Status.INTERRUPTED:
+        return result
+    stack, objective = result.prior_stack, problem.objective()
+    for motion in motions[:-1]:
+        stack = stack.with_rows(objective.block(motion.coefficients))
+    return replace(result, motions=motions[:-1], stack=stack)
 
 
 def continue_run(
@@ -114,6 +125,8 @@ def continue_run(
     `optimizer.restarts` the starts of a motion are spread over `workers` (default: done here), to
     the same result.
 
+    Interrupted, the best of the motion so far is given to `on_motion` before that goes on.
+
     With `sequence.until` they end with the motion that reaches it.
 
     Where `problem` separates effects, `model` is the problem that the result is kept for: the same
@@ -129,6 +142,8 @@ def continue_run(
         stored = step if model is None else _judged(step, model, result.stack)
         result = result.with_step(stored)
         on_motion(stored, result)
+        if step.motion.status is Status.INTERRUPTED:
+            raise KeyboardInterrupt
         if ending.reached(result):
             break
     return result

@@ -61,18 +61,20 @@ def test_an_interrupted_run_goes_on_to_the_same_numbers(
     process = excite.start(*ASKED, "-o", path)
     told = interrupted(process, path, number)
     left = read_result(path)
-    assert 1 <= len(left.motions) < 3
+    ended = [motion for motion in left.motions if motion.status != "interrupted"]
+    assert 1 <= len(left.motions) <= 3
+    assert len(ended) < 3
     assert len(left.stack.factor) == len(left.base_selection)
     if number == signal.SIGINT:
         assert process.returncode == 130
-        assert "interrupted; every finished motion is in the file" in told
+        assert "interrupted; what was found so far is in the file" in told
         assert "Traceback" not in told
         assert [p.name for p in excite.folder.iterdir()] == ["cut.h5"]
     else:
         assert process.returncode == -signal.SIGKILL
     run = excite(*ASKED, "-o", path, "--resume")
     assert run.returncode == 0, run.stderr
-    assert f"resuming after motion {len(left.motions)}" in run.stderr
+    assert f"resuming after motion {len(ended)}" in run.stderr
     assert_same_numbers(path, whole)
 
 

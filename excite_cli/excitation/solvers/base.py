@@ -24,6 +24,14 @@ class Effort:
     last: int | None = None
 
 
+class CutShortError(KeyboardInterrupt):
+    """Ctrl-C while a solver runs; `outcome` is the best admissible point so far."""
+
+    def __init__(self, outcome: Outcome) -> None:
+        super().__init__()
+        self.outcome = outcome
+
+
 class Solver(ABC):
     """A way to minimise the criterion of a `MotionTask` within its residuals."""
 
@@ -45,4 +53,9 @@ class Solver(ABC):
         """Improve the admissible point `x` (size,); what is returned is admissible too.
 
         `memory`: that of the outcome that it goes on from.
+
+        Raises
+        ------
+        CutShortError
+            It was interrupted.
         """

@@ -38,7 +38,7 @@ from excite_cli.excitation.residuals import (
     squared_per_instant,
     summed_per_instant,
 )
-from excite_cli.excitation.solvers.base import Effort, Solver
+from excite_cli.excitation.solvers.base import CutShortError, Effort, Solver
 from excite_cli.excitation.solvers.quasi_newton import damped_update
 from excite_cli.excitation.task import MotionTask
 
@@ -126,10 +126,18 @@ class _Run:
             criterion = steps[min(step, len(steps) - 1)]
             change = max(change, self.effort.tolerance)
             stage = Stage(number + 1, len(_STAGES), mu)
-            x, status = self.stage(x, criterion, mu, change, stage)
+            try:
+                x, status = self.stage(x, criterion, mu, change, stage)
+            except KeyboardInterrupt:
+                if self.best_x is None:
+                    raise
+                raise CutShortError(self.outcome(x, Status.INTERRUPTED, way)) from None
             way.append(x)
             if status.is_limit:
                 break
+        return self.outcome(x, status, way)
+
+    def outcome(self, x: Array, status: Status, way: list[Array]) -> Outcome:
         assert self.best_x is not None
         return Outcome(
             self.best_x, status, self.iterations, self.task.evaluations, x, self.hessian, tuple(way)
