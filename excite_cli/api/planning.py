@@ -15,6 +15,7 @@ from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import no_gain_in_words
 from excite_cli.errors import ConfigError
+from excite_cli.excitation.ending import most_motions as most_motions
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Progress as Progress
 from excite_cli.excitation.result import Result

@@ -1,7 +1,7 @@
 """A config for a robot of which only the URDF is known: `excite init`."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal, cast
 
@@ -32,11 +32,14 @@ def propose(
     *,
     joints: Sequence[str] = (),
     base: Base = "fixed",
+    package_dirs: Sequence[str | Path] = (),
+    xacro_args: Mapping[str, str] | None = None,
 ) -> Proposal:
     """A config for a robot of which nothing but the URDF is known: `excite init`.
 
     `urdf` is a path (relative to `folder`, where the config will lie) or
-    `example-robot-data:<name>`; `joints` those to move, none for a choice of ours. The `text` of
+    `example-robot-data:<name>`; `joints` those to move, none for a choice of ours; `package_dirs`
+    and `xacro_args` as under `robot` in a config. The `text` of
     what is returned is the YAML file, `notes` say what was chosen and why.
 
     Raises
@@ -52,7 +55,8 @@ def propose(
     >>> propose("data/smoke_arm.urdf").joints[:2]
     ('shoulder_yaw', 'shoulder_pitch')
     """
-    return propose_config(Request(str(urdf), Path(folder), tuple(joints), base))
+    dirs, arguments = tuple(map(str, package_dirs)), dict(xacro_args or {})
+    return propose_config(Request(str(urdf), Path(folder), tuple(joints), base, dirs, arguments))
 
 
 @checked()
@@ -62,12 +66,15 @@ def save_proposal(
     *,
     joints: Sequence[str] = (),
     base: str = "fixed",
+    package_dirs: Sequence[str | Path] = (),
+    xacro_args: Mapping[str, str] | None = None,
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Answer:
     """Write the config that `propose` gives for a robot to `output` (default: <robot>.yaml here).
 
-    `robot` is `example-robot-data:<name>` or a URDF file. What is returned says what was chosen.
+    `robot` is `example-robot-data:<name>` or a file (URDF, xacro, MJCF). What is returned says
+    what was chosen.
 
     Raises
     ------
@@ -79,15 +86,26 @@ def save_proposal(
     if base not in ("fixed", "floating"):
         raise ConfigError(f"--base {base}: allowed are fixed and floating.")
     known = str(robot).startswith(EXAMPLE_PREFIX)
-    name = str(robot).removeprefix(EXAMPLE_PREFIX) if known else Path(robot).stem
+    name = (
+        str(robot).removeprefix(EXAMPLE_PREFIX) if known else Path(robot).stem.removesuffix(".urdf")
+    )
     path = Path(f"{name}.yaml") if output is None else Path(output)
     with held({"output": path}, overwrite, () if known else (robot,)):
         folder = path.resolve().parent
         source = str(robot) if known else _from(Path(robot), folder)
-        load_description(source, relative_to=folder)  # a wrong name is reported at once
+        dirs = tuple(_from(Path(each), folder) for each in package_dirs)
+        # A wrong name is reported at once.
+        load_description(source, dirs, folder, xacro_args)
         text = f"looking at {name}: capsules and tables of its meshes take longest, once"
         tell(Note(Level.INFO, text))
-        found = propose(source, folder, joints=joints, base=cast(Base, base))
+        found = propose(
+            source,
+            folder,
+            joints=joints,
+            base=cast(Base, base),
+            package_dirs=dirs,
+            xacro_args=xacro_args,
+        )
         write_text_atomically(path, found.text)
         return proposal_answer(found, source, str(path))
 

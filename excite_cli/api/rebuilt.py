@@ -28,7 +28,7 @@ def rebuilt_problem(
     folder = Path(result.config_folder)
     if config is not None:
         folder, given = Path(config).resolve().parent, load_spec(Path(config)).robot
-        found = {"urdf": given.urdf, "package_dirs": given.package_dirs}
+        found = {name: getattr(given, name) for name in ("urdf", "package_dirs", "xacro_args")}
         spec = spec.model_copy(update={"robot": spec.robot.model_copy(update=found)})
     urdf = spec.robot.urdf
     if not urdf.startswith(EXAMPLE_PREFIX) and not (folder / urdf).is_file():

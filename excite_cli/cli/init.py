@@ -1,6 +1,7 @@
 """`excite init`: a config that works, for a robot of which only the URDF is known."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +16,9 @@ def init(
         str | None,
         typer.Option("--robot", help="A robot of example-robot-data; see `excite robots`."),
     ] = None,
-    urdf: Annotated[Path | None, typer.Option("--urdf", help="A URDF file.")] = None,
+    urdf: Annotated[
+        Path | None, typer.Option("--urdf", help="A file: URDF, xacro, or MJCF (MuJoCo).")
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Config to write. Default: <robot>.yaml here."),
@@ -27,6 +30,16 @@ def init(
     base: Annotated[
         str, typer.Option("--base", help="fixed (on a stand too), or floating.")
     ] = "fixed",
+    package_dirs: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--package-dirs", metavar="FOLDER", help="Holds packages or meshes (may be repeated)."
+        ),
+    ] = None,
+    xacro_args: Annotated[
+        list[str] | None,
+        typer.Option("--xacro-arg", metavar="NAME=VALUE", help="Of a xacro (may be repeated)."),
+    ] = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -40,6 +53,8 @@ def init(
     --robot and --urdf, the terminal is asked.
 
     Example:  excite init --robot ur10
+
+    Example:  excite init --urdf arm.urdf.xacro --xacro-arg gripper=none
     """
     from excite_cli.api.proposing import EXAMPLE_PREFIX, save_proposal
     from excite_cli.api.threads import single_threaded
@@ -67,7 +82,22 @@ def init(
             answers.output,
             joints=answers.joints,
             base=base,
+            package_dirs=package_dirs or (),
+            xacro_args=_pairs(xacro_args or ()),
             overwrite=overwrite,
             tell=terminal.tell,
         )
     terminal.show(answer)
+
+
+def _pairs(words: Sequence[str]) -> dict[str, str]:
+    """`NAME=VALUE` (or ROS's `NAME:=VALUE`) by name."""
+    from excite_cli.errors import ConfigError
+
+    found = {}
+    for word in words:
+        name, equal, value = word.partition("=")
+        if not equal or not name.rstrip(":"):
+            raise ConfigError(f"--xacro-arg {word}: give NAME=VALUE, as --xacro-arg gripper=none.")
+        found[name.rstrip(":")] = value
+    return found

@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from excite_cli.api.planning import most_motions
 from excite_cli.cli.best_so_far import Best
 from excite_cli.cli.console import Line
 from excite_cli.config.spec import Spec
@@ -19,7 +20,7 @@ def iterations_of(spec: Spec) -> int:
 
 def start_line(show: Line, spec: Spec) -> Callable[[int, "Progress"], None]:
     """What `plan` reports to, shown with `show(text, iterations done)`."""
-    total, most = spec.sequence.most, spec.optimizer.max_iterations
+    total, most = most_motions(spec.sequence), spec.optimizer.max_iterations
     of = "of" if spec.sequence.until is None else "of at most"
     best: dict[int, Best] = defaultdict(Best)
 

@@ -41,7 +41,12 @@ class PayloadSpec(Section):
 class RobotSpec(Section):
     """Which robot, which of its joints move, and where the others stand."""
 
-    urdf: str = Field(description="path relative to this file, or example-robot-data:<name>")
+    urdf: str = Field(
+        description="URDF, xacro or MJCF: path relative to this file, or example-robot-data:<name>"
+    )
+    xacro_args: dict[str, str | int | float | bool] = Field(
+        default_factory=dict, description="arguments of a xacro file, {name: value}"
+    )
     package_dirs: tuple[str, ...] = Field(
         (), description="folders in which package:// names of the URDF are looked up"
     )

@@ -44,6 +44,7 @@ Duration = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False), _NO_TRUTH
 Frequency = Annotated[float, Field(gt=0, le=630, allow_inf_nan=False), _NO_TRUTH_VALUE]
 Power = Annotated[float, Field(ge=1, le=1e4, allow_inf_nan=False), _NO_TRUTH_VALUE]
 Samples = Annotated[int, Field(ge=2, le=1_000_000), _NO_TRUTH_VALUE]
+Motions = Annotated[int, Field(ge=1, le=1000), _NO_TRUTH_VALUE]
 Harmonics = Annotated[int, Field(ge=1, le=100), _NO_TRUTH_VALUE]
 ControlPoints = Annotated[int, Field(ge=4, le=500), _NO_TRUTH_VALUE]
 Share = Annotated[float, Field(gt=0, le=1), _NO_TRUTH_VALUE]

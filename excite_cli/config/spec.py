@@ -18,7 +18,7 @@ from excite_cli.config.data_spec import (
 )
 from excite_cli.config.identified_spec import IdentifiedSpec
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.config.section import Integer, Positive, Power, Section, Share
+from excite_cli.config.section import Integer, Motions, Positive, Power, Section, Share
 from excite_cli.config.trajectory_spec import FourierSpec, SamplingSpec, TrajectorySpec
 from excite_cli.config.uncertainty_spec import UncertaintySpec
 
@@ -118,19 +118,12 @@ class UntilSpec(Section):
 class SequenceSpec(Section):
     """Motions generated one after the other."""
 
-    motions: Integer | None = Field(
+    motions: Motions | None = Field(
         None,
-        ge=1,
-        le=1000,
         description="how many, each on top of all earlier ones; with `until`: at most; default: 1, "
         "with `until` 20",
     )
     until: UntilSpec | None = Field(None, description="ends the sequence earlier")
-
-    @property
-    def most(self) -> int:
-        """Motions, or the most of them."""
-        return self.motions or (1 if self.until is None else 20)
 
 
 class Spec(Section):

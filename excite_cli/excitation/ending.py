@@ -4,6 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
+from excite_cli.config.spec import SequenceSpec
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.free_design import FreeDesign
 from excite_cli.excitation.invariant import Invariants, design_for, invariants
@@ -15,6 +16,14 @@ from excite_cli.excitation.stack import Stack
 _ROUNDING = 1e-9
 # Beyond this condition number the information cannot be inverted: nothing is precise yet.
 _SINGULAR = 1e7
+
+
+_MOST = 20  # motions where a precision or a time is asked for, and no number
+
+
+def most_motions(sequence: SequenceSpec) -> int:
+    """Motions, or the most of them where `until` may end them earlier."""
+    return sequence.motions or (1 if sequence.until is None else _MOST)
 
 
 class Ending:
@@ -48,9 +57,9 @@ class Ending:
         """Motions that may be made in all."""
         sequence = self._problem.spec.sequence
         if self._until is None or self._until.duration is None:
-            return sequence.most
+            return most_motions(sequence)
         fitting = self._until.duration / self._problem.trajectory.duration * (1.0 + _ROUNDING)
-        return min(int(fitting), sequence.most)
+        return min(int(fitting), most_motions(sequence))
 
     def reached(self, result: Result) -> bool:
         """Whether the data of `result` are as precise as asked; false where nothing is asked."""

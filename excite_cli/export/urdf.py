@@ -52,7 +52,7 @@ def updated_urdf(robot: Robot, model: IdentifiedModel) -> ModelText:
         A body of `model` has a mass that is not positive: no URDF can hold it.
     """
     builder = ElementTree.TreeBuilder(insert_comments=True)
-    text = robot.description.path.read_text(encoding="utf-8")
+    text = robot.description.urdf
     root = ElementTree.fromstring(text, ElementTree.XMLParser(target=builder))
     links = {link.get("name", ""): link for link in root.findall("link")}
     notes = []

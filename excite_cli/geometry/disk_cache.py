@@ -6,7 +6,6 @@ be written is no error.
 """
 
 import hashlib
-import os
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -17,18 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.atomic import write_atomically
+from excite_cli.cache_folder import cache_folder
 from excite_cli.errors import FileError
 
 Arrays = Mapping[str, NDArray[Any]]
 
 _DIGEST = "digest"
-
-
-def cache_folder() -> Path:
-    """Folder of the program's cache: `$XDG_CACHE_HOME/excite` or `~/.cache/excite`."""
-    given = os.environ.get("XDG_CACHE_HOME", "")
-    root = Path(given) if Path(given).is_absolute() else Path("~/.cache").expanduser()
-    return root / "excite"
 
 
 def stored_arrays(key: str) -> dict[str, NDArray[Any]] | None:

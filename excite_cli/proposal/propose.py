@@ -2,7 +2,8 @@
 
 import math
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -34,13 +35,15 @@ class Request:
     """What is requested.
 
     urdf: as robot.urdf says it; folder: that of the config, from which paths start; joints: to
-    move, empty for a choice of ours.
+    move, empty for a choice of ours; package_dirs, xacro_args: as under robot.
     """
 
     urdf: str
     folder: Path
     joints: tuple[str, ...] = ()
     base: Literal["fixed", "floating"] = "fixed"
+    package_dirs: tuple[str, ...] = ()
+    xacro_args: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,11 +72,13 @@ def propose(request: Request) -> Proposal:
     NoAdmissibleMotionError
         No posture of the robot is clear of its limits.
     """
-    description = load_description(request.urdf, (), request.folder)
+    dirs, arguments = request.package_dirs, request.xacro_args
+    description = load_description(request.urdf, dirs, request.folder, arguments)
     packages = package_folders(description)
-    dirs = tuple(_written(folder, request.folder) for folder in dict.fromkeys(packages.values()))
-    if dirs:
-        description = load_description(request.urdf, dirs, request.folder)
+    if packages:
+        more = (_written(folder, request.folder) for folder in packages.values())
+        dirs = tuple(dict.fromkeys((*dirs, *more)))
+        description = load_description(request.urdf, dirs, request.folder, arguments)
     source = description.path.name
     facts = survey(description)
     _require_inertias(facts, source)
@@ -82,7 +87,7 @@ def propose(request: Request) -> Proposal:
     if facts.has_shapes:
         check_mesh_paths(description)
     visual = _visual_shapes(description, facts)
-    notes = [f"not moved, {words}" for words in choice.in_words()]
+    notes = [*description.notes, *(f"not moved, {words}" for words in choice.in_words())]
     for name, folder in packages.items():
         notes.append(f"meshes of {name} are taken from {folder}")
     posture = first_posture(
@@ -134,6 +139,8 @@ def _draft(
     if dirs:
         robot["package_dirs"] = list(dirs)
         comments["robot", "package_dirs"] = "hold the meshes that the URDF names"
+    if request.xacro_args:
+        robot["xacro_args"] = dict(request.xacro_args)
     robot["base"] = request.base
     if request.base == "floating":
         robot["rows"] = ["base", "joints"]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from excite_cli.config.load import parsed_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.joint_columns import Quantity
+from excite_cli.constraints.mesh_clearance import MeshClearance
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.start import (
@@ -45,7 +46,7 @@ _TABLED = 0.002
 _SELDOM_APART = 0.8
 _ROUNDS = 10
 _FEW_TRIES, _MANY_TRIES = 6, 40
-_DIGITS = 4
+_DIGITS, _FINE_DIGITS = 4, 8
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def settle(tree: Tree, comments: Comments, folder: Path) -> Settled:
         No posture is clear, whatever gives way.
     """
     comments = dict(comments)
-    tries = _FEW_TRIES
+    tries, digits, moved = _FEW_TRIES, _DIGITS, False
     for _ in range(_ROUNDS):
         problem = build_problem(parsed_spec(tree, "the proposed config"), folder)
         task = MotionTask(problem)
@@ -79,20 +80,24 @@ def settle(tree: Tree, comments: Comments, folder: Path) -> Settled:
                     raise
                 tries = _MANY_TRIES
             continue
-        return _at(tree, comments, problem, start)
+        moved = moved or not start.as_configured
+        posture = np.round(start.posture, digits)
+        _write(tree, problem, posture)
+        if _without_lasting_contacts(tree, comments, problem, posture):
+            continue  # other links have capsules of their own then, so what is written is tried
+        if unclear(task, posture):
+            digits = _FINE_DIGITS
+            continue
+        if moved:
+            comments["robot", "posture"] += ", moved until capsules, limits and torques have room"
+        robot = replace(problem.robot, posture=posture)
+        return Settled(tree, comments, replace(problem, robot=robot), start)
     raise NoAdmissibleMotionError("No clear posture was found, although limits were loosened.")
 
 
-def _at(tree: Tree, comments: Comments, problem: Problem, start: Start) -> Settled:
-    """The problem with its posture written into it."""
-    posture = tree["robot"].setdefault("posture", {})
-    for name, value in zip(problem.robot.joint_names, start.posture.tolist(), strict=True):
-        posture[name] = round(value, _DIGITS)
-    if not start.as_configured:
-        comments["robot", "posture"] += ", moved until capsules, limits and torques have room"
-    _without_lasting_contacts(tree, comments, problem, start.posture)
-    robot = replace(problem.robot, posture=start.posture)
-    return Settled(tree, comments, replace(problem, robot=robot), start)
+def _write(tree: Tree, problem: Problem, posture: Array) -> None:
+    into = tree["robot"].setdefault("posture", {})
+    into.update(zip(problem.robot.joint_names, posture.tolist(), strict=True))
 
 
 def _yielded(tree: Tree, comments: Comments, task: MotionTask, posture: Array) -> bool:
@@ -114,13 +119,36 @@ def _yielded(tree: Tree, comments: Comments, task: MotionTask, posture: Array) -
     for constraint, columns in in_the_way:
         if len(constraint.capsules_of(columns[0])) == 2:
             label = constraint.labels[columns[0]]
-            return (
+            if (
                 _nearer(tree, comments, label, _MARGIN)
                 or _by_meshes(tree, comments, task)
                 or _nearer(tree, comments, label, _LEAST_MARGIN)
                 or _kept_still(tree, comments, task)
-            )
-    return False
+            ):
+                return True
+            break
+    return _without_tabled(tree, comments, in_the_way)
+
+
+def _without_tabled(
+    tree: Tree, comments: Comments, in_the_way: list[tuple[Constraint, tuple[int, ...]]]
+) -> bool:
+    """Leave out links whose meshes, asked by tables, are too near each other in all postures."""
+    own = tree["constraints"].get("self_collision")
+    found = [
+        [constraint.tables[column].first, constraint.tables[column].second]
+        for constraint, columns in in_the_way
+        if isinstance(constraint, MeshClearance)
+        for column in columns
+    ]
+    if own is None or not found:
+        return False
+    own.setdefault("ignore", []).extend(found)
+    own["by_meshes"] = [pair for pair in own.get("by_meshes", ()) if pair not in found]
+    if not own["by_meshes"]:
+        del own["by_meshes"]
+    _explain(own, comments)
+    return True
 
 
 def _unbound(tree: Tree, comments: Comments, names: list[str]) -> None:
@@ -206,13 +234,14 @@ def _kept_still(tree: Tree, comments: Comments, task: MotionTask) -> bool:
 
 def _without_lasting_contacts(
     tree: Tree, comments: Comments, problem: Problem, posture: Array
-) -> None:
+) -> bool:
     """Leave out pairs of links whose meshes touch in many postures: no motion keeps them apart.
 
     The same for those that are as good as in contact where the robot stands: no table can keep
-    them apart.
+    them apart. Whether there are any that were not left out before.
     """
     own = tree["constraints"].get("self_collision")
+    before = len(own.get("ignore", ())) if own is not None else 0
     robot = replace(problem.robot, posture=posture)
     for constraint in problem.constraints:
         if own is None or len(constraint.capsules_of(0)) != 2:
@@ -226,8 +255,10 @@ def _without_lasting_contacts(
         near = near_at_posture(robot, capsules, _pairs(constraint), left_out, _TABLED)
         if near:
             own.setdefault("ignore", []).extend(map(list, near))
-    if own is not None:
-        _explain(own, comments)
+    if own is None:
+        return False
+    _explain(own, comments)
+    return len(own.get("ignore", ())) != before
 
 
 def _pairs(constraint: Constraint) -> CollisionPairs:

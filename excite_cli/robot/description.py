@@ -11,12 +11,15 @@ right angles that were rounded become exact.
 import hashlib
 import math
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
 from excite_cli.errors import RobotError, nearest
 from excite_cli.given_files import require_stored
+from excite_cli.robot.formats.base import Asked
+from excite_cli.robot.formats.catalogue import as_urdf
 from excite_cli.robot.mesh_trial import try_meshes
 from excite_cli.robot.urdf_check import parsed
 
@@ -49,7 +52,9 @@ _PREFERRED = {
 class RobotDescription:
     """A URDF as text, where it came from, and where its packages lie.
 
-    `mimicking` names the joints that follow another one, with that other one.
+    `xml` is what is used of `urdf`, the text as given or as it was made of another format, which
+    may have left out what is told in `notes`. `mimicking` names the joints that follow another
+    one, with that other one.
     """
 
     name: str
@@ -59,6 +64,8 @@ class RobotDescription:
     package_dirs: tuple[str, ...]
     sha256: str
     mimicking: dict[str, str]
+    urdf: str
+    notes: tuple[str, ...] = ()
 
 
 def example_robots_folder() -> Path:
@@ -90,20 +97,26 @@ def example_robots() -> dict[str, Path]:
 
 
 def load_description(
-    urdf: str, package_dirs: tuple[str, ...] = (), relative_to: Path | None = None
+    urdf: str,
+    package_dirs: tuple[str, ...] = (),
+    relative_to: Path | None = None,
+    arguments: Mapping[str, object] | None = None,
 ) -> RobotDescription:
-    """Read and check a URDF given by path or as `example-robot-data:<name>`.
+    """Read and check a URDF, xacro or MJCF, given by path or as `example-robot-data:<name>`.
 
     Parameters
     ----------
     urdf: path (relative to `relative_to`) or `example-robot-data:<name>`
     package_dirs: folders that hold the packages named by `package://`
     relative_to: folder that relative paths start from; default the working directory
+    arguments: of xacro
 
     Raises
     ------
     RobotError
-        Unknown name, missing or unreadable file, not a URDF, or larger than 20 MB.
+        Unknown name, missing or unreadable file, not a robot, or larger than 20 MB.
+    MissingExtraError
+        The library that reads its format is not installed.
     FileError
         It is a named pipe, a socket or a device.
     """
@@ -132,21 +145,23 @@ def load_description(
                 f"robot.urdf: there is no file {path}.{meant} Give a path relative to the YAML "
                 f"file, or {EXAMPLE_PREFIX}<name>."
             )
-    text = _read(path)
-    tree = parsed(path, text)
-    packages = (*extra, str(_share_folder(path)), str(path.parent))
+    found = as_urdf(path, _read(path), Asked(extra, arguments or {}))
+    tree = parsed(path, found.text)
+    packages = (*extra, str(_share_folder(path)), str(path.parent), *found.folders)
     return RobotDescription(
-        name=path.stem,
+        name=path.stem.removesuffix(".urdf"),
         source=urdf,
         path=path,
         xml=_without_continuous_joints(tree),
         package_dirs=tuple(dict.fromkeys(packages)),
-        sha256=hashlib.sha256(text.encode()).hexdigest(),
+        sha256=hashlib.sha256(found.text.encode()).hexdigest(),
         mimicking={
             joint.get("name", ""): mimic.get("joint", "")
             for joint in tree.findall("joint")
             for mimic in joint.findall("mimic")
         },
+        urdf=found.text,
+        notes=found.notes,
     )
 
 

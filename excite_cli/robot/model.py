@@ -149,7 +149,7 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
     ConfigError
         A joint is unknown, the posture leaves the limits, or limits cross.
     """
-    description = load_description(spec.urdf, spec.package_dirs, relative_to)
+    description = load_description(spec.urdf, spec.package_dirs, relative_to, spec.xacro_args)
     full = _parse(description, spec)
     if spec.payload is not None:
         add_payload(full, payload_on(full, spec.payload))

@@ -5,12 +5,11 @@ and in the folders that ROS_PACKAGE_PATH and AMENT_PREFIX_PATH name. A relative 
 URDF's own folder (`../meshes/arm.stl`) needs the folder that holds it.
 """
 
-import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from pathlib import Path
 
 from excite_cli.robot.description import RobotDescription, mesh_file
+from excite_cli.robot.packages import folders_of_packages
 
 _PREFIX = "package://"
 
@@ -33,22 +32,8 @@ def package_folders(description: RobotDescription) -> dict[str, Path]:
         package = inside.split("/")[0]
         if package in found or any(mesh_file(folder / inside) for folder in known):
             continue
-        for folder in _folders(description.path):
+        for folder in folders_of_packages(description.path):
             if mesh_file(folder / inside):
                 found[package] = folder
                 break
     return found
-
-
-def _folders(urdf: Path) -> Iterator[Path]:
-    for folder in urdf.parents:
-        yield folder
-        try:
-            beneath = sorted(folder.iterdir()) if folder != folder.parent else []
-        except OSError:
-            continue
-        yield from (inner for inner in beneath if inner.is_dir())
-    for variable, inner in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
-        for entry in filter(None, os.environ.get(variable, "").split(os.pathsep)):
-            yield Path(entry) / inner
-            yield Path(entry).parent / inner

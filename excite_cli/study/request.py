@@ -53,6 +53,8 @@ def _robot(spec: Spec, folder: Path) -> str:
     from excite_cli.robot.description import load_description
 
     try:
-        return load_description(spec.robot.urdf, spec.robot.package_dirs, folder).sha256
+        return load_description(
+            spec.robot.urdf, spec.robot.package_dirs, folder, spec.robot.xacro_args
+        ).sha256
     except RobotError:
         return _MISSING

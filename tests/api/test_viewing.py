@@ -75,7 +75,7 @@ def test_a_motion_at_hand_is_drawn(loop: Loop, tmp_path: Path) -> None:
         progress=lambda text, done, total: frames.append((done, total)),
     )
     assert (found.motion, found.frames, found.seconds) == ("motion_2", 3, 1.5)
-    assert frames == [(0, 3), (1, 3), (2, 3)]
+    assert frames == [(0, 3), (1, 3), (2, 3), (3, 3)]
     assert found.path.read_bytes()[:4] == b"GIF8"
     assert found.path.stat().st_size == found.size
 

@@ -102,6 +102,7 @@ LEVELS: dict[str, tuple[str, type[Section]]] = {
     ),
     "optimizer": (f"{ROBOT}\noptimizer: {{@: 1}}", spec.OptimizerSpec),
     "sequence": (f"{ROBOT}\nsequence: {{@: 1}}", spec.SequenceSpec),
+    "sequence.until": (f"{ROBOT}\nsequence: {{until: {{@: 1}}}}", spec.UntilSpec),
     "effects.0": (f"{ROBOT}\neffects: [{{kind: spring, @: 1}}]", data_spec.EffectSpec),
     "measurement": (f"{ROBOT}\nmeasurement: {{@: 1}}", data_spec.MeasurementSpec),
     "measurement.filter": (

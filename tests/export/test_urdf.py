@@ -66,6 +66,7 @@ def test_the_rest_of_the_file_is_kept(tmp_path: Path) -> None:
     robot = random_robot(1, joints=3, folder=tmp_path)
     path = robot.description.path
     path.write_text(path.read_text().replace("</robot>", "<!-- mine --><gazebo>x</gazebo></robot>"))
+    robot = build_robot(RobotSpec(urdf=str(path)))
     phi = true_inertias(robot, 0.3, seed=2)
     text = updated_urdf(robot, IdentifiedModel(phi)).text
     assert "<!-- mine -->" in text

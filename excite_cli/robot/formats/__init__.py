@@ -1,0 +1,1 @@
+"""Formats that robots are described in, and how each becomes a URDF."""

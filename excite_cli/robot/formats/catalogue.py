@@ -1,0 +1,21 @@
+"""All formats; the first that recognises a file reads it."""
+
+from pathlib import Path
+
+from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.mjcf import Mjcf
+from excite_cli.robot.formats.plain_urdf import PlainUrdf
+from excite_cli.robot.formats.xacro import Xacro
+
+FORMATS: tuple[RobotFormat, ...] = (Xacro(), Mjcf(), PlainUrdf())
+
+
+def as_urdf(path: Path, text: str, asked: Asked) -> Urdf:
+    """The robot of a file as a URDF.
+
+    Raises
+    ------
+    RobotError, MissingExtraError
+        See `RobotFormat.urdf`.
+    """
+    return next(each for each in FORMATS if each.recognises(path, text)).urdf(path, text, asked)

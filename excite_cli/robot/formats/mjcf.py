@@ -1,0 +1,376 @@
+"""MJCF, MuJoCo's own format, compiled by MuJoCo and written as a URDF of the same robot.
+
+Includes, defaults and classes are MuJoCo's to resolve; what it has compiled is one tree of bodies.
+A joint of MJCF may lie anywhere in its body, so a link's frame is the body's, shifted to the last
+of its joints: X = T(p) R Π_i T(p_i) Rot(a_i, q_i − ref_i) T(−p_i), with the reference angle in the
+joint's origin, so that positions are MuJoCo's.
+"""
+
+import hashlib
+import struct
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from excite_cli.atomic import write_atomically
+from excite_cli.cache_folder import cache_folder
+from excite_cli.errors import FileError, MissingExtraError, RobotError
+from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+
+Array = NDArray[np.float64]
+Element = ElementTree.Element
+
+_FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
+_PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)  # mjtGeom
+_BALL_POINTS = 200
+
+
+class Mjcf(RobotFormat):
+    """Recognised by its root element, `<mujoco>`."""
+
+    name = "MJCF"
+
+    def recognises(self, path: Path, text: str) -> bool:
+        """Whether the root element is `mujoco` (a URDF may have such an element within)."""
+        if "<mujoco" not in text:
+            return False
+        try:
+            return ElementTree.fromstring(text).tag == "mujoco"
+        except ElementTree.ParseError:
+            return False
+
+    def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
+        """Bodies as links with inertias, shapes, joints, limits, efforts, friction, couplings."""
+        try:
+            import mujoco
+        except ImportError as error:
+            raise MissingExtraError(
+                "Files of MJCF need mujoco, which is not installed. Run: pip install "
+                "'excite-cli[formats]'."
+            ) from error
+        try:
+            model = mujoco.MjModel.from_xml_path(str(path))
+        except Exception as error:
+            reason = " ".join(str(error).split())
+            raise RobotError(f"{path.name}: MuJoCo cannot compile it: {reason[:400]}") from error
+        return _Writer(model, path).written()
+
+
+class _Writer:
+    """One compiled model as XML."""
+
+    def __init__(self, model: Any, path: Path) -> None:
+        self.m, self.path = model, path
+        self.robot = ElementTree.Element("robot", name=path.stem)
+        self.notes: list[str] = []
+        self.folders: set[str] = set()
+        self.efforts = self._efforts()
+        self.followed = self._couplings()
+
+    def written(self) -> Urdf:
+        root, kept = self._root()
+        if root == 0:
+            ElementTree.SubElement(self.robot, "link", name=self._body(0))
+        for body in kept:
+            self._link(body, is_root=body == root)
+        self._told()
+        text = ElementTree.tostring(self.robot, encoding="unicode")
+        return Urdf(text, tuple(sorted(self.folders)), tuple(self.notes))
+
+    def _root(self) -> tuple[int, list[int]]:
+        """The body that becomes the URDF's root (0: the world), and the bodies that are kept.
+
+        Bodies that float are things about, unless nothing else moves: then the one with the most
+        joints is the robot.
+        """
+        trees: dict[int, list[int]] = {}
+        for body in range(1, self.m.nbody):
+            trees.setdefault(int(self.m.body_rootid[body]), []).append(body)
+        floating = {root for root in trees if _FREE in self._types(root)}
+        joints = {
+            root: sum(len(self._types(body)) for body in trees[root]) - (root in floating)
+            for root in trees
+        }
+        if not any(joints.values()):
+            raise RobotError(f"{self.path.name}: no body has a joint that could be moved.")
+        fixed = [root for root in trees if root not in floating]
+        if any(joints[root] for root in fixed):
+            left = sorted(floating)
+            kept = [body for root in sorted(fixed) for body in trees[root]]
+            found = 0
+        else:
+            found = max(floating, key=lambda root: joints[root])
+            left = sorted(set(trees) - {found})
+            kept = trees[found]
+        if left:
+            names = ", ".join(self._body(root) for root in left)
+            self.notes.append(f"not part of the robot, left out: {names}")
+        return found, kept
+
+    def _types(self, body: int) -> list[int]:
+        return [int(self.m.jnt_type[j]) for j in self._joints(body)]
+
+    def _joints(self, body: int) -> range:
+        first = int(self.m.body_jntadr[body])
+        return range(first, first + int(self.m.body_jntnum[body])) if first >= 0 else range(0)
+
+    def _movable(self, body: int) -> list[int]:
+        return [j for j in self._joints(body) if self.m.jnt_type[j] in (_SLIDE, _HINGE)]
+
+    def _offset(self, body: int) -> Array:
+        """Origin (3,) of a body's link in the body's frame: its last joint."""
+        joints = self._movable(body)
+        return np.array(self.m.jnt_pos[joints[-1]]) if joints else np.zeros(3)
+
+    def _link(self, body: int, is_root: bool) -> None:
+        link = ElementTree.SubElement(self.robot, "link", name=self._body(body))
+        shift = self._offset(body)
+        mass = float(self.m.body_mass[body])
+        if mass > 0.0:
+            inertial = ElementTree.SubElement(link, "inertial")
+            turn = _matrix(self.m.body_iquat[body])
+            _origin(inertial, self.m.body_ipos[body] - shift, np.eye(3))
+            ElementTree.SubElement(inertial, "mass", value=repr(mass))
+            # Written in the link's axes: no angles, no rounding of them.
+            inertia = turn @ np.diag(self.m.body_inertia[body]) @ turn.T
+            names = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2),
+                     ("izz", 2, 2))  # fmt: skip
+            figures = {name: repr(float(inertia[i, j])) for name, i, j in names}
+            ElementTree.SubElement(inertial, "inertia", figures)
+        self._shapes(link, body, shift)
+        if not is_root:
+            self._connected(body)
+
+    def _connected(self, body: int) -> None:
+        """The joints from the parent's link to the body's, through links without mass."""
+        m, parent = self.m, int(self.m.body_parentid[body])
+        place = np.array(m.body_pos[body]) - self._offset(parent)
+        turn, before = _matrix(m.body_quat[body]), np.zeros(3)
+        joints, above = self._movable(body), self._body(parent)
+        if any(kind == _BALL for kind in self._types(body)):
+            name = self._body(body)
+            self.notes.append(f"the ball joint of {name} stays where it is: one angle per joint")
+        if not joints:
+            self._joint(f"{self._body(body)}_fixed", "fixed", above, self._body(body), place, turn)
+            return
+        for j in joints:
+            last = j == joints[-1]
+            below = self._body(body) if last else f"{self._body(body)}__{self._name(j)}"
+            if not last:
+                ElementTree.SubElement(self.robot, "link", name=below)
+            axis, ref = np.array(m.jnt_axis[j]), float(m.qpos0[m.jnt_qposadr[j]])
+            place = place + turn @ (np.array(m.jnt_pos[j]) - before)
+            if m.jnt_type[j] == _SLIDE:
+                kind = "prismatic"
+                place = place - ref * (turn @ axis)
+            else:
+                kind = "revolute" if m.jnt_limited[j] else "continuous"
+                turn = turn @ pin.exp3(-ref * axis)
+            joint = self._joint(self._name(j), kind, above, below, place, turn)
+            ElementTree.SubElement(joint, "axis", xyz=_words(axis))
+            self._limit(joint, j)
+            self._dynamics(joint, j)
+            before, place, turn, above = np.array(m.jnt_pos[j]), np.zeros(3), np.eye(3), below
+
+    def _joint(
+        self, name: str, kind: str, parent: str, child: str, place: Array, turn: Array
+    ) -> Element:
+        joint = ElementTree.SubElement(self.robot, "joint", name=name, type=kind)
+        _origin(joint, place, turn)
+        ElementTree.SubElement(joint, "parent", link=parent)
+        ElementTree.SubElement(joint, "child", link=child)
+        return joint
+
+    def _limit(self, joint: Element, j: int) -> None:
+        effort = self.efforts.get(j, 0.0)  # 0: not known, as for the velocity, which MJCF lacks
+        limit = {"effort": repr(effort), "velocity": "0"}
+        if self.m.jnt_limited[j]:
+            lower, upper = map(float, self.m.jnt_range[j])
+            limit |= {"lower": repr(lower), "upper": repr(upper)}
+        elif self.m.jnt_type[j] == _SLIDE:
+            limit |= {"lower": "-1e9", "upper": "1e9"}
+        ElementTree.SubElement(joint, "limit", limit)
+        if j in self.followed:
+            driver, multiplier, offset = self.followed[j]
+            words = {"multiplier": repr(multiplier), "offset": repr(offset)}
+            ElementTree.SubElement(joint, "mimic", {"joint": self._name(driver), **words})
+
+    def _dynamics(self, joint: Element, j: int) -> None:
+        dof = int(self.m.jnt_dofadr[j])
+        damping, friction = float(self.m.dof_damping[dof]), float(self.m.dof_frictionloss[dof])
+        if damping or friction:
+            ElementTree.SubElement(
+                joint, "dynamics", damping=repr(damping), friction=repr(friction)
+            )
+
+    def _efforts(self) -> dict[int, float]:
+        """The largest torque [N·m or N] of joints whose actuators, or whose joint, limit it."""
+        m, found = self.m, {}
+        for actuator in range(m.nu):
+            if m.actuator_trntype[actuator] != 0:  # of a joint
+                continue
+            j, gear = int(m.actuator_trnid[actuator, 0]), abs(float(m.actuator_gear[actuator, 0]))
+            if m.actuator_forcelimited[actuator]:
+                force = float(np.abs(m.actuator_forcerange[actuator]).max())
+            elif m.actuator_ctrllimited[actuator] and m.actuator_biastype[actuator] == 0:
+                gain = abs(float(m.actuator_gainprm[actuator, 0]))
+                force = gain * float(np.abs(m.actuator_ctrlrange[actuator]).max())
+            else:
+                continue
+            found[j] = force * gear
+        for j in range(m.njnt):
+            if m.jnt_actfrclimited[j]:
+                most = float(np.abs(m.jnt_actfrcrange[j]).max())
+                found[j] = min(most, found.get(j, most))
+        return found
+
+    def _couplings(self) -> dict[int, tuple[int, float, float]]:
+        """Joints that follow another one: that one, multiplier and offset."""
+        m, found = self.m, {}
+        for k in range(m.neq):
+            if m.eq_type[k] != 2 or int(m.eq_obj2id[k]) < 0:  # no coupling of two joints
+                continue
+            follower, driver = int(m.eq_obj1id[k]), int(m.eq_obj2id[k])
+            constant, slope, *rest = map(float, m.eq_data[k, :5])
+            at, of = (float(m.qpos0[m.jnt_qposadr[j]]) for j in (follower, driver))
+            if any(rest):
+                self.notes.append(
+                    f"{self._name(follower)} follows {self._name(driver)} by a curve; its slope "
+                    "at the reference position is taken"
+                )
+            found[follower] = (driver, slope, at + constant - slope * of)
+        return found
+
+    def _told(self) -> None:
+        m = self.m
+        closed = [k for k in range(m.neq) if m.eq_type[k] in (0, 1) and m.eq_active0[k]]
+        if closed:
+            self.notes.append(
+                f"{len(closed)} closed loop(s) (<equality> connect or weld) are cut: the joints "
+                "within move on their own here"
+            )
+        if m.ntendon:
+            self.notes.append(f"{m.ntendon} tendon(s) are left out: their forces are not modelled")
+        if bool((np.asarray(m.dof_armature) > 0).any()):
+            self.notes.append(
+                "armature (inertia of rotors) has no place in a URDF: declare it with "
+                "effects: [{kind: armature}]"
+            )
+
+    def _shapes(self, link: Element, body: int, shift: Array) -> None:
+        first, count = int(self.m.body_geomadr[body]), int(self.m.body_geomnum[body])
+        geoms = range(first, first + count) if first >= 0 else range(0)
+        solid = [g for g in geoms if self.m.geom_contype[g] or self.m.geom_conaffinity[g]]
+        shown = [g for g in geoms if g not in solid] or solid
+        for kind, chosen in (("collision", solid), ("visual", shown)):
+            for g in chosen:
+                for place, turn, shape in self._geometry(g):
+                    item = ElementTree.SubElement(link, kind)
+                    _origin(item, place - shift, turn)
+                    ElementTree.SubElement(item, "geometry").append(shape)
+                    if kind == "visual":
+                        material = ElementTree.SubElement(item, "material", name=f"colour_{g}")
+                        ElementTree.SubElement(material, "color", rgba=_words(self._colour(g)))
+
+    def _colour(self, g: int) -> Array:
+        material = int(self.m.geom_matid[g])
+        return np.array(self.m.mat_rgba[material] if material >= 0 else self.m.geom_rgba[g])
+
+    def _geometry(self, g: int) -> Iterator[tuple[Array, Array, Element]]:
+        m = self.m
+        place, turn = np.array(m.geom_pos[g]), _matrix(m.geom_quat[g])
+        kind, size = int(m.geom_type[g]), np.array(m.geom_size[g])
+        if kind == _SPHERE:
+            yield place, turn, ElementTree.Element("sphere", radius=repr(float(size[0])))
+        elif kind in (_CYLINDER, _CAPSULE):
+            figures = {"radius": repr(float(size[0])), "length": repr(2 * float(size[1]))}
+            yield place, turn, ElementTree.Element("cylinder", figures)
+            for side in (-1.0, 1.0) if kind == _CAPSULE else ():
+                ball = ElementTree.Element("sphere", radius=repr(float(size[0])))
+                yield place + side * size[1] * turn[:, 2], turn, ball
+        elif kind == _BOX:
+            yield place, turn, ElementTree.Element("box", size=_words(2 * size))
+        elif kind == _ELLIPSOID:
+            points = size * _sphere_points()
+            yield place, turn, self._mesh(points, ConvexHull(points).simplices)
+        elif kind == _MESH:
+            mesh = int(m.geom_dataid[g])
+            vertices = slice(int(m.mesh_vertadr[mesh]), None)
+            points = m.mesh_vert[vertices][: int(m.mesh_vertnum[mesh])]
+            faces = m.mesh_face[int(m.mesh_faceadr[mesh]) :][: int(m.mesh_facenum[mesh])]
+            yield place, turn, self._mesh(np.array(points, dtype=float), np.array(faces))
+        elif kind not in (_PLANE, _HFIELD):
+            self.notes.append(f"a shape of {self._body(int(m.geom_bodyid[g]))} is left out")
+
+    def _mesh(self, points: Array, faces: NDArray[Any]) -> Element:
+        """A mesh as MuJoCo has it (scaled, recentred), as a file in the cache."""
+        path = _stored(_stl(points, faces))
+        self.folders.add(str(path.parent))
+        return ElementTree.Element("mesh", filename=f"file://{path}")
+
+    def _body(self, body: int) -> str:
+        return str(self.m.body(body).name) or f"body_{body}"
+
+    def _name(self, j: int) -> str:
+        return str(self.m.joint(j).name) or f"{self._body(int(self.m.jnt_bodyid[j]))}_joint_{j}"
+
+
+def _matrix(quaternion: Array) -> Array:
+    w, x, y, z = map(float, quaternion)
+    return np.asarray(pin.Quaternion(w, x, y, z).normalized().matrix())
+
+
+def _origin(element: Element, place: Array, turn: Array) -> None:
+    figures = {"xyz": _words(place), "rpy": _words(pin.rpy.matrixToRpy(np.asarray(turn)))}
+    ElementTree.SubElement(element, "origin", figures)
+
+
+def _words(values: Array) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _sphere_points() -> Array:
+    k = np.arange(_BALL_POINTS) + 0.5
+    z, angle = 1 - 2 * k / _BALL_POINTS, np.pi * (1 + 5**0.5) * k
+    ring = np.sqrt(1 - z**2)
+    return np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])
+
+
+def _stl(points: Array, faces: NDArray[Any]) -> bytes:
+    """Binary STL of triangles `faces` (F, 3) of `points` (N, 3)."""
+    records = np.zeros(
+        len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")]
+    )
+    records["corners"] = points[faces]
+    return b"\0" * 80 + struct.pack("<I", len(faces)) + records.tobytes()
+
+
+def _fill(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
+
+
+def _stored(content: bytes) -> Path:
+    """The file in the user's cache that holds `content`.
+
+    Raises
+    ------
+    RobotError
+        It cannot be written.
+    """
+    path = cache_folder() / "meshes" / f"{hashlib.sha256(content).hexdigest()[:32]}.stl"
+    try:
+        if not (path.is_file() and path.read_bytes() == content):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(path, lambda temporary: _fill(temporary, content))
+    except (OSError, FileError) as error:
+        raise RobotError(
+            f"meshes of MJCF are kept in {path.parent}, which cannot be written: {error}. Set "
+            "XDG_CACHE_HOME to a folder that can."
+        ) from error
+    return path

@@ -1,0 +1,19 @@
+"""URDF itself: nothing to do."""
+
+from pathlib import Path
+
+from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+
+
+class PlainUrdf(RobotFormat):
+    """The format that all others become; what no other recognises is taken for one."""
+
+    name = "URDF"
+
+    def recognises(self, path: Path, text: str) -> bool:
+        """Any file."""
+        return True
+
+    def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
+        """The text as it is."""
+        return Urdf(text)
