@@ -102,6 +102,10 @@ def test_all_examples_run(tmp_path: Path, cache: Path) -> None:
     for ours, theirs in JOINTS.items():
         urdf = re.sub(rf'(<joint name=)"{ours}"', rf'\1"{theirs}"', urdf)
     (tmp_path / "arm.urdf").write_text(urdf, encoding="utf-8")
+    argument = '<xacro:arg name="gripper" default="two_fingers"/>'
+    xacro = urdf.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1)
+    xacro = xacro.replace("</robot>", f"{argument}</robot>")
+    (tmp_path / "arm.urdf.xacro").write_text(xacro, encoding="utf-8")
     (tmp_path / "ur10.yaml").write_text(CONFIG, encoding="utf-8")
     found = examples()
     last = found.pop("init", [])  # it writes another ur10.yaml

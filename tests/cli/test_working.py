@@ -38,7 +38,7 @@ def test_idle_workers_are_told(
 
 
 def test_what_can_be_gone_on_with_is_told_how() -> None:
-    assert stopped(["optimize", "a.yaml"])[1].endswith("motion is in the file: see --resume.")
+    assert stopped(["optimize", "a.yaml"])[1].endswith("so far is in the file: see --resume.")
     assert stopped(["study", "a.yaml"])[1].endswith("case is in the folder: see --resume.")
     assert stopped(["check", "a.h5"]) == (
         128 + signal.SIGINT,

@@ -26,8 +26,10 @@ class Xacro(RobotFormat):
     name = "xacro"
 
     def recognises(self, path: Path, text: str) -> bool:
-        """`.xacro`, or elements of `xmlns:xacro`."""
-        return path.suffix == ".xacro" or bool(_NAMESPACE.search(text) and "<xacro:" in text)
+        """`.xacro`, or elements of `xmlns:xacro`; but no `.urdf`, in which such are left over."""
+        if path.suffix in (".xacro", ".urdf"):
+            return path.suffix == ".xacro"
+        return bool(_NAMESPACE.search(text) and "<xacro:" in text)
 
     def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
         """The expanded text; `$(find package)` as `find_package` does."""
