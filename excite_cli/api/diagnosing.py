@@ -9,6 +9,7 @@ from excite_cli.api.loading import (
     Case,
     dataset_of,
     inputs_of,
+    measured_case,
     robot_base,
     sources_of,
     tell_findings,
@@ -78,6 +79,7 @@ def diagnose(
         raise ConfigError("--apply-unconfirmed says nothing without --apply NEW.yaml.")
     if smallest and apply is None:
         raise ConfigError("--smallest says nothing without --apply NEW.yaml.")
+    problem = measured_case(problem)
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, "apply": apply}, overwrite, inputs), at_hand(workers):
         dataset = dataset_of(problem, data, tell)

@@ -9,6 +9,7 @@ from excite_cli.api.loading import (
     Case,
     dataset_of,
     inputs_of,
+    measured_case,
     robot_base,
     sources_of,
     tell_findings,
@@ -66,6 +67,7 @@ def identify(
         Config and data do not fit; a run is too short; order or signs of torques cannot be right;
         a file exists already.
     """
+    problem = measured_case(problem)
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, **models}, overwrite, inputs), at_hand(workers):
@@ -115,6 +117,7 @@ def identify_load(
     ConfigError, FileError
         The link is unknown or must be named; the fit belongs to another robot; a run is too short.
     """
+    problem = measured_case(problem)
     dataset = dataset_of(problem, data, tell)
     # Signs and order of columns are not judged: beside the URDF, a load looks like other columns.
     stored = fit if isinstance(fit, StoredFit) else read_fit(Path(fit))

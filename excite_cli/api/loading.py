@@ -9,6 +9,7 @@ import numpy as np
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.paths import paths_in, refuse_twice
+from excite_cli.base_link.rows import with_base
 from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
@@ -22,7 +23,7 @@ from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.merged_findings import merged
 from excite_cli.measurement.quality import raise_for_errors
 from excite_cli.robot.described import describe
-from excite_cli.robot.model import Robot, build_robot
+from excite_cli.robot.model import Robot, build_measured_robot, build_robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.shown.record import Shown, show
 from excite_cli.store.fit_file import read_fit
@@ -53,6 +54,15 @@ class Case(Shown):
     def base(self) -> BaseParameters:
         """Base parameters of the robot."""
         return find_base_parameters(self.robot)
+
+
+def measured_case(problem: Problem | Case) -> Problem | Case:
+    """The case whose robot is that of the data: with `base` among robot.rows its base moves."""
+    rows = problem.spec.robot.rows
+    if "base" not in rows or problem.robot.base_joints:
+        return problem
+    robot = build_measured_robot(problem.spec.robot, problem.folder)
+    return Case(problem.spec, problem.folder, robot, problem.file)
 
 
 def robot_base(problem: Problem | Case) -> BaseParameters:
@@ -162,16 +172,23 @@ def load_data(
     paths = [files] if isinstance(files, str | Path) else files
     given = [Path(each) for each in paths]
     refuse_twice(given)  # a run that is fitted must not be the sealed one, too
-    robot, limits = problem.robot, problem.robot.limits
+    problem = measured_case(problem)
+    robot, limits, spec = problem.robot, problem.robot.limits, problem.spec.measurement
+    own = slice(robot.base_joints, None)
+    torques = "joints" in problem.spec.robot.rows
     data = read_dataset(
         given,
-        problem.spec.measurement,
-        robot.joint_names,
-        (limits.lower, limits.upper, limits.velocity, limits.effort),
-        (~robot.sliding).astype(float),
+        spec,
+        robot.joint_names[own],
+        (limits.lower[own], limits.upper[own], limits.velocity[own], limits.effort[own]),
+        (~robot.sliding[own]).astype(float),
+        torques,
     )
     raise_for_errors(data)
-    if problem.spec.measurement.gravity == "subtracted":
+    if robot.base_joints:
+        data, noticed = with_base(robot, data, spec, torques)
+        data = replace(data, findings=(*data.findings, *noticed))
+    if spec.gravity == "subtracted":
         data = with_gravity(robot, data)
     tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs_in_words(data)}"))
     if isinstance(problem, Case) and problem.base.note:  # a problem has told it
@@ -206,10 +223,16 @@ def dataset_of(
     """
     if not isinstance(data, Dataset):
         return load_data(problem, data, tell)
-    if data.joint_names != problem.robot.joint_names:
+    problem = measured_case(problem)
+    joints, base = problem.robot.joint_names, problem.robot.base_joints
+    if base and data.joint_names == joints[base:]:
+        torques = "joints" in problem.spec.robot.rows
+        data, found = with_base(problem.robot, data, problem.spec.measurement, torques)
+        tell_findings(found, tell)
+    if data.joint_names != joints:
         raise FileError(
             f"the data are of other joints ({', '.join(data.joint_names)}) than the config "
-            f"({', '.join(problem.robot.joint_names)}). Read them with `load_data` and this config."
+            f"({', '.join(joints)}). Read them with `load_data` and this config."
         )
     if not data.runs:
         raise FileError("the data hold no run. Give one, or read them with `load_data`.")

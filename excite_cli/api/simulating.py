@@ -7,7 +7,7 @@ from pathlib import Path
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.entering import Start, entered, start_posture
-from excite_cli.api.loading import Case, inputs_of, problem_of
+from excite_cli.api.loading import Case, inputs_of, measured_case, problem_of
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.api.outputs import held
 from excite_cli.config.data_spec import MeasurementSpec
@@ -17,7 +17,9 @@ from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.export.timed import repeated
 from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.simulation.base_sensors import Instruments
 from excite_cli.simulation.covariate_series import parse_series as parse_series
 from excite_cli.simulation.engine import load_mujoco
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
@@ -30,7 +32,7 @@ from excite_cli.summary.simulation import simulation_answer as simulation_answer
 from excite_cli.trajectory.chain import Segment
 
 # What of the config's measurement section changes neither positions nor torques when it is read.
-_KEPT = {"filter", "topic", "rate", "covariates"}
+_KEPT = {"filter", "topic", "rate", "covariates", "wrench", "base"}
 
 
 @checked("motions")
@@ -73,25 +75,27 @@ def simulate(
     """
     with held({"output": output}, overwrite, inputs_of(problem, motions)):
         load_mujoco()
+        robot = measured_case(problem).robot
         segments = load_motions(problem, motions, chosen, tell)
         if not segments:
             raise FileError("There is no motion to play.")
         planned, settings = _planned(problem, segments, settings, start, tell)
         takes = takes_of(planned, settings.repeat)
-        planted = [each for text in effects for each in parse_planted(text, problem.robot, takes)]
-        own = declared_effects(problem.spec.effects, problem.robot) if declared else ()
+        planted = [each for text in effects for each in parse_planted(text, robot, takes)]
+        own = declared_effects(problem.spec.effects, robot) if declared else ()
         if output is not None:
             _warn_of_conversion(problem.spec.measurement, tell)
         found = simulate_motions(
-            problem.robot,
+            robot,
             planned,
             settings,
             planted,
             own,
+            Instruments(problem.spec.measurement, settings) if robot.base_joints else None,
             lambda run, done: progress(run, done, sum(map(len, takes.values()))),
         )
         if output is not None:
-            write_dataset(Path(output), found.dataset, _attributes(problem, found, settings))
+            write_dataset(Path(output), found.dataset, _attributes(robot, problem, found, settings))
         return found
 
 
@@ -135,10 +139,10 @@ def _warn_of_conversion(measurement: MeasurementSpec, tell: Tell) -> None:
 
 
 def _attributes(
-    problem: Problem | Case, found: Simulation, settings: SimulationSettings
+    robot: Robot, problem: Problem | Case, found: Simulation, settings: SimulationSettings
 ) -> dict[str, object]:
     """What the data file says about its making."""
-    truth = found.truth.record(problem.robot.joint_names)
+    truth = found.truth.record(robot.joint_names)
     columns = [each.name for each in settings.covariates]  # their values are in the runs
     return {
         "simulated": True,

@@ -12,6 +12,7 @@ from excite_cli.config.section import (
     Section,
     Share,
 )
+from excite_cli.config.wrench_spec import BaseStateSpec, WrenchSpec
 
 EffectKind = str
 RunStates = dict[EffectKind, str]  # `none`: without it
@@ -129,11 +130,29 @@ class MeasurementSpec(Section):
         description="joints that move, but whose torque was not recorded or is worth nothing: "
         "only their motion is used",
     )
+    wrench: tuple[WrenchSpec, ...] = Field(
+        (WrenchSpec(),),
+        min_length=1,
+        description="sensors between the robot and what it stands on, for robot.rows with 'base': "
+        "all that hold it",
+    )
+    base: BaseStateSpec = Field(BaseStateSpec(), description="how the base moved meanwhile")
     trust: bool = Field(
         False, description="take order and signs of the columns as they are, whatever the URDF says"
     )
     topic: str | None = Field(None, description="topic of a bag; default: the only JointState")
     filter: FilterSpec = FilterSpec()
+
+    @property
+    def of_base(self) -> frozenset[str]:
+        """Channels of the base and of what holds it, which belong to no joint."""
+        imu = self.base.imu
+        named = (
+            *(sensor.channel for sensor in self.wrench),
+            *((imu.gyroscope, imu.accelerometer) if imu else ()),
+            *((self.base.pose,) if self.base.pose else ()),
+        )
+        return frozenset(named)
 
 
 class KnownPayloadSpec(Section):

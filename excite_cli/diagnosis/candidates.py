@@ -62,7 +62,8 @@ def possible_effects(
     """All effects to be tested but those declared, and how many tests each stands for.
 
     `around` are shapes at places where effects were found already. Kinds that follow a column of
-    the log are none where no column is declared, so that they cost the others nothing.
+    the log are none where no column is declared, so that they cost the others nothing; nor are
+    those of a wrench where none is measured.
 
     Raises
     ------
@@ -74,6 +75,8 @@ def possible_effects(
     names = list(catalogue()) if spec.kinds == "all" else list(spec.kinds)
     if not seen.covariates:
         names = [name for name in names if not catalogue()[name].follows_covariate]
+    if not seen.robot.base_joints:
+        names = [name for name in names if catalogue()[name].scope != "base"]
     known = {effect.place._replace(runs=()) for effect in declared}
     searched = _searched([name for name in names if name not in spec.exclude], known, spec, seen)
     known_in_runs = {effect.place for effect in declared}

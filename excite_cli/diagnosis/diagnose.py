@@ -115,7 +115,12 @@ def _diagnosed(
     check_left_to_fit(spec, parts)
     refuse_sealed_copies(parts)
     processing, training = _prepared(spec, parts)
-    require_motion(training, processing, robot.joint_names, spec.measurement.without_torque)
+    require_motion(
+        training,
+        processing,
+        robot.joint_names,
+        (*spec.measurement.without_torque, *robot.unmeasured),
+    )
     kept = prepare_all(parts.sealed, processing)  # refused early where too short
     suspicious = check_recorded(robot, parts.training, training, processing, spec.measurement)
     traced = _traced(model, spec, parts, processing, progress)

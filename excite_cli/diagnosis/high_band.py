@@ -120,8 +120,9 @@ def _of_run(
     bands, moving_speed = shared
     run, fit, torque = task
     v = np.stack([np.interp(run.t, fit.t, column) for column in fit.v.T], axis=1)
-    good = run.usable() & np.isfinite(run.tau) & ~_near_reversal(v, run.step)
-    sliding = good & (np.abs(v) > moving_speed)
+    of_base = np.arange(v.shape[1]) < run.base_rows
+    good = run.usable() & np.isfinite(run.tau) & (of_base | ~_near_reversal(v, run.step))
+    sliding = good & (of_base | (np.abs(v) > moving_speed))
     left = run.tau - _at_recorded_rate(torque, run, fit)
     series = _bridged((run.tau, left), good, run.step)
     counted, energies, stretches = [], [], []

@@ -10,7 +10,12 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns, seen_of, with_effects
+from excite_cli.identification.regression import (
+    effect_columns,
+    for_base_columns,
+    seen_of,
+    with_effects,
+)
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
 from excite_cli.workers.at_hand import each
@@ -92,10 +97,8 @@ def training_data(
     """Columns of the declared model and torque of every part; `folds` are left out together."""
     spool = Spool()
     tasks = ((body.run, body.inertial, s) for body, s in zip(modelled, signals, strict=True))
-    mean = None if model.prior is None else model.prior.mean
     parts = [
-        (spool.keep(columns), spool.keep(tau))
-        for columns, tau in each(_declared, (model.declared, mean), tasks)
+        (spool.keep(columns), spool.keep(tau)) for columns, tau in each(_declared, model, tasks)
     ]
     precision = None
     if model.prior is not None:
@@ -106,12 +109,13 @@ def training_data(
 
 
 def _declared(
-    shared: tuple[Sequence[Effect], Array | None],
-    task: tuple[PreparedRun, Array, Signals],
-    tell: Tell,
+    model: Model, task: tuple[PreparedRun, Array, Signals], tell: Tell
 ) -> tuple[Array, Array]:
-    """Inertial columns and those of the declared effects, and torque less that of the prior."""
-    (effects, mean), (run, inertial, signals) = shared, task
-    tau = run.tau_fit if mean is None else run.tau_fit - inertial @ mean
-    own = run.averaged_for_fit(effect_columns(effects, signals))
+    """Inertial columns and those of the declared effects, and torque less what is known of it."""
+    run, inertial, signals = task
+    if model.prior is None:
+        tau = for_base_columns(model.robot, model.base, run)
+    else:
+        tau = run.tau_fit - inertial @ model.prior.mean
+    own = run.averaged_for_fit(effect_columns(model.declared, signals))
     return np.concatenate([inertial, own], axis=2), tau

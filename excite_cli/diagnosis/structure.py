@@ -116,6 +116,7 @@ class Quantities:
         self, data: TrainingData, signals: Sequence[Signals], joint_names: Sequence[str]
     ) -> None:
         self._data, self._names = data, joint_names
+        self._base = signals[0].body.robot.base_joints  # known hardly beyond its noise
 
         def averaged(series: Sequence[Array]) -> list[Array]:
             return [run.averaged(x) for run, x in zip(data.runs, series, strict=True)]
@@ -164,7 +165,7 @@ class Quantities:
         )
         for name, series in self._columns.items():
             yield Covariate("covariate", name), [x[:, None] for x in series]
-        for k, name in enumerate(self._names):
+        for k, name in enumerate(self._names[self._base :], self._base):
             yield Covariate("position", name), [x[:, k, None] for x in self._q]
             yield Covariate("speed", name), [x[:, k, None] for x in self._v]
             yield Covariate("acceleration", name), [x[:, k, None] for x in self._a]

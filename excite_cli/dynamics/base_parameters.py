@@ -18,7 +18,11 @@ from numpy.typing import NDArray
 from scipy.linalg import lstsq, qr
 
 from excite_cli.dynamics.near_right_angles import nearly_right, squared
-from excite_cli.dynamics.regressor import Regressor, standard_parameter_names
+from excite_cli.dynamics.regressor import (
+    PARAMETERS_PER_BODY,
+    Regressor,
+    standard_parameter_names,
+)
 from excite_cli.errors import RobotError
 from excite_cli.robot.model import Array, Robot
 
@@ -66,6 +70,15 @@ class BaseParameters:
         direction[self.selection] = 0.0
         direction[self.selection] = -self.mapping @ direction
         return direction
+
+    def beside(self, phi: Array) -> Array:
+        """φ (P,) less what the base parameters hold of it, `Y φ − Y_B mapping φ = Y beside(φ)`.
+
+        It shows nothing, but where a base moves that stood still in the states of the selection.
+        """
+        rest = phi.copy()
+        rest[self.selection] -= self.mapping @ phi
+        return rest
 
     @property
     def note(self) -> str:
@@ -172,6 +185,7 @@ def base_parameters_as_given(
 
 def _stack(regressor: Regressor, robot: Robot, count: int, seed: int) -> Array:
     y = regressor.evaluate(*robot.draw_states(count, seed))
+    y[:, :, : PARAMETERS_PER_BODY * robot.massless] = 0.0
     return y.reshape(-1, y.shape[-1])
 
 

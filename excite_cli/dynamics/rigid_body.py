@@ -81,6 +81,7 @@ class RigidBody:
             full[t] = pin.computeJointTorqueRegressor(model, data, *state).reshape(model.nv, -1)[
                 robot.moved
             ]
+        full[:, :, : PARAMETERS_PER_BODY * robot.massless] = 0.0
         return full
 
     @cached_property

@@ -35,7 +35,7 @@ from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.link_frame import LinkFrame
 from excite_cli.robot.model import Array, Robot
 
-Scope = Literal["joint", "pair", "robot"]
+Scope = Literal["joint", "pair", "robot", "base"]
 Picture = Literal["cloud", "window"]
 
 # By how much a shape parameter is changed, up and down, once its effect is found.
@@ -86,6 +86,7 @@ class Effect(ABC):
     of_whole_torque: ClassVar[bool] = False
     # A body that one joint carries: part of the load of joints, and named by its link if one likes.
     carried: ClassVar[bool] = False
+    on_base: ClassVar[bool] = False  # rows of a measured base may have it, which have no gears
     # Its torque at an instant depends on the time, or on other instants: it needs a series.
     over_time: ClassVar[bool] = False
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`
@@ -127,10 +128,13 @@ class Effect(ABC):
     @classmethod
     def places(cls, robot: Robot) -> list[tuple[int, ...]]:
         """The sets of joints on which this kind is looked for."""
+        first = 0 if cls.on_base else robot.base_joints
         if cls.scope == "joint":
-            return [(j,) for j in range(robot.n)]
+            return [(j,) for j in range(first, robot.n)]
         if cls.scope == "pair":
-            return neighbours(robot)
+            return [pair for pair in neighbours(robot) if min(pair) >= first]
+        if cls.scope == "base":
+            return [tuple(range(robot.base_joints))] if robot.base_joints else []
         return [tuple(range(robot.n))]
 
     @classmethod

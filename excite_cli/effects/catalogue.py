@@ -41,6 +41,7 @@ from excite_cli.effects.torque_gain import TorqueGain
 from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.effects.torque_saturation import TorqueSaturation
 from excite_cli.effects.viscous_friction import ViscousFriction
+from excite_cli.effects.wrench_gain import WrenchGain
 from excite_cli.errors import ConfigError, ExciteWarning, nearest
 from excite_cli.robot.model import Array, Robot
 
@@ -64,6 +65,7 @@ _OURS: tuple[type[Effect], ...] = (
     CovariateOffset,
     TorqueGain,
     TorqueDelay,
+    WrenchGain,
     TorqueSaturation,
     Ripple,
     CableForce,

@@ -23,6 +23,12 @@ def places_named(
         A name is unknown, or the joints do not fit the kind.
     """
     everything = tuple(range(robot.n))
+    if kind.scope == "base":
+        if not robot.base_joints:
+            raise ConfigError(
+                f"{where}: {kind.kind} is of a measured wrench, and robot.rows has no 'base'."
+            )
+        return kind.places(robot)
     if list(names) == [ALL]:
         whole = kind.scope == "robot" and not kind.carried
         return [everything] if whole else kind.places(robot)

@@ -44,7 +44,7 @@ class PositionFriction(Effect):
     @classmethod
     def places(cls, robot: Robot) -> list[tuple[int, ...]]:
         """Joints that turn."""
-        return [(j,) for j in range(robot.n) if not robot.sliding[j]]
+        return [(j,) for j in range(robot.base_joints, robot.n) if not robot.sliding[j]]
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:

@@ -28,6 +28,7 @@ class TorqueGain(Effect):
         ),
     )  # fmt: skip
     data_defect: ClassVar = True
+    on_base: ClassVar = True
     of_whole_torque: ClassVar = True
     usual: ClassVar = True
     changes_between_runs: ClassVar = True

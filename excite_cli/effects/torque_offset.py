@@ -15,6 +15,7 @@ class TorqueOffset(Effect):
     """τ_j = b."""
 
     kind: ClassVar = "torque_offset"
+    on_base: ClassVar = True
     title: ClassVar = "offset of the measured torque"
     signature: ClassVar = "the residual is the same wherever the joint is and however it moves"
     parameters: ClassVar = (Parameter("offset", "N·m", 0.05, 50.0, part_of_torque=True),)

@@ -104,7 +104,7 @@ def identify(
         [run.prepared for run in training.runs],
         processing,
         robot.joint_names,
-        spec.measurement.without_torque,
+        (*spec.measurement.without_torque, *robot.unmeasured),
     )
     tell("fit")
     known_rows = np.hstack([np.zeros((len(known.rows), base.rank)), known.rows])

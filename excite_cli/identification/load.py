@@ -102,7 +102,12 @@ def identify_load(
         dataset.runs, spec.measurement.filter, spec.diagnosis.moving_speed
     )
     prepared = prepare_all(dataset.runs, processing, LeftOut.by(effects))
-    require_motion(prepared, processing, robot.joint_names, spec.measurement.without_torque)
+    require_motion(
+        prepared,
+        processing,
+        robot.joint_names,
+        (*spec.measurement.without_torque, *robot.unmeasured),
+    )
     regression = build_regression(robot, base, effects, prepared)
     # What the URDF says of the robot is in its fit, and nobody asks here for a consistent one.
     plain = spec.identification.model_copy(update={"inertias": "free", "consistent": False})

@@ -148,7 +148,7 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
         tau=np.stack([each.tau for each in valid], axis=1),
         valid=np.stack([each.filled for each in valid], axis=1),
         valid_averages=tuple(each.averages for each in valid),
-        moving=speed > processing.moving_speed,
+        moving=(speed > processing.moving_speed) | (np.arange(speed.shape[1]) < run.base_rows),
         fit_averages=tuple(each.averages for each in fit),
         tau_fit=np.stack([each.tau for each in fit], axis=1),
         usable=np.stack([each.filled for each in fit], axis=1),
@@ -264,6 +264,7 @@ def _motion(
     for j, k, s in coupled:
         both = _sliding(speed(j) + s * speed(k), run.step, processing)
         sliding[:, [j, k]] &= both[:, None]
+    sliding[:, : run.base_rows] = True
     return v, a, sliding
 
 

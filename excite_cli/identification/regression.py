@@ -103,6 +103,18 @@ def effect_columns(effects: Sequence[Effect], signals: Signals) -> Array:
     return np.concatenate(blocks, axis=2)
 
 
+def for_base_columns(robot: Robot, base: BaseParameters, run: PreparedRun) -> Array:
+    """Torque (M, n) to be fitted by the columns of the base parameters.
+
+    Where the base moves, without what these leave out: how it sways shows too little of its inertia
+    to be fitted, so that the URDF's is taken.
+    """
+    if not robot.base_joints:
+        return run.tau_fit
+    rest = RigidBody(robot, base.beside(standard_parameters(robot)), run.q, run.v, run.a)
+    return run.tau_fit - run.averaged_for_fit(rest.load)
+
+
 def build_regression(
     robot: Robot,
     base: BaseParameters,
@@ -123,7 +135,7 @@ def build_regression(
                 step=prepared.step,
                 columns=spool.keep(own),
                 rank=len(base.selection),
-                tau=prepared.tau_fit,
+                tau=for_base_columns(robot, base, prepared),
                 usable=prepared.usable,
                 moving=prepared.moving,
                 prepared=prepared,

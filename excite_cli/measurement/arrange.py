@@ -56,7 +56,7 @@ def arrange(
     for channel, columns in raw.columns.items():
         by_joint = {names.get(column, column): values for column, values in columns.items()}
         if channel == "tau":
-            by_joint.update({joint: np.zeros(len(raw.t)) for joint in without_torque})
+            by_joint.update(_none(without_torque, raw))
         missing = [joint for joint in joints if joint not in by_joint]
         if not missing:
             matrices[channel] = np.column_stack([by_joint[joint] for joint in joints])
@@ -67,6 +67,8 @@ def arrange(
             findings.append(Finding("no_speed", "note", text, raw.name, tuple(missing)))
         left = [j for j in by_joint if j not in joints or missing]
         extra.update({f"{channel}_{joint}": by_joint[joint] for joint in left})
+    if "tau" not in matrices and set(without_torque) >= set(joints):
+        matrices["tau"] = np.zeros((len(raw.t), len(joints)))
     if "tau" not in matrices:
         raise FileError(_missing(source, raw.name, "tau", list(joints), []))
     others = sorted({names.get(column, column) for column in positions} - set(joints))
@@ -88,6 +90,10 @@ def arrange(
         extra={**kept, **extra},
     )
     return run, findings
+
+
+def _none(joints: Sequence[str], raw: RawRun) -> dict[str, Array]:
+    return {joint: np.zeros(len(raw.t)) for joint in joints}
 
 
 def _numbered(columns: list[str], joints: tuple[str, ...], source: str) -> dict[str, str]:

@@ -36,11 +36,13 @@ def read_dataset(
     joint_names: tuple[str, ...],
     limits: tuple[Array, Array, Array, Array] | None = None,
     revolute: Array | None = None,
+    torques: bool = True,
 ) -> Dataset:
     """Read measured files as one data set, converted and checked.
 
     `limits`: lower, upper, velocity, effort of the moved joints, (n,) each, infinite where there is
-    none. `revolute` (n,): which joints turn (default all); angles in degrees are theirs.
+    none. `revolute` (n,): which joints turn (default all); angles in degrees are theirs. Without
+    `torques` those of no joint are read, as if all were `without_torque`.
 
     Findings of severity `error` are returned with the others; `quality.raise_for_errors` turns
     them into an exception.
@@ -57,7 +59,9 @@ def read_dataset(
     if not paths:
         raise FileError("No measured file is given.")
     check_names(spec.names, joint_names)
-    check_joints(spec, joint_names)
+    if not torques:
+        spec = spec.model_copy(update={"without_torque": joint_names, "coupling": {}})
+    check_joints(spec, joint_names, torques)
     turning = np.ones(len(joint_names), bool) if revolute is None else np.asarray(revolute, bool)
     known = (
         Limits(*limits, turning)
@@ -65,7 +69,9 @@ def read_dataset(
         else replace(Limits.unknown(len(joint_names)), revolute=turning)
     )
     channels: dict[str, str | None] = {str(key): name for key, name in spec.channels.items()}
-    options = ReadOptions(joint_names, spec.names, channels, spec.rate, spec.topic)
+    options = ReadOptions(
+        joint_names, spec.names, channels, spec.rate, spec.topic, torques, spec.of_base
+    )
     findings: list[Finding] = declared(spec, joint_names)
     runs: list[Run] = []
     taken: set[str] = set()
@@ -106,8 +112,8 @@ def _recordings(paths: Sequence[Path], options: ReadOptions) -> Iterator[tuple[P
     later: list[tuple[Path, list[RawRun]]] = []
     for path in paths:
         raws = reader_for(path).read(path, options)
-        parts += [(path, raw) for raw in raws if is_part(raw)]
-        whole = [raw for raw in raws if not is_part(raw)]
+        parts += [(path, raw) for raw in raws if is_part(raw, options)]
+        whole = [raw for raw in raws if not is_part(raw, options)]
         if parts:
             later.append((path, whole))
         elif whole:

@@ -46,7 +46,8 @@ class Run(Shown):
     `start`: the campaign's time at t = 0 [s], once it is known (`campaign_clock`). `recorded` (T,):
     where samples were interpolated, the hash of the nearest one in the file. `torque_step` (n,):
     what torques are multiples of, 0 where they are not. `before` (L, n): of a block, the positions
-    right before it, from which joints with a memory come.
+    right before it, from which joints with a memory come. The first `base_rows` columns are a
+    base's, which has no friction: it counts at rest, too.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Run(Shown):
     covariates: dict[str, Array] = field(default_factory=dict)
     torque_step: Array | None = None
     before: Array | None = None
+    base_rows: int = 0
 
     @property
     def id(self) -> RunId:

@@ -101,7 +101,7 @@ def _all(path: Path, file: Any, found: list[tuple[str, Any]], wanted: ReadOption
 
 
 def _needed(wanted: ReadOptions) -> str:
-    return ", ".join(wanted.called(name) or name for name in ("t", "q", "tau"))
+    return ", ".join(wanted.called(name) or name for name in ("t", *wanted.needed))
 
 
 def _member(path: Path, group: Any, name: str) -> Any:
@@ -149,7 +149,7 @@ def _count(group: Any) -> int:
 
 def _run(path: Path, file: Any, group: Any, name: str, wanted: ReadOptions) -> RawRun:
     where = f"{path}: {group.name}" if name else str(path)
-    for channel in ("q", "tau"):
+    for channel in wanted.needed:
         called = wanted.called(channel) or channel
         if called not in group:
             raise FileError(
@@ -206,7 +206,9 @@ def _by_channel(
     for key, array in arrays.items():
         channel = wanted.channel(key)
         matrix = array[:, None] if array.ndim == 1 and len(names) == 1 else array
-        if matrix.ndim == 2 and matrix.shape[1] == len(names):
+        if key in wanted.apart:
+            others[channel] = array
+        elif matrix.ndim == 2 and matrix.shape[1] == len(names):
             columns[channel] = dict(zip(names, matrix.T, strict=True))
         elif channel in ("q", "dq", "tau"):
             raise FileError(_wrong_shape(where, key, array.shape, len(names), len(array)))

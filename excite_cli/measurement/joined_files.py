@@ -20,9 +20,9 @@ from excite_cli.measurement.reader import RawRun, ReadOptions
 _WORDS = {"q": "positions", "tau": "torques"}  # without which nothing can be said
 
 
-def is_part(raw: RawRun) -> bool:
-    """Whether it lacks positions or torques."""
-    return any(not raw.columns.get(channel) for channel in _WORDS)
+def is_part(raw: RawRun, wanted: ReadOptions) -> bool:
+    """Whether it lacks positions or torques, if these are needed."""
+    return any(not raw.columns.get(channel) for channel in wanted.needed)
 
 
 def joined(parts: Sequence[tuple[Path, RawRun]], wanted: ReadOptions) -> tuple[Path, RawRun]:
@@ -53,7 +53,8 @@ def joined(parts: Sequence[tuple[Path, RawRun]], wanted: ReadOptions) -> tuple[P
         others: dict[str, Array] = {**whole.others, **raw.others}
         findings = (*whole.findings, *raw.findings)
         whole = replace(whole, columns=columns, others=others, findings=findings)
-    for channel, word in _WORDS.items():
+    for channel in wanted.needed:
+        word = _WORDS[channel]
         if not whole.columns.get(channel):
             there = [f"{name}_<joint>" for name, by_joint in whole.columns.items() if by_joint]
             raise FileError(

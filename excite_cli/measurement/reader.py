@@ -29,7 +29,8 @@ class ReadOptions:
 
     `channels`: the file's name of t, q, dq, tau where it differs; None leaves a channel out.
     `rate` [Hz] of files without time stamps; `topic` of a bag; `joints` the robot's names with
-    `names` (file's name -> joint), for readers that must choose between sources.
+    `names` (file's name -> joint), for readers that must choose between sources. Without `torques`
+    a file need not hold any. Channels `apart` belong to no joint, however many columns they have.
     """
 
     joints: tuple[str, ...]
@@ -37,6 +38,13 @@ class ReadOptions:
     channels: Mapping[str, str | None] = field(default_factory=dict)
     rate: float | None = None
     topic: str | None = None
+    torques: bool = True
+    apart: frozenset[str] = frozenset()
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """Channels without which nothing can be said."""
+        return ("q", "tau") if self.torques else ("q",)
 
     def called(self, channel: str) -> str | None:
         """The file's name of a channel; None if it is to be left out."""

@@ -18,7 +18,7 @@ from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
-def check_joints(spec: MeasurementSpec, joints: tuple[str, ...]) -> None:
+def check_joints(spec: MeasurementSpec, joints: tuple[str, ...], torques: bool = True) -> None:
     """Raise ConfigError for a joint in `measurement` that the robot does not move."""
     named: dict[str, list[str]] = {
         "coupling": [*spec.coupling, *(k for shares in spec.coupling.values() for k in shares)],
@@ -45,8 +45,11 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...]) -> None:
                     f"measurement.{key}: '{name}' is not a moved joint."
                     f"{nearest(name, joints)} Moved joints: {', '.join(joints)}."
                 )
-    if set(spec.without_torque) >= set(joints):
-        raise ConfigError("measurement.without_torque names every joint: nothing is left to fit.")
+    if torques and set(spec.without_torque) >= set(joints):
+        raise ConfigError(
+            "measurement.without_torque names every joint: nothing is left to fit, but for the "
+            "wrench at the base of robot.base: floating with robot.rows: [base]."
+        )
     for joint, shares in spec.coupling.items():
         unknown = [motor for motor in shares if motor in spec.without_torque]
         if unknown and joint not in spec.without_torque:

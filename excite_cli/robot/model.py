@@ -6,7 +6,7 @@ body to the regressor, but no variable to the motion.
 """
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from excite_cli.config.robot_spec import JointLimits, RobotSpec
 from excite_cli.errors import ConfigError, RobotError, nearest
+from excite_cli.robot.base_joints import BASE_JOINTS, on_base_joints
 from excite_cli.robot.carried_payload import Payload, add_payload, payload_on
 from excite_cli.robot.description import (
     UNBOUNDED,
@@ -53,8 +54,9 @@ class Robot:
 
     `rows` are the rows of the inverse dynamics that are measured; `moved` the velocity indices of
     the moved joints; `reference` the configuration (nq,) at which everything else stands. The
-    inertias of `model` include that of the `payload`; `description` knows nothing of it. With
-    `visual_shapes`, the visual shapes of links without collision shapes count as such.
+    inertias of `model` include that of the `payload`; `description` knows nothing of it. The first
+    `base_joints` joints are those of a base that moves (`base_joints.py`). With `visual_shapes`,
+    the visual shapes of links without collision shapes count as such.
     """
 
     name: str
@@ -71,6 +73,7 @@ class Robot:
     locked: dict[str, float] = field(default_factory=dict)
     payload: Payload | None = None
     visual_shapes: bool = False
+    base_joints: int = 0
 
     @property
     def n(self) -> int:
@@ -81,6 +84,21 @@ class Robot:
     def n_bodies(self) -> int:
         """Number of bodies that carry inertial parameters."""
         return int(self.model.njoints) - 1
+
+    @property
+    def massless(self) -> int:
+        """How many of the first bodies have no mass whatever a fit says: those between joints of
+        the base."""
+        return max(self.base_joints - 1, 0)
+
+    @property
+    def unmeasured(self) -> tuple[str, ...]:
+        """Joints whose torque is none of the `rows`, of a robot whose base's are."""
+        if not self.base_joints:
+            return ()
+        rows = set(self.rows.tolist())
+        names = zip(self.moved.tolist(), self.joint_names, strict=True)
+        return tuple(name for row, name in names if row not in rows)
 
     @property
     def sliding(self) -> NDArray[np.bool_]:
@@ -111,13 +129,18 @@ class Robot:
         return np.hstack([np.zeros((len(v), 6)), v])
 
     def draw_states(self, count: int, seed: int) -> tuple[Array, Array, Array]:
-        """`count` random positions, velocities and accelerations (count, n) within the limits."""
+        """`count` random positions, velocities and accelerations (count, n) within the limits.
+
+        A base stands still: it sways by millimetres, which shows no inertia of its own.
+        """
         rng = np.random.default_rng(seed)
         lower, upper = self.limits.ranges()
         speed = np.minimum(self.limits.velocity, _FASTEST)  # placeholders like 1e6 drown gravity
         q = rng.uniform(lower, upper, (count, self.n))
         v = rng.uniform(-speed, speed, (count, self.n))
         a = rng.uniform(-3 * speed, 3 * speed, (count, self.n))
+        for x in (q, v, a):
+            x[:, : self.base_joints] = 0.0
         return q, v, a
 
     def fingerprint(self) -> str:
@@ -150,6 +173,32 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
         A joint is unknown, the posture leaves the limits, or limits cross.
     """
     description = load_description(spec.urdf, spec.package_dirs, relative_to, spec.xacro_args)
+    return _built(description, spec)
+
+
+def build_measured_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
+    """The robot as its data show it: where the wrench at a base is measured, the base moves.
+
+    That is `build_robot` but for `rows` with `base`: the first six joints are then those of the
+    base, and `rows` what is measured of them and of the others.
+
+    Raises
+    ------
+    RobotError, ConfigError
+        See `build_robot`; the robot has joints of the names of the base's.
+    """
+    if "base" not in spec.rows:
+        return build_robot(spec, relative_to)
+    description = load_description(spec.urdf, spec.package_dirs, relative_to, spec.xacro_args)
+    joints = "all" if spec.joints == "all" else (*BASE_JOINTS, *spec.joints)
+    fixed = spec.model_copy(update={"base": "fixed", "rows": ("joints",), "joints": joints})
+    robot = _built(on_base_joints(description), fixed)
+    count = len(BASE_JOINTS)
+    rows = robot.rows if "joints" in spec.rows else robot.rows[:count]
+    return replace(robot, rows=rows, base_joints=count)
+
+
+def _built(description: RobotDescription, spec: RobotSpec) -> Robot:
     full = _parse(description, spec)
     if spec.payload is not None:
         add_payload(full, payload_on(full, spec.payload))

@@ -54,9 +54,11 @@ class Gains:
 
 
 def reference_of(robot: Robot, motion: Planned, t: Array) -> Reference:
-    """Reference and feed-forward at the instants `t` (N,)."""
-    q, v, a = motion.states(t)
-    return Reference(t, q, v, a, InverseDynamics(robot).torques(q, v, a))
+    """Reference and feed-forward at the instants `t` (N,); a base stands still."""
+    q, v, a = (np.hstack([np.zeros((len(t), robot.base_joints)), x]) for x in motion.states(t))
+    known = InverseDynamics(robot).torques(q, v, a)
+    known[:, : robot.base_joints] = 0.0  # the ground pushes back, it knows no model
+    return Reference(t, q, v, a, known)
 
 
 def compensated(build: Build, reference: Reference, share: float) -> Reference:

@@ -36,8 +36,11 @@ def record(
     sharpness, level = build.reading.T
     tau = (1.0 + build.gain) * (tau + sharpness * (np.clip(tau, -level, level) - tau))
     tau = tau + _other_defects(build, t, q, tau) + build.offset
+    base = build.robot.base_joints  # its instruments are others (`base_sensors.py`)
+    rms[:base] = 0.0
     tau = tau + settings.torque_noise * rms * _noise(tau.shape, settings.noise_correlation, rng)
-    return Run(build.run.name, t, _counted(q, settings.encoder), tau, dq)
+    counted = np.hstack([q[:, :base], _counted(q[:, base:], settings.encoder)])
+    return Run(build.run.name, t, counted, tau, dq)
 
 
 def _torques(build: Build, played: Played, t: Array, settings: SimulationSettings) -> Array:

@@ -10,6 +10,7 @@ from excite_cli.simulation.covariate_series import CovariateSeries
 
 MOST_REPEATED = 10_000
 _MOST_SAMPLES = 20_000_000
+_NOISES = ("force_noise", "moment_noise", "acceleration_noise", "rate_noise")
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,9 @@ class SimulationSettings:
     `periods` of it in each; `pause` [s] between recordings, which then have absolute stamps.
     `bandwidth` of the controller [rad/s], `compensation`: the share of friction and springs that it
     knows. `torque_limits`: the motors stop at the robot's effort limits. `covariates`: further
-    columns of the log, which effects may follow.
+    columns of the log, which effects may follow. `force_noise` [N] and `moment_noise` [N·m] are
+    those of measured wrenches, `acceleration_noise` [m/s²] and `rate_noise` [rad/s] of the base's
+    inertial unit.
     """
 
     seed: int = 1
@@ -41,6 +44,10 @@ class SimulationSettings:
     lead_in: float = 1.0
     torque_limits: bool = False
     covariates: tuple[CovariateSeries, ...] = ()
+    force_noise: float = 2.0
+    moment_noise: float = 0.5
+    acceleration_noise: float = 0.02
+    rate_noise: float = 1e-3
 
     @property
     def physics_step(self) -> float:
@@ -81,7 +88,7 @@ class SimulationSettings:
                 f"inertia error: {self.inertia_error:g} is not between 0 and 0.6; 0.2 makes "
                 "inertias 10 to 30 % larger or smaller."
             )
-        for name in ("torque_noise", "encoder", "pause"):
+        for name in ("torque_noise", "encoder", "pause", *_NOISES):
             if not getattr(self, name) >= 0.0:
                 raise ConfigError(f"{name.replace('_', ' ')}: it must not be negative.")
         for name in ("repeat", "periods"):

@@ -12,6 +12,7 @@ from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.record import Shown
+from excite_cli.simulation.base_sensors import Instruments
 from excite_cli.simulation.build import assemble, make
 from excite_cli.simulation.controller import (
     Reference,
@@ -71,12 +72,13 @@ def simulate(
     settings: SimulationSettings = SimulationSettings(),
     effects: Sequence[Planted] = (),
     declared: Sequence[Effect] = (),
+    instruments: Instruments | None = None,
     progress: Progress = lambda text, done: None,
 ) -> Simulation:
     """Play `motions` on a robot that differs from the model, and record them.
 
     `effects` are in the robot as they are; `declared` ones get sizes of their own. The same
-    arguments give the same numbers.
+    arguments give the same numbers. Of a robot with a base that moves, `instruments` measure that.
 
     Raises
     ------
@@ -96,13 +98,14 @@ def simulate(
         takes = takes_of(motions, settings.repeat)
         start = 0.0
         for motion in motions:
-            taken = _takes(robot, phi, motion, takes[motion.name], settings, planted, start)
+            names = takes[motion.name]
+            taken = _takes(robot, phi, motion, names, settings, planted, start, instruments)
             for run, error in taken:
                 progress(run.name, len(runs))
                 runs.append(run)
                 tracking[run.name] = error
                 start = _next_start(run, settings)
-    dataset = Dataset(robot.joint_names, tuple(runs), ("simulated",))
+    dataset = Dataset(robot.joint_names[robot.base_joints :], tuple(runs), ("simulated",))
     return Simulation(dataset, Truth(phi, planted), tracking)
 
 
@@ -130,6 +133,7 @@ def _takes(
     settings: SimulationSettings,
     planted: Sequence[Planted],
     start: float,
+    instruments: Instruments | None,
 ) -> Iterator[tuple[Run, Array]]:
     """Every take of one motion with its tracking error; the channel `q_ref` is the motion itself.
 
@@ -158,10 +162,12 @@ def _takes(
         numbers = [settings.seed, 2, _number(name.encode()), _number(motion.number)]
         rng = np.random.default_rng(numbers)
         run = record(build, played[active], duration, settings, rng)
+        if instruments is not None:
+            run = instruments.logged(robot, run, build.gravity, rng)
         epoch = _FIRST_DAY + start if settings.pause else None
         extra = {"q_ref": motion.states(run.t)[0]}
         extra |= {s.name: s.recorded(start + run.t, rng) for s in settings.covariates}
-        run = replace(run, extra=extra, start=start, epoch=epoch)
+        run = replace(run, extra={**run.extra, **extra}, start=start, epoch=epoch)
         start = _next_start(run, settings)
         yield run, _tracking_error(reference, played[active], duration)
 

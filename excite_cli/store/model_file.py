@@ -26,7 +26,7 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.prior import inertial_prior
 from excite_cli.identification.processing import Processing
 from excite_cli.identification.stored_model import StoredModel
-from excite_cli.robot.model import Robot, build_robot
+from excite_cli.robot.model import Robot, build_measured_robot
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.own_file import is_own
@@ -131,7 +131,7 @@ def _of_config(path: Path) -> StoredModel:
             f"{path} is no model: give a fit or a diagnosis (HDF5), or a config (YAML)."
         )
     spec, folder = load_spec(path, []), path.resolve().parent
-    robot, told = build_robot(spec.robot, folder), spec.identified
+    robot, told = build_measured_robot(spec.robot, folder), spec.identified
     if told is not None:
         return _of_numbers(path, spec, folder, robot, told)
     if spec.effects:
@@ -198,7 +198,7 @@ def _errors(told: IdentifiedSpec) -> Errors | None:
 
 def _robot(path: Path, config: str, folder: str, fingerprint: str) -> tuple[Spec, Path, Robot]:
     spec = parse_spec(config, f"the config stored in {path}")
-    robot = build_robot(spec.robot, Path(folder))
+    robot = build_measured_robot(spec.robot, Path(folder))
     if robot.fingerprint() != fingerprint:
         raise _other_robot(path, spec)
     return spec, Path(folder), robot

@@ -13,6 +13,7 @@ from excite_cli.config import (
     spec,
     trajectory_spec,
     uncertainty_spec,
+    wrench_spec,
 )
 from excite_cli.config.load import MAX_BYTES, load_spec, parse_spec
 from excite_cli.config.section import Section
@@ -108,6 +109,15 @@ LEVELS: dict[str, tuple[str, type[Section]]] = {
     "measurement.filter": (
         f"{ROBOT}\nmeasurement: {{filter: {{@: 1}}}}",
         data_spec.FilterSpec,
+    ),
+    "measurement.wrench.0": (
+        f"{ROBOT}\nmeasurement: {{wrench: [{{@: 1}}]}}",
+        wrench_spec.WrenchSpec,
+    ),
+    "measurement.base": (f"{ROBOT}\nmeasurement: {{base: {{@: 1}}}}", wrench_spec.BaseStateSpec),
+    "measurement.base.imu": (
+        f"{ROBOT}\nmeasurement: {{base: {{imu: {{@: 1}}}}}}",
+        wrench_spec.ImuSpec,
     ),
     "identification": (f"{ROBOT}\nidentification: {{@: 1}}", data_spec.IdentificationSpec),
     "identification.known_payload": (

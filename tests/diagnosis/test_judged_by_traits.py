@@ -49,6 +49,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
     "torque_offset": (1.0, 2, True),
     "torque_gain": (4.0, 2, True),
     "torque_delay": (4.0, 2, False),
+    "wrench_gain": (4.0, 2, True),
     "torque_saturation": (4.0, 3, False),
     "ripple": (4.0, 3, False),
     "cable_force": (25.0, 3, False),

@@ -35,11 +35,13 @@ def signals(robot: Robot) -> Signals:
 def test_every_kind_can_be_drawn(kind: str, robot: Robot, signals: Signals) -> None:
     effect_kind = kind_named(kind)
     shape, _ = effect_kind.planted(1.0, {})
-    found = effect_kind(effect_kind.places(robot)[0], shape).abscissa(signals)
+    whole = effect_kind.scope == "base"
+    place = tuple(range(robot.n)) if whole else effect_kind.places(robot)[0]
+    found = effect_kind(place, shape).abscissa(signals)
     if found is None:  # drawn over the torque that it predicts
         assert kind in {
             "backlash", "base_tilt", "cable_force", "elasticity", "encoder_offset", "payload",
-            "torque_delay",
+            "torque_delay", "wrench_gain",
         }  # fmt: skip
         return
     assert found.values.shape == signals.t.shape

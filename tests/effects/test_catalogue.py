@@ -31,6 +31,7 @@ KINDS = [
     "covariate_offset",
     "torque_gain",
     "torque_delay",
+    "wrench_gain",
     "torque_saturation",
     "ripple",
     "cable_force",
@@ -52,7 +53,7 @@ def _every_effect(kind: type[Effect], robot: Robot, samples: int) -> list[Effect
     signals = [signals_of(robot, samples)]
     return [
         kind(place, shape)
-        for place in kind.places(robot)
+        for place in (kind.places(robot) or [tuple(range(robot.n))])
         for shape in [kind.planted(1.0, {})[0], *kind.grid(robot, place, signals)[:6]]
     ]
 

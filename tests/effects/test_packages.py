@@ -12,7 +12,7 @@ from excite_cli.errors import ConfigError, ExciteWarning
 from tests.trust.conftest import SMOKE
 from tests.trust.in_process import excite
 
-OURS = 27
+OURS = 28
 GOOD = """
 import numpy as np
 from excite_cli.effects.spring import Spring

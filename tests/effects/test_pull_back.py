@@ -15,7 +15,7 @@ from tests.effects.motions import signals_at, states
 from tests.robot.random_robots import random_robot
 
 # No motion is planned for these; a model in use has their slopes all the same.
-WITH_SLOPE = {"covariate_friction", "covariate_offset", "friction_change"}
+WITH_SLOPE = {"covariate_friction", "covariate_offset", "friction_change", "wrench_gain"}
 EXCITABLE = [name for name, kind in catalogue().items() if kind.excitable]
 SAMPLES, STEP = 5, 0.1
 

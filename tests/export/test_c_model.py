@@ -19,9 +19,10 @@ from excite_cli.export.c_model import c_model
 from excite_cli.identification.identified_model import IdentifiedModel, Series
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot, build_robot
-from tests.docs.test_predict import PLANTED
+from tests.docs.test_predict import PLANTED as ON_JOINTS
 from tests.robot.random_robots import random_robot
 
+PLANTED = (*ON_JOINTS, ("wrench_gain", tuple(range(6)), {}, [0.02]))
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
 UR10 = RobotSpec(urdf=str(Path(__file__).parents[2] / "data" / "ur10_cb" / "ur10.urdf"))

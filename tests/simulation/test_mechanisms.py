@@ -379,6 +379,11 @@ def test_effects_of_others_act_through_their_own_formula(robot: Robot, clean: Si
     assert grown == pytest.approx(0.3 * drifting.t, abs=1e-9)
 
 
+def a_place(kind: type[Effect], robot: Robot) -> tuple[int, ...]:
+    whole = kind.scope in ("robot", "base")
+    return tuple(range(robot.n)) if whole else kind.places(robot)[0]
+
+
 def test_every_kind_of_the_catalogue_can_be_planted(robot: Robot, clean: Simulation) -> None:
     """With its defaults: it runs, and something recorded differs from the bare robot.
 
@@ -396,7 +401,7 @@ def test_every_kind_of_the_catalogue_can_be_planted(robot: Robot, clean: Simulat
         kind = catalogue()[name]
         if kind.of_campaign or kind.follows_covariate:
             continue
-        joints = tuple(range(robot.n)) if kind.scope == "robot" else kind.places(robot)[0]
+        joints = a_place(kind, robot)
         run = played(robot, plant(kind, joints, kind.parameters[0].high / 10)).dataset.runs[0]
         assert not np.array_equal(run.tau, clean.dataset.runs[0].tau), name
 
@@ -404,6 +409,7 @@ def test_every_kind_of_the_catalogue_can_be_planted(robot: Robot, clean: Simulat
 # What of the simulated robot each kind changes; all others act through their own formula, which the
 # controller knows.
 CHANGED = {
+    "wrench_gain": {"gain"},
     "viscous_friction": {"damping", "compensated"},
     "coulomb_friction": {"friction", "compensated"},
     "armature": {"armature", "compensated"},
@@ -427,7 +433,7 @@ CHANGED = {
 @pytest.mark.parametrize("name", list(catalogue()))
 def test_every_kind_goes_into_the_robot_by_its_own_part(robot: Robot, name: str) -> None:
     kind = catalogue()[name]
-    joints = tuple(range(robot.n)) if kind.scope == "robot" else kind.places(robot)[0]
+    joints = a_place(kind, robot)
     others = {"coulomb": 2.0} if name == "coupled_friction" else {}
     phi = standard_parameters(robot)
     bare, built = (

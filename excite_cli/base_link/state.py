@@ -1,0 +1,133 @@
+"""How a base moved: its six coordinates from an estimator's pose or from an inertial unit.
+
+The coordinates are those of `BASE_JOINTS`: the root's displacement along its axes at the reference,
+then yaw, pitch and roll from there. What an inertial unit is integrated to drifts; a robot that
+stands comes back, so that polynomials are taken off.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.integrate import cumulative_trapezoid
+from scipy.spatial.transform import Rotation
+
+from excite_cli.config.wrench_spec import BaseStateSpec, ImuSpec
+from excite_cli.errors import ConfigError, FileError
+from excite_cli.measurement.dataset import Array, Run
+from excite_cli.measurement.wrench_channels import channel_of
+from excite_cli.robot.base_joints import BASE_JOINTS
+from excite_cli.robot.link_frame import link_frame
+from excite_cli.robot.model import Robot
+
+_SLOWEST = 4.0  # s
+_FARTHEST = 1.2  # rad: how far a base may pitch from its reference
+
+
+@dataclass(frozen=True)
+class BaseState:
+    """Coordinates (T, 6) [m, rad]; `lean` [rad]: of the mean specific force from the reference's.
+
+    `lean` is None where nothing measured it.
+    """
+
+    q: Array
+    lean: Array | None = None
+
+
+def base_state(robot: Robot, run: Run, spec: BaseStateSpec) -> BaseState:
+    """How the base of `robot` (that of the data) moved in `run`.
+
+    Raises
+    ------
+    FileError
+        A channel is missing, of another width, or not finite; the base turned too far.
+    ConfigError
+        The unit's link is unknown or moves in the base.
+    """
+    if spec.pose is not None:
+        found = BaseState(_from_pose(robot, channel_of(run, spec.pose, 7, "measurement.base.pose")))
+    elif spec.imu is not None:
+        found = _from_imu(robot, run, spec.imu)
+    else:
+        found = BaseState(np.zeros((len(run.t), len(BASE_JOINTS))))
+    if np.abs(found.q[:, 4]).max(initial=0.0) > _FARTHEST:
+        raise FileError(
+            f"run '{run.label}': the base pitches by {np.abs(found.q[:, 4]).max():.2f} rad from "
+            f"robot.base_orientation; up to {_FARTHEST} can be told apart from yaw and roll. "
+            "Give the orientation in which it stands."
+        )
+    return found
+
+
+def reference_rotation(robot: Robot) -> Array:
+    """Axes (3, 3) of the base at its reference in the world."""
+    return np.asarray(robot.model.jointPlacements[1].rotation)
+
+
+def _from_pose(robot: Robot, pose: Array) -> Array:
+    reference = reference_rotation(robot)
+    turned = Rotation.from_matrix(reference.T) * Rotation.from_quat(pose[:, 3:])
+    moved = (pose[:, :3] - pose[:, :3].mean(axis=0)) @ reference
+    return np.column_stack([moved, np.unwrap(turned.as_euler("ZYX"), axis=0)])
+
+
+def _from_imu(robot: Robot, run: Run, spec: ImuSpec) -> BaseState:
+    """A base that stands: what turns and moves comes back, constants are the sensors'."""
+    rotation, lever = unit_on_base(robot, spec.link)
+    rate = channel_of(run, spec.gyroscope, 3, "measurement.base.imu.gyroscope")
+    force = channel_of(run, spec.accelerometer, 3, "measurement.base.imu.accelerometer")
+    rate, force = rate @ rotation.T, force @ rotation.T
+    turned = _integrated(rate - rate.mean(axis=0), run.step)
+    angles = _without_drift(turned.as_euler("ZYX"), run.duration)
+    spin = np.gradient(rate, run.step, axis=0)
+    force = force - np.cross(spin, lever) - np.cross(rate, np.cross(rate, lever))
+    gravity = reference_rotation(robot).T @ np.asarray(robot.model.gravity.linear)
+    specific = Rotation.from_euler("ZYX", angles).apply(force)
+    lean = _turn(specific.mean(axis=0), -gravity)
+    speed = _integral(specific - specific.mean(axis=0), run.step)
+    moved = _without_drift(_integral(speed, run.step), run.duration)
+    return BaseState(np.column_stack([moved, angles]), lean)
+
+
+def unit_on_base(robot: Robot, link: str | None) -> tuple[Array, Array]:
+    """Rotation (3, 3) and place (3,) of the unit in the root."""
+    if link is None:
+        return np.eye(3), np.zeros(3)
+    frame = link_frame(robot, link, "measurement.base.imu.link")
+    if frame.joint != len(BASE_JOINTS) - 1:
+        raise ConfigError(
+            f"measurement.base.imu.link: '{link}' moves in the base, with joint "
+            f"'{robot.joint_names[frame.joint]}'. Name a link of the base."
+        )
+    return frame.rotation, frame.translation
+
+
+def _integrated(rate: Array, step: float) -> Rotation:
+    """Orientations from rates (T, 3) in axes of the body, by their means between samples."""
+    turns = Rotation.from_rotvec(0.5 * (rate[1:] + rate[:-1]) * step).as_matrix()
+    found = np.empty((len(rate), 3, 3))
+    found[0] = np.eye(3)
+    for k, turn in enumerate(turns):
+        found[k + 1] = found[k] @ turn
+    return Rotation.from_matrix(found)
+
+
+def _integral(x: Array, step: float) -> Array:
+    return np.asarray(cumulative_trapezoid(x, dx=step, axis=0, initial=0.0))
+
+
+def _without_drift(x: Array, duration: float) -> Array:
+    """Without what is slower than a swing in `_SLOWEST` seconds."""
+    at = np.linspace(-1.0, 1.0, len(x))
+    degree = min(2 + round(duration / _SLOWEST), len(x) - 1)
+    return x - legendre.legval(at, legendre.legfit(at, x, degree)).T
+
+
+def _turn(a: Array, b: Array) -> Array:
+    """Rotation vector (3,) [rad] that turns the direction of `a` into that of `b`."""
+    axis = np.cross(a, b)
+    size = float(np.linalg.norm(axis))
+    if size == 0.0:
+        return np.zeros(3)
+    return np.asarray(axis / size * np.arctan2(size, float(a @ b)))

@@ -1,0 +1,46 @@
+"""Frames at which wrenches act on the robot, and what these do to all of its joints."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from excite_cli.robot.model import Array, Robot
+
+
+@dataclass(frozen=True, eq=False)
+class ContactFrame:
+    """The frame of a wrench that acts on the body of moved `joint`.
+
+    `rotation` (3, 3) and `position` (3,) [m] stand in the joint's frame, or are fixed `in_world`.
+    """
+
+    joint: int
+    rotation: Array
+    position: Array
+    in_world: bool = False
+
+
+def contact_jacobians(
+    robot: Robot, frames: Sequence[ContactFrame], q: Array
+) -> Iterator[list[Array]]:
+    """At every posture of q (T, n), for every frame J (6, n) in axes of its own.
+
+    Jᵀ w is what a wrench w = [force; moment] that acts on the robot there does to all joints.
+    """
+    model, first = robot.model, int(robot.model.njoints) - robot.n
+    data, aligned = model.createData(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    for posture in robot.configurations(q):
+        pin.computeJointJacobians(model, data, posture)
+        found = []
+        for frame in frames:
+            place = data.oMi[first + frame.joint]
+            whole = pin.getJointJacobian(model, data, first + frame.joint, aligned)
+            jacobian = whole.reshape(6, -1)[:, robot.moved]
+            axes, point = frame.rotation, frame.position
+            if not frame.in_world:
+                axes, point = place.rotation @ axes, place.act(point)
+            linear = jacobian[:3] - pin.skew(point - place.translation) @ jacobian[3:]
+            found.append(np.vstack([axes.T @ linear, axes.T @ jacobian[3:]]))
+        yield found
