@@ -34,8 +34,8 @@ from rich.text import Text
 
 from excite_cli import __version__
 from excite_cli.api.outputs import leave_claims
-from excite_cli.api.showing import Answer, Level, Note, Table
-from excite_cli.cli.layout import rendered
+from excite_cli.api.showing import Answer, Command, Level, Note, Part, Table
+from excite_cli.cli.layout import copyable, rendered, wrapped
 from excite_cli.cli.stopping import stopped
 from excite_cli.errors import REFUSALS, ExciteError, ExciteWarning, refusal
 
@@ -63,17 +63,17 @@ class Terminal:
     @property
     def err(self) -> Console:
         """Progress and messages."""
-        return _console(sys.stderr)
+        return _messages()
 
     def say(self, text: str) -> None:
         """A message for people, unless quiet."""
         if not self.quiet:
-            self.err.print(text)
+            _print_words(self.err, text)
 
     def detail(self, text: str) -> None:
         """A message for those who asked for more."""
         if self.verbose:
-            self.err.print(text)
+            _print_words(self.err, text)
 
     def tell(self, note: Note) -> None:
         """What the library tells while it works."""
@@ -91,10 +91,10 @@ class Terminal:
         if not answer.good:
             raise typer.Exit(1)
 
-    def _print(self, parts: Sequence[Table | str]) -> None:
+    def _print(self, parts: Sequence[Part]) -> None:
         with (out := self.out).capture() as printed:
             for before, part in zip([None, *parts], parts, strict=False):
-                if before is not None and not (isinstance(before, str) and isinstance(part, str)):
+                if isinstance(before, Table) or (before is not None and isinstance(part, Table)):
                     out.print()
                 _print(out, part)
         print("\n".join(line.rstrip() for line in printed.get().splitlines()))
@@ -113,9 +113,10 @@ class Terminal:
             return
         columns: list[ProgressColumn] = [SpinnerColumn()]
         columns += [TextColumn("{task.description}")] if title else []
-        columns += [TextColumn("{task.fields[text]}", table_column=Column(no_wrap=True))]
+        columns += [TextColumn("{task.fields[text]}", table_column=Column(overflow="fold"))]
         columns += [_Remaining()]
-        with Progress(*columns, console=self.err, transient=True) as bar:
+        out = self.err
+        with Progress(*columns, console=out, transient=True) as bar, _beside(out):
             task = bar.add_task(title, total=total, text="")
             started = 0
 
@@ -127,6 +128,23 @@ class Terminal:
                 bar.update(task, completed=done, total=total, text=text)
 
             yield show
+
+
+# Consoles whose progress line is shown: only they know how to print a message above it.
+_live: list[Console] = []
+
+
+@contextmanager
+def _beside(out: Console) -> Iterator[None]:
+    _live.append(out)
+    try:
+        yield
+    finally:
+        _live.remove(out)
+
+
+def _messages() -> Console:
+    return _live[-1] if _live else _console(sys.stderr)
 
 
 class Line(Protocol):
@@ -165,14 +183,24 @@ class _Remaining(TimeRemainingColumn):
         return Text.assemble("≤ ", super().render(task))
 
 
-def _print(out: Console, part: Table | str) -> None:
-    """A sentence, or a table whose title may be wider than its columns."""
+def _print(out: Console, part: Part) -> None:
+    """A sentence, a command, or a table under a title that may be wider than its columns."""
     if isinstance(part, Table):
         if part.title:
-            out.print(part.title, style="bold", soft_wrap=out.width >= _WHOLE_ROWS)
-        out.print(rendered(part))
+            _print_words(out, part.title, "bold")
+        for number, each in enumerate(rendered(part, out.width)):
+            if number:
+                out.print()
+            out.print(each)
+    elif isinstance(part, Command):
+        out.print(copyable(f"  {part.line}", out.width), soft_wrap=True)
     else:
-        out.print(part, soft_wrap=out.width >= _WHOLE_ROWS)
+        _print_words(out, part)
+
+
+def _print_words(out: Console, words: str, style: str | None = None) -> None:
+    """Text that wraps at its spaces."""
+    out.print(wrapped(words, out.width), style=style, soft_wrap=True)
 
 
 def _is_terminal(file: TextIO) -> bool:
@@ -327,9 +355,7 @@ def _bug(error: Exception) -> int:
 
 def _tell(message: str) -> None:
     """On stderr; the first word red on a terminal."""
-    head, colon, rest = message.partition(":")
-    if colon and head == "error":
-        text = Text.assemble((f"{head}:", "bold red"), rest)
-    else:
-        text = Text(message)
-    _console(sys.stderr).print(text, soft_wrap=True)
+    out = _messages()
+    text = Text(wrapped(message, out.width) if out.is_terminal else message)
+    text.highlight_regex("^error:", "bold red")
+    out.print(text, soft_wrap=True)

@@ -4,6 +4,7 @@ from html import escape
 
 from excite_cli import load_data, read_fit, read_result, simulate
 from excite_cli.shown.record import Shown
+from excite_cli.shown.command import Command
 from excite_cli.summary.diagnosis import diagnosis_answer
 from excite_cli.summary.simulation import simulation_answer
 from tests.api.conftest import Loop
@@ -49,7 +50,7 @@ def test_a_diagnosis_is_told_as_by_the_program() -> None:
     assert "viscous_friction on " in repr(found)
     assert "mean error" in repr(found)
     answer = diagnosis_answer(found, "arm.yaml", {"diagnosis": "d.h5", "config": None})
-    for part in answer.parts[:-3]:  # but for what the program says of itself
+    for part in answer.parts[:-4]:  # but for what the program says of itself
         assert escape(part if isinstance(part, str) else part.title) in html_of(found)
-    assert "--after d.h5" in str(answer.parts[-2])
+    assert answer.parts[-2] == Command(("excite", "optimize", "arm.yaml", "--after", "d.h5"))
     assert answer.data["output"] == {"diagnosis": "d.h5"}
