@@ -138,7 +138,7 @@ def _attributes(
     problem: Problem | Case, found: Simulation, settings: SimulationSettings
 ) -> dict[str, object]:
     """What the data file says about its making."""
-    truth = found.truth.record(problem.robot.joint_names)
+    truth = found.truth.record()
     columns = [each.name for each in settings.covariates]  # their values are in the runs
     return {
         "simulated": True,

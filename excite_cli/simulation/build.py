@@ -211,10 +211,11 @@ def _check_friction(build: Build) -> None:
     """What takes the place of dry friction needs as much of it."""
     short = build.friction < -1e-9
     if short.any():
-        name = build.robot.joint_names[int(np.argmax(short))]
+        j = int(np.argmax(short))
+        name, unit = build.robot.joint_names[j], "N" if build.robot.sliding[j] else "N·m"
         raise RobotError(
-            f"joint '{name}' of the simulated robot lacks {-build.friction[short][0]:.3g} N·m of "
-            "dry friction, of which a planted effect is a part. Plant more of it: --effect "
+            f"joint '{name}' of the simulated robot lacks {-build.friction[j]:.3g} {unit} of dry "
+            "friction, of which a planted effect is a part. Plant more of it: --effect "
             f"'coulomb_friction@{name}=…'."
         )
 

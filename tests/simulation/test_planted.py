@@ -61,13 +61,15 @@ def test_levels_and_gaps_are_what_is_given_first(robot: Robot) -> None:
 
 def test_a_record_says_everything_by_name(robot: Robot) -> None:
     (spring,) = parse_planted("spring@elbow_joint=20,rest_position:0.5;runs:motion_2", robot, RUNS)
-    record = spring.record(robot.joint_names)
+    record = spring.record(robot.joint_names, robot.sliding)
     assert record["kind"] == "spring"
     assert record["joints"] == ["elbow_joint"]
     assert record["runs"] == ["motion_2"]
     parameters = record["parameters"]
     assert isinstance(parameters, dict)
     assert parameters["stiffness"] == {"value": 20.0, "unit": "N·m/rad"}
+    slides = spring.record(robot.joint_names, np.ones(robot.n, dtype=bool))["parameters"]
+    assert [each["unit"] for each in slides.values()] == ["N/m", "N", "m"]
 
 
 @pytest.mark.parametrize(
