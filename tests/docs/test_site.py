@@ -11,6 +11,11 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 # What a page would load by itself; links that a reader may follow are none of it.
 _LOADED = re.compile(r"<(?:script|img|link|iframe|source)\b[^>]*?\b(?:src|href)=[\"']?([^\"'\s>]+)")
+_CODE = re.compile(r"<(pre|code|script|math)\b.*?</\1>", re.DOTALL)
+_TEXT = re.compile(r"<(p|li|td|dd)\b[^>]*>(.*?)</\1>", re.DOTALL)
+_TAG = re.compile(r"<[^>]+>")
+# The beginning of an item, emphasis, code, a link, a row of a table.
+_MARK = re.compile(r"(?:^|\n)\s*(?:[-*+]|\d+[.)]) |\*\*|`|\]\(|\n\|.*\|")
 _STYLE = re.compile(r"""(?:url\(|@import\s+)["']?(https?:)?//""")
 
 
@@ -42,6 +47,20 @@ def test_pages_load_nothing_from_elsewhere(site: Path) -> None:
         assert not outside, f"{page.name} loads {outside}"
     for style in site.rglob("*.css"):
         assert not _STYLE.search(style.read_text(encoding="utf-8")), style.name
+
+
+def test_no_mark_of_markdown_is_left(site: Path) -> None:
+    """Lists need a blank line before them, emphasis and code their closing marks."""
+    for page in site.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        article = text[text.find("<article") : text.find("</article>")]
+        shown = _CODE.sub("", article)
+        for _, inner in _TEXT.findall(shown):
+            words = _TAG.sub("", inner)
+            left = _MARK.search(words)
+            assert left is None, f"{page.name}: {words[: left.end() + 60]!r}"
+    effects = (site / "effects.html").read_text(encoding="utf-8")
+    assert effects.count("<li><strong>Seen as</strong>") > 20
 
 
 def test_formulas_are_mathml(site: Path) -> None:
