@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.browser import started_browser
+
 ROOT = Path(__file__).resolve().parents[2]
 # What a page would load by itself; links that a reader may follow are none of it.
 _LOADED = re.compile(r"<(?:script|img|link|iframe|source)\b[^>]*?\b(?:src|href)=[\"']?([^\"'\s>]+)")
@@ -69,6 +71,24 @@ def test_formulas_are_mathml(site: Path) -> None:
     assert 'class="arithmatex"' not in text
     for page in site.rglob("*.html"):
         assert "\\frac" not in page.read_text(encoding="utf-8").partition("<footer")[0], page.name
+
+
+def test_the_search_works_from_a_folder(site: Path) -> None:
+    """Opened as files, with nothing fetched: a word leads to its page, and the link is good."""
+    with started_browser() as browser:
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.set_default_timeout(20_000)
+        asked: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto((site / "how-to" / "data.html").as_uri())
+        page.click("input.md-search__input")
+        page.keyboard.type("stribeck")
+        link = page.wait_for_selector("a.md-search-result__link[href*='effects.html']")
+        assert link is not None
+        link.click()
+        page.wait_for_url(re.compile(r"effects\.html"))
+        assert "Stribeck friction" in page.inner_text("article")
+        assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
 
 
 def test_public_functions_are_in_the_reference(site: Path) -> None:
