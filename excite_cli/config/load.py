@@ -3,7 +3,7 @@
 Errors name the key's path, what is allowed and the nearest known key.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from excite_cli.config.explain import explain
 from excite_cli.config.lines import line_at
 from excite_cli.config.spec import Spec
 from excite_cli.config.strict_yaml import load_strict
+from excite_cli.config.values import plain_values
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.given_files import require_stored
 
@@ -79,8 +80,7 @@ def parse_spec(text: str, source: str = "config", overrides: list[str] | None = 
     tree = load_strict(text, source)
     if not isinstance(tree, dict):
         raise ConfigError(f"{source}: a problem is a mapping with at least the key 'robot'.")
-    for override in overrides or []:
-        _apply(tree, override)
+    _apply_all(tree, overrides)
     changed = [override.partition("=")[0].strip() for override in overrides or []]
 
     def line_of(place: Place) -> int | None:
@@ -90,6 +90,15 @@ def parse_spec(text: str, source: str = "config", overrides: list[str] | None = 
         return line_at(text, place)
 
     return parsed_spec(tree, source, line_of)
+
+
+def spec_of(
+    values: Mapping[str, Any], overrides: list[str] | None = None, source: str = "config"
+) -> Spec:
+    """As `load_spec`, from what a YAML file would hold; `source` is named in messages."""
+    tree = plain_values(values, source)
+    _apply_all(tree, overrides)
+    return parsed_spec(tree, source)
 
 
 def parsed_spec(
@@ -113,6 +122,11 @@ def parsed_spec(
 def spec_as_yaml(spec: Spec) -> str:
     """The full resolved problem as YAML text; loading it gives the same `Spec`."""
     return yaml.safe_dump(spec.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+
+
+def _apply_all(tree: dict[str, Any], overrides: list[str] | None) -> None:
+    for override in overrides or []:
+        _apply(tree, override)
 
 
 def _apply(tree: dict[str, Any], override: str) -> None:
