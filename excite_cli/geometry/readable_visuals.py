@@ -25,7 +25,8 @@ def readable_visuals(robot: Robot) -> tuple[pin.GeometryModel, dict[str, str]]:
     shapes = [(link, shape) for link in root.findall("link") for shape in link.findall("visual")]
     for link, shape in shapes:
         link.remove(shape)
-    kept, lacking = [], {}
+    kept: list[tuple[ElementTree.Element, ElementTree.Element]] = []
+    lacking: dict[str, str] = {}
     for link, shape in shapes:
         link.append(shape)
         try:
