@@ -80,7 +80,8 @@ def parse_spec(text: str, source: str = "config", overrides: list[str] | None = 
     tree = load_strict(text, source)
     if not isinstance(tree, dict):
         raise ConfigError(f"{source}: a problem is a mapping with at least the key 'robot'.")
-    _apply_all(tree, overrides)
+    for override in overrides or []:
+        apply_override(tree, override)
     changed = [override.partition("=")[0].strip() for override in overrides or []]
 
     def line_of(place: Place) -> int | None:
@@ -97,7 +98,8 @@ def spec_of(
 ) -> Spec:
     """As `load_spec`, from what a YAML file would hold; `source` is named in messages."""
     tree = plain_values(values, source)
-    _apply_all(tree, overrides)
+    for override in overrides or []:
+        apply_override(tree, override)
     return parsed_spec(tree, source)
 
 
@@ -124,12 +126,7 @@ def spec_as_yaml(spec: Spec) -> str:
     return yaml.safe_dump(spec.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
 
-def _apply_all(tree: dict[str, Any], overrides: list[str] | None) -> None:
-    for override in overrides or []:
-        _apply(tree, override)
-
-
-def _apply(tree: dict[str, Any], override: str) -> None:
+def apply_override(tree: dict[str, Any], override: str) -> None:
     """Set one `key.path=value`; the value is YAML."""
     key, separator, text = override.partition("=")
     if not separator or not key.strip():

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from excite_cli.errors import RobotError
+from excite_cli.geometry import gltf_scenes
 from excite_cli.geometry.capsule_fit import sphere_points
-from excite_cli.geometry.gltf_scenes import whole_scenes
 from excite_cli.robot.description import check_mesh_paths
 from excite_cli.robot.model import Robot
 
@@ -115,7 +115,9 @@ def collision_model(robot: Robot) -> pin.GeometryModel:
         advice = " Repair the mesh, or drop constraints.self_collision."
         geometry = _geometry(robot, "collision", pin.GeometryType.COLLISION, advice)
         if robot.visual_shapes:
-            shown = whole_scenes(_geometry(robot, "visual", pin.GeometryType.VISUAL, advice))
+            shown = gltf_scenes.whole_scenes(
+                _geometry(robot, "visual", pin.GeometryType.VISUAL, advice)
+            )
             has = {item.parentFrame for item in geometry.geometryObjects}
             for item in shown.geometryObjects:
                 if item.parentFrame not in has:
@@ -126,7 +128,7 @@ def collision_model(robot: Robot) -> pin.GeometryModel:
 
 def visual_model(robot: Robot) -> pin.GeometryModel:
     """Visual geometry of the URDF; otherwise as `collision_model`."""
-    return whole_scenes(_geometry(robot, "visual", pin.GeometryType.VISUAL))
+    return gltf_scenes.whole_scenes(_geometry(robot, "visual", pin.GeometryType.VISUAL))
 
 
 def _geometry(
