@@ -1,5 +1,6 @@
 """What the robot of one run is made of, and its making: inertias, joints, drives, instruments."""
 
+import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -216,7 +217,7 @@ def _check_friction(build: Build) -> None:
         raise RobotError(
             f"joint '{name}' of the simulated robot lacks {-build.friction[j]:.3g} {unit} of dry "
             "friction, of which a planted effect is a part. Plant more of it: --effect "
-            f"'coulomb_friction@{name}=…'."
+            f"{shlex.quote(f'coulomb_friction@{name}=…')}."
         )
 
 
@@ -231,7 +232,7 @@ def _check_inertia(build: Build, plant: Plant) -> None:
     raise RobotError(
         f"joint '{build.robot.joint_names[joint]}' moves no inertia and cannot be simulated. Give "
         f"its links an inertia in the URDF, lock it, or plant a motor's inertia: --effect "
-        f"'armature@{build.robot.joint_names[joint]}=0.1'."
+        f"{shlex.quote(f'armature@{build.robot.joint_names[joint]}=0.1')}."
     )
 
 

@@ -5,6 +5,7 @@
 `payload@gripper_link=1.5;runs:motion_2`.
 """
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -95,10 +96,8 @@ def parse_planted(
     place, equals, numbers = body.partition("=")
     kind_name, at, joints_text = place.partition("@")
     if not (at and equals and kind_name.strip() and joints_text.strip()):
-        raise ConfigError(
-            f"{where}: not of the form {FORM}; for example 'coulomb_friction@"
-            f"{robot.joint_names[-1]}=4'."
-        )
+        example = shlex.quote(f"coulomb_friction@{robot.joint_names[-1]}=4")
+        raise ConfigError(f"{where}: not of the form {FORM}; for example {example}.")
     kind = kind_named(kind_name.strip(), where)
     value, others = _numbers(numbers, kind, where)
     runs, covariate = _clauses(clauses, takes, where)

@@ -1,6 +1,7 @@
 """Motions in, measured data out: the whole simulation as one function."""
 
 import hashlib
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -120,10 +121,11 @@ def _dated(effect: Effect) -> bool:
 def _require_column(effect: Effect, settings: SimulationSettings) -> None:
     names = [each.name for each in settings.covariates]
     if effect.covariate and effect.covariate not in names:
+        column = shlex.quote(f"{effect.covariate}=25,end:45,time_constant:600")
         raise ConfigError(
             f"{effect.kind} follows '{effect.covariate}', a column that the simulated log does not "
             f"have.{nearest(effect.covariate, names)} Give it: --covariate "
-            f"'{effect.covariate}=25,end:45,time_constant:600', or leave the effect out "
+            f"{column}, or leave the effect out "
             "(--no-declared)."
         )
 

@@ -1,6 +1,8 @@
 """The words that plant effects, and what is said when they are wrong."""
 
 import re
+import shlex
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,3 +95,11 @@ def test_messages(robot: Robot, text: str, words: str) -> None:
     with pytest.raises(ConfigError, match=re.escape(words)) as error:
         parse_planted(text, robot, RUNS)
     assert text in str(error.value)
+
+
+def test_an_example_is_quoted_for_a_shell(robot: Robot) -> None:
+    odd = replace(robot, joint_names=(*robot.joint_names[:-1], "tool's joint"))
+    with pytest.raises(ConfigError) as error:
+        parse_planted("spring", odd, RUNS)
+    example = str(error.value).partition("for example ")[2].removesuffix(".")
+    assert shlex.split(example) == ["coulomb_friction@tool's joint=4"]
