@@ -63,7 +63,7 @@ def _default(field: Schema) -> str:
         return "defaults there"
     plain = {True: "true", False: "false"}
     text = plain[value] if isinstance(value, bool) else str(value).replace("'", "")
-    return f"default `{text}`" if value not in ({}, []) else "none unless given"
+    return f"default `{text}`" if value not in ({}, [], "") else "none unless given"
 
 
 def _words(field: Schema) -> str:

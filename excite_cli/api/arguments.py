@@ -84,6 +84,8 @@ def _fits(value: object, hint: Any) -> bool:
 def _in_words(hint: Any) -> str:
     if get_origin(hint) is Sequence:
         return f"a list ({_listed(_choices(get_args(hint)[0]))})"
+    if get_origin(hint) is Mapping:
+        return "a dict"
     return _WORDS.get(hint, getattr(hint, "__name__", str(hint)))
 
 

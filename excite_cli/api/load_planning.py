@@ -20,7 +20,9 @@ from excite_cli.identification.load import ExpectedLoad, expected_load, require_
 from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.robot.link_frame import carrying_frame
 from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.record import Shown, show
 from excite_cli.store.fit_file import read_fit
+from excite_cli.summary.problem import problem_parts
 
 # Durations [s] that are tried; shorter runs are little more than the borders of the filters.
 SECONDS = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
@@ -28,8 +30,8 @@ SECONDS = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 _MASS, _ENOUGH, _NEAR = 1.0, 0.004, 1.2e-3
 
 
-@dataclass(frozen=True)
-class LoadProblem:
+@dataclass(frozen=True, repr=False)
+class LoadProblem(Shown):
     """A problem whose motion shows a load, and how well: `expected`. `enough`: as well as asked."""
 
     problem: Problem
@@ -48,6 +50,13 @@ class LoadProblem:
         if self.enough:
             return words
         return f"{words}: no duration up to {seconds:.3g} s tells it to 0.4 % and 1.2 mm"
+
+
+show(
+    LoadProblem,
+    lambda found: found.sentence,
+    lambda found: [found.sentence, *problem_parts(found.problem)],
+)
 
 
 @checked()

@@ -1,9 +1,10 @@
 """Configs, problems and measured data: what every command begins with."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from excite_cli.api.arguments import checked
 from excite_cli.api.paths import paths_in, refuse_twice
 from excite_cli.base_link.rows import with_base
 from excite_cli.config.inputs import files_of_config
-from excite_cli.config.load import load_spec
+from excite_cli.config.load import load_spec, spec_of
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.errors import FileError
@@ -34,6 +35,8 @@ from excite_cli.summary.robots import robot_parts
 
 # Share of a joint's torque on sealed data from which a fit is doubted.
 _MUCH_LEFT = 0.1
+# A YAML file, or what it would hold.
+Config = str | Path | Mapping[str, Any]
 _LEVELS = {"note": Level.NOTE, "warning": Level.WARNING}
 
 
@@ -80,8 +83,10 @@ show(
 
 
 @checked()
-def load_case(config: str | Path, overrides: Sequence[str] = ()) -> Case:
+def load_case(config: Config, overrides: Sequence[str] = ()) -> Case:
     """The robot and declared model of a config, without capsules; `overrides` as with `--set`.
+
+    Instead of a file, `config` may be a dict, as for `load_problem`.
 
     Raises
     ------
@@ -93,16 +98,16 @@ def load_case(config: str | Path, overrides: Sequence[str] = ()) -> Case:
     >>> load_case("configs/smoke.yaml").robot.joint_names[:2]
     ('shoulder_yaw', 'shoulder_pitch')
     """
-    spec, file = load_spec(Path(config), list(overrides)), Path(config).resolve()
-    return Case(spec, file.parent, build_robot(spec.robot, file.parent), file)
+    spec, folder, file = _given(config, overrides)
+    return Case(spec, folder, build_robot(spec.robot, folder), file)
 
 
 @checked()
-def load_problem(
-    config: str | Path, overrides: Sequence[str] = (), tell: Tell = log_note
-) -> Problem:
+def load_problem(config: Config, overrides: Sequence[str] = (), tell: Tell = log_note) -> Problem:
     """The whole problem of a config: robot, trajectory, criterion, constraints, grids.
 
+    `config` is a YAML file or, put together in Python, a dict of what such a file would hold, where
+    arrays and paths are allowed too; its relative paths start from the working directory.
     `overrides` are `key.path=value`, as with `--set`. Capsules of a robot that is new to this
     machine are fitted first, which takes seconds to a minute, and kept in the cache. `tell` hears
     what was understood, and what a person must know of it.
@@ -116,9 +121,18 @@ def load_problem(
     --------
     >>> load_problem("configs/smoke.yaml", ["sequence.motions=1"]).variables
     45
+    >>> load_problem({"robot": {"urdf": "data/smoke_arm.urdf"}, "seed": 2}).robot.n
+    5
     """
-    spec, file = load_spec(Path(config), list(overrides)), Path(config).resolve()
-    return _built(spec, file.parent, file, tell)
+    return _built(*_given(config, overrides), tell)
+
+
+def _given(config: Config, overrides: Sequence[str]) -> tuple[Spec, Path, Path | None]:
+    """What a config says, the folder that its paths start from, and its file if it is one."""
+    if isinstance(config, Mapping):
+        return spec_of(config, list(overrides)), Path.cwd(), None
+    file = Path(config).resolve()
+    return load_spec(Path(config), list(overrides)), file.parent, file
 
 
 def problem_of(case: Problem | Case, tell: Tell = log_note) -> Problem:

@@ -17,7 +17,6 @@ from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.export.timed import repeated
 from excite_cli.measurement.hdf5_writer import write_dataset
-from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.base_sensors import Instruments
 from excite_cli.simulation.covariate_series import parse_series as parse_series
@@ -95,7 +94,7 @@ def simulate(
             lambda run, done: progress(run, done, sum(map(len, takes.values()))),
         )
         if output is not None:
-            write_dataset(Path(output), found.dataset, _attributes(robot, problem, found, settings))
+            write_dataset(Path(output), found.dataset, _attributes(problem, found, settings))
         return found
 
 
@@ -139,10 +138,10 @@ def _warn_of_conversion(measurement: MeasurementSpec, tell: Tell) -> None:
 
 
 def _attributes(
-    robot: Robot, problem: Problem | Case, found: Simulation, settings: SimulationSettings
+    problem: Problem | Case, found: Simulation, settings: SimulationSettings
 ) -> dict[str, object]:
     """What the data file says about its making."""
-    truth = found.truth.record(robot.joint_names)
+    truth = found.truth.record()
     columns = [each.name for each in settings.covariates]  # their values are in the runs
     return {
         "simulated": True,

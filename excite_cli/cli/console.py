@@ -1,20 +1,16 @@
-"""What a command says: tables and messages, progress, JSON, exit statuses.
+"""What a command says: tables and messages, progress, JSON.
 
 stdout is the answer (a table, or JSON with `--json`), stderr is progress and messages.
 """
 
-import errno
 import json
 import math
 import os
-import platform
 import sys
-import traceback
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Protocol, TextIO
 
 import typer
@@ -32,14 +28,10 @@ from rich.segment import Segment
 from rich.table import Column
 from rich.text import Text
 
-from excite_cli import __version__
-from excite_cli.api.outputs import leave_claims
-from excite_cli.api.showing import Answer, Level, Note, Table
-from excite_cli.cli.layout import rendered
-from excite_cli.cli.stopping import stopped
-from excite_cli.errors import REFUSALS, ExciteError, ExciteWarning, refusal
+from excite_cli.api.showing import Answer, Command, Level, Note, Part, Table
+from excite_cli.cli.layout import copyable, rendered, wrapped
+from excite_cli.errors import ExciteWarning
 
-BUG, INTERRUPTED = 70, 130
 # Off a terminal rows stay whole, so that they can be searched and cut.
 _WHOLE_ROWS = 10_000
 # Names in files may hold what a terminal obeys: C0 and C1, but for the tab and the end of a line.
@@ -63,17 +55,17 @@ class Terminal:
     @property
     def err(self) -> Console:
         """Progress and messages."""
-        return _console(sys.stderr)
+        return _messages()
 
     def say(self, text: str) -> None:
         """A message for people, unless quiet."""
         if not self.quiet:
-            self.err.print(text)
+            _print_words(self.err, text)
 
     def detail(self, text: str) -> None:
         """A message for those who asked for more."""
         if self.verbose:
-            self.err.print(text)
+            _print_words(self.err, text)
 
     def tell(self, note: Note) -> None:
         """What the library tells while it works."""
@@ -85,16 +77,16 @@ class Terminal:
     def show(self, answer: Answer) -> None:
         """The answer, as JSON or as tables and sentences; exit status 1 where it is bad."""
         if self.as_json:
-            print(json.dumps(_finite(answer.data), ensure_ascii=not _is_unicode(sys.stdout)))
+            print(json.dumps(_finite(answer.data), ensure_ascii=not is_unicode(sys.stdout)))
         else:
             self._print(answer.parts)
         if not answer.good:
             raise typer.Exit(1)
 
-    def _print(self, parts: Sequence[Table | str]) -> None:
+    def _print(self, parts: Sequence[Part]) -> None:
         with (out := self.out).capture() as printed:
             for before, part in zip([None, *parts], parts, strict=False):
-                if before is not None and not (isinstance(before, str) and isinstance(part, str)):
+                if isinstance(before, Table) or (before is not None and isinstance(part, Table)):
                     out.print()
                 _print(out, part)
         print("\n".join(line.rstrip() for line in printed.get().splitlines()))
@@ -113,9 +105,10 @@ class Terminal:
             return
         columns: list[ProgressColumn] = [SpinnerColumn()]
         columns += [TextColumn("{task.description}")] if title else []
-        columns += [TextColumn("{task.fields[text]}", table_column=Column(no_wrap=True))]
+        columns += [TextColumn("{task.fields[text]}", table_column=Column(overflow="fold"))]
         columns += [_Remaining()]
-        with Progress(*columns, console=self.err, transient=True) as bar:
+        out = self.err
+        with Progress(*columns, console=out, transient=True) as bar, _beside(out):
             task = bar.add_task(title, total=total, text="")
             started = 0
 
@@ -127,6 +120,23 @@ class Terminal:
                 bar.update(task, completed=done, total=total, text=text)
 
             yield show
+
+
+# Consoles whose progress line is shown: only they know how to print a message above it.
+_live: list[Console] = []
+
+
+@contextmanager
+def _beside(out: Console) -> Iterator[None]:
+    _live.append(out)
+    try:
+        yield
+    finally:
+        _live.remove(out)
+
+
+def _messages() -> Console:
+    return _live[-1] if _live else _console(sys.stderr)
 
 
 class Line(Protocol):
@@ -148,10 +158,11 @@ class _Console(Console):
     ) -> Iterator[Segment]:
         """Segments whose text a terminal only shows; none grows, so that columns stay."""
         for text, style, control in super().render(renderable, options):
-            yield Segment(text if control else _harmless(text), style, control)
+            yield Segment(text if control else harmless(text), style, control)
 
 
-def _harmless(text: str) -> str:
+def harmless(text: str) -> str:
+    """A text that a terminal only shows."""
     return text.translate(_OBEYED)
 
 
@@ -165,21 +176,31 @@ class _Remaining(TimeRemainingColumn):
         return Text.assemble("≤ ", super().render(task))
 
 
-def _print(out: Console, part: Table | str) -> None:
-    """A sentence, or a table whose title may be wider than its columns."""
+def _print(out: Console, part: Part) -> None:
+    """A sentence, a command, or a table under a title that may be wider than its columns."""
     if isinstance(part, Table):
         if part.title:
-            out.print(part.title, style="bold", soft_wrap=out.width >= _WHOLE_ROWS)
-        out.print(rendered(part))
+            _print_words(out, part.title, "bold")
+        for number, each in enumerate(rendered(part, out.width)):
+            if number:
+                out.print()
+            out.print(each)
+    elif isinstance(part, Command):
+        out.print(copyable(f"  {part.line}", out.width), soft_wrap=True)
     else:
-        out.print(part, soft_wrap=out.width >= _WHOLE_ROWS)
+        _print_words(out, part)
+
+
+def _print_words(out: Console, words: str, style: str | None = None) -> None:
+    """Text that wraps at its spaces."""
+    out.print(wrapped(words, out.width), style=style, soft_wrap=True)
 
 
 def _is_terminal(file: TextIO) -> bool:
     return file.isatty() and os.environ.get("TERM") != "dumb"
 
 
-def _is_unicode(file: TextIO) -> bool:
+def is_unicode(file: TextIO) -> bool:
     """Whether every character can be written; JSON has another way to say those that cannot."""
     return (file.encoding or "utf-8").lower().startswith("utf")
 
@@ -215,7 +236,7 @@ def _sparse(title: str) -> Line:
         nonlocal last
         if time.monotonic() - last >= 5.0:
             last = time.monotonic()
-            print(_harmless(f"{title}  {text}".strip()), file=sys.stderr, flush=True)
+            print(harmless(f"{title}  {text}".strip()), file=sys.stderr, flush=True)
 
     return tell
 
@@ -241,95 +262,15 @@ def told_warnings() -> Iterator[None]:
             if not issubclass(category, ExciteWarning):
                 otherwise(message, category, *where)
             elif not {"--quiet", "-q"} & set(sys.argv):
-                _tell(f"warning: {message}")
+                tell_message(f"warning: {message}")
 
         warnings.showwarning = show  # type: ignore[assignment]
         yield
 
 
-def run_guarded(action: Callable[[], None]) -> int:
-    """Run a command; return its exit status, with one message instead of a traceback."""
-    status: Any = 0
-    try:
-        try:
-            action()
-        except SystemExit as ended:
-            status = ended.code
-        sys.stdout.flush()
-    except ExciteError as error:
-        _tell(f"error: {error}")
-        return error.exit_status
-    except KeyboardInterrupt:
-        status, words = stopped(sys.argv[1:])
-        _tell(words)
-        return status
-    except MemoryError:
-        _tell(f"error: out of memory; {_less_memory(sys.argv[1:])}.")
-        return 2
-    except OSError as error:
-        return _refused(error)
-    except Exception as error:
-        return _bug(error)
-    finally:
-        leave_claims()
-    return status if isinstance(status, int) else 0
-
-
-def _less_memory(arguments: Sequence[str]) -> str:
-    """What takes less memory, for the command line `arguments`."""
-    measured = {
-        "diagnose": "take fewer runs, fewer samples or fewer candidates (diagnosis.kinds)",
-        "identify": "take fewer runs or fewer samples",
-    }
-    command = next((each for each in arguments if not each.startswith("-")), "")
-    return measured.get(command, "take fewer samples, harmonics or joints")
-
-
-# Nothing that a user could fix: the program looked for a file that it should have asked for.
-_OUR_FAULT = (errno.ENOENT, errno.EEXIST)
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-
-
-def _refused(error: OSError) -> int:
-    """What the file system refused, to a file or to the output."""
-    printed = error.filename is None and error.errno in _FULL
-    if error.errno not in REFUSALS or error.errno in _OUR_FAULT:
-        return _bug(error)
-    if error.filename is None and not printed:
-        return _bug(error)
-    if printed:
-        _print_nowhere()
-    _tell(f"error: {'standard output' if printed else error.filename}: {refusal(error)}")
-    return 2
-
-
-def _print_nowhere() -> None:
-    """So that Python's own last flush does not fail once more."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _bug(error: Exception) -> int:
-    """One message on what to report; the traceback with --verbose."""
-    if {"--verbose", "-v"} & set(sys.argv):
-        sys.stderr.write(_harmless(traceback.format_exc()))
-        ask = "Please report it: the command, and all that is printed above."
-    else:
-        ask = "Please run the command again with --verbose, and report it with what that prints."
-    last = traceback.extract_tb(error.__traceback__)[-1:]
-    place = "".join(f" at {Path(frame.filename).name}:{frame.lineno}" for frame in last)
-    _tell(
-        f"error: a bug of excite, not of your input ({type(error).__name__}{place}: {error}).\n"
-        f"{ask}\n"
-        f"excite {__version__}, Python {platform.python_version()}, {platform.platform()}"
-    )
-    return BUG
-
-
-def _tell(message: str) -> None:
-    """On stderr; the first word red on a terminal."""
-    head, colon, rest = message.partition(":")
-    if colon and head == "error":
-        text = Text.assemble((f"{head}:", "bold red"), rest)
-    else:
-        text = Text(message)
-    _console(sys.stderr).print(text, soft_wrap=True)
+def tell_message(message: str) -> None:
+    """On stderr; the first word of an error is red on a terminal."""
+    out = _messages()
+    text = Text(wrapped(message, out.width) if out.is_terminal else message)
+    text.highlight_regex("^error:", "bold red")
+    out.print(text, soft_wrap=True)

@@ -1,22 +1,25 @@
 """How `--help` looks: summary, examples to copy, arguments, options in groups.
 
 Without boxes, so that it reads the same at 80 columns, in a pager and in a pipe. Examples stand in
-the docstring of a command, after `Example:` or `Examples:`, and are shown as they are written: a
-line that was wrapped could not be copied.
+the docstring of a command, after `Example:` or `Examples:`; where they are too long for a terminal,
+their lines end in a backslash, so that they can be copied.
 """
 
 import inspect
 import os
+import re
 import textwrap
 from enum import Enum
 from typing import Any, get_args
 
 from typer.core import TyperCommand, TyperGroup
 
+from excite_cli.cli.layout import copyable, wrapped
+
 # Groups of options are reported in this order; those of no group come first, as "Options".
 WORK, OUTPUT, MESSAGES = "Workers", "Output files", "Messages"
 _LAST = (WORK, OUTPUT, MESSAGES)
-_INDENT = 2
+_INDENT, _FARTHER = 2, 6
 _NARROWEST, _WIDEST_NAMES = 50, 26
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
 _METAVARS = {"path": "FILE", "int": "N", "float": "X", "text": "TEXT", "str": "TEXT"}
@@ -66,9 +69,9 @@ def write_page(command: Any, ctx: Any, formatter: Any) -> None:
     for paragraph in (command.help or "").split("\n\n"):
         formatter.write("\n" + _filled(paragraph, width))
     if command.epilog:
-        formatter.write(
-            f"\n{_heading('Examples')}\n" + textwrap.indent(command.epilog, "  ") + "\n"
-        )
+        examples = re.sub(r" *\\\n *", " ", command.epilog).splitlines()
+        lines = (copyable(" " * _INDENT + example, width) for example in examples)
+        formatter.write(f"\n{_heading('Examples')}\n" + "\n".join(lines) + "\n")
     for title, rows in sections_of(command, ctx).items():
         formatter.write(f"\n{_heading(title)}\n" + _rows(rows, width))
 
@@ -148,23 +151,25 @@ def _plain_types(annotation: Any) -> list[type]:
 
 
 def _filled(text: str, width: int, indent: int = _INDENT) -> str:
-    return (
-        textwrap.indent(textwrap.fill(text, width - indent, break_on_hyphens=False), " " * indent)
-        + "\n"
-    )
+    return textwrap.indent(wrapped(text, width - indent), " " * indent) + "\n"
 
 
 def _rows(rows: list[tuple[str, str]], width: int) -> str:
-    """Two columns; a name too long for the first one has a line of its own."""
+    """Two columns; a name too long for the first one has a line of its own.
+
+    So has one whose words hold a longer word than there is room for beside it.
+    """
     names = [len(name) for name, _ in rows if len(name) <= _WIDEST_NAMES]
     column = _INDENT + max(names, default=_WIDEST_NAMES) + 2
     text = ""
     for name, words in rows:
         first = " " * _INDENT + name
-        lines = textwrap.wrap(words, width - column, break_on_hyphens=False)
-        if not lines or len(first) + 2 > column:
+        longest = max(map(len, words.split()), default=0)
+        beside = column if longest <= width - column else _FARTHER
+        lines = wrapped(words, width - beside).splitlines()
+        if not lines or len(first) + 2 > beside:
             text += first + "\n"
         else:
             text += first.ljust(column) + lines.pop(0) + "\n"
-        text += "".join(" " * column + line + "\n" for line in lines)
+        text += "".join(" " * beside + line + "\n" for line in lines)
     return text

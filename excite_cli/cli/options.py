@@ -43,7 +43,8 @@ Set = Annotated[
 ]
 Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Override the config's seed.")]
 Json = Annotated[
-    bool, typer.Option("--json", help="Print the answer as JSON.", rich_help_panel=MESSAGES)
+    bool,
+    typer.Option("--json", help="Print the answer as JSON, errors too.", rich_help_panel=MESSAGES),
 ]
 Quiet = Annotated[
     bool,

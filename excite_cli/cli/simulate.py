@@ -27,7 +27,7 @@ def simulate(
             rich_help_panel=_ROBOT,
             metavar="KIND@JOINT=VALUE",
             help="Put an effect into the robot (may be repeated); in full: "
-            "KIND@JOINT,…=VALUE,NAME:VALUE,…;runs:RUN|RUN;covariate:COLUMN.",
+            "KIND@JOINT,…=VALUE,NAME:VALUE,…, then ;runs:RUN|RUN, then ;covariate:COLUMN.",
             autocompletion=complete_effect,
         ),
     ] = None,

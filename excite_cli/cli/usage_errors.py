@@ -3,6 +3,7 @@
 Each becomes one `ConfigError`, so that it looks and ends like every other bad input.
 """
 
+import shlex
 from collections.abc import Iterable
 from typing import Any
 
@@ -48,7 +49,8 @@ def in_our_words(error: Exception, words: list[str], commands: Iterable[str]) ->
     if "unexpected extra argument" in reason:
         extra = reason.rpartition("(")[2].rstrip(")")
         if path.endswith(" init"):  # the one command whose robot is an option
-            usage = f" Did you mean --robot {extra}, or --urdf {extra}?"
+            one = shlex.quote(extra) if extra in words else "NAME"  # several are told as one text
+            usage = f" Did you mean --robot {one}, or --urdf {one}?"
         return ConfigError(f"{where}unexpected: {extra}.{usage}")
     return ConfigError(f"{where}{reason[:1].lower()}{reason[1:]}.{more}")
 

@@ -3,7 +3,7 @@
 Errors name the key's path, what is allowed and the nearest known key.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from excite_cli.config.explain import explain
 from excite_cli.config.lines import line_at
 from excite_cli.config.spec import Spec
 from excite_cli.config.strict_yaml import load_strict
+from excite_cli.config.values import plain_values
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.given_files import require_stored
 
@@ -80,7 +81,7 @@ def parse_spec(text: str, source: str = "config", overrides: list[str] | None = 
     if not isinstance(tree, dict):
         raise ConfigError(f"{source}: a problem is a mapping with at least the key 'robot'.")
     for override in overrides or []:
-        _apply(tree, override)
+        apply_override(tree, override)
     changed = [override.partition("=")[0].strip() for override in overrides or []]
 
     def line_of(place: Place) -> int | None:
@@ -90,6 +91,16 @@ def parse_spec(text: str, source: str = "config", overrides: list[str] | None = 
         return line_at(text, place)
 
     return parsed_spec(tree, source, line_of)
+
+
+def spec_of(
+    values: Mapping[str, Any], overrides: list[str] | None = None, source: str = "config"
+) -> Spec:
+    """As `load_spec`, from what a YAML file would hold; `source` is named in messages."""
+    tree = plain_values(values, source)
+    for override in overrides or []:
+        apply_override(tree, override)
+    return parsed_spec(tree, source)
 
 
 def parsed_spec(
@@ -115,7 +126,7 @@ def spec_as_yaml(spec: Spec) -> str:
     return yaml.safe_dump(spec.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
 
-def _apply(tree: dict[str, Any], override: str) -> None:
+def apply_override(tree: dict[str, Any], override: str) -> None:
     """Set one `key.path=value`; the value is YAML."""
     key, separator, text = override.partition("=")
     if not separator or not key.strip():

@@ -21,6 +21,7 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.section import Integer, Motions, Positive, Power, Section, Share
 from excite_cli.config.trajectory_spec import FourierSpec, SamplingSpec, TrajectorySpec
 from excite_cli.config.uncertainty_spec import UncertaintySpec
+from excite_cli.shown.record import Shown
 
 CriterionKind = Literal[
     "condition_number",
@@ -126,7 +127,7 @@ class SequenceSpec(Section):
     until: UntilSpec | None = Field(None, description="ends the sequence earlier")
 
 
-class Spec(Section):
+class Spec(Shown, Section):
     """A whole problem."""
 
     robot: RobotSpec

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.effects.parameter import unit_of_slider
 
 _SURE = 2.0  # standard deviations from which a change is told
 _LONG = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
@@ -31,7 +32,9 @@ def _told(found: Diagnosis, named: NamedEffect) -> Iterator[str]:
             continue
         if start is None:
             continue
-        end = Value(start + change.value, change.std, catalogue()[of].parameters[0].unit)
+        unit = catalogue()[of].parameters[0].unit
+        unit = unit if change.unit == parameter.unit else unit_of_slider(unit)
+        end = Value(start + change.value, change.std, unit)
         if kind.of_campaign:
             how = "fell" if abs(end.value) < abs(start) else "rose"
             over = _duration(record.shape["span"])

@@ -76,12 +76,11 @@ def named_effects(
                 effect=replace(
                     record_of(c.effect, names, parameters[own]), link=link.name if link else ""
                 ),
-                parameters={
-                    name: replace(value, unit=c.effect.unit_on(value.unit, model.robot.sliding))
-                    for name, value in c.effect.report(
-                        seen @ parameters[own], seen @ covariance[own, own] @ seen.T
-                    ).items()
-                },
+                parameters=c.effect.report_on(
+                    model.robot.sliding,
+                    seen @ parameters[own],
+                    seen @ covariance[own, own] @ seen.T,
+                ),
                 p_value=judge.told_p_value(i, gain),
                 share_of_residual=float(np.clip(share, 0.0, 1.0)),
                 gain=float(judge.left_out_gain(rest, [i])),

@@ -28,6 +28,7 @@ from excite_cli.excitation.extension import in_words, why_not_planned
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.shown.command import Command
 from excite_cli.shown.record import Shown
 
 
@@ -98,8 +99,13 @@ def next_experiment(
     return {
         "purpose": purpose,
         "pairs": pairs,
-        "command": f"excite optimize {config} --after {file}",
+        "command": next_command(config, file).line,
     }
+
+
+def next_command(config: str, file: str) -> Command:
+    """What plans the next motion of `config` after the diagnosis in `file`."""
+    return Command(("excite", "optimize", config, "--after", file))
 
 
 def plan_after(

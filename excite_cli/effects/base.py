@@ -15,7 +15,7 @@ its name.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import ClassVar, Literal
 
@@ -369,6 +369,15 @@ class Effect(ABC):
             if shape.name in self.shape:
                 found[shape.name] = Value(float(self.shape[shape.name]), float("nan"), shape.unit)
         return found
+
+    def report_on(
+        self, sliding: NDArray[np.bool_], values: Array, covariance: Array
+    ) -> dict[str, Value]:
+        """`report` with the units of a robot whose moved joints slide, or do not (n,)."""
+        return {
+            name: replace(value, unit=self.unit_on(value.unit, sliding))
+            for name, value in self.report(values, covariance).items()
+        }
 
     def unit_on(self, unit: str, sliding: NDArray[np.bool_]) -> str:
         """A unit of its parameters on a robot whose moved joints slide, or do not (n,)."""

@@ -43,7 +43,8 @@ class Elasticity(Effect):
             return ""
         stiffness = 1.0 / values[0]
         return (
-            f"a gear of {stiffness:.3g} N·m/rad would bend by {bent:.2g} rad under its usual load"
+            f"a gear of {stiffness:.3g} N·m/rad (N/m) would bend by {bent:.2g} rad (m) under its "
+            "usual load"
         )
 
     def model_error(self, values: Array) -> Array:

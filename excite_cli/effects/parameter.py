@@ -38,18 +38,17 @@ class Parameter:
     def why_not(self, value: float) -> str:
         """Why no fit with this value is believed; empty if it may be."""
         if self.nonnegative and value < 0:
-            return f"{self.name} of {value:.3g} {self.unit} cannot be negative"
+            return f"{self.name} of {value:.3g} cannot be negative"
         if not self.allows(value, early=False):
-            return f"{self.name} of {value:.3g} {self.unit}: {self.because or 'out of range'}"
+            return f"{self.name} of {value:.3g}: {self.because or 'out of range'}"
         return ""
 
     def absurd(self, value: float, torque: float) -> str:
-        """Why it is too large for a joint whose largest torque [N·m] is this; empty if not."""
+        """Why it is too large for a joint with this largest torque [N·m; N]; empty if not."""
         if not self.part_of_torque or abs(value) <= torque:
             return ""
         return (
-            f"{self.name} of {value:.3g} {self.unit} is more than the largest torque of its joint, "
-            f"{torque:.3g} N·m"
+            f"{self.name} of {value:.3g} is more than the largest torque of its joint, {torque:.3g}"
         )
 
 

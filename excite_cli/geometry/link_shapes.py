@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from excite_cli.errors import RobotError
+from excite_cli.geometry import gltf_scenes
 from excite_cli.geometry.capsule_fit import sphere_points
 from excite_cli.robot.description import check_mesh_paths
 from excite_cli.robot.model import Robot
@@ -114,7 +115,7 @@ def collision_model(robot: Robot) -> pin.GeometryModel:
         advice = " Repair the mesh, or drop constraints.self_collision."
         geometry = _geometry(robot, "collision", pin.GeometryType.COLLISION, advice)
         if robot.visual_shapes:
-            shown = _geometry(robot, "visual", pin.GeometryType.VISUAL, advice)
+            shown = visual_model(robot, advice)
             has = {item.parentFrame for item in geometry.geometryObjects}
             for item in shown.geometryObjects:
                 if item.parentFrame not in has:
@@ -123,9 +124,9 @@ def collision_model(robot: Robot) -> pin.GeometryModel:
     return _latest[2]
 
 
-def visual_model(robot: Robot) -> pin.GeometryModel:
-    """Visual geometry of the URDF; otherwise as `collision_model`."""
-    return _geometry(robot, "visual", pin.GeometryType.VISUAL)
+def visual_model(robot: Robot, advice: str = "") -> pin.GeometryModel:
+    """Visual geometry of the URDF; otherwise as `collision_model`. `advice` ends its errors."""
+    return gltf_scenes.whole_scenes(_geometry(robot, "visual", pin.GeometryType.VISUAL, advice))
 
 
 def _geometry(

@@ -36,7 +36,7 @@ def mask_saturated(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding
             level = side * float((side * values).max())
             share = np.count_nonzero(at) / len(values)
             text = (
-                f"torque of {joint} stands at its {word} limit {level:.6g} N·m in {share:.1%} of "
+                f"torque of {joint} stands at its {word} limit {level:.6g} in {share:.1%} of "
                 "moving samples: saturated, or clipped when recorded; these samples are masked"
             )
             findings.append(Finding("saturated", "warning", text, run.name, (joint,)))

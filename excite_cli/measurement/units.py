@@ -220,7 +220,7 @@ def _torque(
     j = int(np.argmax(share))
     if share[j] > 3:
         text = (
-            f"torque of {joints[j]} reaches {largest[j]:.4g} N·m, {share[j]:.3g} times its effort "
+            f"torque of {joints[j]} reaches {largest[j]:.4g}, {share[j]:.3g} times its effort "
             "limit: a placeholder in the URDF, or another unit"
         )
         return [Finding("torque_units", "note", text, where, (joints[j],))]

@@ -14,7 +14,7 @@ _WORDS = {
     "working_stride": "every so many recorded samples are worked on",
     "border": "cut off at both ends [s]",
     "velocity": "speeds are",
-    "moving_speed": "a joint moves from [rad/s]",
+    "moving_speed": "a joint moves from [rad/s; m/s]",
     "bandwidth": "bandwidth of the speeds [Hz]",
     "reasons": "reasons",
     "samples": "samples used",
@@ -24,7 +24,7 @@ _WORDS = {
     "standstill_share": "samples left out at standstill and reversals",
     "invalid_share": "samples left out as invalid",
     "noise_orders": "order of the noise model",
-    "noise_rms": "noise that the model leaves [N·m]",
+    "noise_rms": "noise that the model leaves [N·m; N]",
 }
 _SHARES = ("standstill_share", "invalid_share")
 

@@ -55,7 +55,8 @@ def _label(run: str, parts: Sequence[TorqueTrace]) -> str:
 def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: int) -> Plot:
     left = [part.measured[:, j] - part.predicted[:, j] for part in parts]
     before = [part.measured[:, j] - part.before[:, j] for part in parts if part.before is not None]
-    words = f"Torque of {name}, measured with RMS {_rms([p.measured[:, j] for p in parts])} {unit}"
+    what = torque_or_force(unit).capitalize()
+    words = f"{what} of {name}, measured with RMS {_rms([p.measured[:, j] for p in parts])} {unit}"
     words += f"; the model leaves RMS {_rms(left)} {unit}"
     if before:
         words += f", the declared model without the effects found {_rms(before)} {unit}"

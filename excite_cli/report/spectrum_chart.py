@@ -52,9 +52,16 @@ def random_stack(result: Result, problem: Problem) -> Array:
     return stack.factor
 
 
+def row_unit(problem: Problem) -> str:
+    """Of what is measured: torques, and forces where something slides or the base can move."""
+    robot = problem.robot
+    return "N·m (N)" if robot.sliding.any() or len(robot.rows) > robot.n else "N·m"
+
+
 def spectrum_unit(problem: Problem) -> str:
     """Rows are torques (or shares of them); columns kg, kg·m and kg·m² unless they are scaled."""
-    row = "N·m" if problem.weighting.row_name == "none" else "weighted N·m"
+    row = row_unit(problem)
+    row = row if problem.weighting.row_name == "none" else f"weighted {row}"
     if problem.weighting.column_name == "none":
         return f"{row} per kg, kg·m, kg·m²"
     return f"{row} per scaled parameter"

@@ -15,6 +15,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.report.campaign import Campaign, in_figures
 from excite_cli.report.page import Block, Section, Table, Text
+from excite_cli.report.spectrum_chart import row_unit
 from excite_cli.robot.model import Array
 
 _SHOWN = 6
@@ -43,7 +44,7 @@ def weakest_section(campaign: Campaign) -> Section:
         return Section(anchor, title, (_direction_table(columns, turned[-1]),), words)
     blocks: list[Block] = [
         _direction_table(columns, turned[-1]),
-        _parameter_table(result, columns),
+        _parameter_table(result, columns, row_unit(problem)),
     ]
     if len(result.effect_names):
         listed = ", ".join(result.effect_names)
@@ -105,7 +106,7 @@ def _direction_table(columns: _Columns, direction: Array) -> Table:
     )
 
 
-def _parameter_table(result: Result, columns: _Columns) -> Table:
+def _parameter_table(result: Result, columns: _Columns, unit: str) -> Table:
     """Standard deviations for noise of one unit per row of the stack, the worst known first."""
     inverse = np.linalg.pinv(result.stack.factor)
     std = columns.scales * np.linalg.norm(inverse, axis=1)
@@ -123,7 +124,7 @@ def _parameter_table(result: Result, columns: _Columns) -> Table:
         for i in order
     )
     plain = bool(np.all(result.row_weights == 1.0))
-    noise = "1 N·m" if plain else "one weighted unit"
+    noise = f"1 {unit}" if plain else "one weighted unit"
     return Table(
         ("base parameter", "unit", "by the URDF", "std", "of the value"),
         rows,

@@ -57,8 +57,8 @@ class Snapshot:
     covariates: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Change:
+@dataclass(frozen=True, repr=False)
+class Change(Shown):
     """A parameter over the days: `before` and `after` [unit] the day `since`, `std` of the change.
 
     `p_value` corrected for the number of parameters and days; `values` (K,) NaN where not known,

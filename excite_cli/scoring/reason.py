@@ -154,7 +154,8 @@ def _told(
             beside = np.hstack(others)
             without = residual - beside @ _solved(beside, residual)[0]
         share = (float(without @ without) - float(rest @ rest)) / max(first, 1e-30)
-        told = effect.report(values[part], correlated * noise * covariance[part, part])
+        spread = correlated * noise * covariance[part, part]
+        told = effect.report_on(robot.sliding, values[part], spread)
         record = record_of(effect, robot.joint_names, values[part])
         reasons.append(Reason(replace(record, runs=()), told, share))
     return tuple(sorted(reasons, key=lambda each: -each.share))

@@ -21,8 +21,8 @@ class Reason:
     share: float
 
 
-@dataclass(frozen=True)
-class ScoredRun:
+@dataclass(frozen=True, repr=False)
+class ScoredRun(Shown):
     """A run, or a part of it, beside the torque that the model predicts; nothing was fitted.
 
     `allowed` RMS of the residual by joint [N·m] (N) that the model's own residual allows in this

@@ -18,6 +18,7 @@ from scipy.optimize import nnls
 
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import Array
+from excite_cli.shown.record import Shown
 
 REVERSAL = 0.05  # rad/s: friction is known least below
 _HOUR = 3600.0
@@ -35,8 +36,8 @@ class Residual:
     step: float
 
 
-@dataclass(frozen=True)
-class Thresholds:
+@dataclass(frozen=True, repr=False)
+class Thresholds(Shown):
     """Of every joint the `coefficients` c₀ … c₃ (n, 4) of s², and the `level` x (n,).
 
     `false_alarms` an hour that they are made for, on all joints together; `time_constant` [s].

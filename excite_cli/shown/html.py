@@ -1,16 +1,23 @@
-"""Tables and sentences as HTML, for notebooks."""
+"""Tables, sentences and commands as HTML, for notebooks."""
 
 from collections.abc import Iterable
 from html import escape
 
-from excite_cli.shown.table import Table
+from excite_cli.shown.command import Command
+from excite_cli.shown.table import Part, Table
 
 
-def as_html(parts: Iterable[Table | str]) -> str:
+def as_html(parts: Iterable[Part]) -> str:
     """Tables and paragraphs, without style but the alignment; texts are escaped."""
-    return "\n".join(
-        _table(part) if isinstance(part, Table) else f"<p>{_text(part)}</p>" for part in parts
-    )
+    return "\n".join(map(_part, parts))
+
+
+def _part(part: Part) -> str:
+    if isinstance(part, Table):
+        return _table(part)
+    if isinstance(part, Command):
+        return f"<pre>{escape(part.line)}</pre>"
+    return f"<p>{_text(part)}</p>"
 
 
 def _table(table: Table) -> str:

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from excite_cli.shown.command import Command
+
 
 @dataclass(frozen=True)
 class Table:
@@ -29,5 +31,6 @@ class Table:
             raise ValueError(f"'{self.title}' has no columns {sorted(unknown)}")
 
 
-# What is shown of a record, in reading order: tables, and sentences between them.
-Parts = list[Table | str]
+# What is shown of a record, in reading order: tables, sentences, commands to go on with.
+Part = Table | Command | str
+Parts = list[Part]

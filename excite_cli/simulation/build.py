@@ -1,5 +1,6 @@
 """What the robot of one run is made of, and its making: inertias, joints, drives, instruments."""
 
+import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -211,11 +212,12 @@ def _check_friction(build: Build) -> None:
     """What takes the place of dry friction needs as much of it."""
     short = build.friction < -1e-9
     if short.any():
-        name = build.robot.joint_names[int(np.argmax(short))]
+        j = int(np.argmax(short))
+        name, unit = build.robot.joint_names[j], "N" if build.robot.sliding[j] else "N·m"
         raise RobotError(
-            f"joint '{name}' of the simulated robot lacks {-build.friction[short][0]:.3g} N·m of "
-            "dry friction, of which a planted effect is a part. Plant more of it: --effect "
-            f"'coulomb_friction@{name}=…'."
+            f"joint '{name}' of the simulated robot lacks {-build.friction[j]:.3g} {unit} of dry "
+            "friction, of which a planted effect is a part. Plant more of it: --effect "
+            f"{shlex.quote(f'coulomb_friction@{name}=…')}."
         )
 
 
@@ -230,7 +232,7 @@ def _check_inertia(build: Build, plant: Plant) -> None:
     raise RobotError(
         f"joint '{build.robot.joint_names[joint]}' moves no inertia and cannot be simulated. Give "
         f"its links an inertia in the URDF, lock it, or plant a motor's inertia: --effect "
-        f"'armature@{build.robot.joint_names[joint]}=0.1'."
+        f"{shlex.quote(f'armature@{build.robot.joint_names[joint]}=0.1')}."
     )
 
 

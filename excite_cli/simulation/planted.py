@@ -5,11 +5,13 @@
 `payload@gripper_link=1.5;runs:motion_2`.
 """
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named, require_covariate
@@ -37,15 +39,15 @@ class Planted:
         }
         return {**self.effect.settings, **self.extra, **self.effect.shape, **linear}
 
-    def record(self, joint_names: Sequence[str]) -> dict[str, Any]:
-        """As plain data, for files and answers; `joint_names` are the robot's."""
+    def record(self, joint_names: Sequence[str], sliding: NDArray[np.bool_]) -> dict[str, Any]:
+        """As plain data, for files and answers; names (n,) of the robot's joints, which slide."""
         nothing = np.zeros((len(self.values), len(self.values)))
         return {
             "kind": self.effect.kind,
             "joints": [joint_names[j] for j in self.effect.joints],
             "parameters": {
                 name: {"value": value.value, "unit": value.unit}
-                for name, value in self.effect.report(self.values, nothing).items()
+                for name, value in self.effect.report_on(sliding, self.values, nothing).items()
             },
             "shape": dict(self.effect.shape),
             "values": [float(value) for value in self.values],
@@ -94,10 +96,8 @@ def parse_planted(
     place, equals, numbers = body.partition("=")
     kind_name, at, joints_text = place.partition("@")
     if not (at and equals and kind_name.strip() and joints_text.strip()):
-        raise ConfigError(
-            f"{where}: not of the form {FORM}; for example 'coulomb_friction@"
-            f"{robot.joint_names[-1]}=4'."
-        )
+        example = shlex.quote(f"coulomb_friction@{robot.joint_names[-1]}=4")
+        raise ConfigError(f"{where}: not of the form {FORM}; for example {example}.")
     kind = kind_named(kind_name.strip(), where)
     value, others = _numbers(numbers, kind, where)
     runs, covariate = _clauses(clauses, takes, where)

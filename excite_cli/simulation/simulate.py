@@ -1,10 +1,12 @@
 """Motions in, measured data out: the whole simulation as one function."""
 
 import hashlib
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.effects.base import Effect
 from excite_cli.errors import ConfigError, nearest
@@ -36,22 +38,27 @@ _FIRST_DAY = 1.7e9  # s from 1970: when a simulated campaign with pauses begins
 
 @dataclass(frozen=True)
 class Truth:
-    """What the simulated robot is: inertias φ (10·n_bodies,) and all its effects."""
+    """What the simulated robot is: inertias φ (10·n_bodies,) and all its effects.
+
+    `joint_names` (n,) and which of them slide (n,).
+    """
 
     phi: Array = field(repr=False)
     effects: tuple[Planted, ...]
+    joint_names: tuple[str, ...]
+    sliding: NDArray[np.bool_]
 
-    def record(self, joint_names: Sequence[str]) -> dict[str, object]:
-        """As plain data; `joint_names` are the robot's."""
+    def record(self) -> dict[str, object]:
+        """As plain data."""
         return {
-            "effects": [planted.record(joint_names) for planted in self.effects],
+            "effects": [each.record(self.joint_names, self.sliding) for each in self.effects],
             "phi": self.phi.tolist(),
         }
 
 
 @dataclass(frozen=True, repr=False)
 class Simulation(Shown):
-    """Recorded runs, the truth behind them, and the RMS tracking error (n,) of every run [rad]."""
+    """Recorded runs, the truth behind them, and each run's RMS tracking error (n,) [rad; m]."""
 
     dataset: Dataset
     truth: Truth
@@ -106,7 +113,7 @@ def simulate(
                 tracking[run.name] = error
                 start = _next_start(run, settings)
     dataset = Dataset(robot.joint_names[robot.base_joints :], tuple(runs), ("simulated",))
-    return Simulation(dataset, Truth(phi, planted), tracking)
+    return Simulation(dataset, Truth(phi, planted, robot.joint_names, robot.sliding), tracking)
 
 
 def _dated(effect: Effect) -> bool:
@@ -117,10 +124,11 @@ def _dated(effect: Effect) -> bool:
 def _require_column(effect: Effect, settings: SimulationSettings) -> None:
     names = [each.name for each in settings.covariates]
     if effect.covariate and effect.covariate not in names:
+        column = shlex.quote(f"{effect.covariate}=25,end:45,time_constant:600")
         raise ConfigError(
             f"{effect.kind} follows '{effect.covariate}', a column that the simulated log does not "
             f"have.{nearest(effect.covariate, names)} Give it: --covariate "
-            f"'{effect.covariate}=25,end:45,time_constant:600', or leave the effect out "
+            f"{column}, or leave the effect out "
             "(--no-declared)."
         )
 

@@ -1,5 +1,6 @@
 """What changed between days, in sentences, a table and as data."""
 
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,10 @@ def changes_parts(found: Changes) -> Parts:
 
 def changes_table(found: Changes) -> Table:
     """The parameters that changed, and some that did not."""
-    shown = found.changes[: max(_SHOWN, len(found.significant))]
+    return _table(found.changes[: max(_SHOWN, len(found.significant))])
+
+
+def _table(shown: Sequence[Change]) -> Table:
     rows = tuple(
         (
             change.name,
@@ -104,4 +108,5 @@ def changes_data(found: Changes) -> dict[str, Any]:
     }
 
 
+show(Change, _told, lambda change: [_table([change])])
 show(Changes, lambda found: sentences(found)[0], changes_parts)

@@ -6,7 +6,7 @@ from typing import Any
 
 from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.change_words import changes_in_words
-from excite_cli.diagnosis.next_motion import next_experiment
+from excite_cli.diagnosis.next_motion import next_command, next_experiment
 from excite_cli.diagnosis.records import (
     Diagnosis,
     NamedEffect,
@@ -52,12 +52,13 @@ def diagnosis_answer(
     With `verbose` also how the data were processed, every round's suspects, and small effects.
     """
     files = {kind: str(path) for kind, path in written.items() if path is not None}
-    experiment = next_experiment(found, config, files.get("diagnosis", "DIAGNOSIS.h5"))
+    place = files.get("diagnosis", "DIAGNOSIS.h5")
+    experiment = next_experiment(found, config, place)
     parts = diagnosis_parts(found, verbose)
     if not verbose:
         rounds = counted(len(found.rounds), "round")
         parts.append(f"({rounds} of tests; --verbose shows the suspects of each, and why not.)")
-    parts += [_next(experiment), *files_in_words(files)]
+    parts += [_next(experiment), next_command(config, place), *files_in_words(files)]
     return Answer(tuple(parts), {**diagnosis_data(found, experiment), "output": files}, found.good)
 
 
@@ -169,11 +170,8 @@ def _verdict(found: Diagnosis) -> str:
 def _next(experiment: dict[str, Any]) -> str:
     if experiment["purpose"] == "separate":
         count = len(experiment["pairs"])
-        return (
-            f"Next motion: tell apart {count} pair{'s' if count > 1 else ''} of effects:  "
-            f"{experiment['command']}"
-        )
-    return f"Next motion: excite the extended model:  {experiment['command']}"
+        return f"Next motion: tell apart {count} pair{'s' if count > 1 else ''} of effects:"
+    return "Next motion: excite the extended model:"
 
 
 def _in_words(found: Diagnosis) -> str:

@@ -2,7 +2,9 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from typing import Any
 
+from excite_cli.config.spec import Spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.excitation.problem import Problem
@@ -42,6 +44,20 @@ def problem_notes(problem: Problem) -> Iterator[Note]:
         yield _detail(f"payload: {robot.payload.in_words}, part of the predicted torque")
     for name, words in zip(_symbols(problem), problem.base.in_words(), strict=True):
         yield _detail(f"  base parameter {name}: {words}")
+
+
+def spec_parts(spec: Spec) -> Parts:
+    """What was given, key by key; everything else is a default."""
+    rows = tuple(_given(spec.model_dump(mode="json", exclude_unset=True), ""))
+    return [Table("Problem", ("key", "value"), rows, left=("key",), words=("value",))]
+
+
+def _given(tree: dict[str, Any], above: str) -> Iterator[tuple[str, str]]:
+    for name, value in tree.items():
+        if isinstance(value, dict) and value:
+            yield from _given(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", str(value)
 
 
 def problem_parts(problem: Problem) -> Parts:
@@ -137,3 +153,8 @@ def _symbols(problem: Problem) -> list[str]:
 
 
 show(Problem, lambda problem: "; ".join(_heard(problem)[:2]), problem_parts)
+show(
+    Spec,
+    lambda spec: f"{spec.robot.urdf}; {', '.join(sorted(spec.model_fields_set - {'robot'}))}",
+    spec_parts,
+)

@@ -2,6 +2,7 @@
 
 from excite_cli.proposal.propose import Proposal
 from excite_cli.shown.answer import Answer
+from excite_cli.shown.command import Command
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts
 
@@ -18,7 +19,9 @@ def proposal_answer(found: Proposal, source: str, path: str) -> Answer:
         "duration": problem.trajectory.duration,
         "notes": list(found.notes),
     }
-    return Answer((*proposal_parts(found), path, f"next:  excite optimize {path}"), data)
+    return Answer(
+        (*proposal_parts(found), path, "next:", Command(("excite", "optimize", path))), data
+    )
 
 
 def proposal_parts(found: Proposal) -> Parts:

@@ -40,11 +40,13 @@ def _in_words(found: Replay) -> str:
     before, after = found.means
     over = f"{found.seconds:.3g} s of recorded torques"
     lost = f" {' and '.join(found.lost)} left all bounds." if found.lost else ""
+    all_slide = set(found.after) <= set(found.sliding)
+    unit = "mm" if all_slide else "mrad (mm)" if found.sliding else "mrad"
     if before is None:
-        return f"Played with {over}, {found.model} deviates by {1e3 * after:.3g} mrad.{lost}"
+        return f"Played with {over}, {found.model} deviates by {1e3 * after:.3g} {unit}.{lost}"
     verb = "instead of" if found.good else "and no less than"
     return (
-        f"Played with {over}, {found.model} deviates from the robot by {1e3 * after:.3g} mrad "
+        f"Played with {over}, {found.model} deviates from the robot by {1e3 * after:.3g} {unit} "
         f"{verb} the URDF's {1e3 * before:.3g} (mean over joints).{lost}"
     )
 

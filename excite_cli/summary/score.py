@@ -49,11 +49,15 @@ def in_words(run: ScoredRun, found: Score) -> str:
     """What explains a run, or that nothing does."""
     if not run.left:
         return "as the model allows"
-    worst = max(run.left, key=lambda joint: max(run.ratio[joint], run.peak[joint] / 2.5))
-    beyond = f"{run.ratio[worst]:.2g} times what is allowed on {worst}"
+    beyond = _beyond(run)
     if not run.reasons:
         return f"{beyond}; nothing that changes from day to day explains it"
     return f"{' and '.join(_reason(each, found) for each in run.reasons)} ({beyond})"
+
+
+def _beyond(run: ScoredRun) -> str:
+    worst = max(run.left, key=lambda joint: max(run.ratio[joint], run.peak[joint] / 2.5))
+    return f"{run.ratio[worst]:.2g} times what is allowed on {worst}"
 
 
 def _reason(reason: Reason, found: Score) -> str:
@@ -173,4 +177,27 @@ def _run_data(run: ScoredRun, found: Score) -> dict[str, Any]:
     }
 
 
+def _run_in_words(run: ScoredRun) -> str:
+    """`monday: 1.2% of the torque; as the model allows`, as far as the run itself knows."""
+    state = _beyond(run) if run.left else "as the model allows" if run.allowed else "not judged"
+    return f"{run.name}: {percent(run.error.mean_relative_moving)} of the torque; {state}"
+
+
+def _run_parts(run: ScoredRun) -> Parts:
+    names = ("joint", "where moving", "RMS", "allowed", "ratio")
+    rows = tuple(
+        (
+            joint,
+            percent(run.error.relative_moving[joint]),
+            figure(rms),
+            figure(run.allowed[joint]) if joint in run.allowed else "",
+            figure(run.ratio[joint]) if joint in run.ratio else "",
+        )
+        for joint, rms in run.error.rms.items()
+    )
+    bold = tuple(k for k, row in enumerate(rows) if row[0] in run.left)
+    return [_run_in_words(run), Table("", names, rows, left=("joint",), bold=bold)]
+
+
+show(ScoredRun, _run_in_words, _run_parts)
 show(Score, lambda found: sentences(found)[0], score_parts)

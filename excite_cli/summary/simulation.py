@@ -39,10 +39,14 @@ def simulation_parts(found: Simulation) -> Parts:
 
 
 def _records(found: Simulation) -> list[dict[str, Any]]:
-    return [each.record(found.dataset.joint_names) for each in found.truth.effects]
+    truth = found.truth
+    return [each.record(truth.joint_names, truth.sliding) for each in truth.effects]
 
 
 def _run_table(found: Simulation) -> Table:
+    """Tracking of joints that turn and of joints that slide, each where there are some."""
+    slides, names = found.truth.sliding, found.truth.joint_names
+    kinds = [(unit, of) for unit, of in (("mrad", ~slides), ("mm", slides)) if of.any()]
     rows = []
     for run in found.dataset.runs:
         error = 1e3 * found.tracking[run.name]
@@ -52,13 +56,14 @@ def _run_table(found: Simulation) -> Table:
                 run.name,
                 str(len(run.t)),
                 f"{run.duration:.2f}",
-                f"{np.sqrt(np.mean(error**2)):.3f}",
-                f"{error[worst]:.3f}",
-                found.dataset.joint_names[worst],
+                *(f"{np.sqrt(np.mean(error[of] ** 2)):.3f}" for _, of in kinds),
+                f"{error[worst]:.3f} {'mm' if slides[worst] else 'mrad'}",
+                names[worst],
             )
         )
-    names = ("run", "samples", "seconds", "tracking [mrad]", "worst", "joint")
-    return Table("Runs (tracking: RMS)", names, tuple(rows), left=("run", "joint"))
+    tracking = [f"tracking [{unit}]" for unit, _ in kinds]
+    columns = ("run", "samples", "seconds", *tracking, "worst", "joint")
+    return Table("Runs (tracking: RMS)", columns, tuple(rows), left=("run", "joint"))
 
 
 def _effect_table(records: list[dict[str, Any]]) -> Table:

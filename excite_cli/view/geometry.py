@@ -1,7 +1,7 @@
 """What the robot looks like: the URDF's visual shapes, in the frames of the joints that carry them.
 
-Where the URDF shows nothing (or its visual meshes are missing) the collision shapes are taken, and
-where there are none of these either, sticks between the joints.
+A visual mesh that is missing is left out. Where nothing of the URDF can be shown the collision
+shapes are taken, and where there are none of these either, sticks between the joints.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from excite_cli.errors import RobotError
-from excite_cli.geometry.link_shapes import collision_model, visual_model
+from excite_cli.geometry.link_shapes import collision_model
+from excite_cli.geometry.readable_visuals import readable_visuals
 from excite_cli.robot.model import Array, Robot
 from excite_cli.view.surface import (
     Surface,
@@ -51,11 +52,7 @@ def robot_bodies(robot: Robot, cell: float = 0.0) -> tuple[tuple[Body, ...], str
 
     cell: detail below this size [m] is dropped.
     """
-    note = ""
-    try:
-        model = visual_model(robot)
-    except RobotError as error:
-        model, note = None, f"{error} The collision shapes are shown instead."
+    model, note = _visuals(robot)
     if model is None or not model.geometryObjects:
         try:
             model = collision_model(robot)
@@ -78,6 +75,21 @@ def robot_bodies(robot: Robot, cell: float = 0.0) -> tuple[tuple[Body, ...], str
         colour = _colour(item, list(links).index(link))
         found.append(Body(str(item.name), int(item.parentJoint), surface, colour))
     return tuple(found), note
+
+
+def _visuals(robot: Robot) -> tuple[pin.GeometryModel | None, str]:
+    """Visual shapes that can be read, and a note on the others."""
+    try:
+        model, lacking = readable_visuals(robot)
+    except RobotError as error:
+        return None, f"{error} The collision shapes are shown instead."
+    if not lacking:
+        return model, ""
+    why = next(iter(lacking.values()))
+    if not model.geometryObjects:
+        return None, f"{why} The collision shapes are shown instead."
+    are = "is" if len(lacking) == 1 else "are"
+    return model, f"{', '.join(lacking)} {are} drawn without what cannot be read: {why}"
 
 
 def _colour(item: pin.GeometryObject, number: int) -> Colour:

@@ -3,7 +3,9 @@
 from html import escape
 
 from excite_cli import load_data, read_fit, read_result, simulate
+from excite_cli.shown.command import Command
 from excite_cli.shown.record import Shown
+from excite_cli.shown.table import Table
 from excite_cli.summary.diagnosis import diagnosis_answer
 from excite_cli.summary.simulation import simulation_answer
 from tests.api.conftest import Loop
@@ -24,12 +26,21 @@ def test_measured_data(loop: Loop) -> None:
 
 
 def test_a_simulation(loop: Loop) -> None:
-    effects = ["coulomb_friction@elbow=2"]
+    effects = ["coulomb_friction@elbow=2", "coulomb_friction@slide=3"]
     found = simulate(loop.problem, read_result(loop.result), effects, chosen=[1], declared=False)
-    assert repr(found) == "Simulation(motion_1; coulomb_friction@elbow)"
-    table = simulation_answer(found, "data.h5", 1).parts[1]
-    assert not isinstance(table, str)
-    assert "coulomb 2 N·m" in table.rows[0][2]
+    assert repr(found) == "Simulation(motion_1; coulomb_friction@elbow, coulomb_friction@slide)"
+    runs, table = simulation_answer(found, "data.h5", 1).parts[:2]
+    assert isinstance(runs, Table)
+    assert isinstance(table, Table)
+    turns, slides = (row[2] for row in table.rows)
+    assert turns.startswith("coulomb 2 N·m")
+    assert slides.startswith("coulomb 3 N")
+    assert "N·m" not in slides
+    (run,) = (dict(zip(runs.columns, row, strict=True)) for row in runs.rows)
+    elbow, slide = 1e3 * found.tracking["motion_1"]
+    assert run["tracking [mrad]"] == f"{elbow:.3f}"
+    assert run["tracking [mm]"] == f"{slide:.3f}"
+    assert run["worst"] == (f"{elbow:.3f} mrad" if elbow > slide else f"{slide:.3f} mm")
     assert all(escape(cell) in html_of(found) for cell in table.rows[0])
 
 
@@ -49,7 +60,7 @@ def test_a_diagnosis_is_told_as_by_the_program() -> None:
     assert "viscous_friction on " in repr(found)
     assert "mean error" in repr(found)
     answer = diagnosis_answer(found, "arm.yaml", {"diagnosis": "d.h5", "config": None})
-    for part in answer.parts[:-3]:  # but for what the program says of itself
+    for part in answer.parts[:-4]:  # but for what the program says of itself
         assert escape(part if isinstance(part, str) else part.title) in html_of(found)
-    assert "--after d.h5" in str(answer.parts[-2])
+    assert answer.parts[-2] == Command(("excite", "optimize", "arm.yaml", "--after", "d.h5"))
     assert answer.data["output"] == {"diagnosis": "d.h5"}

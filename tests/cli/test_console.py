@@ -1,7 +1,6 @@
 """Tables that can be read and copied, completion, and the message of a bug."""
 
 import json
-import sys
 
 import pytest
 import typer.main
@@ -18,7 +17,8 @@ from excite_cli.cli.completion import (
     complete_key,
     complete_robot,
 )
-from excite_cli.cli.console import BUG, Terminal, run_guarded
+from excite_cli.cli.console import Terminal
+from excite_cli.cli.ending import run_guarded
 from excite_cli.errors import FileError
 from excite_cli.excitation.progress import Figure, Measure, Progress, Stage
 from excite_cli.export.motions import MOTION_EXPORTERS
@@ -67,31 +67,6 @@ def test_every_command_takes_the_flags_of_the_contract() -> None:
         known = {option for param in command.params for option in param.opts}
         missing = {"--json", "--quiet", "--verbose", "--no-progress"} - known
         assert not missing, f"excite {name} lacks {missing}"
-
-
-def test_a_bug_says_how_to_report_it(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail() -> None:
-        raise ZeroDivisionError("by nothing")
-
-    monkeypatch.setattr(sys, "argv", ["excite", "optimize"])
-    assert run_guarded(fail) == BUG
-    told = capsys.readouterr().err
-    assert "a bug of excite, not of your input (ZeroDivisionError at test_console.py:" in told
-    assert "--verbose" in told
-    assert "Traceback" not in told
-    monkeypatch.setattr(sys, "argv", ["excite", "optimize", "--verbose"])
-    assert run_guarded(fail) == BUG
-    assert "Traceback" in capsys.readouterr().err
-
-
-def test_a_refusal_of_the_file_system_is_no_bug(capsys: pytest.CaptureFixture[str]) -> None:
-    def refuse() -> None:
-        raise PermissionError(13, "Permission denied", "/there/x.h5")
-
-    assert run_guarded(refuse) == 2
-    assert capsys.readouterr().err.startswith("error: /there/x.h5: no permission.")
 
 
 def test_completion_knows_robots_formats_kinds_and_keys() -> None:

@@ -11,7 +11,7 @@ import typer
 import yaml
 
 from excite_cli.cli.app import app
-from excite_cli.cli.console import run_guarded
+from excite_cli.cli.ending import run_guarded
 from excite_cli.config.load import load_spec
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects

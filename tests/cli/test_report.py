@@ -9,7 +9,7 @@ import h5py
 import pytest
 import typer
 
-from excite_cli.cli.console import run_guarded
+from excite_cli.cli.ending import run_guarded
 from excite_cli.cli.optimize import optimize
 from excite_cli.cli.report import report
 

@@ -108,7 +108,7 @@ def test_people_get_tables_and_quiet_ones_nothing_else(excite: Program, two_moti
     [
         (("--effect", "coulomb_friction@elbw=1"), "Did you mean 'elbow'?"),
         (("--motion", "7"), "has no motion 7; it has 1, 2"),
-        (("--effect", "covariate_offset@elbow=1;covariate:temp"), "--covariate 'temp=25,"),
+        (("--effect", "covariate_offset@elbow=1;covariate:temp"), "--covariate temp=25,"),
         (("--covariate", "temp=warm"), "'warm' is not a finite number"),
         (("--rate", "9000"), "rate: 9000 Hz cannot be recorded"),
         (("--set", "robot.joints=[elbow]"), "moves other joints than"),

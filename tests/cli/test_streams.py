@@ -51,6 +51,22 @@ def test_the_status_is_that_of_the_answer(shell, two_motions: Run, rest: str) ->
     assert run.returncode == 1, run.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "rest", "status"),
+    [
+        ("robots", "| head -1", 0),
+        ("schema", "| head -c 1", 0),
+        ("--help", "| true", 0),
+        ("optimize --help", "| (exec <&-; sleep 0.1)", 0),
+        ("robots no_such_robot", "2>&1 | true", 2),
+    ],
+)
+def test_a_reader_that_leaves_is_no_error(shell, words: str, rest: str, status: int) -> None:  # type: ignore[no-untyped-def]
+    """Neither a traceback nor a word of it, whenever the pipe is closed."""
+    run = shell(*words.split(), rest=rest)
+    assert (run.returncode, run.stderr) == (status, "")
+
+
 def test_an_answer_that_a_full_disk_loses_is_an_error(shell, two_motions: Run) -> None:  # type: ignore[no-untyped-def]
     run = shell("check", SMOKE, two_motions.path, *BROKEN, rest="> /dev/full")
     assert run.returncode == 2

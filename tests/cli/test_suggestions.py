@@ -83,6 +83,22 @@ def test_what_is_missing_or_of_another_kind(
     assert said in told(words, capsys, monkeypatch)
 
 
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["init", "my arm's.urdf"], "--urdf 'my arm'\"'\"'s.urdf'?"),
+        (["init", "my", "arm.urdf"], "--urdf NAME?"),
+    ],
+)
+def test_a_suggested_name_is_quoted_for_a_shell(
+    words: list[str | Path],
+    meant: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert told(words, capsys, monkeypatch).endswith(meant)
+
+
 def test_a_key_is_told_with_its_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from excite_cli.cli.console import run_guarded
+from excite_cli.cli.ending import run_guarded
 from excite_cli.cli.export import export
 from excite_cli.cli.optimize import optimize
 from excite_cli.cli.view import view

@@ -1,5 +1,6 @@
 """The motion after a diagnosis: it separates aliases, or excites what was found."""
 
+import shlex
 from dataclasses import replace
 
 import numpy as np
@@ -59,6 +60,8 @@ def test_purpose_and_command_without_planning() -> None:
     assert pair["effect"] == {"kind": "viscous_friction", "joints": ["elbow"], "shape": {}}
     assert pair["alias"]["kind"] == "nonlinear_viscous_friction"
     assert found["command"] == "excite optimize arm.yaml --after found.h5"
+    spaced = next_experiment(make_diagnosis(), "my arm.yaml", "it's $found.h5")["command"]
+    assert shlex.split(spaced)[2:] == ["my arm.yaml", "--after", "it's $found.h5"]
     assert next_experiment(make_diagnosis(rivals=()))["purpose"] == "excite"
 
 

@@ -137,3 +137,50 @@ def test_hooks_are_the_tools_of_lint() -> None:
         r"^lint: .*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE
     )
     assert programs == set(re.findall(r"\$\(BIN\)/([\w-]+)", lint))
+
+
+def installs(text: str) -> list[str]:
+    """What is to be installed by every `pip install …` of a text, in quotes if it is so there."""
+    return re.findall(r"pip install ('[^']*'|[\w.\[\],-]+\w\]?)", text)
+
+
+def told_in(path: Path) -> list[str]:
+    """Texts of a module or a page; those of a module in one piece each."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".py":
+        return [text]
+    nodes = ast.walk(ast.parse(text))
+    return [
+        "".join(str(part.value) for part in node.values if isinstance(part, ast.Constant))
+        if isinstance(node, ast.JoinedStr)
+        else node.value
+        for node in nodes
+        if isinstance(node, ast.JoinedStr)
+        or (isinstance(node, ast.Constant) and isinstance(node.value, str))
+    ]
+
+
+def test_what_messages_say_to_install_is_there() -> None:
+    """The package by its name at pip, quoted for a shell, with an extra that has the library."""
+    extras, name = PROJECT["project"]["optional-dependencies"], PROJECT["project"]["name"]
+    required = {re.split(r"[^\w-]", each)[0] for each in PROJECT["project"]["dependencies"]}
+    pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md"]
+    seen = set()
+    for path in (*(ROOT / "excite_cli").rglob("*.py"), *pages):
+        for text in told_in(path):
+            for asked in installs(text):
+                if asked in required or asked.startswith(("figaroh", "-")) or asked == ".":
+                    continue
+                found = re.fullmatch(rf"'{name}\[(\w+)\]'", asked)
+                assert found is not None, f"{path.relative_to(ROOT)}: pip install {asked}"
+                own = {re.split(r"[^\w-]", each)[0] for each in extras[found[1]]}
+                source = path.read_text(encoding="utf-8").lower()
+                if path.suffix == ".py":
+                    assert any(each in source for each in own), f"{path.name}: {found[1]}"
+                seen.add(found[1])
+    assert {"plot", "bags", "view", "sim", "cluster", "formats"} <= seen
+
+
+def test_the_command_and_the_module_have_the_names_that_are_told() -> None:
+    assert PROJECT["project"]["scripts"] == {"excite": "excite_cli.cli.app:main"}
+    assert (ROOT / "excite_cli" / "__main__.py").is_file()

@@ -1,10 +1,5 @@
-"""The page of a small campaign in a real browser: nothing fails, nothing overflows, all reacts.
+"""The page of a small campaign in a real browser: nothing fails, nothing overflows, all reacts."""
 
-The browser is the one that EXCITE_BROWSER names, or the first of the usual names on the path.
-"""
-
-import os
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,18 +9,10 @@ import pytest
 
 from excite_cli.report.assembly import Source, page_of
 from excite_cli.report.page import render
+from tests.browser import started_browser
 from tests.report.case import Case
 
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-
-_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-_OFFLINE = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
 _OVERFLOW = "document.documentElement.scrollWidth - innerWidth"
-
-
-def _browser() -> str | None:
-    named = os.environ.get("EXCITE_BROWSER")
-    return named or next((path for path in map(shutil.which, _NAMES) if path), None)
 
 
 @pytest.fixture(scope="module")
@@ -41,13 +28,8 @@ def address(case: Case, tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    path = _browser()
-    if path is None:
-        pytest.skip(f"no browser: none of {', '.join(_NAMES)} is there, and no EXCITE_BROWSER")
-    with playwright.sync_playwright() as library:
-        started = library.chromium.launch(executable_path=path, args=list(_OFFLINE))
+    with started_browser() as started:
         yield started
-        started.close()
 
 
 @pytest.fixture

@@ -1,10 +1,12 @@
 """Notes, tables and records without a terminal."""
 
 import logging
+import shlex
 from dataclasses import dataclass
 
 import pytest
 
+from excite_cli.shown.command import Command
 from excite_cli.shown.html import as_html
 from excite_cli.shown.note import Level, Note, log_note, saying
 from excite_cli.shown.record import Shown, show
@@ -55,6 +57,13 @@ def test_html_is_escaped_aligned_and_bold() -> None:
     assert '<td style="text-align: right">1.5</td>' in html
     assert '<th style="text-align: left">two<br>lines</th>' in html
     assert html.count("<tr>") == 3
+
+
+def test_a_command_is_quoted_for_a_shell() -> None:
+    command = Command(("excite", "optimize", "my <arm>.yaml", "--after", "it's.h5"))
+    assert shlex.split(command.line) == list(command.words)
+    html = as_html([command])
+    assert html.startswith("<pre>excite optimize &#x27;my &lt;arm&gt;.yaml&#x27; --after ")
 
 
 def test_a_table_has_as_many_cells_as_columns() -> None:

@@ -58,7 +58,7 @@ def test_an_effect_names_the_column_that_it_follows(robot: Robot) -> None:
     assert planted.effect.covariate == "temp"
     assert planted.effect.shape == {"reference": 25.0, "curvature": 0.0}
     assert planted.values.tolist() == [-0.1, -0.02]
-    assert planted.record(robot.joint_names)["covariate"] == "temp"
+    assert planted.record(robot.joint_names, robot.sliding)["covariate"] == "temp"
     with pytest.raises(ConfigError, match="covariate_friction follows a column"):
         parse_planted("covariate_friction@elbow_joint=1", robot, {})
     with pytest.raises(ConfigError, match="spring follows no column"):

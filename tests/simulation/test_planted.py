@@ -1,6 +1,8 @@
 """The words that plant effects, and what is said when they are wrong."""
 
 import re
+import shlex
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -61,13 +63,15 @@ def test_levels_and_gaps_are_what_is_given_first(robot: Robot) -> None:
 
 def test_a_record_says_everything_by_name(robot: Robot) -> None:
     (spring,) = parse_planted("spring@elbow_joint=20,rest_position:0.5;runs:motion_2", robot, RUNS)
-    record = spring.record(robot.joint_names)
+    record = spring.record(robot.joint_names, robot.sliding)
     assert record["kind"] == "spring"
     assert record["joints"] == ["elbow_joint"]
     assert record["runs"] == ["motion_2"]
     parameters = record["parameters"]
     assert isinstance(parameters, dict)
     assert parameters["stiffness"] == {"value": 20.0, "unit": "N·m/rad"}
+    slides = spring.record(robot.joint_names, np.ones(robot.n, dtype=bool))["parameters"]
+    assert [each["unit"] for each in slides.values()] == ["N/m", "N", "m"]
 
 
 @pytest.mark.parametrize(
@@ -91,3 +95,11 @@ def test_messages(robot: Robot, text: str, words: str) -> None:
     with pytest.raises(ConfigError, match=re.escape(words)) as error:
         parse_planted(text, robot, RUNS)
     assert text in str(error.value)
+
+
+def test_an_example_is_quoted_for_a_shell(robot: Robot) -> None:
+    odd = replace(robot, joint_names=(*robot.joint_names[:-1], "tool's joint"))
+    with pytest.raises(ConfigError) as error:
+        parse_planted("spring", odd, RUNS)
+    example = str(error.value).partition("for example ")[2].removesuffix(".")
+    assert shlex.split(example) == ["coulomb_friction@tool's joint=4"]

@@ -56,7 +56,7 @@ def printed(found: Diagnosis) -> str:
         if isinstance(part, Table):
             lines += [part.title, " ".join(part.columns), *(" ".join(row) for row in part.rows)]
         else:
-            lines.append(part)
+            lines.append(part if isinstance(part, str) else part.line)
     return "\n".join(lines)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import excite_cli
 from excite_cli import (
     Case,
     Problem,
@@ -30,11 +31,16 @@ from excite_cli.api.checking import check_answer
 from excite_cli.api.comparing import comparison_answer
 from excite_cli.api.planning import plan_answer
 from excite_cli.cli.console import Terminal
+from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.run_identity import Origin
+from excite_cli.scoring.changes import Change
+from excite_cli.scoring.records import ScoredRun
+from excite_cli.scoring.thresholds import Thresholds
 from excite_cli.shown.answer import Answer
-from excite_cli.shown.record import Shown
+from excite_cli.shown.record import Shown, _found
 from excite_cli.shown.table import Table
+from excite_cli.workers.base import Workers
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, smoke_spec
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -46,6 +52,18 @@ RUN = Run(
     np.zeros((5, 3)),
     origin=Origin("log.h5", "/runs/elbow"),
 )
+CHANGE = Change(
+    "viscous of elbow", "elbow", "N·m·s/rad", 1.0, 2.0, 0.1, 1e-6, "may", (1.0, 2.0), (0.1, 0.1)
+)
+ELBOW = {"elbow": 0.02}
+ERRORS = Errors(0.02, 0.02, ELBOW, ELBOW, ELBOW, ELBOW, (0.01, 0.03))
+SCORED = ScoredRun(
+    "monday", "monday.h5", 6.0, ERRORS, allowed={"elbow": 0.03}, ratio={"elbow": 3.0},
+    peak={"elbow": 1.0}, left=("elbow",),
+)  # fmt: skip
+THRESHOLDS = Thresholds(("a", "b"), np.ones((2, 4)), np.array([3.0, 4.0]), 0.5, 0.02)
+# Settings, and records of a few words, which Python itself shows well.
+SHORT = {"Drawing", "Exported", "Level", "Note", "Report", "Serving", "SimulationSettings", "View"}
 BRIEF = ["optimizer.max_iterations=6", "sequence.motions=1"]
 
 
@@ -79,6 +97,10 @@ def records(problem: Problem, result: Result) -> dict[str, Shown]:
         "moves 5 joints": propose(str(ROOT / "data" / "smoke_arm.urdf")),
         "smoke_arm: 5 joints (": describe_robot(ROOT / "data" / "smoke_arm.urdf"),
         "The gradient is right.": verify_gradient(problem),
+        "smoke_arm.urdf; constraints, optimizer, sampling": problem.spec,
+        "viscous of elbow rose from 1 to 2.00 ± 0.10 N·m·s/rad since may": CHANGE,
+        "monday: 2.00% of the torque; 3 times what is allowed on elbow": SCORED,
+        "2 joints, 0.5 false alarms an hour": THRESHOLDS,
     }
 
 
@@ -100,6 +122,15 @@ def test_a_run_says_where_it_was_read() -> None:
     assert html is not None
     assert "log.h5 /runs/elbow" in html
     assert "from" not in (replace(RUN, origin=Origin())._repr_html_() or "")
+
+
+def test_every_public_record_has_words_and_tables() -> None:
+    public = {name: getattr(excite_cli, name) for name in excite_cli.__all__}
+    for name, kind in public.items():
+        if not isinstance(kind, type) or issubclass(kind, Exception | Workers) or name in SHORT:
+            continue
+        assert issubclass(kind, Shown), name
+        assert _found(kind) is not None, name
 
 
 def test_a_record_is_a_few_words(records: dict[str, Shown]) -> None:

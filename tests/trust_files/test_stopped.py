@@ -11,7 +11,7 @@ import pytest
 import typer
 
 from excite_cli.cli.app import app
-from excite_cli.cli.console import run_guarded
+from excite_cli.cli.ending import run_guarded
 from tests.cli.program import EXCITE, SMOKE, Installed, environment
 
 LONG = ("optimize", SMOKE, "--motions", "9", "--set", "optimizer.max_iterations=300")

@@ -22,6 +22,7 @@ INERTIAL = (
 )
 SPHERE = '<geometry><sphere radius="0.1"/></geometry>'
 BOX = '<geometry><box size="0.2 0.2 0.2"/></geometry>'
+ROUND = f"<collision>{SPHERE}</collision>"
 RED = '<material name="red"><color rgba="0.9 0.1 0.2 1"/></material>'
 
 
@@ -72,6 +73,19 @@ def test_collision_shapes_where_nothing_is_visual(tmp_path: Path) -> None:
     bodies, _ = robot_bodies(_robot(tmp_path, "", f"<collision>{BOX}</collision>"))
     assert [body.joint for body in bodies] == [1]
     np.testing.assert_allclose(np.abs(bodies[0].surface.points), 0.1)
+
+
+def test_a_missing_mesh_costs_no_other_shape(tmp_path: Path) -> None:
+    """The link is shown without it, and named; what else the URDF shows is shown."""
+    missing = f'<visual><geometry><mesh filename="none.stl"/></geometry></visual>{ROUND}'
+    shown = f"<visual>{BOX}</visual>"
+    bodies, note = robot_bodies(_robot(tmp_path, shown, missing))
+    assert [body.name for body in bodies] == ["a_0"]
+    assert note.startswith("b is drawn without what cannot be read: ")
+    assert "the visual mesh 'none.stl' was not found" in note
+    bodies, note = robot_bodies(_robot(tmp_path, missing + shown, missing))
+    assert [len(body.surface.faces) for body in bodies] == [12]  # the box
+    assert note.startswith("a, b are drawn without what cannot be read: ")
 
 
 def test_missing_visual_meshes_are_told(tmp_path: Path) -> None:

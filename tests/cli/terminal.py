@@ -1,0 +1,44 @@
+"""The installed program on a terminal of its own, some columns wide."""
+
+import fcntl
+import os
+import pty
+import re
+import struct
+import subprocess
+import termios
+from pathlib import Path
+
+_ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+
+
+def seen_on_a_terminal(
+    words: list[str], columns: int, folder: Path, variables: dict[str, str]
+) -> str:
+    """All that was printed, lines that were replaced included, without what steers a terminal."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
+    kept = {name: value for name, value in variables.items() if name != "COLUMNS"}
+    process = subprocess.Popen(
+        words,
+        cwd=folder,
+        env={**kept, "TERM": "xterm"},
+        stdin=subprocess.DEVNULL,
+        stdout=theirs,
+        stderr=theirs,
+    )
+    os.close(theirs)
+    text = b""
+    while True:
+        try:
+            read = os.read(ours, 65536)
+        except OSError:  # the other side is closed
+            break
+        if not read:
+            break
+        text += read
+    os.close(ours)
+    process.wait(60)
+    # Where a line begins anew, the terminal's cursor moves; all of them are kept here.
+    moved = re.sub(r"\x1b\[[0-9]*[AGK]", "\n", text.decode(errors="replace"))
+    return "\n".join(line for line in re.split(r"[\r\n]+", _ESCAPES.sub("", moved)) if line.strip())
