@@ -13,7 +13,7 @@ from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.covariate_series import CovariateSeries
 from excite_cli.simulation.engine import load_mujoco
-from excite_cli.simulation.mujoco_model import Plant, build_plant, refresh
+from excite_cli.simulation.mujoco_model import Plant, build_plant, coupling_name, refresh
 from excite_cli.simulation.planted import Planted
 
 _STABLE = 0.25  # step times the highest frequency of springs
@@ -155,7 +155,7 @@ def make(build: Build, step: float) -> Plant:
     model.dof_damping[motor] = build.damping
     model.dof_frictionloss[motor] = build.friction
     for c, coupling in enumerate(build.couplings):
-        model.tendon_frictionloss[c] = coupling.force
+        model.tendon_frictionloss[model.tendon(coupling_name(c)).id] = coupling.force
     stiff, constant = build.springs.T
     model.jnt_stiffness[motor] = stiff
     model.qpos_spring[motor] = np.divide(
@@ -171,29 +171,27 @@ def make(build: Build, step: float) -> Plant:
 
 def mass_matrix(plant: Plant, q: Array) -> Array:
     """Inertia (n, n) as the motors see it with stiff transmissions, armatures included."""
-    data = plant.new_data()
-    return _full(plant, data, q)[np.ix_(plant.motor, plant.motor)]
+    return np.asarray(mass_matrices(plant, q[None])[0])
 
 
 def mass_matrices(plant: Plant, q: Array) -> Array:
     """As `mass_matrix`, for postures (T, n)."""
-    data = plant.new_data()
-    at = np.ix_(plant.motor, plant.motor)
-    return np.array([_full(plant, data, posture)[at] for posture in q])
+    data, n = plant.new_data(), len(plant.motor)
+    return np.array([_full(plant, data, posture)[:n, :n] for posture in q])
 
 
 def sudden_inertias(plant: Plant, q: Array) -> Array:
     """What the motors feel of a quick push, (T, n, n): links behind soft gears do not follow."""
-    data = plant.new_data()
-    at = np.ix_(plant.motor, plant.motor)
-    return np.array([np.linalg.inv(np.linalg.inv(_full(plant, data, each))[at]) for each in q])
+    data, n = plant.new_data(), len(plant.motor)
+    inverse = np.linalg.inv
+    return np.array([inverse(inverse(_full(plant, data, each))[:n, :n]) for each in q])
 
 
 def _full(plant: Plant, data: Any, q: Array) -> Array:
+    """Inertia of the coordinates that move on their own, the motors' first."""
     mujoco = load_mujoco()
     size = plant.model.nv
-    data.qpos[:] = 0.0
-    data.qpos[plant.motor] = q
+    data.qpos[:] = plant.coordinates(q)
     mujoco.mj_kinematics(plant.model, data)
     mujoco.mj_comPos(plant.model, data)
     if plant.model.ntendon:
@@ -204,7 +202,7 @@ def _full(plant: Plant, data: Any, q: Array) -> Array:
         unit[column] = 1.0
         mujoco.mj_mulM(plant.model, data, full[column], unit)
         unit[column] = 0.0
-    return full
+    return np.asarray(plant.spread.T @ full @ plant.spread)
 
 
 def _check_friction(build: Build) -> None:
@@ -241,7 +239,7 @@ def _shorten(plant: Plant, step: float) -> None:
     if not stiffness.any():
         return
     full = _full(plant, plant.new_data(), np.zeros(len(plant.motor)))
-    root = np.sqrt(stiffness)
+    root = np.sqrt(stiffness)[plant.motor.tolist() + plant.gear[plant.gear >= 0].tolist()]
     square = np.linalg.eigvalsh(root[:, None] * np.linalg.solve(full, np.diag(root)))
     needed = step * np.sqrt(max(square[-1], 0.0)) / _STABLE
     if needed > _MOST_STEPS:
@@ -251,5 +249,6 @@ def _shorten(plant: Plant, step: float) -> None:
         )
     model.opt.timestep = step / max(1, int(np.ceil(needed)))
     model.dof_solref[:, 0] = 2 * model.opt.timestep
+    model.eq_solref[:, 0] = 2 * model.opt.timestep
     if model.ntendon:
         model.tendon_solref_fri[:, 0] = 2 * model.opt.timestep

@@ -4,22 +4,29 @@ import numpy as np
 import pytest
 
 from excite_cli.config.constraints_spec import (
+    BoxSpec,
     ConstraintsSpec,
+    ContactSpec,
     DiscSpec,
     JointLimitsSpec,
     PolygonSpec,
     SelfCollisionSpec,
+    SurroundingsSpec,
     TorqueSpec,
 )
 from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.config.uncertainty_spec import UncertaintySpec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics
 from excite_cli.dynamics.states import States
+from excite_cli.dynamics.uncertain_inertias import inertia_uncertainty
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.differences import central_differences
 from excite_cli.robot.model import Robot, build_robot
+from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot
 
 
@@ -67,6 +74,28 @@ def test_gradients_on_random_robots(seed: int) -> None:
 def test_gradients_on_a_real_arm_with_capsules() -> None:
     robot = build_robot(RobotSpec(urdf="example-robot-data:panda"))
     for constraint in build_constraints(_all(DiscSpec(radius=0.3), collision=True), robot):
+        _check(robot, constraint, 1, 1e-5)
+
+
+@pytest.mark.parametrize("uncertain", [False, True])
+@pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
+def test_gradients_where_joints_follow_others(parts: tuple, uncertain: bool) -> None:
+    robot = coupled_robot(parts, base="floating", rows=("joints",))
+    around = SurroundingsSpec(
+        floor=-0.2, boxes={"box": BoxSpec(size=(1, 1, 1), position=(2, 0, 0))}
+    )
+    ground = ContactSpec(friction=0.7)
+    spec = _all(DiscSpec(radius=0.3), collision=True).model_copy(
+        update={"contact": ground, "surroundings": around}
+    )
+    known = None
+    if uncertain:
+        known = inertia_uncertainty(UncertaintySpec(mass=0.1), robot, find_base_parameters(robot))
+    found = build_constraints(spec, robot, known)
+    assert {"joint_torque", "balance", "contact", "self_collision", "surroundings"} <= {
+        constraint.name for constraint in found
+    }
+    for constraint in found:
         _check(robot, constraint, 1, 1e-5)
 
 

@@ -13,6 +13,7 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.simulation.mujoco_model import build_plant
 from excite_cli.simulation.true_robot import true_inertias
+from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot
 
 mujoco = pytest.importorskip("mujoco")
@@ -23,9 +24,10 @@ def mujoco_torques(robot: Robot, phi: Array, q: Array, v: Array, a: Array) -> Ar
     data = plant.new_data()
     torques = np.empty_like(q)
     for t in range(len(q)):
-        data.qpos[plant.motor], data.qvel[plant.motor], data.qacc[plant.motor] = q[t], v[t], a[t]
+        data.qpos[:] = plant.coordinates(q[t])
+        data.qvel[:], data.qacc[:] = plant.spread @ v[t], plant.spread @ a[t]
         mujoco.mj_inverse(plant.model, data)
-        torques[t] = data.qfrc_inverse[plant.motor]
+        torques[t] = plant.spread.T @ data.qfrc_inverse
     return torques
 
 
@@ -44,6 +46,12 @@ def assert_same_dynamics(robot: Robot) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_random_trees(seed: int, floating: bool) -> None:
     assert_same_dynamics(random_robot(seed, joints=6, floating=floating))
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
+def test_grippers_whose_fingers_follow(parts: tuple, base: str) -> None:
+    assert_same_dynamics(coupled_robot(parts, base=base))
 
 
 @pytest.mark.parametrize("name", ["ur10", "panda"])
