@@ -97,10 +97,11 @@ def _link_of(joint: ElementTree.Element, end: str) -> str:
 def _lumped(robot: Robot, root: ElementTree.Element, carried: str) -> list[str]:
     """Links that move with `carried`, without itself: over fixed and locked joints."""
     found, left = [], [carried]
+    moving = robot.tree.joint_names
     while left:
         link = left.pop()
         for joint in root.findall("joint"):
-            if _link_of(joint, "parent") == link and joint.get("name") not in robot.joint_names:
+            if _link_of(joint, "parent") == link and joint.get("name") not in moving:
                 left.append(_link_of(joint, "child"))
                 found.append(left[-1])
     return found

@@ -18,6 +18,7 @@ from excite_cli.simulation.planted import Planted
 
 _STABLE = 0.25  # step times the highest frequency of springs
 _MOST_STEPS = 200
+_NOTHING = 1e-9  # kg·m²
 _HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)  # flanks of a gear
 
 
@@ -163,6 +164,8 @@ def make(build: Build, step: float) -> Plant:
     )
     _check_friction(build)
     _check_inertia(build, plant)
+    if plant.coupled:
+        _check_followers(build, plant)
     refresh(plant)
     _shorten(plant, step)
     model.jnt_solref[:] = [2 * model.opt.timestep, 1.0]
@@ -217,14 +220,31 @@ def _check_friction(build: Build) -> None:
         )
 
 
+def _check_followers(build: Build, plant: Plant) -> None:
+    """MuJoCo knows the joints that follow others as joints of their own, which must move a mass."""
+    tree = build.robot.tree
+    column, unit = np.zeros(plant.model.nv), np.eye(plant.model.nv)
+    data = plant.new_data()
+    data.qpos[:] = plant.coordinates(build.robot.posture)
+    load_mujoco().mj_forward(plant.model, data)
+    for name, body in zip(tree.joint_names, plant.bodies, strict=True):
+        at = int(plant.model.body_dofadr[body])
+        load_mujoco().mj_mulM(plant.model, data, column, unit[at])
+        if column[at] <= _NOTHING and name not in build.robot.joint_names:
+            raise RobotError(
+                f"joint '{name}', which follows another one, moves no inertia and cannot be "
+                "simulated. Give its links an inertia in the URDF, or lock its driver."
+            )
+
+
 def _check_inertia(build: Build, plant: Plant) -> None:
     matrix = mass_matrix(plant, build.robot.posture)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-12))
     worst, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    if np.diag(matrix).min() > 1e-9 and worst[0] > 1e-9:
+    if np.diag(matrix).min() > _NOTHING and worst[0] > _NOTHING:
         return
     light = int(np.argmin(np.diag(matrix)))
-    joint = light if np.diag(matrix)[light] <= 1e-9 else int(np.argmax(np.abs(vectors[:, 0])))
+    joint = light if np.diag(matrix)[light] <= _NOTHING else int(np.argmax(np.abs(vectors[:, 0])))
     raise RobotError(
         f"joint '{build.robot.joint_names[joint]}' moves no inertia and cannot be simulated. Give "
         f"its links an inertia in the URDF, lock it, or plant a motor's inertia: --effect "
