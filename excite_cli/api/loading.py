@@ -169,6 +169,7 @@ def load_data(
         robot.joint_names,
         (limits.lower, limits.upper, limits.velocity, limits.effort),
         (~robot.sliding).astype(float),
+        robot.motors,
     )
     raise_for_errors(data)
     if problem.spec.measurement.gravity == "subtracted":

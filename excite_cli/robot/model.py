@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, RobotError
+from excite_cli.measurement.motors import Motors, motors_of
 from excite_cli.robot.carried_payload import Payload, add_payload, payload_on
 from excite_cli.robot.coupling import Coupling
 from excite_cli.robot.description import (
@@ -42,7 +43,8 @@ class Robot:
     inertias of `model` include that of the `payload`; `description` knows nothing of it. With
     `visual_shapes`, the visual shapes of links without collision shapes count as such.
 
-    Where joints follow others (`coupling`), `model` has all of them; `joint_names`, `rows` and
+    `motors` drive several joints together; None where each joint has its own. Where joints follow
+    others (`coupling`), `model` has all of them; `joint_names`, `rows` and
     `moved` count those that move on their own, and `tree` is the robot in which all would.
     """
 
@@ -61,6 +63,7 @@ class Robot:
     payload: Payload | None = None
     visual_shapes: bool = False
     coupling: Coupling | None = None
+    motors: Motors | None = None
 
     @cached_property
     def tree(self) -> "Robot":
@@ -291,6 +294,7 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
         locked={name: posture[name] for name in names if name not in moving},
         payload=None if spec.payload is None else payload_on(model, spec.payload),
         coupling=coupling,
+        motors=motors_of(spec.transmissions, moved_names),
     )
 
 
