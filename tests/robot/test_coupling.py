@@ -14,6 +14,7 @@ from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.errors import ConfigError, RobotError
+from excite_cli.excitation.boundary import posture_of as boundary_posture
 from excite_cli.robot.carried import MovedBodies
 from excite_cli.robot.described import describe
 from excite_cli.robot.link_frame import leaves, link_frame, own_link
@@ -110,6 +111,12 @@ def test_a_posture_that_contradicts_the_driver_is_told() -> None:
 def test_a_follower_cannot_be_moved_alone() -> None:
     with pytest.raises(ConfigError, match=r"'finger_2' mimics 'finger_1' and moves with"):
         coupled_robot(HAND, joints=("finger_2",))
+
+
+def test_a_motion_names_the_driver_where_it_begins() -> None:
+    robot = coupled_robot(HAND)
+    with pytest.raises(ConfigError, match=r"joint 'finger_2' follows another joint \(mimic\)"):
+        boundary_posture(robot, {"finger_2": 0.02}, "trajectory.start")
 
 
 def test_what_nobody_can_follow_is_told(tmp_path: Path) -> None:

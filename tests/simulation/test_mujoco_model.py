@@ -10,10 +10,13 @@ from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.dynamics.pseudo_inertia import pseudo_inertias, ten_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.errors import RobotError
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.simulation.build import assemble, make
 from excite_cli.simulation.mujoco_model import build_plant
 from excite_cli.simulation.true_robot import true_inertias
-from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
+from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
 from tests.robot.random_robots import random_robot
 
 mujoco = pytest.importorskip("mujoco")
@@ -52,6 +55,15 @@ def test_random_trees(seed: int, floating: bool) -> None:
 @pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
 def test_grippers_whose_fingers_follow(parts: tuple, base: str) -> None:
     assert_same_dynamics(coupled_robot(parts, base=base))
+
+
+def test_a_follower_without_mass_is_told(tmp_path: Path) -> None:
+    head, tail = urdf_of(HAND).split('<link name="right_finger">')
+    rest = tail[tail.index("</inertial>") + len("</inertial>") :]
+    (tmp_path / "hand.urdf").write_text(f'{head}<link name="right_finger">{rest}')
+    robot = build_robot(RobotSpec(urdf=str(tmp_path / "hand.urdf")))
+    with pytest.raises(RobotError, match=r"'finger_2', which follows another one, moves no iner"):
+        make(assemble(robot, standard_parameters(robot), RunId("a"), ()), 1e-3)
 
 
 @pytest.mark.parametrize("name", ["ur10", "panda"])
