@@ -43,9 +43,9 @@ class Robot:
     inertias of `model` include that of the `payload`; `description` knows nothing of it. With
     `visual_shapes`, the visual shapes of links without collision shapes count as such.
 
-    `motors` drive several joints together; None where each joint has its own. Where joints follow
-    others (`coupling`), `model` has all of them; `joint_names`, `rows` and
-    `moved` count those that move on their own, and `tree` is the robot in which all would.
+    Where joints follow others (`coupling`), `model` has all of them; `joint_names`, `rows` and
+    `moved` count those that move on their own, and `tree` is the robot in which all would. `motors`
+    drive several joints together; None where each joint has its own.
     """
 
     name: str
@@ -85,6 +85,7 @@ class Robot:
             moved=first + np.arange(len(own.driver)),
             limits=own.limits,
             coupling=None,
+            motors=None,
         )
 
     @property
@@ -101,15 +102,12 @@ class Robot:
     @property
     def followers(self) -> tuple[tuple[str, ...], ...]:
         """For every moved joint (n,) the joints that follow it."""
-        every = () if self.coupling is None else self.coupling.joint_names
-        return tuple(
-            tuple(
-                name
-                for k, name in enumerate(every)
-                if self.coupling is not None and self.coupling.driver[k] == j and name != own
-            )
-            for j, own in enumerate(self.joint_names)
-        )
+        found: list[list[str]] = [[] for _ in self.joint_names]
+        if self.coupling is not None:
+            for name, j in zip(self.coupling.joint_names, self.coupling.driver, strict=True):
+                if name != self.joint_names[j]:
+                    found[j].append(name)
+        return tuple(map(tuple, found))
 
     @cached_property
     def parents(self) -> tuple[int, ...]:
