@@ -196,6 +196,7 @@ def load_data(
         robot.joint_names[own],
         (limits.lower[own], limits.upper[own], limits.velocity[own], limits.effort[own]),
         (~robot.sliding[own]).astype(float),
+        robot.motors,
         torques,
     )
     raise_for_errors(data)

@@ -97,9 +97,7 @@ class Model(Shown):
         q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
         series, single = self._series(q, v, np.zeros_like(q), None, None, 0.0, check=False)
         robot, model = self.made.robot, self._standing
-        body = RigidBody(
-            robot, model.phi + model.carried(robot.n), series.q, 0 * series.v, series.a
-        )
+        body = RigidBody(robot, model.phi + model.carried(robot), series.q, 0 * series.v, series.a)
         carried = (
             body.load if load is None else np.asarray(load, dtype=float).reshape(series.q.shape)
         )

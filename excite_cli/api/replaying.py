@@ -61,14 +61,16 @@ def replay(
     simple, notes = for_simulators(stored, "mjcf")
     exported = mjcf(robot, simple)
     q = np.concatenate([run.q for run in runs])
-    inertia = inertias(exported.text, q[:: max(1, len(q) // _POSTURES)])
+    postures = robot.all_positions(q[:: max(1, len(q) // _POSTURES)])
+    inertia = inertias(exported.text, postures)
     lost: list[str] = []
 
     def deviation(text: str, played: list[Played], name: str) -> dict[str, float]:
-        found = drift(text, played, inertia)
+        found = drift(text, [_of_all(robot, run) for run in played], inertia)
         if found.lost:
             lost.append(name)
-        return dict(zip(robot.joint_names, map(float, found.rms), strict=True))
+        rms = dict(zip(robot.tree.joint_names, map(float, found.rms), strict=True))
+        return {joint: rms[joint] for joint in robot.joint_names}
 
     before = None
     untouched = _urdf(robot)
@@ -106,6 +108,15 @@ def _urdf(robot: Robot) -> ModelText | str | None:
 
 def _played(run: PreparedRun, torque: Array) -> Played:
     return Played(run.t, run.q, run.v, torque)
+
+
+def _of_all(robot: Robot, run: Played) -> Played:
+    """The run with the joints that follow others, which no motor drives."""
+    if robot.coupling is None:
+        return run
+    torque = np.zeros((len(run.t), robot.tree.n))
+    torque[:, np.array(robot.model_joints) - robot.first_joint] = run.torque
+    return Played(run.t, robot.all_positions(run.q), robot.all_rates(run.v), torque)
 
 
 def _of_robot(model: Model, run: PreparedRun) -> Array:

@@ -24,6 +24,35 @@ class JointLimits(Section):
         return value
 
 
+class TransmissionSpec(Section):
+    """Motors that drive joints together: a differential, belts that run over other joints."""
+
+    joints: tuple[str, ...] = Field(description="moved joints that it drives")
+    motors: tuple[str, ...] = Field(description="as many motors, by names of their own")
+    matrix: tuple[tuple[Finite, ...], ...] = Field(
+        description="joint positions = matrix · motor positions; a row per joint"
+    )
+    limits: dict[str, JointLimits] = Field(
+        default_factory=dict, description="limits of the motors, by name"
+    )
+
+    @model_validator(mode="after")
+    def _square(self) -> "TransmissionSpec":
+        count = len(self.joints)
+        if count == 0 or len(self.motors) != count:
+            raise ValueError(
+                f"{count} joints and {len(self.motors)} motors; there must be as many, at least one"
+            )
+        if len(self.matrix) != count or any(len(row) != count for row in self.matrix):
+            raise ValueError(f"matrix must have {count} rows of {count} numbers, a row per joint")
+        for name in self.limits:
+            if name not in self.motors:
+                raise ValueError(
+                    f"limits: '{name}' is none of its motors ({', '.join(self.motors)})"
+                )
+        return self
+
+
 class PayloadSpec(Section):
     """Something rigid that a link carries: its mass and the capsule that contains it."""
 
@@ -66,6 +95,9 @@ class RobotSpec(Section):
     )
     gravity: Vector3 = Field((0.0, 0.0, -9.81), description="[m/s²] in the world frame")
     limits: dict[str, JointLimits] = Field(default_factory=dict)
+    transmissions: tuple[TransmissionSpec, ...] = Field(
+        (), description="motors that drive several joints together"
+    )
     payload: PayloadSpec | None = None
 
     @field_validator("joints")

@@ -26,6 +26,7 @@ from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.constraints.keep_out import build_keep_out
 from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
+from excite_cli.constraints.motor_limits import MotorBound, MotorTorque
 from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.constraints.support_polygon import support_polygon
@@ -39,6 +40,7 @@ from excite_cli.geometry.collision_pairs import choose_pairs
 from excite_cli.geometry.obstacle_pairs import choose_obstacle_pairs, ignored_pairs
 from excite_cli.geometry.obstacles import build_obstacles
 from excite_cli.geometry.pair_tables import mesh_tables, require_tabled
+from excite_cli.measurement.motors import Motors
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 
@@ -130,7 +132,8 @@ def _keep_out(spec: dict[str, KeepOutSpec], setting: Setting) -> Iterable[Constr
 
 
 def _joint_bounds(spec: JointLimitsSpec, setting: Setting) -> Iterable[Constraint]:
-    robot, found = setting.robot, []
+    robot = setting.robot
+    found: list[Constraint] = []
     limits, names = robot.limits, robot.joint_names
     if spec.position:
         lower = limits.lower + spec.position_margin
@@ -151,16 +154,36 @@ def _joint_bounds(spec: JointLimitsSpec, setting: Setting) -> Iterable[Constrain
     if spec.acceleration is not None:
         acceleration = np.minimum(acceleration, spec.acceleration)
     found.append(JointBound.between(2, -acceleration, acceleration, robot))
-    return [bound for bound in found if bound.labels]
+    of_motors = [] if robot.motors is None else _motor_bounds(spec, robot.motors)
+    return [bound for bound in (*found, *of_motors) if bound.labels]
+
+
+def _motor_bounds(spec: JointLimitsSpec, motors: Motors) -> Iterable[Constraint]:
+    """As those of joints, for motors that drive several."""
+    if spec.position:
+        yield MotorBound(motors, 0, *motors.ranges())
+    if spec.velocity is not False:
+        speed = spec.scale * motors.bounds("velocity")
+        yield MotorBound(motors, 1, -speed, speed)
+    acceleration = motors.bounds("acceleration")
+    yield MotorBound(motors, 2, -acceleration, acceleration)
 
 
 def _torque(spec: TorqueSpec, setting: Setting) -> Iterable[Constraint]:
     robot = setting.robot
-    if not np.isfinite(robot.limits.effort).any():
+    of_motors = np.full(robot.n, np.inf)
+    if robot.motors is not None:
+        of_motors = spec.scale * robot.motors.bounds("effort")
+    found: list[Constraint] = []
+    if np.isfinite(of_motors).any():
+        found.append(MotorTorque(robot, of_motors, setting.uncertainty))
+    if not found and not np.isfinite(robot.limits.effort).any():
         raise ConfigError(
             "constraints.torque: the URDF gives no effort limits; give robot.limits.<joint>.effort."
         )
-    return [JointTorque(robot, spec.scale * robot.limits.effort, setting.uncertainty)]
+    if np.isfinite(robot.limits.effort).any():
+        found.insert(0, JointTorque(robot, spec.scale * robot.limits.effort, setting.uncertainty))
+    return found
 
 
 def _balance(spec: DiscSpec | PolygonSpec, setting: Setting) -> Iterable[Constraint]:

@@ -113,6 +113,11 @@ def _region(name: str, spec: dict[str, tuple[float, float]], robot: Robot) -> Re
     where = f"constraints.keep_out.{name}"
     known = [*robot.joint_names, *robot.locked]
     for joint in spec:
+        if joint in robot.tree.joint_names and joint not in robot.joint_names:
+            raise ConfigError(
+                f"{where}: joint '{joint}' follows another one (mimic). Name its driver, with the "
+                "positions of that one."
+            )
         if joint not in known:
             raise ConfigError(
                 f"{where}: the robot has no joint '{joint}'.{nearest(joint, known)} "

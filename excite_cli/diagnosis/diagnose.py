@@ -50,7 +50,12 @@ from excite_cli.identification.declared_runs import check_declared_runs, check_l
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
-from excite_cli.identification.prepare import PreparedRun, prepare_all, require_motion
+from excite_cli.identification.prepare import (
+    PreparedRun,
+    prepare_all,
+    require_motion,
+    standing_still,
+)
 from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
@@ -110,7 +115,6 @@ def _diagnosed(
 ) -> Diagnosis:
     started = time.monotonic()
     check_declared_runs(spec, dataset)
-    model = _model(robot, base, spec)
     parts = split(dataset, sealed, spec.diagnosis.block, spec.identification.needed_runs)
     check_left_to_fit(spec, parts)
     refuse_sealed_copies(parts)
@@ -121,6 +125,8 @@ def _diagnosed(
         robot.joint_names,
         (*spec.measurement.without_torque, *robot.unmeasured),
     )
+    standing = standing_still(training, robot.joint_names)
+    model = _model(robot, base, spec, bool(standing))
     kept = prepare_all(parts.sealed, processing)  # refused early where too short
     suspicious = check_recorded(robot, parts.training, training, processing, spec.measurement)
     traced = _traced(model, spec, parts, processing, progress)
@@ -189,6 +195,7 @@ def _diagnosed(
             *dataset.findings,
             *assumed_scale(spec.measurement, spec.identification),
             *suspicious,
+            *standing,
             *_noticed(assumed, floor, robot, parts.training),
         ),
         processing=_choices(processing, traced, parts, training),
@@ -318,11 +325,13 @@ def _absorbed(model: Model, traced: Traced) -> tuple[Absorbed, ...]:
     return tuple(found)
 
 
-def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:
-    prior = None
-    if spec.identification.inertias == "cad":
-        cad = standard_parameters(robot)
-        prior = KeptInertias(cad, prior_rows(robot, cad, spec.identification.uncertainty))
+def _model(robot: Robot, base: BaseParameters, spec: Spec, still: bool) -> Model:
+    """`still`: a joint does not move, and noise alone decides what only its motion shows."""
+    prior, cad = None, standard_parameters(robot)
+    kept = spec.identification.inertias == "cad"
+    if kept or (still and cad[::10].any()):
+        uncertainty = spec.identification.uncertainty if kept else 1.0
+        prior = KeptInertias(cad, prior_rows(robot, cad, uncertainty))
     declared = declared_effects(spec.effects, robot)
     declared = with_known_load(spec.identification, declared, robot)
     return Model(robot, base, declared, prior, spec.runs)

@@ -56,7 +56,8 @@ class FictitiousInertiaAdjoint:
         total = np.zeros((3, len(q), self._model.nv))
         for weight, inertias in self._passes(left, right):
             self._add_pass(total, states, weight, inertias.reshape(-1, 10))
-        return total[0][:, robot.moved], total[1][:, robot.moved], total[2][:, robot.moved]
+        gq, gv, ga = (robot.gathered(part[:, robot.tree.moved]) for part in total)
+        return gq, gv, ga
 
     def _passes(self, left: Array, right: Array) -> Iterator[tuple[Array, Array]]:
         """Weights (T, nv) and standard parameters (P,) of each RNEA-derivatives pass."""
@@ -66,7 +67,8 @@ class FictitiousInertiaAdjoint:
         least = np.abs(direction[::10]).min()
         shift = (2.0 * np.abs(right).max(axis=1) + 1e-300) / least
         weights = np.zeros((*left.shape[:2], self._model.nv))
-        weights[:, :, self.robot.rows] = left
+        for weight, rows in zip(weights, left, strict=True):
+            weight[:, self.robot.tree.rows] = self.robot.spread_rows(rows)
         yield from zip(weights, right + shift[:, None] * direction, strict=True)
         if self._silent is None:
             yield -np.einsum("k,ktr->tr", shift, weights), reference

@@ -19,7 +19,6 @@ from scipy.linalg import lstsq, qr
 
 from excite_cli.dynamics.near_right_angles import nearly_right, squared
 from excite_cli.dynamics.regressor import (
-    PARAMETERS_PER_BODY,
     Regressor,
     standard_parameter_names,
 )
@@ -185,7 +184,6 @@ def base_parameters_as_given(
 
 def _stack(regressor: Regressor, robot: Robot, count: int, seed: int) -> Array:
     y = regressor.evaluate(*robot.draw_states(count, seed))
-    y[:, :, : PARAMETERS_PER_BODY * robot.massless] = 0.0
     return y.reshape(-1, y.shape[-1])
 
 

@@ -73,6 +73,9 @@ def block_pull_back(
     -------
     gq, gv, ga, each (T, n)
     """
+    coupled, robot = robot, robot.tree
+    q, v, a = coupled.all_positions(q), coupled.all_rates(v), coupled.all_rates(a)
+    Z = coupled.spread_rows(Z)
     joints = joints_of(robot)
     motions = body_motions(robot, joints, q, v, a)
     jacobians = body_jacobians(joints, motions, robot.n)
@@ -98,7 +101,7 @@ def block_pull_back(
         wrench = _by_placement(by_transform[k], transforms[k])
         world = np.concatenate([wrench[:, None, :3] @ turned, wrench[:, None, 3:] @ turned], axis=2)
         gradient[:, : robot.n] += (world @ jacobian.basic)[:, 0]
-    gq, gv, ga = np.split(gradient, 3, axis=1)
+    gq, gv, ga = map(coupled.gathered, np.split(gradient, 3, axis=1))
     return gq, gv, ga
 
 

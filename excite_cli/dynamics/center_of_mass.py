@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from excite_cli.dynamics.spatial_adjoint import cross
 from excite_cli.dynamics.states import States
+from excite_cli.robot.carried import carried_bodies
 from excite_cli.robot.model import Array, Robot
 
 
@@ -25,13 +26,7 @@ class CenterOfMass:
         still = model.inertias[0]
         self._still = still.mass * np.asarray(still.lever)
         self.total_mass = float(self._mass.sum() + still.mass)
-        carries = np.zeros((robot.n, robot.n_bodies))
-        first = int(model.njoints) - 1 - robot.n
-        for body in range(1, model.njoints):
-            for joint in model.supports[body]:
-                if joint > first:
-                    carries[joint - 1 - first, body - 1] = 1.0
-        self._carries = carries
+        self._carries = carried_bodies(robot).T[:, 1:]
 
     def _moments(self, states: States) -> Array:
         """m_j c_j in the world, (T, B, 3)."""
@@ -49,10 +44,10 @@ class CenterOfMass:
         """∂c/∂q (T, 3, n) [m/rad or m/m]."""
         carried_mass = self._carries @ self._mass
         carried_moment = self._carries @ self._moments(states)
-        columns = states.columns[:, self._robot.moved]
+        columns = states.columns[:, self._robot.tree.moved]
         derivative = columns[..., :3] * carried_mass[:, None]
         derivative = derivative + cross(columns[..., 3:], carried_moment)
-        return derivative.transpose(0, 2, 1) / self.total_mass
+        return self._robot.gathered(derivative.transpose(0, 2, 1)) / self.total_mass
 
     def rows(self, states: States) -> Array:
         """M, Σ m x, Σ m y as rows (T, 3, 4·(1 + n_bodies)) on m, m c of what stands still first."""
@@ -75,7 +70,7 @@ class CenterOfMass:
         moving = masses.reshape(len(times), -1, 4)[:, 1:]
         mass, first = moving[..., :1], moving[..., 1:, None]
         moments = mass * translations[times] + (rotations[times] @ first)[..., 0]
-        columns = states.columns[:, self._robot.moved][times]
+        columns = states.columns[:, self._robot.tree.moved][times]
         change = columns[..., :3] * (self._carries @ mass)
         change = change + cross(columns[..., 3:], self._carries @ moments)
-        return np.asarray((change[..., :2] @ normals[..., None])[..., 0])
+        return self._robot.gathered(np.asarray((change[..., :2] @ normals[..., None])[..., 0]))

@@ -29,15 +29,16 @@ def contact_jacobians(
 
     Jᵀ w is what a wrench w = [force; moment] that acts on the robot there does to all joints.
     """
-    model, first = robot.model, int(robot.model.njoints) - robot.n
+    model, moved = robot.model, robot.tree.moved
     data, aligned = model.createData(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     for posture in robot.configurations(q):
         pin.computeJointJacobians(model, data, posture)
         found = []
         for frame in frames:
-            place = data.oMi[first + frame.joint]
-            whole = pin.getJointJacobian(model, data, first + frame.joint, aligned)
-            jacobian = whole.reshape(6, -1)[:, robot.moved]
+            joint = robot.model_joints[frame.joint]
+            place = data.oMi[joint]
+            whole = pin.getJointJacobian(model, data, joint, aligned).reshape(6, -1)
+            jacobian = robot.gathered(whole[:, moved])
             axes, point = frame.rotation, frame.position
             if not frame.in_world:
                 axes, point = place.rotation @ axes, place.act(point)

@@ -32,15 +32,16 @@ class BatchKinematics:
     """Forward kinematics of `robot` for a whole array of moved-joint positions.
 
     Bodies are the joints 1 .. njoints-1 of `robot.model` in order; body b is joint b + 1.
-    `parents` (B,), -1 for the world; `variable` (B,), the moved joint that turns or slides the
-    body, -1 for none; `twists` (nv, 6), unit twists [linear; angular] in the frame of their body.
+    `parents` (B,), -1 for the world; `variable` (B,), the joint of `robot.tree` that turns or
+    slides the body, -1 for none; `twists` (nv, 6), unit twists [linear; angular] in the frame of
+    their body.
     """
 
     def __init__(self, robot: Robot) -> None:
         model = robot.model
         self.n_bodies = robot.n_bodies
         self.nv = int(model.nv)
-        self._n = robot.n
+        self._robot = robot
         self._columns_body = np.zeros(self.nv, dtype=np.int64)
         self.twists = np.zeros((self.nv, 6))
         self._rotation_basis = np.zeros((self.n_bodies, 3, 9))
@@ -83,7 +84,8 @@ class BatchKinematics:
 
         `q` (T, n) are the positions of the moved joints [rad or m].
         """
-        q = np.ascontiguousarray(q, dtype=float).reshape(-1, self._n)
+        q = np.asarray(q, dtype=float).reshape(-1, self._robot.n)
+        q = np.ascontiguousarray(self._robot.all_positions(q))
         if KERNELS is None:
             return self._placements_by_level(q)
         rotations = np.empty((len(q), self.n_bodies, 3, 3))

@@ -16,10 +16,11 @@ def readings(
     q, v, a (T, n); `gravity` (3,) of the world.
     """
     rotation, lever = place
-    model, body = robot.model, int(robot.model.njoints) - robot.n + joint
+    model, body = robot.model, robot.model_joints[joint]
     data = model.createData()
     rates, forces = np.empty((2, len(states[0]), 3))
-    for t, (q, v, a) in enumerate(zip(*states, strict=True)):
+    full = robot.configurations(states[0]), *map(robot.velocities, states[1:])
+    for t, (q, v, a) in enumerate(zip(*full, strict=True)):
         pin.forwardKinematics(model, data, q, v, a)
         twist, gained = data.v[body], data.a[body]
         turning = np.cross(twist.angular, lever)

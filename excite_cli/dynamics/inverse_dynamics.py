@@ -25,15 +25,19 @@ class InverseDynamics:
         """τ (T, n) [N·m or N]."""
         model, data = self._model, self._data
         full = [pin.rnea(model, data, *state).copy() for state in self._pinocchio_states(q, v, a)]
-        return np.array(full).reshape(len(q), model.nv)[:, self.robot.moved]
+        every = np.array(full).reshape(len(q), model.nv)[:, self.robot.tree.moved]
+        return self.robot.gathered(every)
 
     def derivatives(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """∂τ/∂q, ∂τ/∂v, ∂τ/∂a, each (T, n, n)."""
         by_q, by_v, by_a = rnea_derivatives(
             self._model, self._data, self._pinocchio_states(q, v, a), len(q)
         )
-        rows, columns = np.ix_(self.robot.moved, self.robot.moved)
-        return by_q[:, rows, columns], by_v[:, rows, columns], by_a[:, rows, columns]
+        rows, columns = np.ix_(self.robot.tree.moved, self.robot.tree.moved)
+        gathered = self.robot.gathered
+        by_joint = (gathered(part[:, rows, columns]) for part in (by_q, by_v, by_a))
+        by_q, by_v, by_a = (gathered(part.swapaxes(1, 2)).swapaxes(1, 2) for part in by_joint)
+        return by_q, by_v, by_a
 
 
 def rnea_derivatives(

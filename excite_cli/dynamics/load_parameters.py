@@ -23,8 +23,7 @@ def load_parameters(robot: Robot, link: str | None) -> BaseParameters:
         The link is unknown or must be named, or no motion tells all ten apart.
     """
     frame = carrying_frame(robot, link, "criterion.load_link")
-    bodies = robot.n_bodies - robot.n
-    selection = 10 * (bodies + frame.joint) + np.arange(10)
+    selection = 10 * (robot.model_joints[frame.joint] - 1) + np.arange(10)
     y = Regressor(robot).evaluate(*robot.draw_states(_SAMPLES, _SEED))[:, :, selection]
     rows = y.reshape(-1, 10)
     sizes = np.linalg.norm(rows, axis=0)

@@ -19,7 +19,7 @@ class Regressor:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self._data = robot.model.createData()
-        self._all_rows = len(robot.rows) == robot.model.nv
+        self._all_rows = len(robot.tree.rows) == robot.model.nv
 
     def evaluate(self, q: Array, v: Array, a: Array) -> Array:
         """Y for the measured rows.
@@ -40,7 +40,8 @@ class Regressor:
         full = np.empty((len(q), model.nv, PARAMETERS_PER_BODY * robot.n_bodies))
         for t, (qt, vt, at) in enumerate(zip(qs, vs, accelerations, strict=True)):
             full[t] = compute(model, data, qt, vt, at)
-        return full if self._all_rows else full[:, robot.rows]
+        full[:, :, : PARAMETERS_PER_BODY * robot.massless] = 0.0
+        return robot.gathered_rows(full if self._all_rows else full[:, robot.tree.rows])
 
 
 def standard_parameters(robot: Robot) -> Array:

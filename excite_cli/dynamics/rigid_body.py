@@ -5,6 +5,7 @@ the torque of gravity along each axis of the world, and the Jacobian of the last
 computed once, at first use.
 """
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, Regressor
 from excite_cli.robot.model import Array, Robot
 
 # φ₁ of every body: 1 kg and 1 kg·m² at its frame.
@@ -68,21 +69,8 @@ class RigidBody:
     @cached_property
     def regressor(self) -> Array:
         """Y (T, n, 10·n_bodies) of the moved joints."""
-        robot, model = self.robot, self.robot.model
-        data = model.createData()
-        full = np.empty((len(self.q), robot.n, PARAMETERS_PER_BODY * robot.n_bodies))
-        states = zip(
-            robot.configurations(self.q),
-            robot.velocities(self.v),
-            robot.velocities(self.a),
-            strict=True,
-        )
-        for t, state in enumerate(states):
-            full[t] = pin.computeJointTorqueRegressor(model, data, *state).reshape(model.nv, -1)[
-                robot.moved
-            ]
-        full[:, :, : PARAMETERS_PER_BODY * robot.massless] = 0.0
-        return full
+        robot = replace(self.robot, rows=self.robot.moved)
+        return Regressor(robot).evaluate(self.q, self.v, self.a)
 
     @cached_property
     def load(self) -> Array:
@@ -146,24 +134,25 @@ class RigidBody:
         """Torque (T, n, 3) that one m/s² of gravity along world x, y, z asks for."""
         robot, model = self.robot, self._model.copy()
         data = model.createData()
-        columns = np.empty((len(self.q), robot.n, 3))
+        columns = np.empty((len(self.q), robot.tree.n, 3))
         configurations = robot.configurations(self.q)
         for axis in range(3):
             model.gravity.linear = np.eye(3)[axis]
             for t, q in enumerate(configurations):
-                columns[t, :, axis] = pin.computeGeneralizedGravity(model, data, q)[robot.moved]
-        return columns
+                torque = pin.computeGeneralizedGravity(model, data, q)
+                columns[t, :, axis] = torque[robot.tree.moved]
+        return robot.gathered(columns.swapaxes(1, 2)).swapaxes(1, 2)
 
     def tip_jacobian(self) -> Array:
         """Jacobian (T, 6, n) of the last moved joint's frame, aligned with the world."""
         robot, model = self.robot, self.robot.model
         data, last = model.createData(), model.njoints - 1
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        jacobians = np.empty((len(self.q), 6, robot.n))
+        jacobians = np.empty((len(self.q), 6, robot.tree.n))
         for t, q in enumerate(robot.configurations(self.q)):
             jacobian = pin.computeFrameJacobian(model, data, q, _frame_of(model, last), aligned)
-            jacobians[t] = jacobian.reshape(6, -1)[:, robot.moved]  # of one column: 1-D
-        return jacobians
+            jacobians[t] = jacobian.reshape(6, -1)[:, robot.tree.moved]  # of one column: 1-D
+        return robot.gathered(jacobians)
 
 
 def _frame_of(model: pin.Model, joint: int) -> int:

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint, motion_cross
+from excite_cli.robot.carried import carried_bodies
 from excite_cli.robot.model import Array, Robot
 
 Indices = NDArray[np.intp]
@@ -35,8 +36,8 @@ Vectors = tuple[Array, Array]  # linear and angular part, each with its three co
 class _Motion:
     """World motion at the instants requested, components first.
 
-    Of the bodies (…, T, B): orientation (3, 3), place (3), velocity and acceleration (6), of the
-    moved joints (6, T, n): columns with their first and second rates.
+    Of the bodies (…, T, B): orientation (3, 3), place (3), velocity and acceleration (6), of all
+    joints that move (6, T, m): columns with their first and second rates.
     """
 
     turn: Array
@@ -54,14 +55,9 @@ class RowAdjoint:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._adjoint = SpatialAdjoint(robot)
-        model, first = robot.model, int(robot.model.njoints) - robot.n
-        carries = np.zeros((robot.n, robot.n_bodies))
-        for body in range(1, model.njoints):
-            for joint in model.supports[body]:
-                if int(joint) >= first:
-                    carries[int(joint) - first, body - 1] = 1.0
-        self._carries = carries
-        self._own = np.arange(first - 1, robot.n_bodies)
+        self._carries = carried_bodies(robot).T[:, 1:]
+        self._own = np.arange(robot.first_joint - 1, robot.n_bodies)
+        self._shares = np.eye(robot.n) if robot.coupling is None else robot.coupling.matrix
 
     def torques(
         self, q: Array, v: Array, a: Array, times: Indices, joints: Indices, phi: Array
@@ -78,19 +74,20 @@ class RowAdjoint:
         found = tuple(np.zeros((len(times), self._robot.n)) for _ in range(3))
         for joint in np.unique(joints):
             rows = np.flatnonzero(joints == joint)
-            carried = np.flatnonzero(self._carries[joint])
-            further = self._carries[joint, self._own].copy()
-            further[joint] = 0.0
-            parts = self._rows(
-                motion,
-                times[rows],
-                motion.column[:, times[rows], joint],
-                carried,
-                inertias[np.ix_(rows, carried)],
-                further,
-            )
-            for whole, part in zip(found, parts, strict=True):
-                whole[rows] = part
+            for member in np.flatnonzero(self._shares[:, joint]):
+                carried = np.flatnonzero(self._carries[member])
+                further = self._carries[member, self._own].copy()
+                further[member] = 0.0
+                parts = self._rows(
+                    motion,
+                    times[rows],
+                    motion.column[:, times[rows], member],
+                    carried,
+                    inertias[np.ix_(rows, carried)],
+                    further,
+                )
+                for whole, part in zip(found, parts, strict=True):
+                    whole[rows] += self._shares[member, joint] * part
         return found[0], found[1], found[2]
 
     def wrenches(
@@ -106,13 +103,13 @@ class RowAdjoint:
         motion, times = self._motion(q, v, a, times)
         every = np.arange(self._robot.n_bodies)
         inertias = phi.reshape(len(times), -1, 10)
-        return self._rows(motion, times, functionals.T, every, inertias, np.ones(self._robot.n))
+        return self._rows(motion, times, functionals.T, every, inertias, np.ones(len(self._own)))
 
     def _motion(self, q: Array, v: Array, a: Array, times: Indices) -> tuple[_Motion, Indices]:
         """The motion at the instants that occur, and where each row is among them."""
         instants, inverse = np.unique(times, return_inverse=True)
         bodies = self._adjoint.body_motion(q[instants], v[instants], a[instants])
-        moved = self._robot.moved
+        moved = self._robot.tree.moved
         column, rate = bodies.columns[:, moved], bodies.column_rates[:, moved]
         second_rate = motion_cross(bodies.acceleration[:, self._own], column)
         second_rate += motion_cross(bodies.velocity[:, self._own], rate)
@@ -158,7 +155,9 @@ class RowAdjoint:
         gq = motion.second_rate[:, times] * summed[0] + rate * summed[1]
         gq -= column * (carried * further)
         gv = 2 * rate * summed[0] + column * summed[1]
-        return gq.sum(axis=0), gv.sum(axis=0), (column * summed[0]).sum(axis=0)
+        parts = (gq, gv, column * summed[0])
+        by_q, by_v, by_a = (self._robot.gathered(part.sum(axis=0)) for part in parts)
+        return by_q, by_v, by_a
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,8 @@ h_j = V_j ×* g^A_j,
     ∂L/∂q_l = S̈_l·Σ g^A + Ṡ_l·Σ (g^V + h) − S_l·Σ_{i < l} S_i ×* Σ f_j(Z_ij)
     ∂L/∂v_l = 2 Ṡ_l·Σ g^A + S_l·Σ (g^V + h),        ∂L/∂a_l = S_l·Σ g^A.
 
-The cost does not depend on the number of pairs.
+The cost does not depend on the number of pairs. All of it is about joints that move on their own
+(`Robot.tree`); where some follow others, states are spread to all and derivatives gathered.
 """
 
 from dataclasses import dataclass
@@ -100,11 +101,12 @@ class SpatialAdjoint:
         for body in range(1, model.njoints):
             carries[body - 1, [int(j) - 1 for j in model.supports[body] if j > 0]] = 1.0
         self._dof_body = np.array(dof_body, dtype=np.int64)
-        self._moved = np.array(robot.moved, dtype=np.int64)
-        self._rows = np.array(robot.rows, dtype=np.int64)
+        tree = robot.tree
+        self._moved = np.array(tree.moved, dtype=np.int64)
+        self._rows = np.array(tree.rows, dtype=np.int64)
         self._carried = np.ascontiguousarray(carries[:, self._dof_body])
         strict = self._carried[self._dof_body][:, :] - np.equal.outer(dof_body, dof_body)
-        self._strict = strict[np.ix_(robot.moved, robot.rows)]
+        self._strict = strict[np.ix_(tree.moved, tree.rows)]
         self._gravity = np.concatenate([-np.asarray(model.gravity.linear), np.zeros(3)])
 
     @property
@@ -126,13 +128,17 @@ class SpatialAdjoint:
         robot, tree = self.robot, self._kinematics
         position = np.full(10 * robot.n_bodies, -1, dtype=np.int64)
         position[kept] = np.arange(len(kept))
-        found = np.zeros((len(q), len(robot.rows), len(kept)))
+        found = np.zeros((len(q), len(self._rows), len(kept)))
         KERNELS.call(
-            "regressor", *self._structure, *tree.placements(q),
-            np.ascontiguousarray(v, dtype=float), np.ascontiguousarray(a, dtype=float), position,
+            "regressor", *self._structure, *tree.placements(q), *self._all_rates(v, a), position,
             found,
         )  # fmt: skip
-        return found
+        return robot.gathered_rows(found)
+
+    def _all_rates(self, *rates: Array) -> list[Array]:
+        """As the compiled functions take them."""
+        every = map(self.robot.all_rates, rates)
+        return [np.ascontiguousarray(part, dtype=float) for part in every]
 
     def pull_back(
         self, q: Array, v: Array, a: Array, left: Array, right: Array
@@ -155,22 +161,24 @@ class SpatialAdjoint:
         -------
         gq, gv, ga, each (T, n)
         """
+        gathered, weights = self.robot.gathered, self.robot.spread_rows(weights)
         if KERNELS is None:
-            return self._pull_back_by_passes(q, v, a, weights)
-        states = [np.ascontiguousarray(part, dtype=float) for part in (v, a, weights)]
-        found = np.empty((3, len(q), self.robot.n))
+            gq, gv, ga = self._pull_back_by_passes(q, v, a, weights)
+            return gathered(gq), gathered(gv), gathered(ga)
+        found = np.empty((3, len(q), len(self._moved)))
         KERNELS.call(
             "pull_back", *self._structure, _BY_SPIN, _BY_SPIN_TWICE,
-            *self._kinematics.placements(q), *states, *found,
+            *self._kinematics.placements(q), *self._all_rates(v, a),
+            np.ascontiguousarray(weights, dtype=float), *found,
         )  # fmt: skip
-        return found[0], found[1], found[2]
+        return gathered(found[0]), gathered(found[1]), gathered(found[2])
 
     def _pull_back_by_passes(
         self, q: Array, v: Array, a: Array, weights: Array
     ) -> tuple[Array, Array, Array]:
-        """`pull_back_dense` in NumPy, all samples at once."""
-        robot, moved = self.robot, self.robot.moved
-        samples, rows = len(q), len(robot.rows)
+        """`pull_back_dense` of the tree in NumPy, all samples at once."""
+        robot, moved = self.robot, self._moved
+        samples, rows = len(q), len(self._rows)
         motion = self.body_motion(q, v, a)
         by_body = np.ascontiguousarray(
             weights.reshape(samples, rows, robot.n_bodies, 10).transpose(0, 2, 1, 3)
@@ -198,21 +206,21 @@ class SpatialAdjoint:
 
     def body_motion(self, q: Array, v: Array, a: Array) -> BodyMotion:
         """Velocities and accelerations (gravity included) of all bodies in the world frame."""
-        robot = self.robot
+        moved, (v, a) = self._moved, self._all_rates(v, a)
         rotations, translations = self._kinematics.placements(q)
         columns = self._kinematics.axes(rotations, translations)
-        moving = self._carried[:, robot.moved]
-        speeds = columns[:, robot.moved] * v[..., None]
+        moving = self._carried[:, moved]
+        speeds = columns[:, moved] * v[..., None]
         velocity = moving @ speeds
         rates = motion_cross(velocity[:, self._dof_body], columns)
-        accelerations = columns[:, robot.moved] * a[..., None]
-        accelerations += rates[:, robot.moved] * v[..., None]
+        accelerations = columns[:, moved] * a[..., None]
+        accelerations += rates[:, moved] * v[..., None]
         acceleration = moving @ accelerations + self._gravity
         return BodyMotion(rotations, translations, columns, rates, velocity, acceleration)
 
     def _local_columns(self, motion: BodyMotion, turned: Array) -> Array:
         """S_i^(j) for the measured rows i, zero unless i carries j: (T, B, 6, R)."""
-        rows = self.robot.rows
+        rows = self._rows
         columns = motion.columns[:, rows].transpose(0, 2, 1)
         samples, bodies = turned.shape[:2]
         flat = turned.reshape(samples, bodies * 3, 3)
@@ -226,8 +234,7 @@ class SpatialAdjoint:
     def _carried_forces(
         self, motion: BodyMotion, velocity: Array, acceleration: Array, by_body: Array
     ) -> Array:
-        """Σ_{i < l} S_i ×* Σ_{j ≥ l} f_j(Z_ij) for the moved joints l: (T, n, 6)."""
-        robot = self.robot
+        """Σ_{i < l} S_i ×* Σ_{j ≥ l} f_j(Z_ij) for the moved joints l: (T, m, 6)."""
         forces = body_regressors(velocity, acceleration) @ by_body.transpose(0, 1, 3, 2)
         linear = motion.rotations @ forces[:, :, :3]
         angular = motion.rotations @ forces[:, :, 3:]
@@ -235,9 +242,9 @@ class SpatialAdjoint:
         angular += moments.swapaxes(2, 3)
         world = np.concatenate([linear, angular], axis=2)
         samples, bodies = world.shape[:2]
-        summed = self._carried[:, robot.moved].T @ world.reshape(samples, bodies, -1)
-        summed = summed.reshape(samples, robot.n, 6, -1) * self._strict[:, None, :]
-        outer = summed @ motion.columns[:, None, robot.rows]
+        summed = self._carried[:, self._moved].T @ world.reshape(samples, bodies, -1)
+        summed = summed.reshape(samples, len(self._moved), 6, -1) * self._strict[:, None, :]
+        outer = summed @ motion.columns[:, None, self._rows]
         linear = _axial(outer[..., :3, 3:])
         angular = _axial(outer[..., :3, :3]) + _axial(outer[..., 3:, 3:])
         return np.concatenate([linear, angular], axis=-1)

@@ -21,11 +21,9 @@ def whole_parameters(robot: Robot) -> Array:
 def body_names(robot: Robot) -> tuple[tuple[str, ...], ...]:
     """Names of every body from body 0 on: its joint, or `base`; then the links it consists of."""
     links = links_by_joint(robot)
-    first = int(robot.model.njoints) - robot.n
     base = ("base", *links.get("", []))
     still = ((), base) if robot.floating else (base,)
-    moved = [str(name) for name in robot.model.names[first:]]
-    return (*still, *((name, *links.get(name, [])) for name in moved))
+    return (*still, *((name, *links.get(name, [])) for name in robot.tree.joint_names))
 
 
 def drawn_states(robot: Robot, count: int = 30, seed: int = 0) -> States:

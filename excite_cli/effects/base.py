@@ -447,9 +447,7 @@ class Effect(ABC):
 
 def neighbours(robot: Robot) -> list[tuple[int, ...]]:
     """Pairs (j, k), j < k, of moved joints of which k is carried by j directly."""
-    first = int(robot.model.njoints) - robot.n
-    parents = [int(robot.model.parents[first + k]) - first for k in range(robot.n)]
-    return [(parent, k) for k, parent in enumerate(parents) if parent >= 0]
+    return [(parent, k) for k, parent in enumerate(robot.parents) if parent >= 0]
 
 
 def steps_by_ratio(value: float, ratios: Sequence[float]) -> list[float]:

@@ -165,8 +165,15 @@ def declared_effects(specs: tuple[EffectSpec, ...] | None, robot: Robot) -> tupl
 
 
 def urdf_friction(robot: Robot) -> tuple[tuple[Effect, ...], Array]:
-    """Effects of the URDF's <dynamics> (damping, friction), and their parameters (k,) there."""
-    damping, friction = (x[robot.moved] for x in (robot.model.damping, robot.model.friction))
+    """Effects of the URDF's <dynamics> (damping, friction), and their parameters (k,) there.
+
+    Friction of joints that follow others is felt by their drivers, which turn 1/multiplier as fast.
+    """
+    tree = robot.tree
+    damping, friction = (x[tree.moved] for x in (robot.model.damping, robot.model.friction))
+    if robot.coupling is not None:
+        shares = np.abs(robot.coupling.matrix)
+        damping, friction = damping @ shares**2, friction @ shares
     damped, dry = np.flatnonzero(damping > 0), np.flatnonzero(friction > 0)
     effects = (
         *(ViscousFriction((int(j),)) for j in damped),

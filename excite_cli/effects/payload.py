@@ -70,7 +70,7 @@ class Payload(Effect):
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
     ) -> None:
         """The body that carries it has more inertia."""
-        robot.phi[self._ten(robot.robot.n, len(robot.phi))] += values
+        robot.phi[self.ten(robot.robot)] += values
 
     def rows(self, n: int) -> tuple[int, ...]:
         """All joints."""
@@ -78,18 +78,17 @@ class Payload(Effect):
 
     def columns(self, signals: Signals) -> Array:
         """Ten columns of Y, (T, n, 10)."""
-        regressor = signals.body.regressor
-        return regressor[:, :, self._ten(regressor.shape[1], regressor.shape[2])]
+        return signals.body.regressor[:, :, self.ten(signals.body.robot)]
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """The weights, in the ten columns of Y."""
         back = np.zeros_like(signals.body.regressor)
-        back[:, :, self._ten(back.shape[1], back.shape[2])] = weights
+        back[:, :, self.ten(signals.body.robot)] = weights
         return Cotangents(regressor=back)
 
-    def _ten(self, n: int, count: int) -> slice:
-        """Where φ, of `count` entries, has the body that carries it; moved bodies are the last."""
-        first = count + PARAMETERS_PER_BODY * (self.joints[-1] - n)
+    def ten(self, robot: Robot) -> slice:
+        """Where φ has the body that carries it."""
+        first = PARAMETERS_PER_BODY * (robot.model_joints[self.joints[-1]] - 1)
         return slice(first, first + PARAMETERS_PER_BODY)
 
     def seen_from(self, link: LinkFrame) -> Array:

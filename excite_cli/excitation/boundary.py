@@ -122,6 +122,8 @@ def posture_of(robot: Robot, given: Posture, where: str) -> Array:
     for name, value in {} if given == "posture" else dict(given).items():
         if name not in robot.joint_names:
             why = "does not move (robot.joints)" if name in robot.locked else "is unknown"
+            if name in robot.tree.joint_names:
+                why = "follows another joint (mimic)"
             raise ConfigError(
                 f"{where}: joint '{name}' {why}.{nearest(name, robot.joint_names)} Moved joints: "
                 f"{', '.join(robot.joint_names)}."

@@ -52,12 +52,13 @@ def c_model(
         "EFFECTS": _lines(in_words(kept.effects, names).split("; ") if kept.effects else ()),
         "LEFT": _lines(in_words(left, names).split("; ") if left else ()),
         "N": str(robot.n),
+        "M": str(len(tree.joints)),
         "NCOLUMNS": str(len(columns)),
         "WIDTH": repr(WIDTH),
         "RATES": str(int(any("_rate" in code or "load_bend" in code for _, code in codes))),
         "TREE": _tree(tree),
         "BODIES": _bodies(kept.phi, tree),
-        "LOADED": _bodies(kept.phi + kept.carried(robot.n), tree),
+        "LOADED": _bodies(kept.phi + kept.carried(robot), tree),
         "DETECTOR": "" if thresholds is None else detector_in_c(thresholds, _TESTED, _STEP),
         "GRAVITY": reals(tree.gravity),
         "ROBOT_EFFECTS": _code(codes, defects=False),
@@ -86,7 +87,8 @@ def _code(codes: list[tuple[Effect, str]], defects: bool) -> str:
 def _tree(tree: Tree) -> str:
     rows = (
         f"    {{{joint.parent}, {int(joint.sliding)}, {{{reals(joint.rotation)}}}, "
-        f"{{{reals(joint.position)}}}, {{{reals(joint.axis)}}}}}"
+        f"{{{reals(joint.position)}}}, {{{reals(joint.axis)}}}, "
+        f"{joint.driver}, {joint.multiplier!r}, {joint.offset!r}}}"
         for joint in tree.joints
     )
     return ",\n".join(rows)

@@ -1,7 +1,9 @@
 """A MuJoCo model (MJCF) of the moved joints with identified inertias and joint effects.
 
-The kinematic tree, one body per moved joint, no shapes and no actuators: MuJoCo's inverse dynamics
-of it gives the identified torque. A floating base stands at its reference.
+The kinematic tree, one body per joint that moves, no shapes and no actuators: MuJoCo's inverse
+dynamics of it gives the identified torque. A floating base stands at its reference. Joints that
+follow others (mimic) are coupled by <equality>, which MuJoCo's inverse dynamics leaves out: add
+their torques to their drivers', times the multiplier.
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -36,24 +38,26 @@ def mjcf(robot: Robot, model: IdentifiedModel) -> ModelText:
         A body has inertias that MuJoCo refuses, since no mass distribution has them.
     """
     tree = tree_of(robot)
-    phi = model.phi + model.carried(robot.n)
+    phi = model.phi + model.carried(robot)
     parts, left = _parts(robot, model, tree.gravity)
     root = ElementTree.Element("mujoco", {"model": robot.name})
     ElementTree.SubElement(root, "compiler", {"angle": "radian", "autolimits": "false"})
     ElementTree.SubElement(root, "option", {"gravity": vector(parts.gravity)})
     world = ElementTree.SubElement(root, "worldbody")
     placed: list[ElementTree.Element] = []
-    for j, joint in enumerate(tree.joints):
+    for k, joint in enumerate(tree.joints):
         parent = world if joint.parent < 0 else placed[joint.parent]
-        body = _body(parent, joint, phi[_ten(tree, j)])
-        limits = _limits(robot, j)
+        body = _body(parent, joint, phi[_ten(tree, k)])
         kind = "slide" if joint.sliding else "hinge"
-        settings = {"name": joint.name, "type": kind, "axis": vector(joint.axis), **limits}
-        settings.update(_attributes(parts.joints[j]))
+        settings = {"name": joint.name, "type": kind, "axis": vector(joint.axis)}
+        if joint.name in robot.joint_names:
+            settings.update(_limits(robot, joint.driver))
+            settings.update(_attributes(parts.joints[joint.driver]))
         joint_element = ElementTree.Element("joint", settings)
         body.insert(1, joint_element)
         placed.append(body)
     _add_tendons(root, robot, parts)
+    _add_couplings(root, robot, tree)
     ElementTree.indent(root)
     notes = ["shapes, actuators and sensors are not in it"]
     if robot.payload is not None:
@@ -157,6 +161,19 @@ def _attributes(own: dict[str, float]) -> dict[str, str]:
         powers.pop()
     told = {name: number(x) for name, x in own.items() if not name.startswith("damping")}
     return {**told, "damping": vector(np.array(powers))} if any(powers) else told
+
+
+def _add_couplings(root: ElementTree.Element, robot: Robot, tree: Tree) -> None:
+    """The joints that follow others, and what they follow."""
+    followers = [joint for joint in tree.joints if joint.name not in robot.joint_names]
+    if not followers:
+        return
+    coupled = ElementTree.SubElement(root, "equality")
+    for joint in followers:
+        told = {"joint1": joint.name, "joint2": robot.joint_names[joint.driver]}
+        factors = vector(np.array([joint.offset, joint.multiplier, 0.0, 0.0, 0.0]))
+        hard = {"solref": "0.004 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
+        ElementTree.SubElement(coupled, "joint", {**told, "polycoef": factors, **hard})
 
 
 def _add_tendons(root: ElementTree.Element, robot: Robot, parts: MjcfParts) -> None:

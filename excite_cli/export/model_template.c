@@ -37,6 +37,7 @@ typedef double real;
 #define EXCITE_JOINTS @N@
 #define EXCITE_COLUMNS @NCOLUMNS@
 #define N EXCITE_JOINTS
+#define M @M@ /* with the joints that follow others */
 #define SIGN(x) tanh((x) / R(@WIDTH@))
 #define RATES @RATES@ /* some effect looks at rates of torques */
 
@@ -53,21 +54,23 @@ typedef struct {
 typedef struct {
     int parent, slides;      /* parent -1: the world */
     real rotation[9], position[3], axis[3];
+    int driver;              /* it stands at multiplier * q[driver] + offset */
+    real multiplier, offset;
 } joint_of;
 
-static const joint_of JOINT[N] = {
+static const joint_of JOINT[M] = {
 @TREE@
 };
 /* Mass, first moment, inertia (xx, xy, yy, xz, yz, zz) about the joint's frame. */
-static const real BODY[N][10] = {
+static const real BODY[M][10] = {
 @BODIES@
 };
 /* The same with what the links carry. */
-static const real LOADED[N][10] = {
+static const real LOADED[M][10] = {
 @LOADED@
 };
 static const real GRAVITY[3] = {@GRAVITY@};
-static const real STILL[N] = {0};
+static const real STILL[M] = {0};
 
 static void cross(const real *x, const real *y, real *out)
 {
@@ -111,14 +114,30 @@ static void out_of(const real *r, const real *x, real *out) /* out += r x */
         out[i] += r[3 * i] * x[0] + r[3 * i + 1] * x[1] + r[3 * i + 2] * x[2];
 }
 
-/* Recursive Newton-Euler; every body by its ten parameters, in which it is linear. */
-static void rigid(
-    const real body[N][10], const real *gravity, const real *q, const real *v, const real *a, real *tau)
+static void spread(const real *q, const real *v, const real *a, real all[3][M])
 {
-    real r[N][9], p[N][3], w[N][3], dw[N][3], acc[N][3], f[N][3], n[N][3];
+    for (int j = 0; j < M; ++j) {
+        const int driver = JOINT[j].driver;
+        all[0][j] = JOINT[j].multiplier * q[driver] + JOINT[j].offset;
+        all[1][j] = JOINT[j].multiplier * v[driver];
+        all[2][j] = JOINT[j].multiplier * a[driver];
+    }
+}
+
+static void gather(const real *all, real *out) /* out += what the followers ask of their drivers */
+{
+    for (int j = 0; j < M; ++j)
+        out[JOINT[j].driver] += JOINT[j].multiplier * all[j];
+}
+
+/* Recursive Newton-Euler; every body by its ten parameters, in which it is linear. */
+static void rigid_of_all(
+    const real body[M][10], const real *gravity, const real *q, const real *v, const real *a, real *tau)
+{
+    real r[M][9], p[M][3], w[M][3], dw[M][3], acc[M][3], f[M][3], n[M][3];
     static const real zero[3] = {0, 0, 0};
     const real up[3] = {-gravity[0], -gravity[1], -gravity[2]};
-    for (int j = 0; j < N; ++j) {
+    for (int j = 0; j < M; ++j) {
         const int parent = JOINT[j].parent;
         const real *u = JOINT[j].axis, *ten = body[j];
         const real *w0 = parent < 0 ? zero : w[parent], *dw0 = parent < 0 ? zero : dw[parent];
@@ -159,7 +178,7 @@ static void rigid(
         for (int i = 0; i < 3; ++i)
             n[j][i] = moment[i] + x[i] + y[i];
     }
-    for (int j = N - 1; j >= 0; --j) {
+    for (int j = M - 1; j >= 0; --j) {
         const int parent = JOINT[j].parent;
         const real *u = JOINT[j].axis, *felt = JOINT[j].slides ? f[j] : n[j];
         tau[j] = u[0] * felt[0] + u[1] * felt[1] + u[2] * felt[2];
@@ -176,14 +195,24 @@ static void rigid(
     }
 }
 
+static void rigid(
+    const real body[M][10], const real *gravity, const real *q, const real *v, const real *a, real *tau)
+{
+    real all[3][M], torque[M];
+    spread(q, v, a, all);
+    rigid_of_all(body, gravity, all[0], all[1], all[2], torque);
+    memset(tau, 0, N * sizeof(real));
+    gather(torque, tau);
+}
+
 /* x dtau/dq_j + y dtau/dv_j + z dtau/da_j of the rigid bodies, exactly: torque is a polynomial of
  * second degree in v_j and in a sliding q_j, linear in a_j, and has angles q_j and 2 q_j only. */
-static inline void slopes(
+static inline void slopes_of_all(
     const real *q, const real *v, const real *a, int j, real x, real y, real z, real *out)
 {
-    real state[N], ahead[N], behind[N];
+    real state[M], ahead[M], behind[M];
     const real none[3] = {0, 0, 0};
-    memset(out, 0, N * sizeof(real));
+    memset(out, 0, M * sizeof(real));
     memcpy(state, q, sizeof(state));
     if (x != 0) {
         const real near = R(0.78539816339744830962), far = R(1.57079632679489661923);
@@ -193,29 +222,44 @@ static inline void slopes(
             if (weight[k] == 0)
                 continue;
             state[j] = q[j] + shift[k];
-            rigid(BODY, GRAVITY, state, v, a, ahead);
+            rigid_of_all(BODY, GRAVITY, state, v, a, ahead);
             state[j] = q[j] - shift[k];
-            rigid(BODY, GRAVITY, state, v, a, behind);
-            for (int i = 0; i < N; ++i)
+            rigid_of_all(BODY, GRAVITY, state, v, a, behind);
+            for (int i = 0; i < M; ++i)
                 out[i] += x * weight[k] * (ahead[i] - behind[i]);
         }
     }
     if (y != 0) {
         memcpy(state, v, sizeof(state));
         state[j] = v[j] + 1;
-        rigid(BODY, none, q, state, STILL, ahead);
+        rigid_of_all(BODY, none, q, state, STILL, ahead);
         state[j] = v[j] - 1;
-        rigid(BODY, none, q, state, STILL, behind);
-        for (int i = 0; i < N; ++i)
+        rigid_of_all(BODY, none, q, state, STILL, behind);
+        for (int i = 0; i < M; ++i)
             out[i] += y * R(0.5) * (ahead[i] - behind[i]);
     }
     if (z != 0) {
         memset(state, 0, sizeof(state));
         state[j] = z;
-        rigid(BODY, none, q, STILL, state, ahead);
-        for (int i = 0; i < N; ++i)
+        rigid_of_all(BODY, none, q, STILL, state, ahead);
+        for (int i = 0; i < M; ++i)
             out[i] += ahead[i];
     }
+}
+
+/* The same of joint j with all that follow it. */
+static inline void slopes(
+    const real *q, const real *v, const real *a, int j, real x, real y, real z, real *out)
+{
+    real all[3][M], own[M];
+    spread(q, v, a, all);
+    memset(out, 0, N * sizeof(real));
+    for (int k = 0; k < M; ++k)
+        if (JOINT[k].driver == j) {
+            const real m = JOINT[k].multiplier;
+            slopes_of_all(all[0], all[1], all[2], k, m * x, m * y, m * z, own);
+            gather(own, out);
+        }
 }
 
 /* What gravity does more where the base is turned about the two axes that it is least along. */
@@ -240,10 +284,11 @@ static inline void tilted(real roll, real pitch, const real *q, real *out)
 /* J' f of a force in the world's axes at the frame of the last joint. */
 static inline void pushed(const real *force, const real *q, real *out)
 {
-    real r[N][9], p[N][3];
-    for (int j = 0; j < N; ++j) {
+    real all[3][M], r[M][9], p[M][3];
+    spread(q, STILL, STILL, all);
+    for (int j = 0; j < M; ++j) {
         const int parent = JOINT[j].parent;
-        place(j, q[j], r[j], p[j]);
+        place(j, all[0][j], r[j], p[j]);
         if (parent >= 0) {
             real own[9], at[3];
             memcpy(own, r[j], sizeof(own));
@@ -257,14 +302,15 @@ static inline void pushed(const real *force, const real *q, real *out)
         }
     }
     memset(out, 0, N * sizeof(real));
-    for (int j = N - 1; j >= 0; j = JOINT[j].parent) {
+    for (int j = M - 1; j >= 0; j = JOINT[j].parent) {
         real axis[3] = {0, 0, 0}, arm[3], moved[3];
         out_of(r[j], JOINT[j].axis, axis);
         for (int i = 0; i < 3; ++i)
-            arm[i] = p[N - 1][i] - p[j][i];
+            arm[i] = p[M - 1][i] - p[j][i];
         cross(axis, arm, moved);
         const real *way = JOINT[j].slides ? axis : moved;
-        out[j] = way[0] * force[0] + way[1] * force[1] + way[2] * force[2];
+        out[JOINT[j].driver] += JOINT[j].multiplier
+            * (way[0] * force[0] + way[1] * force[1] + way[2] * force[2]);
     }
 }
 

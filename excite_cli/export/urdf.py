@@ -97,10 +97,11 @@ def _link_of(joint: ElementTree.Element, end: str) -> str:
 def _lumped(robot: Robot, root: ElementTree.Element, carried: str) -> list[str]:
     """Links that move with `carried`, without itself: over fixed and locked joints."""
     found, left = [], [carried]
+    moving = robot.tree.joint_names
     while left:
         link = left.pop()
         for joint in root.findall("joint"):
-            if _link_of(joint, "parent") == link and joint.get("name") not in robot.joint_names:
+            if _link_of(joint, "parent") == link and joint.get("name") not in moving:
                 left.append(_link_of(joint, "child"))
                 found.append(left[-1])
     return found
@@ -191,7 +192,10 @@ def _write(link: ElementTree.Element, ten: Array) -> None:
 
 
 def _friction(robot: Robot, root: ElementTree.Element, model: IdentifiedModel) -> list[str]:
-    """Write <dynamics> of every moved joint; return what did not fit in."""
+    """Write <dynamics> of every moved joint; return what did not fit in.
+
+    Friction of joints that follow others was found at their drivers, and is written there.
+    """
     held: dict[str, dict[str, float]] = {name: {} for name in robot.joint_names}
     left: list[Effect] = []
     for effect, values in model.by_effect:
@@ -202,6 +206,7 @@ def _friction(robot: Robot, root: ElementTree.Element, model: IdentifiedModel) -
         of_joint = held[robot.joint_names[effect.joints[0]]]
         for key, value in attributes.items():
             of_joint[key] = of_joint.get(key, 0.0) + value
+    held |= {name: {} for of_joint in robot.followers for name in of_joint}
     for joint in root.findall("joint"):
         found = held.get(joint.get("name", ""))
         dynamics = joint.find("dynamics")

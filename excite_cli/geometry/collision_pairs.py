@@ -18,9 +18,10 @@ from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.mesh_pairs import joined_links
 from excite_cli.geometry.pair_choice_cache import choice_key, store_reasons, stored_reasons
-from excite_cli.geometry.pair_distances import PairDistances, carried_bodies
+from excite_cli.geometry.pair_distances import PairDistances
 from excite_cli.geometry.reasons import NEVER, DroppedPair, LinksApart, Reason, Why
 from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.carried import MovedBodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]
@@ -98,13 +99,13 @@ class _Known:
     """What the structure of the robot and the config say about a pair."""
 
     def __init__(self, robot: Robot, spec: SelfCollisionSpec) -> None:
-        self._carried = carried_bodies(robot)
+        self._moved = MovedBodies(robot)
         self._neighbours = joined_links(robot)
         self._ignored = {frozenset(pair) for pair in spec.ignore}
         self._by_meshes = {frozenset(pair) for pair in spec.by_meshes}
 
     def reason(self, first: Capsule, second: Capsule) -> Reason | None:
-        between = int(np.abs(self._carried[first.joint] - self._carried[second.joint]).sum())
+        between = len(self._moved.between(first.joint, second.joint))
         links = {frozenset((one, two)) for one in first.links for two in second.links}
         if between == 0:
             return Reason(Why.SAME_BODY)
@@ -163,13 +164,13 @@ def _by_meshes(
 
     doubtful: pair of capsules by column of the sample, which is positions and their distances.
     """
-    carried = carried_bodies(robot)
+    between = MovedBodies(robot)
     meshes: MeshDistances | None = None
     known: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = {}
     q, distances = sample
     for k, pair in doubtful.items():
         first, second = (capsules[index] for index in pair)
-        moved = np.flatnonzero(carried[first.joint] != carried[second.joint])
+        moved = between.between(first.joint, second.joint)
         if len(moved) > _FEW_JOINTS:
             continue
         meshes = meshes or MeshDistances(robot)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.geometry.link_meshes import LinkMesh, Part, Poses
-from excite_cli.geometry.pair_distances import carried_bodies
 from excite_cli.geometry.reasons import Standing
+from excite_cli.robot.carried import MovedBodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]
@@ -121,13 +121,13 @@ def movable_pairs(
 
     Left out are links that a joint of the URDF joins directly and pairs in `ignore`.
     """
-    carried = carried_bodies(robot)
+    moved = MovedBodies(robot)
     left_out = {frozenset(pair) for pair in ignore} | joined_links(robot)
     pairs = []
     for i, first in enumerate(meshes):
         for j, second in enumerate(meshes[i + 1 :], i + 1):
-            still = np.array_equal(carried[first.joint], carried[second.joint])
-            if not still and frozenset((first.link, second.link)) not in left_out:
+            moving = len(moved.between(first.joint, second.joint)) > 0
+            if moving and frozenset((first.link, second.link)) not in left_out:
                 pairs.append((i, j))
     return pairs
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from excite_cli.dynamics.states import States
 from excite_cli.geometry.obstacles import Box, Obstacle
-from excite_cli.geometry.pair_distances import carried_bodies
 from excite_cli.geometry.world_segments import CapsuleAxes, WorldSegments
 from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.carried import carried_bodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ class ObstacleDistances:
         self._radii = radius[self._capsule]
         ball = radius + 0.5 * np.linalg.norm(self._axes.along, axis=1)
         self._balls = ball[self._capsule]
-        self._carried = carried_bodies(robot)[self._axes.joints][self._capsule]  # (P, n)
+        self._carried = carried_bodies(robot)[self._axes.joints][self._capsule]  # (P, m)
         self._groups = [
             (obstacle, np.flatnonzero(self._thing == index))
             for index, obstacle in enumerate(obstacles)
@@ -102,5 +102,5 @@ class ObstacleDistances:
             contact = obstacle.contacts(start, along)
             normal[:, some], point[:, some] = contact.normal, start + contact.share * along
         wrench = np.hstack([normal.T, np.cross(point.T, normal.T)])
-        twists = world.columns()[rows][:, self._robot.moved]  # (K, n, 6)
-        return self._carried[cols] * (twists @ wrench[..., None])[..., 0]
+        twists = world.columns()[rows][:, self._robot.tree.moved]  # (K, m, 6)
+        return self._robot.gathered(self._carried[cols] * (twists @ wrench[..., None])[..., 0])

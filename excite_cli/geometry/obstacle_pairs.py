@@ -19,10 +19,10 @@ from excite_cli.errors import ConfigError, nearest
 from excite_cli.geometry.capsules import link_names
 from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacles import FLOOR, Obstacle
-from excite_cli.geometry.pair_distances import carried_bodies
 from excite_cli.geometry.reasons import DroppedPair, Reason, Why
 from excite_cli.geometry.words import reason_in_words
 from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.carried import MovedBodies
 from excite_cli.robot.model import Array, Robot
 
 _SAMPLES, _SEED = 300, 0
@@ -89,7 +89,8 @@ def choose_obstacle_pairs(
         `spec.ignore` names what is not there, or all that can be reached always touches.
     """
     ignored = ignored_pairs(robot, spec)
-    moved_by = carried_bodies(robot).sum(axis=1)
+    moved = MovedBodies(robot)
+    moved_by = [len(moved.moving(joint)) for joint in range(robot.model.njoints)]
     reach = _Reach(robot)
     possible: list[tuple[int, int]] = []
     dropped: dict[tuple[int, int], Reason] = {}
@@ -110,7 +111,7 @@ def choose_obstacle_pairs(
     for k, (i, j) in enumerate(possible):
         # A payload is no part that was built to touch something.
         if robot.payload is None or capsules[i].name != robot.payload.capsule.name:
-            reason = _inseparable(distances[:, k], spec.margin, int(moved_by[capsules[i].joint]))
+            reason = _inseparable(distances[:, k], spec.margin, moved_by[capsules[i].joint])
             if reason:
                 dropped[i, j] = reason
     left = [k for k, pair in enumerate(possible) if pair not in dropped]
@@ -154,10 +155,9 @@ class _Reach:
         pin.forwardKinematics(model, data, robot.reference)
         self._centers = np.zeros((model.njoints, 3))
         self._radii = np.zeros(model.njoints)
-        first = model.njoints - robot.n
-        travel = np.where(
-            robot.sliding, np.maximum(np.abs(robot.limits.lower), np.abs(robot.limits.upper)), 0.0
-        )
+        first, tree = robot.first_joint, robot.tree
+        limits = tree.limits
+        travel = np.where(tree.sliding, np.maximum(np.abs(limits.lower), np.abs(limits.upper)), 0.0)
         for joint in range(first, model.njoints):
             parent, placement = int(model.parents[joint]), model.jointPlacements[joint]
             if parent < first:

@@ -18,6 +18,7 @@ from excite_cli.geometry.segments import Nearest, nearest_points, normals
 from excite_cli.geometry.world_segments import CapsuleAxes, WorldSegments
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.carried import carried_bodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]
@@ -46,9 +47,9 @@ class PairDistances:
         self._radii = radius[self._first] + radius[self._second]
         ball = radius + 0.5 * np.linalg.norm(self._axes.along, axis=1)
         self._balls = ball[self._first] + ball[self._second]
-        carried = carried_bodies(robot)[self._axes.joints]  # (C, n)
+        carried = carried_bodies(robot)[self._axes.joints]  # (C, m)
         self._sign = carried[self._second] - carried[self._first]
-        self._moved = np.array(robot.moved, dtype=np.int64)
+        self._moved = np.array(robot.tree.moved, dtype=np.int64)
 
     @property
     def n_pairs(self) -> int:
@@ -110,9 +111,8 @@ class PairDistances:
     def gradients(self, q: Array | States, rows: Indices, cols: Indices) -> Array:
         """Derivatives (K, n) of the distance at instant rows[k] of pair cols[k] by q."""
         world = self._axes.in_world(q)
-        if KERNELS is not None:
-            return self._compiled_gradients(world, rows, cols)
-        return self._gradients(world, rows, cols)
+        by_passes = self._gradients if KERNELS is None else self._compiled_gradients
+        return self._robot.gathered(by_passes(world, rows, cols))
 
     def _compiled_gradients(self, world: WorldSegments, rows: Indices, cols: Indices) -> Array:
         assert KERNELS is not None
@@ -136,7 +136,7 @@ class PairDistances:
         normal = normals(nearest, along, along_second).T
         point = (start + nearest.share_first * along + 0.5 * nearest.gap).T
         wrench = np.hstack([normal, np.cross(point, normal)])
-        twists = world.columns()[rows][:, self._robot.moved]  # (K, n, 6)
+        twists = world.columns()[rows][:, self._moved]  # (K, m, 6)
         return self._sign[cols] * (twists @ wrench[..., None])[..., 0]
 
     def _nearest_at(
@@ -151,16 +151,3 @@ class PairDistances:
 
 def _length(gap: Array) -> Array:
     return np.sqrt(gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2])
-
-
-def carried_bodies(robot: Robot) -> Array:
-    """(njoints, n) of 0 and 1: does moved joint k carry what is attached to joint j?"""
-    model = robot.model
-    carried = np.zeros((model.njoints, robot.n))
-    first = int(robot.moved[0])
-    for joint in range(1, model.njoints):
-        carried[joint] = carried[model.parents[joint]]
-        column = model.joints[joint].idx_v - first
-        if column >= 0:
-            carried[joint, column] = 1.0
-    return carried

@@ -23,10 +23,10 @@ from excite_cli.geometry.hull_bounds import hull_bounds
 from excite_cli.geometry.link_meshes import LinkMesh, Poses, link_meshes
 from excite_cli.geometry.link_shapes import collision_model
 from excite_cli.geometry.mesh_pairs import PairMeshes, joined_links, movable_pairs
-from excite_cli.geometry.pair_distances import carried_bodies
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.geometry.reasons import NEVER
 from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.carried import MovedBodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]
@@ -109,11 +109,11 @@ def _neighbours(
     meshes = link_meshes(robot)
     guarded = _guarded(capsules, pairs)
     by_hand = {link for capsule in capsules if capsule.by_hand for link in capsule.links}
-    carried = carried_bodies(robot)
+    moved = MovedBodies(robot)
     for i, j in movable_pairs(robot, meshes, ignore):
         both = (meshes[i], meshes[j])
         names = {both[0].link, both[1].link}
-        joints = np.flatnonzero(carried[both[0].joint] != carried[both[1].joint])
+        joints = moved.between(both[0].joint, both[1].joint)
         if len(joints) <= 2 and frozenset(names) not in guarded and not names & by_hand:
             yield both, joints
 
@@ -136,7 +136,7 @@ def require_tabled(
         return
     meshes = {mesh.link: mesh for mesh in link_meshes(robot)}
     by_hand = {link for capsule in capsules if capsule.by_hand for link in capsule.links}
-    carried = carried_bodies(robot)
+    moved = MovedBodies(robot)
     for pair in pairs:
         where = f"constraints.self_collision.by_meshes: {pair[0]} – {pair[1]}"
         if not set(pair) <= set(meshes) or set(pair) & by_hand:
@@ -146,7 +146,7 @@ def require_tabled(
         if frozenset(pair) in joined_links(robot):
             raise ConfigError(f"{where}: a joint joins them, so they are not kept apart at all.")
         one, two = meshes[pair[0]], meshes[pair[1]]
-        joints = int((carried[one.joint] != carried[two.joint]).sum())
+        joints = len(moved.between(one.joint, two.joint))
         if joints == 0:  # they stand still towards each other
             continue
         if joints > 2 or robot.n < 2:

@@ -22,8 +22,8 @@ class RelativeReach:
 
     def __init__(self, robot: Robot) -> None:
         model = robot.model
-        first = int(robot.moved[0])
-        self._columns = [model.joints[j].idx_v - first if j else -1 for j in range(model.njoints)]
+        self._robot, first = robot, robot.first_joint
+        self._columns = [max(j - first, -1) for j in range(model.njoints)]
         self._supports = [list(model.supports[j])[1:] for j in range(model.njoints)]
         self.axes = np.zeros((model.njoints, 3))
         for joint in range(1, model.njoints):
@@ -41,7 +41,7 @@ class RelativeReach:
 
     def at(self, poses: Poses, change: Array) -> "ReachAt":
         """The same for many pairs of links at K middles."""
-        return ReachAt(self, poses, change)
+        return ReachAt(self, poses, np.abs(self._robot.all_rates(change)))
 
     def path(self, first: int, second: int) -> list[int]:
         """Moved joints between two joints, in order from the first to the second."""
@@ -53,7 +53,7 @@ class RelativeReach:
         return self._paths[first, second]
 
     def turn(self, joint: int, change: Array) -> Array:
-        """The change (K,) of a joint out of those of all (K, n)."""
+        """The change (K,) of a joint of the model out of those of all that move (K, m)."""
         return change[:, self._columns[joint]]
 
 

@@ -34,6 +34,7 @@ from excite_cli.identification.regression import (
     signals_of,
     with_effects,
 )
+from excite_cli.identification.weak_directions import WeakDirections, weak_directions
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.record import Shown
@@ -57,7 +58,8 @@ class Fit(Shown):
     [N·m] of the filtered torque. `phi` (P,) full standard parameters with these base parameters,
     nearest to the URDF's; `consistent` those of real bodies, and `links` what these are beside the
     URDF's (none without them). `samples`: independent ones that the data are worth, of `count`.
-    With the URDF's inertias kept, nothing is dropped: `essential` is `identifiable`.
+    With the URDF's inertias kept, nothing is dropped: `essential` is `identifiable`. `kept`: names
+    of base parameters that the data hardly show and that keep to the URDF for that.
     """
 
     method: str
@@ -80,6 +82,7 @@ class Fit(Shown):
     samples: float
     consistent: ConsistentParameters | None = None
     links: tuple[LinkChange, ...] = ()
+    kept: tuple[str, ...] = ()
 
     @property
     def base_values(self) -> Array:
@@ -147,8 +150,8 @@ def fit(
     keep = spec.inertias == "cad"
     prior = inertial_prior(robot, cad, spec.uncertainty if keep else 1.0)
     more = np.column_stack(known) if known is not None and len(known[0]) else None
-    regression, linear = _settled(regression, spec, (prior if keep else None, more), prior)
-    found = _record(regression, spec, linear, prior)
+    regression, linear, weak = _settled(regression, spec, (prior if keep else None, more), prior)
+    found = _record(regression, spec, linear, weak, prior)
     if not spec.consistent:
         return found
     share = np.sqrt(np.clip(linear.samples / max(int(linear.count.sum()), 1), 0.0, 1.0))
@@ -172,26 +175,29 @@ def _settled(
     spec: IdentificationSpec,
     known: tuple[InertialPrior | None, Array | None],
     completion: InertialPrior,
-) -> tuple[Regression, LinearFit]:
+) -> tuple[Regression, LinearFit, WeakDirections | None]:
     """Fit, with columns that follow the model rebuilt until their torque settles.
 
-    `known`: the prior on inertias, and rows [A b] on all parameters.
+    `known`: the prior on inertias, and rows [A b] on all parameters. Without a prior, directions
+    that the data hardly show keep to the URDF.
     """
     base, (prior, more) = regression.base, known
     k = sum(len(effect.parameters) for effect in regression.effects)
     given = [] if more is None else [more]
     if prior is not None:
-        rows, target = prior.on_base(base)
-        given.append(np.column_stack([rows, np.zeros((len(rows), k)), target]))
-    extra = None
-    if given:
-        both = np.concatenate(given)
-        extra = both[:, :-1], both[:, -1]
+        whiten, target = prior.on_base(base)
+        given.append(np.column_stack([whiten, np.zeros((len(whiten), k)), target]))
     usual = np.sqrt(np.square(base.mapping) @ np.square(completion.std))
     sizes = np.append(usual, [p.high for p in effect_parameters(regression.effects)])
-    follow = follows_model(regression)
+    follow, weak = follows_model(regression), None
     for _ in range(_REBUILDS if follow else 1):
-        linear = fit_rows(all_rows(regression.runs), spec.method, extra, sizes)
+        rows = all_rows(regression.runs)
+        linear = fit_rows(rows, spec.method, _together(given), sizes)
+        if prior is None and completion.known:
+            weak = weak_directions(linear, base, completion)
+            if len(weak.rows):
+                of_all = np.insert(weak.rows, [base.rank] * k, 0.0, axis=1)
+                linear = fit_rows(rows, spec.method, _together([*given, of_all]), sizes)
         if not follow:
             break
         before = [run.effects @ linear.x[base.rank :] for run in regression.runs]
@@ -201,7 +207,15 @@ def _settled(
         change = float(np.linalg.norm(np.concatenate(after) - np.concatenate(before)))
         if change <= _SETTLED * max(float(np.linalg.norm(np.concatenate(before))), 1e-12):
             break
-    return regression, linear
+    return regression, linear, weak
+
+
+def _together(given: Sequence[Array]) -> tuple[Array, Array] | None:
+    """Rows [A b] as A and b."""
+    if not given:
+        return None
+    both = np.concatenate(given)
+    return both[:, :-1], both[:, -1]
 
 
 def follows_model(regression: Regression) -> bool:
@@ -246,6 +260,7 @@ def _record(
     regression: Regression,
     spec: IdentificationSpec,
     linear: LinearFit,
+    weak: WeakDirections | None,
     prior: InertialPrior,
 ) -> Fit:
     robot, base, effects = regression.robot, regression.base, regression.effects
@@ -259,6 +274,10 @@ def _record(
         known = std[: base.rank] <= _KNOWN_BEYOND_PRIOR * usual
     else:
         known = (relative[: base.rank] <= _FIXED) | (std[: base.rank] <= _FIXED * usual)
+    kept = np.zeros(base.rank, bool)
+    if weak is not None and len(weak.rows):  # the deviation is then the URDF's
+        kept = weak.deviations > 1.0
+        known &= weak.deviations <= _FIXED
     fixed = (relative[base.rank :] <= _FIXED) | (std[base.rank :] <= smallest)
     identifiable = linear.seen & np.concatenate([known, fixed])
     return Fit(
@@ -290,6 +309,7 @@ def _record(
         phi=prior.completed(base, linear.x[: base.rank]),
         count=int(linear.count.sum()),
         samples=linear.samples,
+        kept=tuple(base.names[index] for index in base.selection[kept]),
     )
 
 

@@ -103,7 +103,7 @@ class IdentifiedModel:
             An effect has no derivatives (`excitable` says so).
         """
         signals = with_effects(self._seen(robot, series), self.effects, self.values)
-        carried = self.carried(robot.n, series.run)
+        carried = self.carried(robot, series.run)
         total = np.zeros((3, *weights.shape))
         onward = weights.copy()  # what reaches the torque, then the load
         for defects in (True, False):
@@ -124,12 +124,12 @@ class IdentifiedModel:
         total += np.array(body.pull_back(onward))
         return total[0], total[1], total[2]
 
-    def carried(self, n: int, run: RunId | None = None) -> Array:
-        """φ (10·n_bodies,) of the bodies among the effects, of `n` moved joints."""
-        count, phi = len(self.phi), np.zeros(len(self.phi))
+    def carried(self, robot: Robot, run: RunId | None = None) -> Array:
+        """φ (10·n_bodies,) of the bodies among the effects."""
+        phi = np.zeros(len(self.phi))
         for effect, values in self.by_effect:
             if effect.carried and effect.active(run or RunId()):
-                first = count + 10 * (effect.joints[-1] - n)
+                first = 10 * (robot.model_joints[effect.joints[-1]] - 1)
                 phi[first : first + 10] += values
         return phi
 

@@ -31,7 +31,7 @@ from excite_cli.identification.identified_model import errors_on
 from excite_cli.identification.implausible_links import implausible
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import noise_floor
-from excite_cli.identification.prepare import prepare_all, require_motion
+from excite_cli.identification.prepare import prepare_all, require_motion, standing_still
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import Regression, build_regression
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
@@ -48,6 +48,7 @@ Tell = Callable[[str], None]
 _SURELY = 3.0
 # Share of a joint's torque on sealed data from which the declared model is doubted.
 _MUCH_LEFT = 0.1
+_TOLD = 6  # names in a sentence
 
 
 @dataclass(frozen=True, repr=False)
@@ -130,6 +131,8 @@ def identify(
         findings=(
             *dataset.findings,
             *assumed_scale(spec.measurement, spec.identification),
+            *standing_still([run.prepared for run in training.runs], robot.joint_names),
+            *_hardly_moved(found),
             *_noticed(found, hausman),
             *_much_left(error),
             *implausible(found.links, found.inertias, found.joint_names),
@@ -210,6 +213,19 @@ def _much_left(error: Errors) -> list[Finding]:
         "something. `excite diagnose` looks for what"
     )
     return [Finding("much_left", "warning", text, "", tuple(much))]
+
+
+def _hardly_moved(found: Fit) -> list[Finding]:
+    """What is taken from the URDF for want of motion."""
+    if not found.kept:
+        return []
+    more = f" and {len(found.kept) - _TOLD} more" if len(found.kept) > _TOLD else ""
+    text = (
+        f"{len(found.kept)} of {found.rank} base parameters hardly show in these data (the URDF "
+        "knows them better even if it is 100% off) and are kept near its values: "
+        f"{', '.join(found.kept[:_TOLD])}{more}."
+    )
+    return [Finding("kept", "note", text)]
 
 
 def _noticed(found: Fit, hausman: Hausman) -> list[Finding]:

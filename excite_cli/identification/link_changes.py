@@ -104,10 +104,10 @@ def link_changes(
 
 def body_names(robot: Robot, body: int) -> tuple[str, str]:
     """Link and joint that stand for a body of φ; those of the root for a floating base."""
-    moved = body - (robot.n_bodies - robot.n)
-    if moved >= 0:
-        return own_link(robot, moved).name, robot.joint_names[moved]
     joint = body + 1
+    moved = joint - robot.first_joint
+    if moved >= 0:
+        return own_link(robot.tree, moved).name, robot.tree.joint_names[moved]
     frames = [str(f.name) for f in robot.model.frames if int(f.parentJoint) == joint]
     root = str(robot.model.names[joint])
     return next((name for name in frames if name != root), root), root

@@ -21,7 +21,7 @@ from excite_cli.identification.averages import (
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.processing import Processing
 from excite_cli.identification.rounding import rounding_of
-from excite_cli.measurement.dataset import Array, Run
+from excite_cli.measurement.dataset import Array, Finding, Run
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.out_of_core import Spool
 from excite_cli.workers.at_hand import each
@@ -303,6 +303,20 @@ def require_motion(
             "all torques are constant: there is nothing to fit. Is this the right channel "
             "(measurement.channels: {tau: …})?"
         )
+
+
+def standing_still(runs: Sequence[PreparedRun], joint_names: Sequence[str]) -> list[Finding]:
+    """What is told of joints that move in none of the runs; nothing where all move."""
+    moving = np.any([run.moving.any(axis=0) for run in runs], axis=0)
+    still = tuple(name for name, moves in zip(joint_names, moving, strict=True) if not moves)
+    if not still:
+        return []
+    text = (
+        f"{', '.join(still)}: {'stands' if len(still) == 1 else 'stand'} still in all of the data "
+        "that are fitted, so that inertias are kept near the URDF's where only that motion shows "
+        "them. Record it, or leave the joint out of robot.joints."
+    )
+    return [Finding("still", "warning", text, "", still)]
 
 
 def _sliding(v: Array, h: float, processing: Processing) -> NDArray[np.bool_]:

@@ -27,6 +27,11 @@ class InertialPrior:
     mean: Array
     std: Array
 
+    @property
+    def known(self) -> bool:
+        """Whether there are any masses to keep to."""
+        return bool((self.mean[::10] > 0.0).any())
+
     def narrowed(self, shares: Array) -> "InertialPrior":
         """The same with deviations multiplied by `shares` (P,)."""
         return InertialPrior(self.mean, shares * self.std)

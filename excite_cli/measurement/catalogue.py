@@ -17,10 +17,11 @@ from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.hdf5_reader import Hdf5Reader
 from excite_cli.measurement.joined_files import is_part, joined
 from excite_cli.measurement.missing_values import known_stamps
+from excite_cli.measurement.motors import Motors
 from excite_cli.measurement.quality import checked
 from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOptions
 from excite_cli.measurement.run_identity import Origin
-from excite_cli.measurement.torque import SECONDS, check_joints, declared, to_joints
+from excite_cli.measurement.torque import SECONDS, check_joints, check_motors, declared, to_joints
 from excite_cli.measurement.units import Limits
 from excite_cli.out_of_core import Spool
 from excite_cli.workers.at_hand import each
@@ -36,13 +37,15 @@ def read_dataset(
     joint_names: tuple[str, ...],
     limits: tuple[Array, Array, Array, Array] | None = None,
     revolute: Array | None = None,
+    motors: Motors | None = None,
     torques: bool = True,
 ) -> Dataset:
     """Read measured files as one data set, converted and checked.
 
     `limits`: lower, upper, velocity, effort of the moved joints, (n,) each, infinite where there is
-    none. `revolute` (n,): which joints turn (default all); angles in degrees are theirs. Without
-    `torques` those of no joint are read, as if all were `without_torque`.
+    none. `revolute` (n,): which joints turn (default all); angles in degrees are theirs. `motors`:
+    those that drive several joints together. Without `torques` those of no joint are read, as if
+    all were `without_torque`.
 
     Findings of severity `error` are returned with the others; `quality.raise_for_errors` turns
     them into an exception.
@@ -58,10 +61,12 @@ def read_dataset(
     """
     if not paths:
         raise FileError("No measured file is given.")
-    check_names(spec.names, joint_names)
+    check_names(spec.names, joint_names if motors is None else (*joint_names, *motors.places))
     if not torques:
         spec = spec.model_copy(update={"without_torque": joint_names, "coupling": {}})
     check_joints(spec, joint_names, torques)
+    if motors is not None:
+        check_motors(spec, motors)
     turning = np.ones(len(joint_names), bool) if revolute is None else np.asarray(revolute, bool)
     known = (
         Limits(*limits, turning)
@@ -72,7 +77,7 @@ def read_dataset(
     options = ReadOptions(
         joint_names, spec.names, channels, spec.rate, spec.topic, torques, spec.of_base
     )
-    findings: list[Finding] = declared(spec, joint_names)
+    findings: list[Finding] = declared(spec, joint_names, motors)
     runs: list[Run] = []
     taken: set[str] = set()
     seen: set[str] = set()
@@ -84,11 +89,12 @@ def read_dataset(
             seen.update(name for raw in raws for column in raw.columns.values() for name in column)
             own, noticed = [], []
             for raw in _named(raws, path, taken):
+                raw = raw if motors is None else motors.renamed(raw, spec)
                 run, more = arrange(raw, joint_names, spec.names, str(path), spec.without_torque)
                 t, epoch = _seconds(raw, spec)
                 run = replace(run, t=t, epoch=epoch, origin=Origin(str(path), raw.place))
                 run = covariates.take(run, raw, spec.names)
-                own.append(to_joints(run, spec, joint_names, turning).kept(spool))
+                own.append(to_joints(run, spec, joint_names, turning, motors).kept(spool))
                 noticed += more
             noted.append(noticed)
             yield path, own

@@ -18,8 +18,11 @@ _SHORTEST = 5  # samples in a row
 _AROUND = 5  # samples before and after that tell whether a joint moves
 
 
-def mask_saturated(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]:
-    """Mark torques at a plateau as not valid; say its level and its share of moving samples."""
+def mask_saturated(run: Run, joints: tuple[str, ...], revolute: Mask) -> tuple[Run, list[Finding]]:
+    """Mark torques at a plateau as not valid; say its level and its share of moving samples.
+
+    `revolute` (n,): which joints turn, and have torques in N·m.
+    """
     if len(run.t) <= 2 * _AROUND:
         return run, []
     valid, findings = run.usable().copy(), []
@@ -36,8 +39,9 @@ def mask_saturated(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding
             level = side * float((side * values).max())
             share = np.count_nonzero(at) / len(values)
             text = (
-                f"torque of {joint} stands at its {word} limit {level:.6g} in {share:.1%} of "
-                "moving samples: saturated, or clipped when recorded; these samples are masked"
+                f"torque of {joint} stands at its {word} limit {level:.6g} "
+                f"{'N·m' if revolute[j] else 'N'} in {share:.1%} of moving samples: "
+                "saturated, or clipped when recorded; these samples are masked"
             )
             findings.append(Finding("saturated", "warning", text, run.name, (joint,)))
             valid[np.flatnonzero(usable)[at], j] = False

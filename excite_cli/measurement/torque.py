@@ -4,6 +4,9 @@ With m the torque of the motors (recorded, or current times the motor's constant
 ratios and S the shares of a coupled transmission (`coupling`),
 
     tau = (I + S) diag(g) m        and, by virtual work,        q_motor = diag(g) (I + S)ᵀ q.
+
+Motors that drive joints together (`robot.transmissions`) are next to the joints: then g, S and
+signs are those of the motors that stand in a joint's place, and `motors` goes on from there.
 """
 
 from collections.abc import Mapping
@@ -14,8 +17,30 @@ import numpy as np
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+from excite_cli.measurement.motors import Motors, at_motors
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+def check_motors(spec: MeasurementSpec, motors: Motors) -> None:
+    """Raise ConfigError where `measurement` contradicts the robot's transmissions."""
+    driven = set(motors.places.values())
+    coupled = {*spec.coupling, *(k for shares in spec.coupling.values() for k in shares)} & driven
+    if coupled:
+        raise ConfigError(
+            f"measurement.coupling: {', '.join(sorted(coupled))} is driven by "
+            "robot.transmissions. Say it once, there."
+        )
+    for joint in spec.without_torque:
+        j = motors.joints.index(joint)
+        shown = np.linalg.inv(motors.matrix)[j] if at_motors("tau", spec) else np.zeros(0)
+        for k in np.flatnonzero(shown):
+            other = motors.joints[int(k)]
+            if other not in spec.without_torque:
+                raise ConfigError(
+                    f"measurement.without_torque: without the torque of the motor "
+                    f"'{motors.names[j]}', that of {other} is not known either. Name it there, too."
+                )
 
 
 def check_joints(spec: MeasurementSpec, joints: tuple[str, ...], torques: bool = True) -> None:
@@ -64,7 +89,13 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...], torques: bool =
         raise ConfigError("measurement.coupling: these shares cannot be inverted.")
 
 
-def to_joints(run: Run, spec: MeasurementSpec, joints: tuple[str, ...], revolute: Mask) -> Run:
+def to_joints(
+    run: Run,
+    spec: MeasurementSpec,
+    joints: tuple[str, ...],
+    revolute: Mask,
+    motors: Motors | None = None,
+) -> Run:
     """The run in s, rad (m) and N·m at the joints, as `spec` declares it."""
     ratio, shares = _per_joint(spec.gear_ratio, joints), _shares(spec, joints)
     angle = np.where(revolute, np.pi / 180 if spec.angle == "deg" else 1.0, 1.0)
@@ -74,6 +105,9 @@ def to_joints(run: Run, spec: MeasurementSpec, joints: tuple[str, ...], revolute
         back = np.linalg.inv(np.eye(len(joints)) + shares.T).T
         q = q / ratio @ back
         dq = None if dq is None else dq / ratio @ back
+        if motors is not None:
+            q = motors.positions(q)
+            dq = None if dq is None else motors.positions(dq)
     q = q + _per_joint(spec.offset, joints, 0.0)
     tau = run.tau * _per_joint(spec.sign, joints)
     if spec.torque == "current":
@@ -83,14 +117,17 @@ def to_joints(run: Run, spec: MeasurementSpec, joints: tuple[str, ...], revolute
     coupled = tau.copy()
     for j, k in np.argwhere(shares):  # not a product with S: 0 · NaN would spread over all joints
         coupled[:, j] += shares[j, k] * tau[:, k]
-    return replace(run, q=q, dq=dq, tau=coupled)
+    converted = replace(run, q=q, dq=dq, tau=coupled)
+    return converted if motors is None else motors.at_joints(converted, spec)
 
 
-def declared(spec: MeasurementSpec, joints: tuple[str, ...]) -> list[Finding]:
+def declared(
+    spec: MeasurementSpec, joints: tuple[str, ...], motors: Motors | None = None
+) -> list[Finding]:
     """Findings about a declaration that contradicts itself."""
     findings = []
     ratio = _per_joint(spec.gear_ratio, joints)
-    if spec.torque == "motor" and (ratio == 1.0).all():
+    if spec.torque == "motor" and (ratio == 1.0).all() and motors is None:
         text = (
             "measurement.torque is 'motor', and every gear_ratio is 1: give "
             "measurement.gear_ratio unless the motors drive the joints directly"

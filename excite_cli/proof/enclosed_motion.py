@@ -53,17 +53,22 @@ class Rates:
 
 
 class EnclosedMotion:
-    """Bodies of `robot` over T intervals; index b is joint b of `robot.model`, 0 the world."""
+    """Bodies of `robot` over T intervals; index b is joint b of `robot.model`, 0 the world.
+
+    `states` are those of the moved joints, `every` those of all that move: joints that follow
+    others do so by a linear map, which enclosures pass without loss.
+    """
 
     def __init__(self, robot: Robot, states: EnclosedStates) -> None:
         self.robot, self.states = robot, states
+        self.every = _of_all(robot, states)
         self.count = states.q.shape[0]
         self._joints = _joints_of(robot)
 
     @cached_property
     def placements(self) -> tuple[tuple[Taylor, Taylor], ...]:
         """Rotation (T, 3, 3) and origin (T, 3) [m] of every body in the world."""
-        sine, cosine = sine_and_cosine(self.states.q)
+        sine, cosine = sine_and_cosine(self.every.q)
         world = (
             Taylor.constant(np.tile(np.eye(3), (self.count, 1, 1))),
             Taylor.constant(np.zeros((self.count, 3))),
@@ -77,7 +82,7 @@ class EnclosedMotion:
                 found.append((placed, origin))
                 continue
             if joint.sliding:
-                way = self.states.q[:, joint.variable, None]
+                way = self.every.q[:, joint.variable, None]
                 axis = _moved(placed, joint.axis)
                 found.append((placed, origin + way.times(axis)))
                 continue
@@ -115,8 +120,8 @@ class EnclosedMotion:
             if axis is None:
                 found.append(Rates(before.spin, before.spin_rate, acceleration))
                 continue
-            speed = self.states.v[:, joint.variable, None].times(axis)
-            change = self.states.a[:, joint.variable, None].times(axis)
+            speed = self.every.v[:, joint.variable, None].times(axis)
+            change = self.every.a[:, joint.variable, None].times(axis)
             turned = cross(before.spin, speed)
             if joint.sliding:
                 acceleration = acceleration + change + turned.scaled(2.0)
@@ -141,6 +146,13 @@ class EnclosedMotion:
         axis = self.axes[joint]
         assert axis is not None, "a joint that stands still has no axis"
         return axis, self.placements[joint][1], self._joints[joint - 1].sliding
+
+
+def _of_all(robot: Robot, states: EnclosedStates) -> EnclosedStates:
+    if robot.coupling is None:
+        return states
+    q, v, a = (part.through(robot.coupling.matrix) for part in (states.q, states.v, states.a))
+    return EnclosedStates(q + robot.coupling.offset, v, a)
 
 
 def _joints_of(robot: Robot) -> tuple[_Joint, ...]:

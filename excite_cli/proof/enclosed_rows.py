@@ -31,14 +31,15 @@ def torque_rows(motion: EnclosedMotion) -> Taylor:
             for joint in model.supports[body]
             if joint > 0 and model.joints[int(joint)].idx_v >= first
         ]
-        terms = np.zeros((3, motion.count, robot.n, _PER_BODY))
-        radius = np.zeros((motion.count, robot.n, _PER_BODY))
+        terms = np.zeros((3, motion.count, robot.tree.n, _PER_BODY))
+        radius = np.zeros((motion.count, robot.tree.n, _PER_BODY))
         if carriers:
             columns = _columns(motion, body, *_along_joints(motion, body, carriers))
             places = [model.joints[joint].idx_v - first for joint in carriers]
             terms[:, :, places], radius[:, places] = columns.terms, columns.radius
         blocks.append(Taylor(terms, radius))
-    return joined(blocks, axis=-1)
+    rows = joined(blocks, axis=-1)
+    return rows if robot.coupling is None else combined(robot.coupling.matrix.T, rows)
 
 
 def ground_rows(motion: EnclosedMotion, about: Array) -> Taylor:

@@ -1,8 +1,9 @@
 """Which joints of a robot a plan should move, and why the others stay where they are.
 
-Names tell wheels, rotors and fingers; the structure tells when a name misleads: a joint that
-carries a tenth of the robot is no finger, and a word that stands in every name says nothing. A
-robot that consists of fingers moves them.
+Names tell wheels, rotors, fingers, faces and hoses; the structure tells when a name misleads: a
+joint that carries a tenth of the robot is no finger, and a word that stands in every name says
+nothing. A robot that consists of fingers moves them. Joints that follow another one move with it.
+Joints of closed loops, which the model cuts, and those of next to no range stay where they are.
 """
 
 import re
@@ -15,6 +16,11 @@ from excite_cli.robot.urdf_joints import UrdfJoint
 _WHEELS = {"wheel", "wheels", "caster", "castor", "suspension", "track"}
 _ROTORS = {"rotor", "rotors", "propeller", "prop"}
 _SENSORS = {"laser", "lidar", "velodyne", "camera", "d435", "hokuyo"}
+_FACES = {"eye", "eyes", "eyelid", "eyelids", "lid", "lids", "brow", "brows", "eyebrow", "mouth",
+          "lip", "lips", "face", "cheek", "nose", "antenna", "antennae"}  # fmt: skip
+_SOFT = {"bellow", "bellows", "hose", "hoses", "cable", "cables", "spring", "springs", "damper",
+         "dampers", "bumper", "bumpers"}  # fmt: skip
+_LEAST_TURN, _LEAST_SLIDE = 0.02, 0.002  # rad and m: a range that shows nothing
 _FINGERS = {"finger", "fingers", "thumb", "index", "pinky", "knuckle", "claw", "jaw", "mrl"}
 # Fingers where others are: a spine has a middle too.
 _AMONG_FINGERS = {"middle", "ring", "little"}
@@ -29,14 +35,20 @@ _TOLD = 6
 
 @dataclass(frozen=True)
 class Choice:
-    """Joints to move, in the order of the URDF, and the others by the reason why not."""
+    """Joints to move, in the order of the URDF, and the others by the reason why not.
+
+    `followers`: joints that move with one that is chosen, by its name.
+    """
 
     chosen: tuple[UrdfJoint, ...]
     left_out: dict[str, tuple[str, ...]]
+    followers: dict[str, tuple[str, ...]]
 
     def in_words(self) -> tuple[str, ...]:
-        """One sentence for each reason."""
-        return tuple(f"{reason}: {_listed(names)}" for reason, names in self.left_out.items())
+        """One sentence for each reason, and for each joint that others follow."""
+        left = (f"not moved, {why}: {_listed(names)}" for why, names in self.left_out.items())
+        led = (f"moved with {name}: {_listed(names)}" for name, names in self.followers.items())
+        return (*left, *led)
 
 
 def choose_joints(joints: Iterable[UrdfJoint], source: str, asked: tuple[str, ...] = ()) -> Choice:
@@ -54,13 +66,17 @@ def choose_joints(joints: Iterable[UrdfJoint], source: str, asked: tuple[str, ..
         raise RobotError(f"{source} has no movable joint: there is nothing to plan for.")
     if asked:
         return _as_asked(joints, asked)
-    ruled = {joint.name: _reason(joint, joints) for joint in joints}
-    fingers = [joint for joint in joints if ruled[joint.name] == _FINGER]
-    kept = [joint for joint in joints if not ruled[joint.name]]
+    own = tuple(joint for joint in joints if joint.mimics is None)
+    ruled = {joint.name: _reason(joint, own) for joint in own}
+    fingers = [joint for joint in own if ruled[joint.name] == _FINGER]
+    kept = [joint for joint in own if not ruled[joint.name]]
     if fingers and (not kept or (len(kept) <= _WRIST and len(fingers) >= _HAND)):
         for joint in fingers:
             ruled[joint.name] = ""
-        kept = [joint for joint in joints if not ruled[joint.name]]
+        kept = [joint for joint in own if not ruled[joint.name]]
+    for joint in joints:  # a joint that follows does as its driver does
+        if joint.mimics is not None:
+            ruled[joint.name] = ruled.get(joint.mimics.driver, _STILL)
     left_out: dict[str, tuple[str, ...]] = {}
     for joint in joints:
         if ruled[joint.name]:
@@ -71,19 +87,38 @@ def choose_joints(joints: Iterable[UrdfJoint], source: str, asked: tuple[str, ..
             f"{source} has no arm, leg or hand to move, only {reasons}. Name joints with --joints "
             "if they are meant all the same."
         )
-    return Choice(tuple(kept), left_out)
+    return Choice(tuple(kept), left_out, _followers(kept, joints))
+
+
+def _followers(
+    chosen: Iterable[UrdfJoint], joints: tuple[UrdfJoint, ...]
+) -> dict[str, tuple[str, ...]]:
+    """Joints that move with the chosen ones."""
+    found = {
+        one.name: tuple(
+            joint.name
+            for joint in joints
+            if joint.mimics is not None and joint.mimics.driver == one.name
+        )
+        for one in chosen
+    }
+    return {name: followers for name, followers in found.items() if followers}
 
 
 _FINGER = "fingers and grippers"
+_STILL = "joints that mimic one that is fixed or unknown"
 
 
 def _reason(joint: UrdfJoint, joints: tuple[UrdfJoint, ...]) -> str:
-    if joint.mimics is not None:
-        return "joints that mimic another"
     if joint.kind not in _MOVABLE:
         return "joints of the base" if not joint.above else f"joints of type {joint.kind}"
+    if joint.in_loop:
+        return "joints of closed loops, which the model cuts"
+    least = _LEAST_SLIDE if joint.sliding else _LEAST_TURN
+    if 0.0 < joint.upper - joint.lower < least:
+        return f"joints with a range below {least:g} {'m' if joint.sliding else 'rad'}"
     words = _words(joint.name)
-    if words & _WHEELS:
+    if words & _WHEELS or (joint.carried < _FINGER_SHARE and _words(joint.child) & _WHEELS):
         return "wheels and casters"
     if words & _ROTORS:
         return "rotors"
@@ -93,6 +128,10 @@ def _reason(joint: UrdfJoint, joints: tuple[UrdfJoint, ...]) -> str:
         return ""
     if words & _SENSORS:
         return "mounts of sensors"
+    if words & _FACES:
+        return "faces"
+    if words & _SOFT:
+        return "springs, bellows and hoses"
     alike = _everywhere(joints)
     words -= alike
     wrist = bool(words & _WRISTS)
@@ -125,8 +164,7 @@ def _words(name: str) -> set[str]:
 
 def _everywhere(joints: tuple[UrdfJoint, ...]) -> set[str]:
     """Words that stand in the name of every joint that moves on its own."""
-    own = [_words(joint.name) for joint in joints if joint.mimics is None]
-    return set.intersection(*own)
+    return set.intersection(*(_words(joint.name) for joint in joints))
 
 
 def _as_asked(joints: tuple[UrdfJoint, ...], asked: tuple[str, ...]) -> Choice:
@@ -140,17 +178,19 @@ def _as_asked(joints: tuple[UrdfJoint, ...], asked: tuple[str, ...]) -> Choice:
         joint = known[name]
         if joint.mimics is not None:
             raise ConfigError(
-                f"--joints: '{name}' mimics '{joint.mimics}' and does not move on its own; coupled "
-                "joints are not modelled. Leave it out."
+                f"--joints: '{name}' mimics '{joint.mimics.driver}' and moves with it. Leave it "
+                f"out, and name '{joint.mimics.driver}' if it is to move."
             )
         if joint.kind not in _MOVABLE:
             raise ConfigError(
                 f"--joints: '{name}' is of type {joint.kind}; only revolute, continuous and "
                 "prismatic joints can be moved."
             )
-    others = tuple(joint.name for joint in joints if joint.name not in asked)
     chosen = tuple(joint for joint in joints if joint.name in asked)
-    return Choice(chosen, {"not requested": others} if others else {})
+    followers = _followers(chosen, joints)
+    moved = {*asked, *(name for names in followers.values() for name in names)}
+    others = tuple(joint.name for joint in joints if joint.name not in moved)
+    return Choice(chosen, {"not requested": others} if others else {}, followers)
 
 
 def _listed(names: tuple[str, ...]) -> str:

@@ -87,7 +87,7 @@ def propose(request: Request) -> Proposal:
     if facts.has_shapes:
         check_mesh_paths(description)
     visual = _visual_shapes(description, facts)
-    notes = [*description.notes, *(f"not moved, {words}" for words in choice.in_words())]
+    notes = [*description.notes, *choice.in_words()]
     for name, folder in packages.items():
         notes.append(f"meshes of {name} are taken from {folder}")
     posture = first_posture(
@@ -150,9 +150,8 @@ def _draft(
             "bolted down, on a stand or on a hoist; floating adds the wrench at the base"
         )
     robot["joints"] = [joint.name for joint in joints]
-    if choice.left_out:
-        left = "; ".join(f"not moved, {words}" for words in choice.in_words())
-        comments["robot", "joints"] = left
+    if choice.in_words():
+        comments["robot", "joints"] = "; ".join(choice.in_words())
     robot["posture"] = {**_inside(posture.others, facts), **posture.moved}
     comments["robot", "posture"] = posture.words
     limits = _limits(joints, comments)

@@ -32,8 +32,8 @@ from excite_cli.excitation.task import MotionTask
 from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.mesh_pairs import joined_links
-from excite_cli.geometry.pair_distances import carried_bodies
 from excite_cli.geometry.pair_tables import near_at_posture
+from excite_cli.robot.carried import MovedBodies
 
 Array = NDArray[np.float64]
 Tree = dict[str, Any]
@@ -179,7 +179,7 @@ def _by_meshes(tree: Tree, comments: Comments, task: MotionTask) -> bool:
     """
     robot, own = task.problem.robot, tree["constraints"]["self_collision"]
     near = pushed_clear(task, robot.posture)
-    meshes, carried, joined = MeshDistances(robot), carried_bodies(robot), joined_links(robot)
+    meshes, moved, joined = MeshDistances(robot), MovedBodies(robot), joined_links(robot)
     before = (len(own.get("by_meshes", ())), len(own.get("ignore", ())))
     for constraint, columns in unclear(task, near):
         for column in columns:
@@ -187,7 +187,7 @@ def _by_meshes(tree: Tree, comments: Comments, task: MotionTask) -> bool:
             if len(both) != 2:
                 continue
             first, second = both
-            joints = int((carried[first.joint] != carried[second.joint]).sum())
+            joints = len(moved.between(first.joint, second.joint))
             for one, other in product(first.links, second.links):
                 if frozenset((one, other)) in joined:
                     continue
@@ -206,7 +206,7 @@ def _kept_still(tree: Tree, comments: Comments, task: MotionTask) -> bool:
     Those nearest to the links go on moving; then their meshes can be kept apart by tables.
     """
     robot = task.problem.robot
-    carried = carried_bodies(robot)
+    moved = MovedBodies(robot)
     near = pushed_clear(task, robot.posture)
     still: set[int] = set()
     for constraint, columns in broken(task, near):
@@ -215,8 +215,8 @@ def _kept_still(tree: Tree, comments: Comments, task: MotionTask) -> bool:
             if len(both) != 2:
                 continue
             first, second = both
-            one, other = carried[first.joint] > 0, carried[second.joint] > 0
-            chains = [np.flatnonzero(one & ~other), np.flatnonzero(other & ~one)]
+            one, other = moved.moving(first.joint), moved.moving(second.joint)
+            chains = [np.setdiff1d(one, other), np.setdiff1d(other, one)]
             if sum(map(len, chains)) <= 2:
                 continue
             kept = 1 if all(map(len, chains)) else 2

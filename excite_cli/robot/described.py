@@ -9,7 +9,10 @@ from excite_cli.shown.record import Shown
 
 @dataclass(frozen=True)
 class DescribedJoint:
-    """A joint with its limits [rad, rad/s, N·m; prismatic: m, m/s, N] and the links it carries."""
+    """A joint with its limits [rad, rad/s, N·m; prismatic: m, m/s, N] and the links it carries.
+
+    `followers` are joints that move with it (mimic); `links` contain those that they carry.
+    """
 
     name: str
     kind: Literal["revolute", "prismatic"]
@@ -18,11 +21,12 @@ class DescribedJoint:
     velocity: float
     effort: float
     links: tuple[str, ...]
+    followers: tuple[str, ...]
 
 
 @dataclass(frozen=True, repr=False)
 class DescribedRobot(Shown):
-    """All joints, and the links that are fixed to the base."""
+    """All moved joints, and the links that are fixed to the base."""
 
     name: str
     joints: tuple[DescribedJoint, ...]
@@ -32,6 +36,7 @@ class DescribedRobot(Shown):
 def describe(robot: Robot) -> DescribedRobot:
     """What a person must know of a robot to write its config."""
     limits, links = robot.limits, links_by_joint(robot)
+    followers = robot.followers
     joints = tuple(
         DescribedJoint(
             name,
@@ -40,7 +45,8 @@ def describe(robot: Robot) -> DescribedRobot:
             float(limits.upper[j]),
             float(limits.velocity[j]),
             float(limits.effort[j]),
-            tuple(links.get(name, [])),
+            tuple(link for each in (name, *followers[j]) for link in links.get(each, [])),
+            followers[j],
         )
         for j, name in enumerate(robot.joint_names)
     )

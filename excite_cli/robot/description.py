@@ -20,7 +20,9 @@ from excite_cli.errors import RobotError, nearest
 from excite_cli.given_files import require_stored
 from excite_cli.robot.formats.base import Asked
 from excite_cli.robot.formats.catalogue import as_urdf
+from excite_cli.robot.loops import Loop, closed_loops, loops_in_words
 from excite_cli.robot.mesh_trial import try_meshes
+from excite_cli.robot.mimic import Mimic, lost, mimics
 from excite_cli.robot.urdf_check import parsed
 
 EXAMPLE_PREFIX = "example-robot-data:"
@@ -54,7 +56,7 @@ class RobotDescription:
 
     `xml` is what is used of `urdf`, the text as given or as it was made of another format, which
     may have left out what is told in `notes`. `mimicking` names the joints that follow another
-    one, with that other one.
+    one, with what they follow; `loops` are closed ones, which are cut.
     """
 
     name: str
@@ -63,9 +65,10 @@ class RobotDescription:
     xml: str
     package_dirs: tuple[str, ...]
     sha256: str
-    mimicking: dict[str, str]
+    mimicking: dict[str, Mimic]
     urdf: str
     notes: tuple[str, ...] = ()
+    loops: tuple[Loop, ...] = ()
 
 
 def example_robots_folder() -> Path:
@@ -147,6 +150,7 @@ def load_description(
             )
     found = as_urdf(path, _read(path), Asked(extra, arguments or {}))
     tree = parsed(path, found.text)
+    followers, loops = mimics(path, tree), closed_loops(tree)
     packages = (*extra, str(_share_folder(path)), str(path.parent), *found.folders)
     return RobotDescription(
         name=path.stem.removesuffix(".urdf"),
@@ -155,13 +159,10 @@ def load_description(
         xml=_without_continuous_joints(tree),
         package_dirs=tuple(dict.fromkeys(packages)),
         sha256=hashlib.sha256(found.text.encode()).hexdigest(),
-        mimicking={
-            joint.get("name", ""): mimic.get("joint", "")
-            for joint in tree.findall("joint")
-            for mimic in joint.findall("mimic")
-        },
+        mimicking=followers,
         urdf=found.text,
-        notes=found.notes,
+        notes=(*found.notes, *lost(followers, tree), *loops_in_words(loops)),
+        loops=loops,
     )
 
 

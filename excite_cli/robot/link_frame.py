@@ -41,14 +41,21 @@ def link_frame(robot: Robot, link: str, where: str) -> LinkFrame:
             f"Its links: {', '.join(sorted(frames))}."
         )
     frame = frames[link]
-    joint = int(frame.parentJoint) - _first(robot)
-    if joint < 0:
+    joint = int(frame.parentJoint)
+    if robot.first_joint <= joint and joint not in robot.model_joints:
+        name = str(robot.model.names[joint])
+        raise ConfigError(
+            f"{where}: link '{link}' is carried by '{name}', which follows another joint (mimic). "
+            "Name a link that a joint of its own carries."
+        )
+    if joint < robot.first_joint:
         raise ConfigError(
             f"{where}: no moved joint carries link '{link}', so its load shows in no torque. "
             f"Links that are moved: {', '.join(sorted(n for n in frames if _moved(robot, n)))}."
         )
     placement = frame.placement
-    return LinkFrame(link, joint, np.array(placement.rotation), np.array(placement.translation))
+    own = robot.model_joints.index(joint)
+    return LinkFrame(link, own, np.array(placement.rotation), np.array(placement.translation))
 
 
 def own_link(robot: Robot, joint: int) -> LinkFrame:
@@ -56,7 +63,7 @@ def own_link(robot: Robot, joint: int) -> LinkFrame:
     names = [
         name
         for name, frame in _links(robot).items()
-        if int(frame.parentJoint) - _first(robot) == joint and frame.placement.isIdentity()
+        if int(frame.parentJoint) == robot.model_joints[joint] and frame.placement.isIdentity()
     ]
     name = names[0] if names else robot.joint_names[joint]
     return LinkFrame(name, joint, np.eye(3), np.zeros(3))
@@ -81,25 +88,18 @@ def carrying_frame(robot: Robot, link: str | None, where: str) -> LinkFrame:
 
 def leaves(robot: Robot) -> tuple[int, ...]:
     """Moved joints that carry no other moved joint."""
-    parents = {int(robot.model.parents[_first(robot) + j]) - _first(robot) for j in range(robot.n)}
-    return tuple(j for j in range(robot.n) if j not in parents)
+    return tuple(j for j in range(robot.n) if j not in robot.parents)
 
 
 def branches(robot: Robot) -> list[tuple[int, ...]]:
     """For every leaf, the moved joints that carry it and no other leaf: an arm of two, a finger."""
-    first = _first(robot)
     carried: list[set[int]] = [set() for _ in range(robot.n)]
     for leaf in leaves(robot):
         joint = leaf
         while joint >= 0:
             carried[joint].add(leaf)
-            joint = int(robot.model.parents[first + joint]) - first
+            joint = robot.parents[joint]
     return [tuple(j for j in range(robot.n) if carried[j] == {leaf}) for leaf in leaves(robot)]
-
-
-def _first(robot: Robot) -> int:
-    """Index of the first moved joint in Pinocchio's model."""
-    return int(robot.model.njoints) - robot.n
 
 
 def _links(robot: Robot) -> dict[str, pin.Frame]:
@@ -107,4 +107,4 @@ def _links(robot: Robot) -> dict[str, pin.Frame]:
 
 
 def _moved(robot: Robot, link: str) -> bool:
-    return int(_links(robot)[link].parentJoint) >= _first(robot)
+    return int(_links(robot)[link].parentJoint) in robot.model_joints

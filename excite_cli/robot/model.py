@@ -7,45 +7,32 @@ body to the regressor, but no variable to the motion.
 
 import hashlib
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from excite_cli.config.robot_spec import JointLimits, RobotSpec
-from excite_cli.errors import ConfigError, RobotError, nearest
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.errors import ConfigError, RobotError
+from excite_cli.measurement.motors import Motors, motors_of
 from excite_cli.robot.base_joints import BASE_JOINTS, on_base_joints
 from excite_cli.robot.carried_payload import Payload, add_payload, payload_on
+from excite_cli.robot.coupling import Coupling
 from excite_cli.robot.description import (
     UNBOUNDED,
     RobotDescription,
     load_description,
-    require_limits,
 )
+from excite_cli.robot.limits import JointRange, Limits, check_range, limits_of
+from excite_cli.robot.mimic import Mimic
+from excite_cli.robot.parsed_model import parsed_model, reduced_model
+from excite_cli.robot.posture import posture_of, require_known
 
 Array = NDArray[np.float64]
 
-# Where a robot has no bound of its own, samples are drawn from these.
-_TURN, _FASTEST = np.pi, 10.0
-_LINK = " (link)"
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Bounds of the moved joints, each of shape (n,); infinite where there is none."""
-
-    lower: Array
-    upper: Array
-    velocity: Array
-    acceleration: Array
-    effort: Array
-
-    def ranges(self) -> tuple[Array, Array]:
-        """Finite positions (n,) to draw between: a turn where there is no bound, or only one."""
-        low, high = np.isfinite(self.lower), np.isfinite(self.upper)
-        lower = np.where(low, self.lower, np.where(high, self.upper - 2 * _TURN, -_TURN))
-        return lower, np.where(high, self.upper, np.where(low, self.lower + 2 * _TURN, _TURN))
+_FASTEST = 10.0  # where a robot has no bound of its own, samples are drawn below this
 
 
 @dataclass(frozen=True)
@@ -57,6 +44,10 @@ class Robot:
     inertias of `model` include that of the `payload`; `description` knows nothing of it. The first
     `base_joints` joints are those of a base that moves (`base_joints.py`). With `visual_shapes`,
     the visual shapes of links without collision shapes count as such.
+
+    Where joints follow others (`coupling`), `model` has all of them; `joint_names`, `rows` and
+    `moved` count those that move on their own, and `tree` is the robot in which all would. `motors`
+    drive several joints together; None where each joint has its own.
     """
 
     name: str
@@ -74,6 +65,97 @@ class Robot:
     payload: Payload | None = None
     visual_shapes: bool = False
     base_joints: int = 0
+    coupling: Coupling | None = None
+    motors: Motors | None = None
+
+    @cached_property
+    def tree(self) -> "Robot":
+        """The robot in which all m joints that move do so on their own: those of its model.
+
+        Itself where no joint follows another. `rows` are those that the measured rows consist of.
+        """
+        own = self.coupling
+        if own is None:
+            return self
+        first = int(self.moved[0])
+        base = self.rows[self.rows < first]
+        followed = np.isin(own.driver, self.rows[self.rows >= first] - first)
+        return replace(
+            self,
+            joint_names=own.joint_names,
+            posture=own.positions(self.posture),
+            rows=np.concatenate([base, first + np.flatnonzero(followed)]),
+            moved=first + np.arange(len(own.driver)),
+            limits=own.limits,
+            coupling=None,
+            motors=None,
+        )
+
+    @property
+    def first_joint(self) -> int:
+        """Index in `model` of the first joint that moves; those after it move as well."""
+        return int(self.model.njoints) - self.tree.n
+
+    @cached_property
+    def model_joints(self) -> tuple[int, ...]:
+        """Index (n,) in `model` of every moved joint; joint k carries body k − 1 of φ."""
+        place = {name: k for k, name in enumerate(self.tree.joint_names)}
+        return tuple(self.first_joint + place[name] for name in self.joint_names)
+
+    @property
+    def followers(self) -> tuple[tuple[str, ...], ...]:
+        """For every moved joint (n,) the joints that follow it."""
+        found: list[list[str]] = [[] for _ in self.joint_names]
+        if self.coupling is not None:
+            for name, j in zip(self.coupling.joint_names, self.coupling.driver, strict=True):
+                if name != self.joint_names[j]:
+                    found[j].append(name)
+        return tuple(map(tuple, found))
+
+    @cached_property
+    def parents(self) -> tuple[int, ...]:
+        """For every moved joint (n,) the one that carries it, -1 for none; followers are passed."""
+        own = {joint: k for k, joint in enumerate(self.model_joints)}
+        found = []
+        for joint in self.model_joints:
+            above = int(self.model.parents[joint])
+            while above > 0 and above not in own:
+                above = int(self.model.parents[above])
+            found.append(own.get(above, -1))
+        return tuple(found)
+
+    def all_positions(self, q: Array) -> Array:
+        """Positions (..., m) of all joints that move, from those of the moved joints (..., n)."""
+        return q if self.coupling is None else self.coupling.positions(q)
+
+    def all_rates(self, v: Array) -> Array:
+        """Speeds or accelerations (..., m) of all joints that move, from (..., n)."""
+        return v if self.coupling is None else self.coupling.rates(v)
+
+    def gathered(self, x: Array) -> Array:
+        """Torques of the moved joints, or derivatives by them, (..., n) from all (..., m)."""
+        return x if self.coupling is None else self.coupling.gathered(x)
+
+    def gathered_rows(self, y: Array) -> Array:
+        """Measured rows (T, R, ...) from the rows of the tree (T, R', ...) that they consist of."""
+        if self.coupling is None:
+            return y
+        return np.asarray(np.einsum("tr...,rs->ts...", y, self._row_shares))
+
+    def spread_rows(self, weights: Array) -> Array:
+        """Weights (T, R', ...) of the tree's rows that are worth those of the rows (T, R, ...)."""
+        if self.coupling is None:
+            return weights
+        return np.asarray(np.einsum("ts...,rs->tr...", weights, self._row_shares))
+
+    @cached_property
+    def _row_shares(self) -> Array:
+        """What each row of the tree is to each measured row (R', R)."""
+        assert self.coupling is not None
+        first, joints = int(self.moved[0]), self.coupling.matrix
+        every = np.eye(first + len(joints), first + self.n)
+        every[first:, first:] = joints
+        return every[np.ix_(self.tree.rows, self.rows)]
 
     @property
     def n(self) -> int:
@@ -103,8 +185,7 @@ class Robot:
     @property
     def sliding(self) -> NDArray[np.bool_]:
         """Which moved joints (n,) are prismatic."""
-        first = self.model.njoints - self.n
-        names = [self.model.joints[first + j].shortname() for j in range(self.n)]
+        names = [self.model.joints[joint].shortname() for joint in self.model_joints]
         return np.array(["JointModelP" in name for name in names])
 
     @property
@@ -116,6 +197,7 @@ class Robot:
 
     def configurations(self, q: Array) -> Array:
         """Pinocchio configurations (T, nq) for moved-joint positions (T, n)."""
+        q = self.all_positions(q)
         if not self.floating:
             return np.ascontiguousarray(q)
         full = np.tile(self.reference, (len(q), 1))
@@ -124,6 +206,7 @@ class Robot:
 
     def velocities(self, v: Array) -> Array:
         """Pinocchio velocities (or accelerations) (T, nv) for those of the moved joints (T, n)."""
+        v = self.all_rates(v)
         if not self.floating:
             return np.ascontiguousarray(v)
         return np.hstack([np.zeros((len(v), 6)), v])
@@ -157,6 +240,7 @@ class Robot:
                 ",".join(map(str, self.rows)),
                 f"base={self.base_orientation}",
                 np.array2string(np.asarray(self.model.gravity.linear)),
+                *([] if self.coupling is None else ["coupled"]),  # earlier versions locked them
             ]
         )
         return hashlib.sha256(text.encode()).hexdigest()
@@ -199,115 +283,108 @@ def build_measured_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
 
 
 def _built(description: RobotDescription, spec: RobotSpec) -> Robot:
-    full = _parse(description, spec)
+    full = parsed_model(description, spec)
     if spec.payload is not None:
         add_payload(full, payload_on(full, spec.payload))
     names = [str(name) for name in full.names[1:] if str(name) != "root_joint"]
     if spec.joints == "all":
         _check_types(full, names, description)
-    chosen = _chosen(spec, names, description.mimicking)
+    mimicking = {name: own for name, own in description.mimicking.items() if name in names}
+    chosen = _chosen(spec, names, mimicking)
     _check_types(full, chosen, description)
     # Joints of the base that slide or float stand still at neutral: they have no single value.
     others = [name for name in names if not _is_single(full, name)]
     names = [name for name in names if name not in others]
-    limits_full = {name: _limits_of(full, name, spec.limits.get(name)) for name in names}
-    _check_limits(chosen, limits_full)
-    posture = _posture(spec, names, chosen, limits_full)
+    followers = {
+        name: own for name, own in mimicking.items() if own.driver in chosen and name in names
+    }
+    alone = {name: _range_of(full, name).given(spec.limits.get(name)) for name in names}
+    ranges = _kept_ranges(chosen, alone, followers)
+    posture = posture_of(spec, names, chosen, ranges, mimicking)
     reference = pin.neutral(full)
     for name in names:
         reference[full.joints[full.getJointId(name)].idx_q] = posture[name]
     if spec.base == "floating":
         rotation = pin.rpy.rpyToMatrix(*spec.base_orientation)
         reference[3:7] = pin.Quaternion(rotation).coeffs()
-    locked = [full.getJointId(name) for name in [*others, *names] if name not in chosen]
-    model = _reduced(full, locked, reference) if locked else full
+    moving = {*chosen, *followers}
+    locked = [full.getJointId(name) for name in [*others, *names] if name not in moving]
+    model = reduced_model(full, locked, reference) if locked else full
     model.gravity.linear = np.array(spec.gravity)
-    moved_names = tuple(n for n in map(str, model.names[1:]) if n != "root_joint")
+    every = tuple(n for n in map(str, model.names[1:]) if n != "root_joint")
+    coupling = _coupling(every, followers, alone) if followers else None
+    moved_names = tuple(name for name in every if name not in followers)
     floating = spec.base == "floating"
-    moved = np.arange(6, model.nv) if floating else np.arange(model.nv)
+    moved = np.arange(len(moved_names)) + (6 if floating else 0)
     rows = np.concatenate(
         ([np.arange(6)] if "base" in spec.rows else []) + ([moved] if "joints" in spec.rows else [])
     )
-    start = np.array([posture[name] for name in moved_names])
+    start = np.array([posture[name] for name in every])
     reduced = np.array(pin.neutral(model))
     if floating:
         reduced[3:7] = reference[3:7]
         reduced[7:] = start
     else:
-        reduced = start.copy()
-    columns = np.array([limits_full[name] for name in moved_names]).T
+        reduced = start
     return Robot(
         name=description.name,
         description=description,
         model=model,
         joint_names=moved_names,
-        posture=start,
+        posture=np.array([posture[name] for name in moved_names]),
         reference=reduced,
         rows=rows,
         moved=moved,
         floating=floating,
-        limits=Limits(*columns),
+        limits=limits_of(moved_names, ranges),
         base_orientation=spec.base_orientation,
-        locked={name: posture[name] for name in names if name not in chosen},
+        locked={name: posture[name] for name in names if name not in moving},
         payload=None if spec.payload is None else payload_on(model, spec.payload),
+        coupling=coupling,
+        motors=motors_of(spec.transmissions, moved_names),
     )
 
 
-def _reduced(full: pin.Model, locked: list[int], reference: Array) -> pin.Model:
-    """The model with joints locked at `reference`.
+def _kept_ranges(
+    chosen: list[str], alone: dict[str, JointRange], followers: dict[str, Mimic]
+) -> dict[str, JointRange]:
+    """Ranges of all joints, those of the chosen ones narrowed for the joints that follow them."""
+    kept = dict(alone)
+    for name, own in followers.items():
+        kept[own.driver] = kept[own.driver].keeping(alone[name], own)
+    for name in chosen:
+        theirs = [each for each, own in followers.items() if own.driver == name]
+        check_range(name, alone[name], kept[name], theirs)
+    return kept
 
-    Pinocchio finds a joint's frame by its name, which a link may have too: such links have another
-    name meanwhile.
-    """
-    joints = {str(name) for name in full.names}
-    for frame in full.frames:
-        if frame.type == pin.FrameType.BODY and str(frame.name) in joints:
-            frame.name = f"{frame.name}{_LINK}"
-    model = pin.buildReducedModel(full, locked, reference)
-    for frame in model.frames:
-        frame.name = str(frame.name).removesuffix(_LINK)
-    return model
+
+def _coupling(
+    every: tuple[str, ...], followers: dict[str, Mimic], ranges: dict[str, JointRange]
+) -> Coupling:
+    """How the joints that move (m,) follow those of them that move on their own."""
+    own = {name: k for k, name in enumerate(n for n in every if n not in followers)}
+    mimics = [followers.get(name, Mimic(name, 1.0, 0.0)) for name in every]
+    return Coupling(
+        joint_names=every,
+        driver=np.array([own[mimic.driver] for mimic in mimics]),
+        multiplier=np.array([mimic.multiplier for mimic in mimics]),
+        offset=np.array([mimic.offset for mimic in mimics]),
+        limits=limits_of(every, ranges),
+    )
 
 
 def links_by_joint(robot: Robot) -> dict[str, list[str]]:
-    """Links that each moved joint carries directly; those fixed to the base under ''."""
+    """Links that each joint that moves carries directly, also those that follow others.
+
+    Those fixed to the base stand under ''.
+    """
     found: dict[str, list[str]] = {}
+    moving = robot.tree.joint_names
     for frame in robot.model.frames:
         if frame.type == pin.FrameType.BODY:
             joint = str(robot.model.names[frame.parentJoint])
-            found.setdefault(joint if joint in robot.joint_names else "", []).append(
-                str(frame.name)
-            )
+            found.setdefault(joint if joint in moving else "", []).append(str(frame.name))
     return found
-
-
-def _parse(description: RobotDescription, spec: RobotSpec) -> pin.Model:
-    require_limits(description)  # the parser would tell it to the terminal, not to us
-    try:
-        if spec.base == "floating":
-            model = pin.buildModelFromXML(description.xml, pin.JointModelFreeFlyer())
-        else:
-            rotation = pin.rpy.rpyToMatrix(*spec.base_orientation)
-            model = pin.buildModelFromXML(description.xml)
-            if any(spec.base_orientation):
-                _turn_base(model, rotation)
-    except (RuntimeError, ValueError) as error:
-        first = str(error).strip().splitlines()[0] if str(error).strip() else "no reason given"
-        raise RobotError(f"{description.path} is not a URDF that can be used: {first}") from error
-    if model.nv - (6 if spec.base == "floating" else 0) < 1:
-        raise RobotError(f"{description.path} has no movable joint.")
-    return model
-
-
-def _turn_base(model: pin.Model, rotation: Array) -> None:
-    turn = pin.SE3(rotation, np.zeros(3))
-    for joint in range(1, model.njoints):
-        if model.parents[joint] == 0:
-            model.jointPlacements[joint] = turn * model.jointPlacements[joint]
-    model.inertias[0] = model.inertias[0].se3Action(turn)
-    for frame in model.frames:
-        if frame.parentJoint == 0:
-            frame.placement = turn * frame.placement
 
 
 def _check_types(model: pin.Model, names: list[str], description: RobotDescription) -> None:
@@ -327,87 +404,29 @@ def _is_single(model: pin.Model, name: str) -> bool:
     return bool(joint.nv == 1 and joint.nq == 1)
 
 
-def _chosen(spec: RobotSpec, names: list[str], mimicking: dict[str, str]) -> list[str]:
+def _chosen(spec: RobotSpec, names: list[str], mimicking: dict[str, Mimic]) -> list[str]:
     if spec.joints == "all":
         return [name for name in names if name not in mimicking]
     for joint in spec.joints:
-        _known(joint, names, "robot.joints")
+        require_known(joint, names, "robot.joints")
         if joint in mimicking:
             raise ConfigError(
-                f"robot.joints: '{joint}' mimics '{mimicking[joint]}' and does not move on its "
-                "own; coupled joints are not modelled. Leave it out of robot.joints."
+                f"robot.joints: '{joint}' mimics '{mimicking[joint].driver}' and moves with it. "
+                f"Leave it out of robot.joints, and name '{mimicking[joint].driver}' there if it "
+                "is to move."
             )
     return [name for name in names if name in spec.joints]
 
 
-def _inside(lower: float, upper: float) -> float:
-    """The middle of the range, or a little off its only bound."""
-    if np.isfinite(lower) and np.isfinite(upper):
-        return (lower + upper) / 2
-    return lower + 0.5 if np.isfinite(lower) else upper - 0.5
-
-
-def _in_degrees(value: float) -> str:
-    """A hint for those who wrote degrees."""
-    if abs(value) <= 2 * np.pi:
-        return ""
-    return f"; angles are in radians, {value:g}° is {np.radians(value):.4g} rad"
-
-
-def _known(joint: str, names: list[str], where: str) -> None:
-    if joint not in names:
-        raise ConfigError(
-            f"{where}: the robot has no joint '{joint}'.{nearest(joint, names)} "
-            f"Its joints: {', '.join(names)}."
-        )
-
-
-def _limits_of(model: pin.Model, name: str, given: JointLimits | None) -> list[float]:
+def _range_of(model: pin.Model, name: str) -> JointRange:
+    """Limits that the URDF gives a joint."""
     joint = model.joints[model.getJointId(name)]
     lower = float(model.lowerPositionLimit[joint.idx_q])
     upper = float(model.upperPositionLimit[joint.idx_q])
-    lower = lower if lower > -UNBOUNDED else -np.inf
-    upper = upper if upper < UNBOUNDED else np.inf
-    velocity = float(model.velocityLimit[joint.idx_v]) or np.inf
-    effort = float(model.effortLimit[joint.idx_v]) or np.inf
-    acceleration = np.inf
-    if given is not None:
-        lower, upper = given.position or (lower, upper)
-        velocity = given.velocity or velocity
-        acceleration = given.acceleration or acceleration
-        effort = given.effort or effort
-    return [lower, upper, velocity, acceleration, effort]
-
-
-def _check_limits(names: list[str], limits: dict[str, list[float]]) -> None:
-    for name in names:
-        lower, upper = limits[name][:2]
-        if not lower < upper:
-            raise ConfigError(
-                f"robot: joint '{name}' has crossed or empty position limits "
-                f"[{lower:g}, {upper:g}]. Give sensible ones under robot.limits.{name}.position, "
-                "or leave the joint out of robot.joints."
-            )
-
-
-def _posture(
-    spec: RobotSpec, names: list[str], chosen: list[str], limits: dict[str, list[float]]
-) -> dict[str, float]:
-    for joint in spec.posture:
-        _known(joint, names, "robot.posture")
-    for joint in spec.limits:
-        _known(joint, names, "robot.limits")
-    posture = {}
-    for name in names:
-        lower, upper = limits[name][:2]
-        if name in spec.posture:
-            value = float(spec.posture[name])
-            if not lower <= value <= upper and (lower < upper or name in chosen):
-                raise ConfigError(
-                    f"robot.posture.{name}: {value:g} is outside its limits "
-                    f"[{lower:g}, {upper:g}]. Give a value between them{_in_degrees(value)}."
-                )
-        else:
-            value = 0.0 if lower <= 0.0 <= upper else _inside(lower, upper)
-        posture[name] = value
-    return posture
+    return JointRange(
+        lower if lower > -UNBOUNDED else -np.inf,
+        upper if upper < UNBOUNDED else np.inf,
+        float(model.velocityLimit[joint.idx_v]) or np.inf,
+        np.inf,
+        float(model.effortLimit[joint.idx_v]) or np.inf,
+    )

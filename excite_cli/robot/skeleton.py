@@ -34,22 +34,19 @@ class Skeleton:
 def skeleton_of(robot: Robot) -> Skeleton:
     """The robot in its posture."""
     model, data = robot.model, robot.model.createData()
-    first = int(model.njoints) - robot.n
     pin.framesForwardKinematics(model, data, robot.configurations(robot.posture[None])[0])
-    places = [np.array(data.oMi[first + j].translation) for j in range(robot.n)]
-    parents = [max(int(model.parents[first + j]) - first, -1) for j in range(robot.n)]
-    tips = list(places)
+    first, own = robot.first_joint, {joint: j for j, joint in enumerate(robot.model_joints)}
+    places = [np.array(data.oMi[joint].translation) for joint in own]
+    parents, tips = robot.parents, list(places)
     for index, frame in enumerate(model.frames):
-        j = int(frame.parentJoint) - first
+        j = own.get(int(frame.parentJoint), -1)
         if j < 0 or j in parents:
             continue
         at = np.array(data.oMf[index].translation)
         if np.linalg.norm(at - places[j]) > np.linalg.norm(tips[j] - places[j]):
             tips[j] = at
     base = np.array(data.oMi[first - 1].translation) if first > 0 else np.zeros(3)
-    return Skeleton(
-        _point(base), tuple(map(_point, places)), tuple(parents), tuple(map(_point, tips))
-    )
+    return Skeleton(_point(base), tuple(map(_point, places)), parents, tuple(map(_point, tips)))
 
 
 def _point(x: Array) -> Point:

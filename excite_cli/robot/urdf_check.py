@@ -110,8 +110,11 @@ def _check_structure(path: Path, root: ElementTree.Element) -> None:
     for joint in joints:
         ends = [_end(path, joint, end, known) for end in ("parent", "child")]
         if ends[1] in parents:
-            _refuse(path, f"two joints lead to link '{_short(ends[1])}'; kinematic loops are not "
-                          "modelled")  # fmt: skip
+            link = _short(ends[1])
+            _refuse(path, f"two joints lead to link '{link}', which closes a loop, and a URDF is a "
+                          f"tree. Cut the loop: give one of the two joints as <loop_joint><link1 "
+                          f"link=\"…\"/><link2 link=\"{link}\"/></loop_joint>; `excite init` then "
+                          "leaves the joints of the loop where they are")  # fmt: skip
         parents.add(ends[1])
         children.setdefault(ends[0], []).append(ends[1])
     roots = sorted(known - parents)

@@ -6,9 +6,11 @@ like any other.
 
 import math
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from excite_cli.robot.description import UNBOUNDED, RobotDescription
+from excite_cli.robot.limits import JointRange
+from excite_cli.robot.mimic import Mimic
 
 
 @dataclass(frozen=True)
@@ -19,7 +21,8 @@ class UrdfJoint:
     infinite `lower` and `upper`. lower, upper [rad or m], velocity [rad/s or m/s], effort [N·m or
     N]: as written, nan where the URDF gives none. carried: share of the robot's mass beyond the
     joint. above: movable joints between it and the base, nearest to the base first. beyond: those
-    that it carries.
+    that it carries. mimics: what it follows; lower, upper and velocity of a joint that others
+    follow are those that these leave it. in_loop: whether it lies on a closed loop, which is cut.
     """
 
     name: str
@@ -30,10 +33,11 @@ class UrdfJoint:
     upper: float
     velocity: float
     effort: float
-    mimics: str | None
+    mimics: Mimic | None
     carried: float
     above: tuple[str, ...]
     beyond: tuple[str, ...]
+    in_loop: bool = False
 
     @property
     def sliding(self) -> bool:
@@ -131,13 +135,13 @@ def survey(description: RobotDescription) -> UrdfSurvey:
     root = ElementTree.fromstring(description.xml)
     tree = _Tree(root)
     total = sum(tree.masses.values())
-    joints = []
+    looped = {joint for loop in description.loops for joint in loop.joints}
+    joints: list[UrdfJoint] = []
     for element in tree.joints:
         if element.get("type") == "fixed":
             continue
         child = _link(element, "child")
         mass, beyond = tree.below(child)
-        mimic = element.find("mimic")
         lower, upper = _limit(element, "lower", 0.0), _limit(element, "upper", 0.0)
         joints.append(
             UrdfJoint(
@@ -149,12 +153,14 @@ def survey(description: RobotDescription) -> UrdfSurvey:
                 upper=upper if upper < UNBOUNDED else math.inf,
                 velocity=_limit(element, "velocity"),
                 effort=_limit(element, "effort"),
-                mimics=None if mimic is None else mimic.get("joint", ""),
+                mimics=description.mimicking.get(element.get("name", "")),
                 carried=mass / total if total > 0 else 0.0,
                 above=tuple(tree.above(element)),
                 beyond=tuple(beyond),
+                in_loop=element.get("name", "") in looped,
             )
         )
+    _narrow(joints)
     return UrdfSurvey(
         joints=tuple(joints),
         mass=total,
@@ -162,6 +168,22 @@ def survey(description: RobotDescription) -> UrdfSurvey:
         has_shapes=bool(root.findall("link/collision/geometry")),
         unguarded=tree.unguarded(root),
     )
+
+
+def _narrow(joints: list[UrdfJoint]) -> None:
+    """Limits of joints that others follow become those that these leave them."""
+    place = {joint.name: k for k, joint in enumerate(joints)}
+    for follower in joints:
+        if follower.mimics is None or follower.mimics.driver not in place:
+            continue
+        k = place[follower.mimics.driver]
+        own, theirs = (
+            JointRange(one.lower, one.upper, one.velocity if one.velocity > 0 else math.inf)
+            for one in (joints[k], follower)
+        )
+        kept = own.keeping(theirs, follower.mimics)
+        speed = kept.velocity if kept.velocity < own.velocity else joints[k].velocity
+        joints[k] = replace(joints[k], lower=kept.lower, upper=kept.upper, velocity=speed)
 
 
 def _link(element: ElementTree.Element, end: str) -> str:

@@ -14,11 +14,12 @@ from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.covariate_series import CovariateSeries
 from excite_cli.simulation.engine import load_mujoco
-from excite_cli.simulation.mujoco_model import Plant, build_plant, refresh
+from excite_cli.simulation.mujoco_model import Plant, build_plant, coupling_name, refresh
 from excite_cli.simulation.planted import Planted
 
 _STABLE = 0.25  # step times the highest frequency of springs
 _MOST_STEPS = 200
+_NOTHING = 1e-9  # kg·m²
 _HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)  # flanks of a gear
 
 
@@ -156,7 +157,7 @@ def make(build: Build, step: float) -> Plant:
     model.dof_damping[motor] = build.damping
     model.dof_frictionloss[motor] = build.friction
     for c, coupling in enumerate(build.couplings):
-        model.tendon_frictionloss[c] = coupling.force
+        model.tendon_frictionloss[model.tendon(coupling_name(c)).id] = coupling.force
     stiff, constant = build.springs.T
     model.jnt_stiffness[motor] = stiff
     model.qpos_spring[motor] = np.divide(
@@ -164,6 +165,8 @@ def make(build: Build, step: float) -> Plant:
     )
     _check_friction(build)
     _check_inertia(build, plant)
+    if plant.coupled:
+        _check_followers(build, plant)
     refresh(plant)
     _shorten(plant, step)
     model.jnt_solref[:] = [2 * model.opt.timestep, 1.0]
@@ -172,29 +175,27 @@ def make(build: Build, step: float) -> Plant:
 
 def mass_matrix(plant: Plant, q: Array) -> Array:
     """Inertia (n, n) as the motors see it with stiff transmissions, armatures included."""
-    data = plant.new_data()
-    return _full(plant, data, q)[np.ix_(plant.motor, plant.motor)]
+    return np.asarray(mass_matrices(plant, q[None])[0])
 
 
 def mass_matrices(plant: Plant, q: Array) -> Array:
     """As `mass_matrix`, for postures (T, n)."""
-    data = plant.new_data()
-    at = np.ix_(plant.motor, plant.motor)
-    return np.array([_full(plant, data, posture)[at] for posture in q])
+    data, n = plant.new_data(), len(plant.motor)
+    return np.array([_full(plant, data, posture)[:n, :n] for posture in q])
 
 
 def sudden_inertias(plant: Plant, q: Array) -> Array:
     """What the motors feel of a quick push, (T, n, n): links behind soft gears do not follow."""
-    data = plant.new_data()
-    at = np.ix_(plant.motor, plant.motor)
-    return np.array([np.linalg.inv(np.linalg.inv(_full(plant, data, each))[at]) for each in q])
+    data, n = plant.new_data(), len(plant.motor)
+    inverse = np.linalg.inv
+    return np.array([inverse(inverse(_full(plant, data, each))[:n, :n]) for each in q])
 
 
 def _full(plant: Plant, data: Any, q: Array) -> Array:
+    """Inertia of the coordinates that move on their own, the motors' first."""
     mujoco = load_mujoco()
     size = plant.model.nv
-    data.qpos[:] = 0.0
-    data.qpos[plant.motor] = q
+    data.qpos[:] = plant.coordinates(q)
     mujoco.mj_kinematics(plant.model, data)
     mujoco.mj_comPos(plant.model, data)
     if plant.model.ntendon:
@@ -205,7 +206,7 @@ def _full(plant: Plant, data: Any, q: Array) -> Array:
         unit[column] = 1.0
         mujoco.mj_mulM(plant.model, data, full[column], unit)
         unit[column] = 0.0
-    return full
+    return np.asarray(plant.spread.T @ full @ plant.spread)
 
 
 def _check_friction(build: Build) -> None:
@@ -221,14 +222,31 @@ def _check_friction(build: Build) -> None:
         )
 
 
+def _check_followers(build: Build, plant: Plant) -> None:
+    """MuJoCo knows the joints that follow others as joints of their own, which must move a mass."""
+    tree = build.robot.tree
+    column, unit = np.zeros(plant.model.nv), np.eye(plant.model.nv)
+    data = plant.new_data()
+    data.qpos[:] = plant.coordinates(build.robot.posture)
+    load_mujoco().mj_forward(plant.model, data)
+    for name, body in zip(tree.joint_names, plant.bodies, strict=True):
+        at = int(plant.model.body_dofadr[body])
+        load_mujoco().mj_mulM(plant.model, data, column, unit[at])
+        if column[at] <= _NOTHING and name not in build.robot.joint_names:
+            raise RobotError(
+                f"joint '{name}', which follows another one, moves no inertia and cannot be "
+                "simulated. Give its links an inertia in the URDF, or lock its driver."
+            )
+
+
 def _check_inertia(build: Build, plant: Plant) -> None:
     matrix = mass_matrix(plant, build.robot.posture)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-12))
     worst, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    if np.diag(matrix).min() > 1e-9 and worst[0] > 1e-9:
+    if np.diag(matrix).min() > _NOTHING and worst[0] > _NOTHING:
         return
     light = int(np.argmin(np.diag(matrix)))
-    joint = light if np.diag(matrix)[light] <= 1e-9 else int(np.argmax(np.abs(vectors[:, 0])))
+    joint = light if np.diag(matrix)[light] <= _NOTHING else int(np.argmax(np.abs(vectors[:, 0])))
     raise RobotError(
         f"joint '{build.robot.joint_names[joint]}' moves no inertia and cannot be simulated. Give "
         f"its links an inertia in the URDF, lock it, or plant a motor's inertia: --effect "
@@ -243,7 +261,7 @@ def _shorten(plant: Plant, step: float) -> None:
     if not stiffness.any():
         return
     full = _full(plant, plant.new_data(), np.zeros(len(plant.motor)))
-    root = np.sqrt(stiffness)
+    root = np.sqrt(stiffness)[plant.motor.tolist() + plant.gear[plant.gear >= 0].tolist()]
     square = np.linalg.eigvalsh(root[:, None] * np.linalg.solve(full, np.diag(root)))
     needed = step * np.sqrt(max(square[-1], 0.0)) / _STABLE
     if needed > _MOST_STEPS:
@@ -253,5 +271,6 @@ def _shorten(plant: Plant, step: float) -> None:
         )
     model.opt.timestep = step / max(1, int(np.ceil(needed)))
     model.dof_solref[:, 0] = 2 * model.opt.timestep
+    model.eq_solref[:, 0] = 2 * model.opt.timestep
     if model.ntendon:
         model.tendon_solref_fri[:, 0] = 2 * model.opt.timestep

@@ -2,7 +2,8 @@
 
 A joint between motor and link that is not stiff (elasticity, backlash) becomes two coordinates on
 one axis, θ of the motor and δ of the transmission: the link stands at θ + δ, the rotor's inertia
-sits on θ alone, the spring or the backlash acts on δ.
+sits on θ alone, the spring or the backlash acts on δ. A joint that follows another one (mimic) is
+held where that stands by a constraint as hard as MuJoCo has.
 """
 
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.robot.model import Array, Robot
-from excite_cli.robot.tree import TreeJoint, tree_of
+from excite_cli.robot.tree import Tree, TreeJoint, tree_of
 from excite_cli.simulation.engine import load_mujoco
 
 # A friction constraint this hard reaches its full force within micro-radians per second of slip.
@@ -28,13 +29,25 @@ class Plant:
     """A compiled model and where things are in it.
 
     `motor` (n,) coordinates of the motors, `gear` (n,) those of the transmission (-1: stiff), and
-    `bodies` (n,) MuJoCo's body that each joint carries.
+    `bodies` (m,) MuJoCo's body that each joint carries that moves. All coordinates (nv,) are
+    `spread` (nv, k) times those that move on their own, the motors' first, plus `offset` (nv,).
     """
 
     model: Any
     motor: NDArray[np.intp]
     gear: NDArray[np.intp]
     bodies: NDArray[np.intp]
+    spread: Array
+    offset: Array
+
+    @property
+    def coupled(self) -> bool:
+        """Whether joints follow others."""
+        return len(self.offset) > self.spread.shape[1]
+
+    def coordinates(self, motors: Array) -> Array:
+        """All coordinates (nv,) with the motors at (n,) and transmissions at rest."""
+        return np.asarray(self.spread[:, : len(motors)] @ motors + self.offset)
 
     def new_data(self) -> Any:
         """A fresh state."""
@@ -58,11 +71,15 @@ def build_plant(
     tree = tree_of(robot)
     spec = mujoco.MjSpec()
     placed: list[Any] = []
-    for j, joint in enumerate(tree.joints):
+    places = _places(robot, tree)
+    for k, joint in enumerate(tree.joints):
         parent = spec.worldbody if joint.parent < 0 else placed[joint.parent]
-        placed.append(_add_body(mujoco, parent, joint, j, j in set(soft)))
+        placed.append(_add_body(mujoco, parent, joint, k, places[k], places[k] in set(soft)))
+    followers = [k for k, place in enumerate(places) if place < 0]
+    for k in followers:
+        _hold(mujoco, spec, tree.joints[k], k, tree.joints[k].driver in set(soft))
     for c, (first, second, factor) in enumerate(couplings):
-        tendon = spec.add_tendon(name=f"coupling_{c}")
+        tendon = spec.add_tendon(name=coupling_name(c))
         tendon.wrap_joint(_motor_name(first), 1.0)
         tendon.wrap_joint(_motor_name(second), factor)
     model = spec.compile()
@@ -70,17 +87,32 @@ def build_plant(
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     model.opt.gravity[:] = tree.gravity
+    motor = np.array([model.joint(_motor_name(j)).dofadr[0] for j in range(robot.n)])
+    gear = np.array(
+        [model.joint(_gear_name(j)).dofadr[0] if j in soft else -1 for j in range(robot.n)]
+    )
+    spread, offset = np.zeros((model.nv, robot.n + len(soft))), np.zeros(model.nv)
+    own = [*motor, *gear[gear >= 0]]
+    spread[own, np.arange(len(own))] = 1.0
+    for k in followers:
+        joint, at = tree.joints[k], model.joint(_follower_name(k)).dofadr[0]
+        driven = spread[motor[joint.driver]]
+        if gear[joint.driver] >= 0:
+            driven = driven + spread[gear[joint.driver]]
+        spread[at], offset[at] = joint.multiplier * driven, joint.offset
     plant = Plant(
         model=model,
-        motor=np.array([model.joint(_motor_name(j)).dofadr[0] for j in range(robot.n)]),
-        gear=np.array(
-            [model.joint(_gear_name(j)).dofadr[0] if j in soft else -1 for j in range(robot.n)]
-        ),
-        bodies=np.array([model.body(_body_name(j)).id for j in range(robot.n)]),
+        motor=motor,
+        gear=gear,
+        bodies=np.array([model.body(_body_name(k)).id for k in range(len(tree.joints))]),
+        spread=spread,
+        offset=offset,
     )
-    model.dof_armature[plant.motor[plant.gear < 0]] = 0.0  # a soft joint needs a rotor
+    rotors = plant.motor[plant.gear >= 0]
+    model.dof_armature[np.setdiff1d(np.arange(model.nv), rotors)] = 0.0  # soft joints need one
     model.dof_solref[:] = [2 * step, 1.0]
     model.dof_solimp[:] = _CRISP
+    model.eq_solref[:] = [2 * step, 1.0]
     if len(couplings):
         model.tendon_solref_fri[:] = [2 * step, 1.0]
         model.tendon_solimp_fri[:] = _CRISP
@@ -89,7 +121,7 @@ def build_plant(
 
 
 def set_inertias(plant: Plant, phi: Array) -> None:
-    """Put the bodies' standard parameters φ (10·n,) into the model, as they are.
+    """Put the bodies' standard parameters φ (10·m,) into the model, as they are.
 
     They are set after compilation: MuJoCo's compiler refuses what no mass distribution has, and
     URDFs are full of such bodies.
@@ -126,19 +158,45 @@ def principal(ten: Array) -> tuple[float, Array, Array, Array]:
     return mass, lever, moments, axes
 
 
-def _add_body(mujoco: Any, parent: Any, joint: TreeJoint, j: int, soft: bool) -> Any:
+def _places(robot: Robot, tree: Tree) -> list[int]:
+    """For every joint of the tree its place among the moved joints, -1 for one that follows."""
+    own = {name: j for j, name in enumerate(robot.joint_names)}
+    return [own.get(joint.name, -1) for joint in tree.joints]
+
+
+def _hold(mujoco: Any, spec: Any, joint: TreeJoint, k: int, soft: bool) -> None:
+    """Let joint k of the tree follow its driver: q − multiplier · q_driver = offset."""
+    tendon = spec.add_tendon(name=_follower_name(k))
+    tendon.wrap_joint(_follower_name(k), 1.0)
+    tendon.wrap_joint(_motor_name(joint.driver), -joint.multiplier)
+    if soft:
+        tendon.wrap_joint(_gear_name(joint.driver), -joint.multiplier)
+    held = spec.add_equality(name=_follower_name(k))
+    held.type, held.name1 = mujoco.mjtEq.mjEQ_TENDON, _follower_name(k)
+    held.data[:5] = [joint.offset, 0.0, 0.0, 0.0, 0.0]
+    held.solimp = _CRISP
+
+
+def _add_body(mujoco: Any, parent: Any, joint: TreeJoint, k: int, j: int, soft: bool) -> Any:
+    """Body k of the tree, on the moved joint j or, for -1, on one that follows."""
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(joint.rotation).ravel())
-    body = parent.add_body(name=_body_name(j), pos=joint.position, quat=quaternion)
+    body = parent.add_body(name=_body_name(k), pos=joint.position, quat=quaternion)
     # Stand-ins of a general shape: the compiler must take no short cut that the real ones break.
     body.mass, body.inertia, body.ipos = 1.0, [1.0, 1.2, 1.4], [0.1, 0.2, 0.3]
     body.iquat = _TURNED
     body.explicitinertial = True
     kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.sliding else mujoco.mjtJoint.mjJNT_HINGE
-    body.add_joint(name=_motor_name(j), type=kind, axis=joint.axis, armature=1.0)
+    name = _motor_name(j) if j >= 0 else _follower_name(k)
+    body.add_joint(name=name, type=kind, axis=joint.axis, armature=1.0)
     if soft:
         body.add_joint(name=_gear_name(j), type=kind, axis=joint.axis)
     return body
+
+
+def coupling_name(c: int) -> str:
+    """The tendon of a coupling's friction."""
+    return f"coupling_{c}"
 
 
 def _body_name(j: int) -> str:
@@ -147,6 +205,10 @@ def _body_name(j: int) -> str:
 
 def _motor_name(j: int) -> str:
     return f"motor_{j}"
+
+
+def _follower_name(k: int) -> str:
+    return f"follower_{k}"
 
 
 def _gear_name(j: int) -> str:

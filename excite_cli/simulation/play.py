@@ -45,9 +45,10 @@ def play(build: Build, plant: Plant, reference: Reference, gains: Gains) -> Play
     data = plant.new_data()
     rows, n = reference.q.shape
     # Views into MuJoCo's memory; a slice, where it will do, costs less than indices.
-    motor = plant.motor if build.soft else slice(None)
+    motor = plant.motor if build.soft or plant.coupled else slice(None)
     qpos, qvel, applied = data.qpos, data.qvel, data.qfrc_applied
-    qpos[motor], qvel[motor] = reference.q[0], reference.v[0]
+    qpos[:] = plant.coordinates(reference.q[0])
+    qvel[:] = plant.spread[:, :n] @ reference.v[0]
     _engage(build, plant, data, reference.feed_forward[0])
     mujoco.mj_forward(model, data)
     effects = _Effects(build, plant, data) if build.looped else None
@@ -98,7 +99,7 @@ class _Effects:
 
     def __init__(self, build: Build, plant: Plant, data: Any) -> None:
         self._looped = LoopedEffects(build)
-        self._motor = plant.motor if build.soft else slice(None)
+        self._motor = plant.motor if build.soft or plant.coupled else slice(None)
         self._load = _Load(plant, data, self._motor)
         self._acceleration = data.qacc
         self._friction = plant.model.dof_frictionloss
@@ -122,14 +123,16 @@ class _Load:
         self._multiply = load_mujoco().mj_mulM
         self._model, self._data, self._motor = plant.model, data, motor
         self._armature = plant.model.dof_armature[motor].copy()
+        self._gathered = plant.spread[:, : len(plant.motor)].T if plant.coupled else None
         self._product = np.zeros(plant.model.nv)
         self._acceleration, self._bias = data.qacc, data.qfrc_bias
 
     def now(self) -> Array:
         """(n,) [N·m]."""
         self._multiply(self._model, self._data, self._product, self._acceleration)
-        motor = self._motor
-        carried: Array = (self._product + self._bias)[motor]
+        carried: Array = self._product + self._bias
+        motor, gathered = self._motor, self._gathered
+        carried = carried[motor] if gathered is None else gathered @ carried
         return carried - self._armature * self._acceleration[motor]
 
 

@@ -104,6 +104,7 @@ def _write(path: Path, found: Identification, attributes: dict[str, Any]) -> Non
                 "inertias": fit.inertias,
                 "count": fit.count,
                 "samples": fit.samples,
+                "kept": list(fit.kept),
                 "effects": json.dumps([_effect_data(effect) for effect in fit.effects]),
             }
         )
@@ -216,6 +217,8 @@ def _read_fit(file: Any, joints: tuple[str, ...]) -> Fit:
         samples=checked.number(settings, "samples"),
         consistent=_consistent(consistent, len(phi), size - rank),
         links=_links(consistent, len(phi) // 10),
+        # Files of earlier versions fitted all of them.
+        kept=checked.texts(settings["kept"], "kept") if "kept" in settings else (),
         **texts,
         **arrays,
     )

@@ -32,7 +32,7 @@ def not_guarded(problem: Problem) -> list[str]:
     model, links = problem.robot.model, links_by_joint(problem.robot)
     return [
         joint
-        for joint in problem.robot.joint_names
+        for joint in problem.robot.tree.joint_names
         if model.inertias[model.getJointId(joint)].mass > 0 and not guarded & set(links[joint])
     ]
 

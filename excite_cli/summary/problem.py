@@ -9,6 +9,7 @@ from excite_cli.constraints.base import Constraint
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.words import dropped_in_words
+from excite_cli.robot.loops import loops_in_words
 from excite_cli.shown.note import Level, Note
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
@@ -26,6 +27,9 @@ def problem_notes(problem: Problem) -> Iterator[Note]:
     )
     if problem.base.note:
         yield Note(Level.NOTE, problem.base.note)
+    moved = set(robot.joint_names)
+    cut = [loop for loop in robot.description.loops if moved & set(loop.joints)]
+    yield from (_warning(f"{told}.") for told in loops_in_words(cut))
     names = ", ".join(_counted_name(constraint) for constraint in problem.constraints) or "none"
     yield _said(f"constraints: {names}")
     yield _detail(

@@ -50,6 +50,7 @@ def robot_answer(found: DescribedRobot) -> Answer:
                 "velocity": joint.velocity,
                 "effort": joint.effort,
                 "links": list(joint.links),
+                "followers": list(joint.followers),
             }
             for joint in found.joints
         },

@@ -31,6 +31,10 @@ LEVELS: dict[str, tuple[str, type[Section]]] = {
         "robot: {urdf: arm.urdf, limits: {elbow: {@: 1}}}",
         robot_spec.JointLimits,
     ),
+    "robot.transmissions.0": (
+        "robot: {urdf: arm.urdf, transmissions: [{joints: [a], motors: [m], matrix: [[1]], @: 1}]}",
+        robot_spec.TransmissionSpec,
+    ),
     "trajectory": (f"{ROBOT}\ntrajectory: {{@: 1}}", trajectory_spec.FourierSpec),
     "sampling": (f"{ROBOT}\nsampling: {{@: 1}}", trajectory_spec.SamplingSpec),
     "sampling.cost": (

@@ -4,22 +4,33 @@ import numpy as np
 import pytest
 
 from excite_cli.config.constraints_spec import (
+    BoxSpec,
     ConstraintsSpec,
+    ContactSpec,
     DiscSpec,
     JointLimitsSpec,
     PolygonSpec,
     SelfCollisionSpec,
+    SurroundingsSpec,
     TorqueSpec,
 )
-from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.config.robot_spec import JointLimits, RobotSpec, TransmissionSpec
+from excite_cli.config.uncertainty_spec import UncertaintySpec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.dynamics.states import States
+from excite_cli.dynamics.uncertain_inertias import inertia_uncertainty
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.differences import central_differences
+from excite_cli.proof.enclosed_motion import EnclosedMotion
+from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
 from excite_cli.robot.model import Robot, build_robot
+from excite_cli.trajectory.fourier import FourierTrajectory
+from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot
 
 
@@ -68,6 +79,96 @@ def test_gradients_on_a_real_arm_with_capsules() -> None:
     robot = build_robot(RobotSpec(urdf="example-robot-data:panda"))
     for constraint in build_constraints(_all(DiscSpec(radius=0.3), collision=True), robot):
         _check(robot, constraint, 1, 1e-5)
+
+
+@pytest.mark.parametrize("uncertain", [False, True])
+@pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
+def test_gradients_where_joints_follow_others(parts: tuple, uncertain: bool) -> None:
+    robot = coupled_robot(parts, base="floating", rows=("joints",))
+    around = SurroundingsSpec(
+        floor=-0.2, boxes={"box": BoxSpec(size=(1, 1, 1), position=(2, 0, 0))}
+    )
+    ground = ContactSpec(friction=0.7)
+    spec = _all(DiscSpec(radius=0.3), collision=True).model_copy(
+        update={"contact": ground, "surroundings": around}
+    )
+    known = None
+    if uncertain:
+        known = inertia_uncertainty(UncertaintySpec(mass=0.1), robot, find_base_parameters(robot))
+    found = build_constraints(spec, robot, known)
+    assert {"joint_torque", "balance", "contact", "self_collision", "surroundings"} <= {
+        constraint.name for constraint in found
+    }
+    for constraint in found:
+        _check(robot, constraint, 1, 1e-5)
+
+
+def with_motors() -> Robot:
+    wrist = TransmissionSpec(
+        joints=("shoulder", "wrist"),
+        motors=("m1", "m2"),
+        matrix=((0.5, 0.5), (0.4, -0.6)),
+        limits={"m1": JointLimits(position=(-1.5, 2.0), velocity=1.5, acceleration=5.0, effort=3.0),
+                "m2": JointLimits(effort=4.0)},
+    )  # fmt: skip
+    return coupled_robot(HAND, transmissions=(wrist,))
+
+
+@pytest.mark.parametrize("uncertain", [False, True])
+def test_motors_that_drive_several_joints_are_bounded(uncertain: bool) -> None:
+    robot = with_motors()
+    known = None
+    if uncertain:
+        known = inertia_uncertainty(UncertaintySpec(mass=0.1), robot, find_base_parameters(robot))
+    spec = ConstraintsSpec(
+        joint_limits=JointLimitsSpec(acceleration=8.0, scale=0.5), torque=TorqueSpec(scale=0.5)
+    )
+    found = {each.name: each for each in build_constraints(spec, robot, known)}
+    of_motors = ("motor_position", "motor_velocity", "motor_acceleration", "motor_torque")
+    assert set(of_motors) < set(found)
+    for name in of_motors:
+        _check(robot, found[name], 1, 1e-5)
+    assert found["motor_torque"].labels == ("m1 lower", "m2 lower", "m1 upper", "m2 upper")
+    q, v, a = robot.draw_states(30, 1)
+    states = States(BatchKinematics(robot), q, v, a)
+    matrix = np.array([[0.5, 0.5], [0.4, -0.6]])
+    theta, speed = (np.linalg.solve(matrix, x[:, :2].T).T for x in (q, v))
+    position = np.column_stack([theta[:, 0] + 1.5, 2.0 - theta[:, 0]])
+    np.testing.assert_allclose(found["motor_position"].margins(states), position, atol=1e-12)
+    allowed = 0.5 * 1.5
+    velocity = np.column_stack([allowed + speed[:, 0], allowed - speed[:, 0]])
+    np.testing.assert_allclose(found["motor_velocity"].margins(states), velocity, atol=1e-12)
+    torque = InverseDynamics(robot).torques(q, v, a)[:, :2] @ matrix
+    plain = np.hstack([np.array([1.5, 2.0]) + torque, np.array([1.5, 2.0]) - torque])
+    margins = found["motor_torque"].margins(states)
+    if uncertain:
+        assert (margins < plain).all()
+    else:
+        np.testing.assert_allclose(margins, plain, atol=1e-12)
+
+
+@pytest.mark.parametrize("uncertain", [False, True])
+def test_bounds_of_motors_between_instants_hold_at_instants(uncertain: bool) -> None:
+    robot = with_motors()
+    known = None
+    if uncertain:
+        known = inertia_uncertainty(UncertaintySpec(mass=0.1), robot, find_base_parameters(robot))
+    spec = ConstraintsSpec(joint_limits=JointLimitsSpec(), torque=TorqueSpec())
+    family = FourierTrajectory(3, 1.5)
+    drawn = np.random.default_rng(0).normal(size=(family.n_coefficients, robot.n))
+    coefficients = drawn * [0.4, 0.4, 0.01]
+    intervals = intervals_of(family, 0.02)
+    motion = EnclosedMotion(robot, enclosed_states(family, coefficients, intervals))
+    for constraint in build_constraints(spec, robot, known):
+        if not constraint.name.startswith("motor"):
+            continue
+        least = constraint.least(motion)
+        assert least is not None
+        for s in (-1.0, -0.3, 0.0, 1.0):
+            at = family.basis(intervals.middles + s * intervals.halves).states(coefficients)
+            margins = constraint.margins(States(BatchKinematics(robot), *at))
+            assert (margins - least).min() > -1e-9
+            assert (margins - least).min() < 0.05 * constraint.scale.max()
 
 
 def test_disc_margin_is_inside_the_circle() -> None:

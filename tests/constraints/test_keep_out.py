@@ -22,6 +22,7 @@ from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.model import Robot, build_robot
+from tests.robot.coupled_robots import HAND, coupled_robot
 
 CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 ARM = RobotSpec(urdf=str(CONFIG.parents[1] / "data" / "smoke_arm.urdf"))
@@ -105,6 +106,11 @@ def test_what_cannot_be_asked_is_refused(
 ) -> None:
     with pytest.raises(ConfigError, match=message):
         build_keep_out({"a": region}, build_robot(ARM))
+
+
+def test_joints_that_follow_others_are_named_by_their_driver() -> None:
+    with pytest.raises(ConfigError, match=r"keep_out.a: joint 'finger_2' follows another one"):
+        build_keep_out({"a": {"finger_2": (0.0, 0.01)}}, coupled_robot(HAND))
 
 
 def test_joints_that_do_not_move_count_where_they_are_locked() -> None:

@@ -12,6 +12,7 @@ from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
 from excite_cli.excitation.differences import relative_error
 from excite_cli.robot.model import Robot, build_robot
+from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot
 
 
@@ -33,7 +34,19 @@ def _draw(robot: Robot, seed: int, pairs: int, samples: int = 4) -> tuple:
 def test_both_adjoints_equal_the_block_form(
     seed: int, joints: int, floating: bool, pairs: int
 ) -> None:
-    robot = random_robot(seed, joints=joints, floating=floating)
+    _assert_alike(random_robot(seed, joints=joints, floating=floating), seed, pairs)
+
+
+@pytest.mark.parametrize("rows", [("joints",), ("base", "joints"), ("base",)])
+@pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
+def test_both_adjoints_where_joints_follow_others(parts: tuple, rows: tuple[str, ...]) -> None:
+    base = "floating" if "base" in rows else "fixed"
+    robot = coupled_robot(parts, base=base, rows=rows)
+    _assert_alike(robot, 1, 3)
+    _assert_slopes(robot)
+
+
+def _assert_alike(robot: Robot, seed: int, pairs: int) -> None:
     states, left, right = _draw(robot, seed, pairs)
     expected = block_pull_back(robot, *states, left.transpose(1, 2, 0) @ right)
     scale = np.sqrt(sum(float((part**2).sum()) for part in expected))
@@ -45,7 +58,10 @@ def test_both_adjoints_equal_the_block_form(
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 def test_adjoints_on_a_real_humanoid_against_differences_of_the_regressor(base: str) -> None:
     rows = ("base", "joints") if base == "floating" else ("joints",)
-    robot = build_robot(RobotSpec(urdf="example-robot-data:talos", base=base, rows=rows))
+    _assert_slopes(build_robot(RobotSpec(urdf="example-robot-data:talos", base=base, rows=rows)))
+
+
+def _assert_slopes(robot: Robot) -> None:
     (q, v, a), left, right = _draw(robot, 5, pairs=3, samples=3)
     rng = np.random.default_rng(1)
     dq, dv, da = rng.normal(size=(3, *q.shape))

@@ -20,6 +20,7 @@ from excite_cli.identification.identified_model import IdentifiedModel, Series
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.docs.test_predict import PLANTED as ON_JOINTS
+from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot
 
 PLANTED = (*ON_JOINTS, ("wrench_gain", tuple(range(6)), {}, [0.02]))
@@ -134,7 +135,16 @@ def test_every_effect_alone(kind: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_random_trees_with_sliding_joints(seed: int, tmp_path: Path) -> None:
     robot = random_robot(seed, joints=5)
-    j = next((j for j in range(robot.n) if robot.sliding[j]), 0)
+    _assert_by_c(robot, next((j for j in range(robot.n) if robot.sliding[j]), 0), tmp_path)
+
+
+@pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
+def test_joints_that_others_follow(parts: tuple, tmp_path: Path) -> None:
+    _assert_by_c(coupled_robot(parts), 2, tmp_path)
+
+
+def _assert_by_c(robot: Robot, j: int, tmp_path: Path) -> None:
+    """Rigid bodies and their derivatives by a joint."""
     effects = (kind_named("encoder_offset")((j,)), kind_named("elasticity")((j,)))
     model = IdentifiedModel(standard_parameters(robot), effects, np.array([0.1, 1e-3]))
     series = series_of(robot)

@@ -12,6 +12,7 @@ from excite_cli.export.mjcf import mjcf
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.simulation.true_robot import true_inertias
+from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot
 
 mujoco = pytest.importorskip("mujoco")
@@ -58,6 +59,26 @@ def test_random_trees(seed: int, floating: bool) -> None:
 
 def test_an_arm() -> None:
     check(build_robot(RobotSpec(urdf="example-robot-data:ur10")))
+
+
+@pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
+def test_joints_that_follow_others(parts: tuple) -> None:
+    """Torques of all joints, gathered, are those of the drivers; the engine holds the followers."""
+    robot = coupled_robot(parts)
+    phi = true_inertias(robot, 0.3, seed=2)
+    text = mjcf(robot, IdentifiedModel(phi)).text
+    q, v, a = robot.draw_states(15, seed=1)
+    found, _ = inverse(text, robot.all_positions(q), robot.all_rates(v), robot.all_rates(a))
+    expected = RigidBody(robot, phi, q, v, a).load
+    assert np.abs(robot.gathered(found) - expected).max() < 1e-9 * np.abs(expected).max()
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qpos[:] = robot.all_positions(robot.posture)
+    for _ in range(200):  # the robot falls
+        mujoco.mj_step(model, data)
+    own = [robot.tree.joint_names.index(name) for name in robot.joint_names]
+    assert np.abs(data.qpos[own] - robot.posture).max() > 0.01
+    np.testing.assert_allclose(data.qpos, robot.all_positions(data.qpos[own]), atol=1e-3)
 
 
 def test_limits_and_names_are_in_it() -> None:

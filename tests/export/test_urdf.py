@@ -6,12 +6,13 @@ import pytest
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.regressor import standard_parameters
-from excite_cli.effects.catalogue import declared_effects
+from excite_cli.effects.catalogue import declared_effects, urdf_friction
 from excite_cli.errors import RobotError
 from excite_cli.export.urdf import updated_urdf
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.simulation.true_robot import true_inertias
+from tests.robot.coupled_robots import CLAW, HAND, written
 from tests.robot.random_robots import random_robot
 
 PANDA = RobotSpec(urdf="example-robot-data:panda")
@@ -35,6 +36,22 @@ def test_loading_it_again_gives_the_parameters(spec: RobotSpec, tmp_path: Path) 
     scale = np.abs(phi).max()
     assert np.abs(standard_parameters(again) - phi).max() < 1e-9 * scale
     assert np.abs(standard_parameters(robot) - phi).max() > 1e-3 * scale
+
+
+@pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
+def test_links_of_joints_that_follow_get_their_own(parts: tuple, tmp_path: Path) -> None:
+    spec = RobotSpec(urdf=written(tmp_path, parts))
+    robot = build_robot(spec)
+    phi = true_inertias(robot, 0.3, seed=2)
+    effects = declared_effects((EffectSpec(kind="viscous_friction"),), robot)
+    made = updated_urdf(robot, IdentifiedModel(phi, effects, np.array([1.0, 2.0, 3.0])))
+    again = reloaded(spec, made.text, tmp_path)
+    assert again.followers == robot.followers
+    assert standard_parameters(again) == pytest.approx(phi, abs=1e-12)
+    assert made.notes == ()
+    found, sizes = urdf_friction(again)
+    assert [effect.joints for effect in found] == [(0,), (1,), (2,)]
+    assert sizes == pytest.approx([1.0, 2.0, 3.0])
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -15,6 +15,7 @@ from excite_cli.geometry.relative_reach import RelativeReach
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.geometry.mesh_cover import uncovered_links
+from tests.robot.coupled_robots import CLAW, coupled_robot
 
 from .fitted_robots import capsules_of, robot_of
 
@@ -35,12 +36,13 @@ def wave(robot: Robot, count: int, seed: int = 0) -> Array:
     return (lower + upper) / 2 + 0.48 * (upper - lower) * np.sin(beat * t + phase)
 
 
-@pytest.mark.parametrize(("name", "count"), [("arm", 300), ("panda", 40)])
+@pytest.mark.parametrize(("name", "count"), [("arm", 300), ("panda", 40), ("claw", 40)])
 @pytest.mark.parametrize("smooth", [True, False])
 def test_least_distances_and_counts_are_those_of_brute_force(
     name: str, count: int, smooth: bool
 ) -> None:
-    robot = arm() if name == "arm" else robot_of(name)
+    named = {"arm": arm, "claw": lambda: coupled_robot(CLAW, posture={"knuckle": 0.3})}
+    robot = named[name]() if name in named else robot_of(name)
     check = MeshCheck(robot)
     q = wave(robot, count) if smooth else robot.draw_states(count, 8)[0]
     found = check.least(q)
@@ -97,6 +99,7 @@ def test_a_link_moves_no_farther_than_its_reach_seen_from_another() -> None:
         (arm(), ("column", "tool")),
         (robot_of("talos"), ("arm_left_6_link", "arm_right_3_link")),
         (robot_of("talos"), ("torso_2_link", "arm_left_4_link")),
+        (coupled_robot(CLAW), ("left_outer", "right_outer")),
     ):
         meshes = {mesh.link: mesh for mesh in link_meshes(robot)}
         first, second = meshes[names[0]], meshes[names[1]]

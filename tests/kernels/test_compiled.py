@@ -23,9 +23,14 @@ from excite_cli.geometry.pair_table import PairTable
 from excite_cli.kernels import compiled as kernels
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.model import Robot
+from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot
 
 ROBOTS = st.tuples(st.integers(0, 10_000), st.integers(2, 9), st.booleans())
+COUPLED = pytest.mark.parametrize(
+    "robot", [coupled_robot(HAND), coupled_robot(CLAW, base="floating")], ids=["hand", "claw"]
+)
 
 pytestmark = pytest.mark.skipif(
     KERNELS is None and shutil.which("cc") is None, reason="no C compiler on this machine"
@@ -45,7 +50,15 @@ def test_a_library_of_another_version_is_not_taken(monkeypatch: pytest.MonkeyPat
 @given(ROBOTS)
 def test_kinematics_and_pull_back(chosen: tuple[int, int, bool]) -> None:
     seed, joints, floating = chosen
-    robot = random_robot(seed, joints, floating)
+    _assert_pull_back(random_robot(seed, joints, floating), seed)
+
+
+@COUPLED
+def test_kinematics_and_pull_back_where_joints_follow(robot: Robot) -> None:
+    _assert_pull_back(robot, 1)
+
+
+def _assert_pull_back(robot: Robot, seed: int) -> None:
     q, v, a = robot.draw_states(7, seed)
     weights = np.random.default_rng(seed).normal(size=(7, len(robot.rows), 10 * robot.n_bodies))
     kinematics, adjoint = BatchKinematics(robot), SpatialAdjoint(robot)
@@ -64,7 +77,15 @@ def test_kinematics_and_pull_back(chosen: tuple[int, int, bool]) -> None:
 @given(ROBOTS)
 def test_regressor_is_pinocchios(chosen: tuple[int, int, bool]) -> None:
     seed, joints, floating = chosen
-    robot = random_robot(seed, joints, floating)
+    _assert_regressor(random_robot(seed, joints, floating), seed)
+
+
+@COUPLED
+def test_regressor_is_pinocchios_where_joints_follow(robot: Robot) -> None:
+    _assert_regressor(robot, 1)
+
+
+def _assert_regressor(robot: Robot, seed: int) -> None:
     states = robot.draw_states(7, seed)
     kept = np.random.default_rng(seed).permutation(10 * robot.n_bodies)[: 4 * robot.n_bodies]
     found = SpatialAdjoint(robot).regressor(*states, kept)
@@ -76,7 +97,15 @@ def test_regressor_is_pinocchios(chosen: tuple[int, int, bool]) -> None:
 @given(ROBOTS)
 def test_distances_and_their_gradients(chosen: tuple[int, int, bool]) -> None:
     seed, joints, floating = chosen
-    robot = random_robot(seed, joints, floating)
+    _assert_distances(random_robot(seed, joints, floating), seed)
+
+
+@COUPLED
+def test_distances_and_their_gradients_where_joints_follow(robot: Robot) -> None:
+    _assert_distances(robot, 1)
+
+
+def _assert_distances(robot: Robot, seed: int) -> None:
     rng = np.random.default_rng(seed)
     capsules = [
         Capsule(f"link_{joint}", joint, *rng.uniform(-0.3, 0.3, (2, 3)), 0.05, ())

@@ -12,6 +12,7 @@ from excite_cli.proof.enclosed_rows import ground_rows, mass_rows, torque_rows
 from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.fourier import FourierTrajectory
+from tests.robot.coupled_robots import CLAW, coupled_robot
 from tests.robot.random_robots import random_robot
 
 ROUNDING = 1e-9
@@ -44,7 +45,15 @@ def off(model, value: np.ndarray, s: float) -> float:
 @settings(max_examples=12, deadline=None)
 @given(st.integers(0, 10**5), st.booleans(), st.sampled_from([0.05, 0.005]))
 def test_bodies_lie_within(seed: int, floating: bool, width: float) -> None:
-    robot = random_robot(seed, 5, floating)
+    bodies_within(random_robot(seed, 5, floating), seed, width)
+
+
+@pytest.mark.parametrize("width", [0.05, 0.005])
+def test_bodies_of_joints_that_follow_lie_within(width: float) -> None:
+    bodies_within(coupled_robot(CLAW), 1, width)
+
+
+def bodies_within(robot: Robot, seed: int, width: float) -> None:
     motion, instants = motion_of(robot, seed, width)
     data = robot.model.createData()
     local = np.array([[0.1, -0.2, 0.3], [0.0, 0.0, 0.0]])
@@ -72,6 +81,15 @@ def test_bodies_lie_within(seed: int, floating: bool, width: float) -> None:
 @given(st.integers(0, 10**5), st.booleans())
 def test_torques_and_mass_lie_within(seed: int, floating: bool) -> None:
     robot = random_robot(seed, 5, floating, rows=("joints",) if floating else None)
+    torques_and_mass_within(robot, seed)
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_torques_of_joints_with_followers_lie_within(base: str) -> None:
+    torques_and_mass_within(coupled_robot(CLAW, base=base), 1)
+
+
+def torques_and_mass_within(robot: Robot, seed: int) -> None:
     motion, instants = motion_of(robot, seed, 0.02)
     model, data = robot.model, robot.model.createData()
     rows, first = torque_rows(motion), mass_rows(motion)
@@ -80,9 +98,10 @@ def test_torques_and_mass_lie_within(seed: int, floating: bool) -> None:
     moment = first.through(phi[None])[..., 0]
     for states, s in instants:
         for t, (q, v, a) in enumerate(full(robot, states)):
-            regressor = pin.computeJointTorqueRegressor(model, data, q, v, a)[robot.moved]
-            assert off(rows[t], regressor, s) < 1e-8
-            assert off(torque[t], pin.rnea(model, data, q, v, a)[robot.moved], s) < 1e-8
+            moved, gathered = robot.tree.moved, robot.gathered
+            regressor = pin.computeJointTorqueRegressor(model, data, q, v, a)[moved]
+            assert off(rows[t], gathered(regressor.T).T, s) < 1e-8
+            assert off(torque[t], gathered(pin.rnea(model, data, q, v, a)[moved]), s) < 1e-8
             center = pin.centerOfMass(model, data, q)
             total = sum(inertia.mass for inertia in model.inertias[1:])
             still = model.inertias[0]

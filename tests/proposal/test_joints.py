@@ -6,9 +6,12 @@ import pytest
 
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.proposal.joints import Choice, choose_joints
+from excite_cli.proposal.propose import Request, propose
 from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
 from excite_cli.robot.urdf_joints import survey
 from tests.proposal.robots import GOOD, joint, link, surveyed, written
+
+TINY = 'lower="-0.0005" upper="0.001" velocity="1" effort="10"'
 
 
 def chosen(name: str, asked: tuple[str, ...] = ()) -> Choice:
@@ -51,8 +54,96 @@ def test_what_is_asked_for_is_moved() -> None:
 
 
 def test_a_joint_that_mimics_cannot_be_asked_for() -> None:
-    with pytest.raises(ConfigError, match=r"'panda_finger_joint2' mimics 'panda_finger_joint1'"):
+    words = r"'panda_finger_joint2' mimics 'panda_finger_joint1' and moves with it\. Leave it out"
+    with pytest.raises(ConfigError, match=words):
         chosen("panda", ("panda_finger_joint2",))
+
+
+def test_a_joint_that_mimics_does_as_its_driver_does() -> None:
+    choice = chosen("panda", ("panda_finger_joint1",))
+    assert choice.followers == {"panda_finger_joint1": ("panda_finger_joint2",)}
+    assert "moved with panda_finger_joint1: panda_finger_joint2" in choice.in_words()
+    assert "panda_finger_joint2" not in choice.left_out["not requested"]
+    assert "panda_finger_joint2" in chosen("panda").left_out["fingers and grippers"]
+
+
+WHY = {
+    "eyes_pitch": ("faces", {}),
+    "jaw_bellows": ("springs, bellows and hoses", {}),
+    "flexure": ("joints with a range below 0.02 rad", {"limit": TINY}),
+    "tool_slide": ("joints with a range below 0.002 m", {"limit": TINY, "kind": "prismatic"}),
+    "drive": ("wheels and casters", {"kind": "continuous", "child": "left_wheel"}),
+}
+
+
+@pytest.mark.parametrize("name", WHY)
+def test_joints_that_should_not_move_are_left_out_with_the_reason(
+    name: str, tmp_path: Path
+) -> None:
+    why, given = WHY[name]
+    end = given.get("child", "end")
+    path = written(
+        tmp_path,
+        link("base"),
+        joint("shoulder", "base", "upper", GOOD),
+        link("upper"),
+        joint(name, "upper", end, given.get("limit", GOOD), given.get("kind", "revolute")),
+        link(end, mass=0.01),
+    )
+    choice = choose_joints(surveyed(path).joints, "robot")
+    assert choice.left_out == {why: (name,)}
+    assert [each.name for each in choice.chosen] == ["shoulder"]
+
+
+def test_the_same_joints_move_if_asked_for_or_where_they_carry_the_robot(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        link("base"),
+        joint("eye_of_the_crane", "base", "upper", GOOD),
+        link("upper"),
+        joint("bellows", "upper", "end", GOOD),
+        link("end", mass=0.01),
+    )
+    joints = surveyed(path).joints
+    assert [each.name for each in choose_joints(joints, "robot").chosen] == ["eye_of_the_crane"]
+    assert [each.name for each in choose_joints(joints, "robot", ("bellows",)).chosen] == [
+        "bellows"
+    ]
+
+
+@pytest.mark.parametrize(
+    "closing",
+    [
+        '<loop_joint name="loop"><link1 link="rod"/><link2 link="crank"/></loop_joint>',
+        '<gazebo><joint name="loop" type="revolute"><parent>robot::rod</parent><child>crank</child>'
+        "</joint></gazebo>",
+    ],
+)
+def test_joints_of_a_closed_loop_stay_where_they_are(closing: str, tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        link("base"),
+        joint("shoulder", "base", "upper", GOOD),
+        link("upper"),
+        joint("motor", "upper", "crank", GOOD),
+        link("crank"),
+        joint("knee", "upper", "shin", GOOD),
+        link("shin"),
+        joint("pin", "shin", "rod", GOOD),
+        link("rod"),
+        closing,
+    )
+    choice = choose_joints(surveyed(path).joints, "robot")
+    assert choice.left_out == {
+        "joints of closed loops, which the model cuts": ("motor", "knee", "pin")
+    }
+    (told,) = load_description(str(path)).notes
+    assert told.startswith(
+        "a closed loop is cut between rod and crank: in the model, motor, knee, "
+    )
+    assert "<mimic>" in told
+    text = propose(Request("robot.urdf", tmp_path)).text
+    assert "not moved, joints of closed loops, which the model cuts: motor, knee, pin" in text
 
 
 def test_an_unknown_joint_is_told_with_the_nearest() -> None:

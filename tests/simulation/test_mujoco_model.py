@@ -10,9 +10,13 @@ from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.dynamics.pseudo_inertia import pseudo_inertias, ten_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.errors import RobotError
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.simulation.build import assemble, make
 from excite_cli.simulation.mujoco_model import build_plant
 from excite_cli.simulation.true_robot import true_inertias
+from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
 from tests.robot.random_robots import random_robot
 
 mujoco = pytest.importorskip("mujoco")
@@ -23,9 +27,10 @@ def mujoco_torques(robot: Robot, phi: Array, q: Array, v: Array, a: Array) -> Ar
     data = plant.new_data()
     torques = np.empty_like(q)
     for t in range(len(q)):
-        data.qpos[plant.motor], data.qvel[plant.motor], data.qacc[plant.motor] = q[t], v[t], a[t]
+        data.qpos[:] = plant.coordinates(q[t])
+        data.qvel[:], data.qacc[:] = plant.spread @ v[t], plant.spread @ a[t]
         mujoco.mj_inverse(plant.model, data)
-        torques[t] = data.qfrc_inverse[plant.motor]
+        torques[t] = plant.spread.T @ data.qfrc_inverse
     return torques
 
 
@@ -44,6 +49,21 @@ def assert_same_dynamics(robot: Robot) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_random_trees(seed: int, floating: bool) -> None:
     assert_same_dynamics(random_robot(seed, joints=6, floating=floating))
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
+def test_grippers_whose_fingers_follow(parts: tuple, base: str) -> None:
+    assert_same_dynamics(coupled_robot(parts, base=base))
+
+
+def test_a_follower_without_mass_is_told(tmp_path: Path) -> None:
+    head, tail = urdf_of(HAND).split('<link name="right_finger">')
+    rest = tail[tail.index("</inertial>") + len("</inertial>") :]
+    (tmp_path / "hand.urdf").write_text(f'{head}<link name="right_finger">{rest}')
+    robot = build_robot(RobotSpec(urdf=str(tmp_path / "hand.urdf")))
+    with pytest.raises(RobotError, match=r"'finger_2', which follows another one, moves no iner"):
+        make(assemble(robot, standard_parameters(robot), RunId("a"), ()), 1e-3)
 
 
 @pytest.mark.parametrize("name", ["ur10", "panda"])

@@ -22,11 +22,13 @@ from excite_cli.atomic import write_atomically
 from excite_cli.cache_folder import cache_folder
 from excite_cli.errors import FileError, MissingExtraError, RobotError
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.loops import TAG
 
 Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 _FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
+_SITE = 6  # mjtObj
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)  # mjtGeom
 _BALL_POINTS = 200
 
@@ -247,14 +249,23 @@ class _Writer:
             found[follower] = (driver, slope, at + constant - slope * of)
         return found
 
+    def _cut(self, k: int) -> None:
+        """What closes a loop, beside the tree; between bodies, or between sites of bodies."""
+        m = self.m
+        ends = [int(m.eq_obj1id[k]), int(m.eq_obj2id[k])]
+        if m.eq_objtype[k] == _SITE:
+            ends = [int(m.site_bodyid[site]) for site in ends]
+        if any(m.body_mocapid[body] >= 0 for body in ends):  # a handle to drag the robot by
+            return
+        loop = ElementTree.SubElement(self.robot, TAG, name=f"loop_{k}")
+        for tag, body in zip(("link1", "link2"), ends, strict=True):
+            ElementTree.SubElement(loop, tag, link=self._body(body))
+
     def _told(self) -> None:
         m = self.m
         closed = [k for k in range(m.neq) if m.eq_type[k] in (0, 1) and m.eq_active0[k]]
-        if closed:
-            self.notes.append(
-                f"{len(closed)} closed loop(s) (<equality> connect or weld) are cut: the joints "
-                "within move on their own here"
-            )
+        for k in closed:
+            self._cut(k)
         if m.ntendon:
             self.notes.append(f"{m.ntendon} tendon(s) are left out: their forces are not modelled")
         if bool((np.asarray(m.dof_armature) > 0).any()):

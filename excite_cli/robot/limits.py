@@ -1,0 +1,112 @@
+"""Limits of the moved joints; those of joints that follow others narrow their driver's.
+
+Where joint f follows d, q_f = m q_d + c, the limits of f hold if q_d stays between (l_f − c)/m and
+(u_f − c)/m, |v_d| below v_f/|m| and |a_d| below a_f/|m|. Torque is that of the driver's row, which
+carries all that follows it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.config.robot_spec import JointLimits
+from excite_cli.errors import ConfigError
+from excite_cli.robot.mimic import Mimic
+
+Array = NDArray[np.float64]
+
+# Where a robot has no bound of its own, samples are drawn from these.
+_TURN = np.pi
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds of the moved joints, each of shape (n,); infinite where there is none."""
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    effort: Array
+
+    def ranges(self) -> tuple[Array, Array]:
+        """Finite positions (n,) to draw between: a turn where there is no bound, or only one."""
+        low, high = np.isfinite(self.lower), np.isfinite(self.upper)
+        lower = np.where(low, self.lower, np.where(high, self.upper - 2 * _TURN, -_TURN))
+        return lower, np.where(high, self.upper, np.where(low, self.lower + 2 * _TURN, _TURN))
+
+
+@dataclass(frozen=True)
+class JointRange:
+    """Bounds of one joint; infinite where there is none."""
+
+    lower: float
+    upper: float
+    velocity: float
+    acceleration: float = np.inf
+    effort: float = np.inf
+
+    def given(self, own: JointLimits | None) -> "JointRange":
+        """With those that the config gives in place of the URDF's."""
+        if own is None:
+            return self
+        lower, upper = own.position or (self.lower, self.upper)
+        return JointRange(
+            lower,
+            upper,
+            own.velocity or self.velocity,
+            own.acceleration or self.acceleration,
+            own.effort or self.effort,
+        )
+
+    def keeping(self, follower: "JointRange", mimic: Mimic) -> "JointRange":
+        """Narrowed so that a joint that follows keeps its limits too.
+
+        An empty range of the follower is none: URDFs leave the limits of such joints out.
+        """
+        m = mimic.multiplier
+        if m == 0.0:
+            return self
+        lower, upper = self.lower, self.upper
+        if follower.lower < follower.upper:
+            ends = [(end - mimic.offset) / m for end in (follower.lower, follower.upper)]
+            lower, upper = max(lower, min(ends)), min(upper, max(ends))
+        return replace(
+            self,
+            lower=lower,
+            upper=upper,
+            velocity=min(self.velocity, follower.velocity / abs(m)),
+            acceleration=min(self.acceleration, follower.acceleration / abs(m)),
+        )
+
+
+def limits_of(names: tuple[str, ...], ranges: Mapping[str, JointRange]) -> Limits:
+    """Of these joints, in their order."""
+    found = [ranges[name] for name in names]
+    columns = ("lower", "upper", "velocity", "acceleration", "effort")
+    return Limits(*(np.array([getattr(one, key) for one in found]) for key in columns))
+
+
+def check_range(name: str, own: JointRange, kept: JointRange, followers: list[str]) -> None:
+    """See that a joint that moves has a range: its `own`, and the one `kept` for its followers.
+
+    Raises
+    ------
+    ConfigError
+        Its limits cross or are empty, or those of the joints that follow it leave it none.
+    """
+    if not own.lower < own.upper:
+        raise ConfigError(
+            f"robot: joint '{name}' has crossed or empty position limits "
+            f"[{own.lower:g}, {own.upper:g}]. Give sensible ones under robot.limits.{name}."
+            "position, or leave the joint out of robot.joints."
+        )
+    if not kept.lower < kept.upper:
+        raise ConfigError(
+            f"robot: joint '{name}' may stand in [{own.lower:g}, {own.upper:g}], but the joints "
+            f"that mimic it ({', '.join(followers)}) have position limits that leave it no range. "
+            "Give theirs under robot.limits.<joint>.position, or leave "
+            f"'{name}' out of robot.joints."
+        )

@@ -1,0 +1,80 @@
+"""Where every joint stands by the config; those that follow others stand where these lead them."""
+
+import numpy as np
+
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.errors import ConfigError, nearest
+from excite_cli.robot.limits import JointRange
+from excite_cli.robot.mimic import Mimic
+
+_AS_TOLD = 1e-3  # rad or m by which a posture may differ from what a joint follows
+
+
+def posture_of(
+    spec: RobotSpec,
+    names: list[str],
+    chosen: list[str],
+    ranges: dict[str, JointRange],
+    mimicking: dict[str, Mimic],
+) -> dict[str, float]:
+    """Positions of all joints `names` [rad or m].
+
+    Raises
+    ------
+    ConfigError
+        The config names an unknown joint, or a position that a joint cannot have.
+    """
+    for joint in spec.posture:
+        require_known(joint, names, "robot.posture")
+    for joint in spec.limits:
+        require_known(joint, names, "robot.limits")
+    posture = {}
+    for name in names:
+        if name in mimicking:
+            continue
+        lower, upper = ranges[name].lower, ranges[name].upper
+        if name in spec.posture:
+            value = float(spec.posture[name])
+            if not lower <= value <= upper and (lower < upper or name in chosen):
+                raise ConfigError(
+                    f"robot.posture.{name}: {value:g} is outside its limits "
+                    f"[{lower:g}, {upper:g}]. Give a value between them{_in_degrees(value)}."
+                )
+        else:
+            value = 0.0 if lower <= 0.0 <= upper else _inside(lower, upper)
+        posture[name] = value
+    for name in names:
+        if name in mimicking:
+            own = mimicking[name]
+            posture[name] = own.position(posture.get(own.driver, 0.0))  # 0: the driver is fixed
+            given = spec.posture.get(name, posture[name])
+            if abs(given - posture[name]) > _AS_TOLD:
+                raise ConfigError(
+                    f"robot.posture.{name}: {given:g} is not where it stands, {posture[name]:.6g}: "
+                    f"it mimics '{own.driver}'. Leave it out, and give robot.posture."
+                    f"{own.driver}."
+                )
+    return posture
+
+
+def _inside(lower: float, upper: float) -> float:
+    """The middle of the range, or a little off its only bound."""
+    if np.isfinite(lower) and np.isfinite(upper):
+        return (lower + upper) / 2
+    return lower + 0.5 if np.isfinite(lower) else upper - 0.5
+
+
+def _in_degrees(value: float) -> str:
+    """A hint for those who wrote degrees."""
+    if abs(value) <= 2 * np.pi:
+        return ""
+    return f"; angles are in radians, {value:g}° is {np.radians(value):.4g} rad"
+
+
+def require_known(joint: str, names: list[str], where: str) -> None:
+    """Raise ConfigError unless the robot has the joint that `where` names."""
+    if joint not in names:
+        raise ConfigError(
+            f"{where}: the robot has no joint '{joint}'.{nearest(joint, names)} "
+            f"Its joints: {', '.join(names)}."
+        )
