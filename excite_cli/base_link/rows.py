@@ -25,6 +25,7 @@ from excite_cli.robot.base_joints import BASE_JOINTS
 from excite_cli.robot.link_frame import link_frame
 from excite_cli.robot.model import Robot
 
+_REFERENCE = "q_ref"
 _LEANS = np.radians(1.0)  # a mounting is hardly better
 
 
@@ -90,10 +91,12 @@ def with_base(
         dq = run.dq
         if dq is not None:
             dq = np.hstack([np.gradient(state.q, run.step, axis=0), dq])
-        step = run.torque_step
+        step, extra = run.torque_step, dict(run.extra)
+        if extra.get(_REFERENCE, q).shape == run.q.shape:  # of a base that should stand still
+            extra[_REFERENCE] = np.hstack([np.zeros((len(run.t), count)), extra[_REFERENCE]])
         runs.append(
             replace(
-                run, q=q, tau=tau, dq=dq, valid=valid, base_rows=count,
+                run, q=q, tau=tau, dq=dq, valid=valid, base_rows=count, extra=extra,
                 torque_step=None if step is None else np.concatenate([np.zeros(count), step]),
             )
         )  # fmt: skip

@@ -65,6 +65,8 @@ def consistent_parameters(
     signs = np.flatnonzero(nonnegative) + count
     nearest = nearest_inertias(back, start, lengths, signs, margin)
     x = nearest.x
+    unseen = np.flatnonzero(~triangle[:, base.rank :].any(axis=0))
+    x[count + unseen] = 0.0  # nothing holds them, and the solver leaves them in its middle
     free = np.linalg.lstsq(triangle, right, rcond=None)[0]
     at = np.concatenate([base.mapping @ x[:count], x[count:]])
     missed = [np.square(triangle @ point - right).sum() for point in (at, free)]

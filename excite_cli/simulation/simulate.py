@@ -177,7 +177,7 @@ def _takes(
         extra |= {s.name: s.recorded(start + run.t, rng) for s in settings.covariates}
         run = replace(run, extra={**run.extra, **extra}, start=start, epoch=epoch)
         start = _next_start(run, settings)
-        yield run, _tracking_error(reference, played[active], duration)
+        yield run, _tracking_error(reference, played[active], duration)[robot.base_joints :]
 
 
 def _next_start(run: Run, settings: SimulationSettings) -> float:

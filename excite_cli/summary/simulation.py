@@ -45,7 +45,8 @@ def _records(found: Simulation) -> list[dict[str, Any]]:
 
 def _run_table(found: Simulation) -> Table:
     """Tracking of joints that turn and of joints that slide, each where there are some."""
-    slides, names = found.truth.sliding, found.truth.joint_names
+    names = found.dataset.joint_names
+    slides = found.truth.sliding[-len(names) :]  # a base's joints come first and are not driven
     kinds = [(unit, of) for unit, of in (("mrad", ~slides), ("mm", slides)) if of.any()]
     rows = []
     for run in found.dataset.runs:
