@@ -15,19 +15,18 @@ from excite_cli.proposal.limits import MOST_ACCELERATION, JointPlan, plan_limits
 from excite_cli.proposal.pace import Pace, choose_pace
 from excite_cli.proposal.posture import FirstPosture, first_posture
 from excite_cli.proposal.settle import Comments, Settled, Tree, settle
-from excite_cli.robot.description import (
-    RobotDescription,
-    check_mesh_paths,
-    load_description,
-)
+from excite_cli.proposal.shapes import Shapes, choose_shapes
+from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.package_search import package_folders
 from excite_cli.robot.reference_postures import reference_posture
-from excite_cli.robot.urdf_joints import UrdfSurvey, survey
+from excite_cli.robot.urdf_joints import UrdfSurvey
 from excite_cli.shown.record import Shown
 
 _TORQUE_SHARE = 0.8
 _MARGIN = 0.01
 _SECONDS = 60.0
+# A diagnosis holds the last one out, and what tells runs apart needs two beside it.
+_MOTIONS = 3
 
 
 @dataclass(frozen=True)
@@ -80,13 +79,11 @@ def propose(request: Request) -> Proposal:
         dirs = tuple(dict.fromkeys((*dirs, *more)))
         description = load_description(request.urdf, dirs, request.folder, arguments)
     source = description.path.name
-    facts = survey(description)
+    shapes = choose_shapes(description)
+    facts = shapes.facts
     _require_inertias(facts, source)
     choice = choose_joints(facts.joints, source, request.joints)
     joints = plan_limits(choice.chosen)
-    if facts.has_shapes:
-        check_mesh_paths(description)
-    visual = _visual_shapes(description, facts)
     notes = [*description.notes, *choice.in_words()]
     for name, folder in packages.items():
         notes.append(f"meshes of {name} are taken from {folder}")
@@ -94,13 +91,9 @@ def propose(request: Request) -> Proposal:
         joints, reference_posture(description, tuple(joint.name for joint in joints))
     )
     pace = choose_pace(joints)
-    tree, comments = _draft(request, dirs, facts, choice, joints, posture, pace, visual)
+    tree, comments = _draft(request, dirs, shapes, choice, joints, posture, pace)
     settled = settle(tree, comments, request.folder)
-    if visual:
-        bare = ", ".join(facts.unguarded)
-        notes.append(f"no collision geometry moves with {bare}: the visual shapes are taken there")
-    elif not facts.has_shapes:
-        notes.append(f"{source} has no collision geometry: self-collision is not checked")
+    notes += shapes.in_words(source)
     notes.append(f"posture: {settled.comments['robot', 'posture']}")
     notes.append(f"motion: {settled.comments['trajectory',]}")
     still = [joint.name for joint in joints if joint.name not in settled.tree["robot"]["joints"]]
@@ -126,12 +119,11 @@ def propose(request: Request) -> Proposal:
 def _draft(
     request: Request,
     dirs: tuple[str, ...],
-    facts: UrdfSurvey,
+    shapes: Shapes,
     choice: Choice,
     joints: tuple[JointPlan, ...],
     posture: FirstPosture,
     pace: Pace,
-    visual: bool,
 ) -> tuple[Tree, Comments]:
     """The config before its posture is known to be clear."""
     comments: Comments = {}
@@ -152,7 +144,7 @@ def _draft(
     robot["joints"] = [joint.name for joint in joints]
     if choice.in_words():
         comments["robot", "joints"] = "; ".join(choice.in_words())
-    robot["posture"] = {**_inside(posture.others, facts), **posture.moved}
+    robot["posture"] = {**_inside(posture.others, shapes.facts), **posture.moved}
     comments["robot", "posture"] = posture.words
     limits = _limits(joints, comments)
     if limits:
@@ -164,10 +156,8 @@ def _draft(
     if any(not math.isnan(joint.effort) for joint in joints):
         constraints["torque"] = {"scale": _TORQUE_SHARE}
         comments["constraints", "torque"] = "share of the effort limits, with the URDF's inertias"
-    if facts.has_shapes or visual:
-        shapes = {"shapes": "visual"} if visual else {}
-        constraints["self_collision"] = {"capsules": "auto", **shapes, "margin": _MARGIN}
-        comments["constraints", "self_collision", "margin"] = "[m] between capsules"
+    if shapes.any:
+        constraints["self_collision"] = _self_collision(shapes, comments)
     comments["constraints",] = "add surroundings: {floor: 0.0} and more; see docs/configuration.md"
     tree: Tree = {
         "robot": robot,
@@ -179,7 +169,7 @@ def _draft(
         "sampling": {"constraints": {"samples": pace.constraint_samples}},
         "constraints": constraints,
         "optimizer": {"max_seconds": _SECONDS},
-        "sequence": {"motions": 1},
+        "sequence": {"motions": _MOTIONS},
         "seed": 1,
     }
     why = (
@@ -189,19 +179,27 @@ def _draft(
     )
     comments["trajectory",] = f"{pace.duration:g} s, {why}"
     comments["optimizer",] = "per start of a motion; restarts: 16 may find better motions"
-    comments["sequence",] = "each further motion is planned on top of the earlier ones"
+    comments["sequence",] = (
+        "each on top of the earlier ones; a diagnosis fits all but the last and judges by that one"
+    )
     return tree, comments
 
 
-def _visual_shapes(description: RobotDescription, facts: UrdfSurvey) -> bool:
-    """Whether visual shapes have to stand for collision shapes, and can be read."""
-    if not facts.unguarded:
-        return False
-    try:
-        check_mesh_paths(description, "visual")
-    except RobotError:
-        return False
-    return True
+def _self_collision(shapes: Shapes, comments: Comments) -> Tree:
+    """What is kept apart, with comments."""
+    where = ("constraints", "self_collision")
+    own: Tree = {"capsules": "auto"}
+    if shapes.visual:
+        own["shapes"] = "visual"
+    own["margin"] = _MARGIN
+    comments[*where, "margin"] = "[m] between capsules"
+    if shapes.without:
+        own["without_shapes"] = list(shapes.without)
+        comments[*where, "without_shapes"] = (
+            "NOT GUARDED: their meshes are missing or cannot be read; name the folder of their "
+            "package under robot.package_dirs"
+        )
+    return own
 
 
 def _limits(joints: tuple[JointPlan, ...], comments: Comments) -> Tree:

@@ -1,8 +1,8 @@
-"""From a URDF's name to checked XML with every mesh found.
+"""From a robot's name or file to checked XML.
 
 `RobotDescription` proves that the file exists, is XML without a document type (no entity tricks),
-is one tree of links and joints of a sane size (`urdf_check`), and that every path it names stays
-inside the folders it may read: its own folder tree, the packages of `package_dirs`, and the
+and is one tree of links and joints of a sane size (`urdf_check`). It names the folders from which
+meshes may be read (`mesh_paths`): its own, the packages of `package_dirs`, and the
 example-robot-data package.
 Continuous joints become revolute ones without bounds, so that one coordinate is one velocity, and
 right angles that were rounded become exact.
@@ -21,14 +21,12 @@ from excite_cli.given_files import require_stored
 from excite_cli.robot.formats.base import Asked
 from excite_cli.robot.formats.catalogue import as_urdf
 from excite_cli.robot.loops import Loop, closed_loops, loops_in_words
-from excite_cli.robot.mesh_trial import try_meshes
 from excite_cli.robot.mimic import Mimic, lost, mimics
 from excite_cli.robot.urdf_check import parsed
 
 EXAMPLE_PREFIX = "example-robot-data:"
 MAX_URDF_BYTES = 20_000_000
 UNBOUNDED = 1e9
-_LONGEST = 200  # characters of a mesh's name that are told
 # How far [rad] an angle is off a right one that was meant, and from where on that matters.
 _ROUNDED, _EXACT = 1e-4, 1e-8
 
@@ -239,56 +237,3 @@ def _without_continuous_joints(root: ElementTree.Element) -> str:
         limit.set("lower", str(-UNBOUNDED))
         limit.set("upper", str(UNBOUNDED))
     return ElementTree.tostring(root, encoding="unicode")
-
-
-def check_mesh_paths(description: RobotDescription, kind: str = "collision") -> None:
-    """Raise unless every mesh of the kind is in a folder that the URDF may read, and can be read.
-
-    kind: `collision` or `visual`; of the latter only those are refused that would end the process.
-
-    Raises
-    ------
-    RobotError
-        A mesh is missing, its path leaves the URDF's folder and packages, or it is damaged.
-    """
-    allowed = [Path(folder).resolve() for folder in description.package_dirs]
-    or_drop = ", or drop constraints.self_collision" if kind == "collision" else ""
-    meshes = []
-    for mesh in ElementTree.fromstring(description.xml).findall(f"link/{kind}/geometry/mesh"):
-        name = mesh.get("filename", "")
-        found = _found(name, description, allowed)
-        if found is None:
-            raise RobotError(
-                f"{description.path.name}: the {kind} mesh '{name[:_LONGEST]}' was not found. "
-                f"Looked in {', '.join(str(folder) for folder in allowed)}. Add the folder that "
-                f"holds the package to robot.package_dirs{or_drop}."
-            )
-        if not any(found.is_relative_to(folder) for folder in allowed):
-            raise RobotError(
-                f"{description.path.name}: the mesh path '{name[:_LONGEST]}' leaves the robot's "
-                "own folders. If that is meant, add its folder to robot.package_dirs."
-            )
-        meshes.append(found)
-    if not description.source.startswith(EXAMPLE_PREFIX):
-        try:
-            try_meshes(meshes, any_format=kind != "collision")
-        except RobotError as error:
-            raise RobotError(f"{description.path.name}: {error}") from error
-
-
-def mesh_file(path: Path) -> Path | None:
-    """The file that `path` leads to, by whatever links; None where there is none.
-
-    Names from a URDF may be anything: too long, with a NUL in them, or links in a circle.
-    """
-    try:
-        return path.resolve() if path.is_file() else None
-    except (OSError, ValueError, RuntimeError):
-        return None
-
-
-def _found(name: str, description: RobotDescription, allowed: list[Path]) -> Path | None:
-    places = [description.path.parent / name.removeprefix("file://")]
-    if name.startswith("package://"):
-        places = [folder / name.removeprefix("package://") for folder in allowed]
-    return next(filter(None, map(mesh_file, places)), None)

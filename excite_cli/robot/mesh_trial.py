@@ -1,7 +1,7 @@
 """Meshes read for a try in a process of their own, before this one reads them.
 
 The library that reads meshes (assimp) can be led by a damaged file to end its process, to fill
-memory or to run on; nothing in this process can hold it then. `try_meshes` starts a process with
+memory or to run on; nothing in this process can hold it then. `faults` starts a process with
 limits of time and memory that reads the files as `coal` does, once for each content. The process is
 this module's `serve`, asked by lines on stdin.
 """
@@ -19,7 +19,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from excite_cli.errors import RobotError
 from excite_cli.measurement.memory_limit import address_space
 
 SUFFIXES = (".stl", ".dae", ".obj", ".ply")
@@ -49,42 +48,45 @@ class Fault:
 _known: dict[str, Fault | None] = {}  # by content
 
 
-def try_meshes(paths: Sequence[Path], any_format: bool = False) -> None:
-    """See that every file can be read as a mesh without harm to the process.
+def faults(paths: Sequence[Path], any_format: bool = False) -> dict[Path, str]:
+    """Files that cannot be read as meshes, or not without harm; why, without a full stop.
 
-    any_format: it may be of any format, and hold anything, as long as reading it does no harm.
-
-    Raises
-    ------
-    RobotError
-        A file is of no known format or too large, or reading it fails in whatever way.
+    any_format: a file may be of any format, and hold anything, as long as reading it does no harm.
     """
-    contents = {path: _content(path, any_format) for path in dict.fromkeys(paths)}
-    for path, content in contents.items():
+    found: dict[Path, str] = {}
+    for path in dict.fromkeys(paths):
+        if refused := _refused(path, any_format):
+            found[path] = f"the mesh {path} {refused}"
+            continue
+        content = _content(path)
         if content not in _known:
             _known[content] = _trial.fault(path)
-    for path, content in contents.items():
         fault = _known[content]
         if fault is not None and (fault.harms or not any_format):
-            raise RobotError(
+            found[path] = (
                 f"the mesh {path} cannot be loaded: {fault.words}. Repair it, or convert it to "
-                "STL with another program."
+                "STL with another program"
             )
+    return found
 
 
-def _content(path: Path, any_format: bool) -> str:
-    """Format and hash of a file's bytes."""
-    suffix = path.suffix.lower()
-    if not any_format and suffix not in SUFFIXES:
-        raise RobotError(f"the mesh {path} is of no known format; read are {', '.join(SUFFIXES)}.")
+def _refused(path: Path, any_format: bool) -> str:
+    """Why a file is not even tried; empty where it is."""
+    if not any_format and path.suffix.lower() not in SUFFIXES:
+        return f"is of no known format; read are {', '.join(SUFFIXES)}"
     size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise RobotError(
-            f"the mesh {path} has {size / 2**20:.0f} MiB; up to {MAX_BYTES / 2**20:.0f} MiB are "
-            "read. Take a coarser one for collisions."
-        )
+    if size <= MAX_BYTES:
+        return ""
+    return (
+        f"has {size / 2**20:.0f} MiB; up to {MAX_BYTES / 2**20:.0f} MiB are read. Take a coarser "
+        "one for collisions"
+    )
+
+
+def _content(path: Path) -> str:
+    """Format and hash of a file's bytes."""
     with path.open("rb") as file:
-        return suffix + hashlib.file_digest(file, "blake2b").hexdigest()
+        return path.suffix.lower() + hashlib.file_digest(file, "blake2b").hexdigest()
 
 
 class _Trial:

@@ -105,13 +105,6 @@ def test_packages_are_found_above_the_urdf(tmp_path: Path) -> None:
     assert any(note.startswith("meshes of arm_description") for note in proposal.notes)
 
 
-def test_a_mesh_that_is_nowhere_is_named(tmp_path: Path) -> None:
-    shape = '<collision><geometry><mesh filename="package://none/a.stl"/></geometry></collision>'
-    written(tmp_path, link("base"), joint("j", "base", "l", GOOD), link("l", shape=shape))
-    with pytest.raises(RobotError, match=r"collision mesh 'package://none/a\.stl' was not found"):
-        propose(Request("robot.urdf", tmp_path))
-
-
 def test_reference_postures_are_read() -> None:
     description = load_description(EXAMPLE_PREFIX + "talos")
     file, state, values = reference_posture(description, ("leg_left_4_joint",))
