@@ -140,13 +140,19 @@ def _judged(answer: dict[str, Any], plant: dict[str, Any]) -> Record:
         "named": [f"{each.name.kind} of {', '.join(each.name.joints)}" for each in found],
         "verdicts": list(result.names),
         "right": result.right,
-        "alone": result.right and all(name in _GOOD for name in result.names),
+        "alone": result.right and _is_alone(result.names),
         "wrong": result.wrong,
         "detected": result.detected,
         "sentence": answer["answer"],
         "before": answer["error"]["before"]["mean_relative_moving"],
         "after": answer["error"]["after"]["mean_relative_moving"],
     }
+
+
+def _is_alone(verdicts: tuple[str, ...]) -> bool:
+    """Whether nothing but the planted effect is named: once, or as the parts that it is made of."""
+    once = sum(name in ("true", "alias") for name in verdicts) <= 1
+    return once and all(name in _GOOD for name in verdicts)
 
 
 def _key(each: dict[str, Any]) -> tuple[Any, ...]:

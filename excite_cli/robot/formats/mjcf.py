@@ -6,8 +6,6 @@ of its joints: X = T(p) R Π_i T(p_i) Rot(a_i, q_i − ref_i) T(−p_i), with th
 joint's origin, so that positions are MuJoCo's.
 """
 
-import hashlib
-import struct
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,10 +16,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from excite_cli.atomic import write_atomically
-from excite_cli.cache_folder import cache_folder
-from excite_cli.errors import FileError, MissingExtraError, RobotError
+from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.kept_meshes import keep_mesh
+from excite_cli.robot.formats.mjcf_sources import mjcf_sources
 from excite_cli.robot.loops import TAG
 
 Array = NDArray[np.float64]
@@ -63,27 +61,50 @@ class Mjcf(RobotFormat):
             raise RobotError(f"{path.name}: MuJoCo cannot compile it: {reason[:400]}") from error
         return _Writer(model, path).written()
 
+    def sources(self, path: Path, text: str) -> tuple[Path, ...] | None:
+        """Includes, meshes, textures and height fields."""
+        return mjcf_sources(path, text)
+
 
 class _Writer:
     """One compiled model as XML."""
 
     def __init__(self, model: Any, path: Path) -> None:
         self.m, self.path = model, path
+        self.root = 0
         self.robot = ElementTree.Element("robot", name=path.stem)
         self.notes: list[str] = []
-        self.folders: set[str] = set()
+        self.meshes: set[str] = set()
         self.efforts = self._efforts()
         self.followed = self._couplings()
 
     def written(self) -> Urdf:
-        root, kept = self._root()
-        if root == 0:
+        self.root, kept = self._root()
+        if self.root == 0:
             ElementTree.SubElement(self.robot, "link", name=self._body(0))
         for body in kept:
-            self._link(body, is_root=body == root)
+            self._link(body, is_root=body == self.root)
         self._told()
         text = ElementTree.tostring(self.robot, encoding="unicode")
-        return Urdf(text, tuple(sorted(self.folders)), tuple(self.notes))
+        folders = {str(Path(mesh).parent) for mesh in self.meshes}
+        return Urdf(
+            text,
+            tuple(sorted(folders)),
+            tuple(self.notes),
+            tuple(sorted(self.meshes)),
+            self._excluded(kept),
+        )
+
+    def _excluded(self, kept: list[int]) -> tuple[tuple[str, str], ...]:
+        """Pairs of links that <contact> excludes."""
+        signatures = [int(each) for each in self.m.exclude_signature]
+        pairs = ((each >> 16, each & 0xFFFF) for each in signatures)
+        there = {*kept, self.root}
+        return tuple(
+            (self._body(one), self._body(other))
+            for one, other in pairs
+            if one in there and other in there
+        )
 
     def _root(self) -> tuple[int, list[int]]:
         """The body that becomes the URDF's root (0: the world), and the bodies that are kept.
@@ -321,8 +342,8 @@ class _Writer:
 
     def _mesh(self, points: Array, faces: NDArray[Any]) -> Element:
         """A mesh as MuJoCo has it (scaled, recentred), as a file in the cache."""
-        path = _stored(_stl(points, faces))
-        self.folders.add(str(path.parent))
+        path = keep_mesh(points, faces)
+        self.meshes.add(str(path))
         return ElementTree.Element("mesh", filename=f"file://{path}")
 
     def _body(self, body: int) -> str:
@@ -351,37 +372,3 @@ def _sphere_points() -> Array:
     z, angle = 1 - 2 * k / _BALL_POINTS, np.pi * (1 + 5**0.5) * k
     ring = np.sqrt(1 - z**2)
     return np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])
-
-
-def _stl(points: Array, faces: NDArray[Any]) -> bytes:
-    """Binary STL of triangles `faces` (F, 3) of `points` (N, 3)."""
-    records = np.zeros(
-        len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")]
-    )
-    records["corners"] = points[faces]
-    return b"\0" * 80 + struct.pack("<I", len(faces)) + records.tobytes()
-
-
-def _fill(path: Path, content: bytes) -> None:
-    path.write_bytes(content)
-
-
-def _stored(content: bytes) -> Path:
-    """The file in the user's cache that holds `content`.
-
-    Raises
-    ------
-    RobotError
-        It cannot be written.
-    """
-    path = cache_folder() / "meshes" / f"{hashlib.sha256(content).hexdigest()[:32]}.stl"
-    try:
-        if not (path.is_file() and path.read_bytes() == content):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, lambda temporary: _fill(temporary, content))
-    except (OSError, FileError) as error:
-        raise RobotError(
-            f"meshes of MJCF are kept in {path.parent}, which cannot be written: {error}. Set "
-            "XDG_CACHE_HOME to a folder that can."
-        ) from error
-    return path
