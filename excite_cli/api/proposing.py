@@ -34,13 +34,15 @@ def propose(
     base: Base = "fixed",
     package_dirs: Sequence[str | Path] = (),
     xacro_args: Mapping[str, str] | None = None,
+    srdf: str | Path | None = None,
 ) -> Proposal:
     """A config for a robot of which nothing but the URDF is known: `excite init`.
 
     `urdf` is a path (relative to `folder`, where the config will lie) or
     `example-robot-data:<name>`; `joints` those to move, none for a choice of ours; `package_dirs`
-    and `xacro_args` as under `robot` in a config. The `text` of
-    what is returned is the YAML file, `notes` say what was chosen and why.
+    and `xacro_args` as under `robot` in a config; `srdf` a file with postures and pairs not to
+    check, else one beside the URDF is taken. The `text` of what is returned is the YAML file,
+    `notes` say what was chosen and why.
 
     Raises
     ------
@@ -55,8 +57,17 @@ def propose(
     >>> propose("data/smoke_arm.urdf").joints[:2]
     ('shoulder_yaw', 'shoulder_pitch')
     """
-    dirs, arguments = tuple(map(str, package_dirs)), dict(xacro_args or {})
-    return propose_config(Request(str(urdf), Path(folder), tuple(joints), base, dirs, arguments))
+    return propose_config(
+        Request(
+            str(urdf),
+            Path(folder),
+            tuple(joints),
+            base,
+            tuple(map(str, package_dirs)),
+            dict(xacro_args or {}),
+            None if srdf is None else Path(srdf),
+        )
+    )
 
 
 @checked()
@@ -68,6 +79,7 @@ def save_proposal(
     base: str = "fixed",
     package_dirs: Sequence[str | Path] = (),
     xacro_args: Mapping[str, str] | None = None,
+    srdf: str | Path | None = None,
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Answer:
@@ -105,6 +117,7 @@ def save_proposal(
             base=cast(Base, base),
             package_dirs=dirs,
             xacro_args=xacro_args,
+            srdf=srdf,
         )
         write_text_atomically(path, found.text)
         return proposal_answer(found, source, str(path))

@@ -40,6 +40,10 @@ def init(
         list[str] | None,
         typer.Option("--xacro-arg", metavar="NAME=VALUE", help="Of a xacro (may be repeated)."),
     ] = None,
+    srdf: Annotated[
+        Path | None,
+        typer.Option("--srdf", help="Postures and pairs not to check. Default: beside the URDF."),
+    ] = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -84,6 +88,7 @@ def init(
             base=base,
             package_dirs=package_dirs or (),
             xacro_args=_pairs(xacro_args or ()),
+            srdf=srdf,
             overwrite=overwrite,
             tell=terminal.tell,
         )

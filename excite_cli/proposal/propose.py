@@ -10,6 +10,7 @@ from typing import Literal
 from excite_cli.config.commented_yaml import commented_yaml
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import RobotError
+from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
 from excite_cli.proposal.joints import Choice, choose_joints
 from excite_cli.proposal.limits import MOST_ACCELERATION, JointPlan, plan_limits
 from excite_cli.proposal.pace import Pace, choose_pace
@@ -19,6 +20,7 @@ from excite_cli.proposal.shapes import Shapes, choose_shapes
 from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.package_search import package_folders
 from excite_cli.robot.reference_postures import reference_posture
+from excite_cli.robot.srdf import read_srdf, srdf_near
 from excite_cli.robot.urdf_joints import UrdfSurvey
 from excite_cli.shown.record import Shown
 
@@ -34,7 +36,8 @@ class Request:
     """What is requested.
 
     urdf: as robot.urdf says it; folder: that of the config, from which paths start; joints: to
-    move, empty for a choice of ours; package_dirs, xacro_args: as under robot.
+    move, empty for a choice of ours; package_dirs, xacro_args: as under robot; srdf: a file, else
+    those near the URDF are looked at.
     """
 
     urdf: str
@@ -43,6 +46,7 @@ class Request:
     base: Literal["fixed", "floating"] = "fixed"
     package_dirs: tuple[str, ...] = ()
     xacro_args: Mapping[str, str] = field(default_factory=dict)
+    srdf: Path | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -87,13 +91,19 @@ def propose(request: Request) -> Proposal:
     notes = [*description.notes, *choice.in_words()]
     for name, folder in packages.items():
         notes.append(f"meshes of {name} are taken from {folder}")
-    posture = first_posture(
-        joints, reference_posture(description, tuple(joint.name for joint in joints))
-    )
+    names = tuple(joint.name for joint in joints)
+    known = [read_srdf(request.srdf)] if request.srdf else srdf_near(description.path)
+    posture = first_posture(joints, reference_posture(known, description.path, names))
     pace = choose_pace(joints)
+    srdf = known[0] if request.srdf else chosen_srdf(known, description)
+    disabled = disabled_pairs(description, srdf, names, shapes.visual)
     tree, comments = _draft(request, dirs, shapes, choice, joints, posture, pace)
+    if shapes.any and disabled.pairs:
+        tree["constraints"]["self_collision"]["ignore"] = list(map(list, disabled.pairs))
+        comments["constraints", "self_collision", "ignore"] = disabled.in_words
     settled = settle(tree, comments, request.folder)
     notes += shapes.in_words(source)
+    notes += disabled.notes if shapes.any else ()
     notes.append(f"posture: {settled.comments['robot', 'posture']}")
     notes.append(f"motion: {settled.comments['trajectory',]}")
     still = [joint.name for joint in joints if joint.name not in settled.tree["robot"]["joints"]]

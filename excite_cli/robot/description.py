@@ -54,7 +54,8 @@ class RobotDescription:
 
     `xml` is what is used of `urdf`, the text as given or as it was made of another format, which
     may have left out what is told in `notes`. `mimicking` names the joints that follow another
-    one, with what they follow; `loops` are closed ones, which are cut.
+    one, with what they follow; `loops` are closed ones, which are cut; `ignored` are pairs of links
+    whose contact the file itself rules out.
     """
 
     name: str
@@ -67,6 +68,7 @@ class RobotDescription:
     urdf: str
     notes: tuple[str, ...] = ()
     loops: tuple[Loop, ...] = ()
+    ignored: tuple[tuple[str, str], ...] = ()
 
 
 def example_robots_folder() -> Path:
@@ -161,6 +163,7 @@ def load_description(
         urdf=found.text,
         notes=(*found.notes, *lost(followers, tree), *loops_in_words(loops)),
         loops=loops,
+        ignored=found.ignored,
     )
 
 

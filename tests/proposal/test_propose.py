@@ -13,6 +13,7 @@ from excite_cli.proposal.limbs import limbs
 from excite_cli.proposal.propose import Request, propose
 from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
 from excite_cli.robot.reference_postures import reference_posture
+from excite_cli.robot.srdf import srdf_near
 from excite_cli.robot.urdf_joints import survey
 from tests.proposal.robots import GOOD, arm, joint, link, written
 from tests.summary.two_arms import two_arms
@@ -107,7 +108,8 @@ def test_packages_are_found_above_the_urdf(tmp_path: Path) -> None:
 
 def test_reference_postures_are_read() -> None:
     description = load_description(EXAMPLE_PREFIX + "talos")
-    file, state, values = reference_posture(description, ("leg_left_4_joint",))
+    near = srdf_near(description.path)
+    file, state, values = reference_posture(near, description.path, ("leg_left_4_joint",))
     assert (file, state) == ("talos.srdf", "half_sitting")
     assert values["leg_left_4_joint"] == pytest.approx(0.859395)
 
