@@ -35,14 +35,15 @@ def propose(
     package_dirs: Sequence[str | Path] = (),
     xacro_args: Mapping[str, str] | None = None,
     srdf: str | Path | None = None,
+    overrides: Sequence[str] = (),
 ) -> Proposal:
     """A config for a robot of which nothing but the URDF is known: `excite init`.
 
     `urdf` is a path (relative to `folder`, where the config will lie) or
     `example-robot-data:<name>`; `joints` those to move, none for a choice of ours; `package_dirs`
     and `xacro_args` as under `robot` in a config; `srdf` a file with postures and pairs not to
-    check, else one beside the URDF is taken. The `text` of what is returned is the YAML file,
-    `notes` say what was chosen and why.
+    check, else one beside the URDF is taken; `overrides` (`key.path=value`) stand in place of what
+    is chosen. The `text` of what is returned is the YAML file, `notes` say what was chosen and why.
 
     Raises
     ------
@@ -66,6 +67,7 @@ def propose(
             tuple(map(str, package_dirs)),
             dict(xacro_args or {}),
             None if srdf is None else Path(srdf),
+            tuple(overrides),
         )
     )
 
@@ -80,6 +82,7 @@ def save_proposal(
     package_dirs: Sequence[str | Path] = (),
     xacro_args: Mapping[str, str] | None = None,
     srdf: str | Path | None = None,
+    overrides: Sequence[str] = (),
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Answer:
@@ -118,6 +121,7 @@ def save_proposal(
             package_dirs=dirs,
             xacro_args=xacro_args,
             srdf=srdf,
+            overrides=overrides,
         )
         write_text_atomically(path, found.text)
         return proposal_answer(found, source, str(path))

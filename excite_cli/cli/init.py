@@ -44,6 +44,7 @@ def init(
         Path | None,
         typer.Option("--srdf", help="Postures and pairs not to check. Default: beside the URDF."),
     ] = None,
+    overrides: options.Set = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -59,6 +60,8 @@ def init(
     Example:  excite init --robot ur10
 
     Example:  excite init --urdf arm.urdf.xacro --xacro-arg gripper=none
+
+    Example:  excite init --robot ur10 --set sequence.motions=5
     """
     from excite_cli.api.proposing import EXAMPLE_PREFIX, save_proposal
     from excite_cli.api.threads import single_threaded
@@ -89,6 +92,7 @@ def init(
             package_dirs=package_dirs or (),
             xacro_args=_pairs(xacro_args or ()),
             srdf=srdf,
+            overrides=overrides or (),
             overwrite=overwrite,
             tell=terminal.tell,
         )

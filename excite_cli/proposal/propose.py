@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from excite_cli.config.commented_yaml import commented_yaml
-from excite_cli.config.load import parse_spec
-from excite_cli.errors import RobotError
+from excite_cli.config.load import apply_override, parse_spec, parsed_spec
+from excite_cli.errors import ConfigError, RobotError
 from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
 from excite_cli.proposal.joints import Choice, choose_joints
 from excite_cli.proposal.limits import MOST_ACCELERATION, JointPlan, plan_limits
@@ -29,6 +29,15 @@ _MARGIN = 0.01
 _SECONDS = 60.0
 # A diagnosis holds the last one out, and what tells runs apart needs two beside it.
 _MOTIONS = 3
+_OF_PAIRS = (("by_meshes",), ("ignore",))
+_OWN_OPTION = {
+    "robot": "--urdf and the other options",
+    "robot.urdf": "--urdf or --robot",
+    "robot.joints": "--joints",
+    "robot.base": "--base",
+    "robot.package_dirs": "--package-dirs",
+    "robot.xacro_args": "--xacro-arg",
+}
 
 
 @dataclass(frozen=True)
@@ -37,7 +46,7 @@ class Request:
 
     urdf: as robot.urdf says it; folder: that of the config, from which paths start; joints: to
     move, empty for a choice of ours; package_dirs, xacro_args: as under robot; srdf: a file, else
-    those near the URDF are looked at.
+    those near the URDF are looked at; overrides: `key.path=value`, of what is proposed.
     """
 
     urdf: str
@@ -47,6 +56,7 @@ class Request:
     package_dirs: tuple[str, ...] = ()
     xacro_args: Mapping[str, str] = field(default_factory=dict)
     srdf: Path | None = None
+    overrides: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -101,6 +111,7 @@ def propose(request: Request) -> Proposal:
     if shapes.any and disabled.pairs:
         tree["constraints"]["self_collision"]["ignore"] = list(map(list, disabled.pairs))
         comments["constraints", "self_collision", "ignore"] = disabled.in_words
+    _override(tree, comments, request.overrides)
     settled = settle(tree, comments, request.folder)
     notes += shapes.in_words(source)
     notes += disabled.notes if shapes.any else ()
@@ -119,7 +130,7 @@ def propose(request: Request) -> Proposal:
     notes += [
         f"{path[2]}: {words}"
         for path, words in settled.comments.items()
-        if path[:2] == ("constraints", "self_collision") and path[2] in ("by_meshes", "ignore")
+        if path[:2] == ("constraints", "self_collision") and path[2:] in _OF_PAIRS
     ]
     text = commented_yaml(settled.tree, settled.comments, _header(request, description))
     parse_spec(text, "the proposed config")
@@ -193,6 +204,23 @@ def _draft(
         "each on top of the earlier ones; a diagnosis fits all but the last and judges by that one"
     )
     return tree, comments
+
+
+def _override(tree: Tree, comments: Comments, overrides: tuple[str, ...]) -> None:
+    """Put what is given in place of what is proposed; whether it works is then tried as all else.
+
+    Raises
+    ------
+    ConfigError
+        A key is unknown, a value is not allowed, or there is an option for it.
+    """
+    for override in overrides:
+        key = override.partition("=")[0].strip()
+        if key in _OWN_OPTION:
+            raise ConfigError(f"--set {key}: give it with {_OWN_OPTION[key]}.")
+        apply_override(tree, override)
+        comments[tuple(key.split("."))] = "as given with --set"
+    parsed_spec(tree, "the proposed config with --set")
 
 
 def _self_collision(shapes: Shapes, comments: Comments) -> Tree:

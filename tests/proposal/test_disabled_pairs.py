@@ -1,5 +1,6 @@
 """Pairs that SRDF and MJCF rule out become ignored pairs of the config, counted and told."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ CHAIN = ("base", "upper", "lower", "hand")
 
 def arm(folder: Path) -> Path:
     parts = [link("base")]
-    for above, below in zip(CHAIN, CHAIN[1:], strict=False):
+    for above, below in pairwise(CHAIN):
         parts += [joint(f"{below}_joint", above, below, GOOD), link(below)]
     return written(folder, *parts)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from excite_cli.config.load import parse_spec
-from excite_cli.errors import RobotError
+from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.start import clear_posture
 from excite_cli.excitation.task import MotionTask
@@ -189,3 +189,40 @@ def test_meshes_that_are_never_far_enough_apart_end_in_no_refusal(tmp_path: Path
     found = propose(Request(str(path), tmp_path))
     assert found.settled.tree["constraints"]["self_collision"]["ignore"] == [["base", "above"]]
     assert "NOT GUARDED" in found.text
+
+
+def test_what_is_given_stands_in_place_of_what_is_proposed(tmp_path: Path) -> None:
+    arm(tmp_path)
+    given = ("sequence.motions=5", "constraints.self_collision=null", "robot.posture.elbow=0.4")
+    proposal = propose(Request("robot.urdf", tmp_path, overrides=given))
+    spec = parse_spec(proposal.text)
+    assert spec.sequence.motions == 5
+    assert spec.constraints.self_collision is None
+    assert spec.robot.posture["elbow"] == 0.4
+    assert "motions: 5  # as given with --set" in proposal.text
+
+
+def test_what_is_given_yields_only_where_nothing_else_would_do(tmp_path: Path) -> None:
+    """A margin wider than the links are apart."""
+    arm(tmp_path)
+    wide = ("constraints.self_collision.margin=0.9",)
+    proposal = propose(Request("robot.urdf", tmp_path, overrides=wide))
+    own = parse_spec(proposal.text).constraints.self_collision
+    assert own is not None
+    assert own.margin < 0.9
+    assert "leaves no room for more" in proposal.text
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("robot.joints=[elbow]", r"^--set robot\.joints: give it with --joints\."),
+        ("sequence.motion=3", r"sequence\.motion.*Did you mean 'motions'"),
+        ("sequence.motions=0", "greater than or equal to 1"),
+        ("sequence", "key.path=value"),
+    ],
+)
+def test_what_cannot_be_set_is_told(tmp_path: Path, given: str, words: str) -> None:
+    arm(tmp_path)
+    with pytest.raises(ConfigError, match=words):
+        propose(Request("robot.urdf", tmp_path, overrides=(given,)))
