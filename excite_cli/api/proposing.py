@@ -88,7 +88,7 @@ def save_proposal(
 ) -> Answer:
     """Write the config that `propose` gives for a robot to `output` (default: <robot>.yaml here).
 
-    `robot` is `example-robot-data:<name>` or a file (URDF, xacro, MJCF). What is returned says
+    `robot` is `example-robot-data:<name>` or a file (URDF, xacro, MJCF, SDF). What is returned says
     what was chosen.
 
     Raises

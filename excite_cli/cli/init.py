@@ -17,7 +17,7 @@ def init(
         typer.Option("--robot", help="A robot of example-robot-data; see `excite robots`."),
     ] = None,
     urdf: Annotated[
-        Path | None, typer.Option("--urdf", help="A file: URDF, xacro, or MJCF (MuJoCo).")
+        Path | None, typer.Option("--urdf", help="A file: URDF, xacro, MJCF or SDF.")
     ] = None,
     output: Annotated[
         Path | None,

@@ -71,7 +71,8 @@ class RobotSpec(Section):
     """Which robot, which of its joints move, and where the others stand."""
 
     urdf: str = Field(
-        description="URDF, xacro or MJCF: path relative to this file, or example-robot-data:<name>"
+        description="URDF, xacro, MJCF or SDF: path relative to this file, or "
+        "example-robot-data:<name>"
     )
     xacro_args: dict[str, str | int | float | bool] = Field(
         default_factory=dict, description="arguments of a xacro file, {name: value}"

@@ -29,7 +29,7 @@ class Shapes:
         links: dict[str, list[str]] = {}
         words: dict[str, str] = {}
         for link, why in self.without.items():
-            group = why.package or why.words
+            group = why.cause or why.words
             links.setdefault(group, []).append(link)
             words.setdefault(group, why.words)
         notes = [f"NOT GUARDED: {', '.join(links[group])}: {words[group]}" for group in links]

@@ -105,7 +105,7 @@ def load_description(
     relative_to: Path | None = None,
     arguments: Mapping[str, object] | None = None,
 ) -> RobotDescription:
-    """Read and check a URDF, xacro or MJCF, given by path or as `example-robot-data:<name>`.
+    """Read and check a URDF, xacro, MJCF or SDF, given by path or as `example-robot-data:<name>`.
 
     Parameters
     ----------

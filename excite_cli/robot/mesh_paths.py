@@ -104,10 +104,10 @@ def check_mesh_paths(description: RobotDescription, kind: Kind = "collision") ->
 
 @dataclass(frozen=True)
 class Unusable:
-    """Why a link's mesh cannot be used, without a full stop, and the package that it names."""
+    """Why a link's mesh cannot be used, without a full stop; `cause`: the package or folder."""
 
     words: str
-    package: str = ""
+    cause: str = ""
 
 
 def unusable(description: RobotDescription, kind: Kind) -> dict[str, Unusable]:
@@ -145,7 +145,8 @@ def _missing(description: RobotDescription, kind: Kind, name: str, files: MeshFi
     if not package:
         return Unusable(
             f"the {kind} mesh '{short}' was not found. {looked}. Add the folder that it is "
-            "relative to to robot.package_dirs (init: --package-dirs)"
+            "relative to to robot.package_dirs (init: --package-dirs)",
+            str(Path(name).parent),
         )
     there = any(package_in(folder, package) for folder in files.folders)
     what = (

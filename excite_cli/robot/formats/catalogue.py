@@ -6,9 +6,10 @@ from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
 from excite_cli.robot.formats.converted import converted
 from excite_cli.robot.formats.mjcf import Mjcf
 from excite_cli.robot.formats.plain_urdf import PlainUrdf
+from excite_cli.robot.formats.sdf import Sdf
 from excite_cli.robot.formats.xacro import Xacro
 
-FORMATS: tuple[RobotFormat, ...] = (Xacro(), Mjcf(), PlainUrdf())
+FORMATS: tuple[RobotFormat, ...] = (Xacro(), Mjcf(), Sdf(), PlainUrdf())
 
 
 def as_urdf(path: Path, text: str, asked: Asked) -> Urdf:

@@ -14,12 +14,19 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
-from excite_cli.robot.formats.kept_meshes import keep_mesh
 from excite_cli.robot.formats.mjcf_sources import mjcf_sources
+from excite_cli.robot.formats.urdf_parts import (
+    add_inertial,
+    add_origin,
+    add_shape,
+    capsule,
+    ellipsoid,
+    mesh,
+    words,
+)
 from excite_cli.robot.loops import TAG
 
 Array = NDArray[np.float64]
@@ -28,7 +35,6 @@ Element = ElementTree.Element
 _FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
 _SITE = 6  # mjtObj
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)  # mjtGeom
-_BALL_POINTS = 200
 
 
 class Mjcf(RobotFormat):
@@ -156,16 +162,9 @@ class _Writer:
         shift = self._offset(body)
         mass = float(self.m.body_mass[body])
         if mass > 0.0:
-            inertial = ElementTree.SubElement(link, "inertial")
             turn = _matrix(self.m.body_iquat[body])
-            _origin(inertial, self.m.body_ipos[body] - shift, np.eye(3))
-            ElementTree.SubElement(inertial, "mass", value=repr(mass))
-            # Written in the link's axes: no angles, no rounding of them.
             inertia = turn @ np.diag(self.m.body_inertia[body]) @ turn.T
-            names = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2),
-                     ("izz", 2, 2))  # fmt: skip
-            figures = {name: repr(float(inertia[i, j])) for name, i, j in names}
-            ElementTree.SubElement(inertial, "inertia", figures)
+            add_inertial(link, mass, self.m.body_ipos[body] - shift, inertia)
         self._shapes(link, body, shift)
         if not is_root:
             self._connected(body)
@@ -196,7 +195,7 @@ class _Writer:
                 kind = "revolute" if m.jnt_limited[j] else "continuous"
                 turn = turn @ pin.exp3(-ref * axis)
             joint = self._joint(self._name(j), kind, above, below, place, turn)
-            ElementTree.SubElement(joint, "axis", xyz=_words(axis))
+            ElementTree.SubElement(joint, "axis", xyz=words(axis))
             self._limit(joint, j)
             self._dynamics(joint, j)
             before, place, turn, above = np.array(m.jnt_pos[j]), np.zeros(3), np.eye(3), below
@@ -205,7 +204,7 @@ class _Writer:
         self, name: str, kind: str, parent: str, child: str, place: Array, turn: Array
     ) -> Element:
         joint = ElementTree.SubElement(self.robot, "joint", name=name, type=kind)
-        _origin(joint, place, turn)
+        add_origin(joint, place, turn)
         ElementTree.SubElement(joint, "parent", link=parent)
         ElementTree.SubElement(joint, "child", link=child)
         return joint
@@ -221,8 +220,8 @@ class _Writer:
         ElementTree.SubElement(joint, "limit", limit)
         if j in self.followed:
             driver, multiplier, offset = self.followed[j]
-            words = {"multiplier": repr(multiplier), "offset": repr(offset)}
-            ElementTree.SubElement(joint, "mimic", {"joint": self._name(driver), **words})
+            figures = {"multiplier": repr(multiplier), "offset": repr(offset)}
+            ElementTree.SubElement(joint, "mimic", {"joint": self._name(driver), **figures})
 
     def _dynamics(self, joint: Element, j: int) -> None:
         dof = int(self.m.jnt_dofadr[j])
@@ -303,12 +302,10 @@ class _Writer:
         for kind, chosen in (("collision", solid), ("visual", shown)):
             for g in chosen:
                 for place, turn, shape in self._geometry(g):
-                    item = ElementTree.SubElement(link, kind)
-                    _origin(item, place - shift, turn)
-                    ElementTree.SubElement(item, "geometry").append(shape)
+                    item = add_shape(link, kind, place - shift, turn, shape)
                     if kind == "visual":
                         material = ElementTree.SubElement(item, "material", name=f"colour_{g}")
-                        ElementTree.SubElement(material, "color", rgba=_words(self._colour(g)))
+                        ElementTree.SubElement(material, "color", rgba=words(self._colour(g)))
 
     def _colour(self, g: int) -> Array:
         material = int(self.m.geom_matid[g])
@@ -321,30 +318,23 @@ class _Writer:
         if kind == _SPHERE:
             yield place, turn, ElementTree.Element("sphere", radius=repr(float(size[0])))
         elif kind in (_CYLINDER, _CAPSULE):
-            figures = {"radius": repr(float(size[0])), "length": repr(2 * float(size[1]))}
-            yield place, turn, ElementTree.Element("cylinder", figures)
-            for side in (-1.0, 1.0) if kind == _CAPSULE else ():
-                ball = ElementTree.Element("sphere", radius=repr(float(size[0])))
-                yield place + side * size[1] * turn[:, 2], turn, ball
+            parts = list(capsule(float(size[0]), 2 * float(size[1])))
+            for height, part in parts if kind == _CAPSULE else parts[:1]:
+                yield place + height * turn[:, 2], turn, part
         elif kind == _BOX:
-            yield place, turn, ElementTree.Element("box", size=_words(2 * size))
+            yield place, turn, ElementTree.Element("box", size=words(2 * size))
         elif kind == _ELLIPSOID:
-            points = size * _sphere_points()
-            yield place, turn, self._mesh(points, ConvexHull(points).simplices)
+            yield place, turn, mesh(*ellipsoid(size), self.meshes)
         elif kind == _MESH:
-            mesh = int(m.geom_dataid[g])
-            vertices = slice(int(m.mesh_vertadr[mesh]), None)
-            points = m.mesh_vert[vertices][: int(m.mesh_vertnum[mesh])]
-            faces = m.mesh_face[int(m.mesh_faceadr[mesh]) :][: int(m.mesh_facenum[mesh])]
-            yield place, turn, self._mesh(np.array(points, dtype=float), np.array(faces))
+            number = int(m.geom_dataid[g])
+            vertices = slice(int(m.mesh_vertadr[number]), None)
+            points = m.mesh_vert[vertices][: int(m.mesh_vertnum[number])]
+            faces = m.mesh_face[int(m.mesh_faceadr[number]) :][: int(m.mesh_facenum[number])]
+            # As MuJoCo has it: scaled, recentred.
+            both = np.array(points, dtype=float), np.array(faces, dtype=np.intp)
+            yield place, turn, mesh(*both, self.meshes)
         elif kind not in (_PLANE, _HFIELD):
             self.notes.append(f"a shape of {self._body(int(m.geom_bodyid[g]))} is left out")
-
-    def _mesh(self, points: Array, faces: NDArray[Any]) -> Element:
-        """A mesh as MuJoCo has it (scaled, recentred), as a file in the cache."""
-        path = keep_mesh(points, faces)
-        self.meshes.add(str(path))
-        return ElementTree.Element("mesh", filename=f"file://{path}")
 
     def _body(self, body: int) -> str:
         return str(self.m.body(body).name) or f"body_{body}"
@@ -356,19 +346,3 @@ class _Writer:
 def _matrix(quaternion: Array) -> Array:
     w, x, y, z = map(float, quaternion)
     return np.asarray(pin.Quaternion(w, x, y, z).normalized().matrix())
-
-
-def _origin(element: Element, place: Array, turn: Array) -> None:
-    figures = {"xyz": _words(place), "rpy": _words(pin.rpy.matrixToRpy(np.asarray(turn)))}
-    ElementTree.SubElement(element, "origin", figures)
-
-
-def _words(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
-
-
-def _sphere_points() -> Array:
-    k = np.arange(_BALL_POINTS) + 0.5
-    z, angle = 1 - 2 * k / _BALL_POINTS, np.pi * (1 + 5**0.5) * k
-    ring = np.sqrt(1 - z**2)
-    return np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])

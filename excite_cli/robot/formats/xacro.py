@@ -47,12 +47,20 @@ class Xacro(RobotFormat):
             document = library.process_file(str(path), mappings=arguments)
             return Urdf(document.toxml())
         except Exception as error:  # xacro raises whatever an expression raises
-            reason = " ".join(str(error).split()) or type(error).__name__
+            reason = _reason(error)
             raise RobotError(
                 f"{path.name}: xacro cannot expand it: {reason[:400]}. Arguments are given under "
                 "robot.xacro_args (init: --xacro-arg NAME=VALUE), folders of packages under "
                 "robot.package_dirs (init: --package-dirs)."
             ) from error
+
+
+def _reason(error: BaseException) -> str:
+    """In words; of an error of ours that xacro wrapped, its own."""
+    ours: BaseException | None = error
+    while ours is not None and not isinstance(ours, RobotError):
+        ours = ours.__cause__ or ours.__context__
+    return " ".join(str(ours or error).split()) or type(error).__name__
 
 
 def _written(value: object) -> str:
