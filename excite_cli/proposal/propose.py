@@ -9,6 +9,7 @@ from typing import Literal
 
 from excite_cli.config.commented_yaml import commented_yaml
 from excite_cli.config.load import apply_override, parse_spec, parsed_spec
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
 from excite_cli.proposal.joints import Choice, choose_joints
@@ -18,6 +19,7 @@ from excite_cli.proposal.posture import FirstPosture, first_posture
 from excite_cli.proposal.settle import Comments, Settled, Tree, settle
 from excite_cli.proposal.shapes import Shapes, choose_shapes
 from excite_cli.robot.description import RobotDescription, load_description
+from excite_cli.robot.model import build_robot
 from excite_cli.robot.package_search import package_folders
 from excite_cli.robot.reference_postures import reference_posture
 from excite_cli.robot.srdf import read_srdf, srdf_near
@@ -111,6 +113,8 @@ def propose(request: Request) -> Proposal:
     if shapes.any and disabled.pairs:
         tree["constraints"]["self_collision"]["ignore"] = list(map(list, disabled.pairs))
         comments["constraints", "self_collision", "ignore"] = disabled.in_words
+    if len(joints) == 1:
+        _with_a_criterion(tree, comments, request.folder)
     _override(tree, comments, request.overrides)
     settled = settle(tree, comments, request.folder)
     notes += shapes.in_words(source)
@@ -204,6 +208,14 @@ def _draft(
         "each on top of the earlier ones; a diagnosis fits all but the last and judges by that one"
     )
     return tree, comments
+
+
+def _with_a_criterion(tree: Tree, comments: Comments, folder: Path) -> None:
+    """Another criterion where the condition number is always 1: of one base parameter."""
+    robot = build_robot(parsed_spec(tree, "the proposed config").robot, folder)
+    if find_base_parameters(robot).rank == 1:
+        tree["criterion"] = {"kind": "log_det"}
+        comments["criterion", "kind"] = "the condition number of one base parameter is always 1"
 
 
 def _override(tree: Tree, comments: Comments, overrides: tuple[str, ...]) -> None:

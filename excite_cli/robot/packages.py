@@ -7,6 +7,8 @@ from pathlib import Path
 
 from excite_cli.errors import RobotError
 
+# Folders of a package in which descriptions lie.
+_OF_DESCRIPTIONS = ("urdf", "xacro", "robots", "robot", "models", "model")
 # By variable: what lies between a folder that it names and the packages.
 _VARIABLES = {
     "ROS_PACKAGE_PATH": "",
@@ -44,6 +46,14 @@ def package_in(folder: Path, name: str) -> Path | None:
         if _is_package(candidate, name):
             return candidate
     return next((inner for inner in _folders_in(folder) if _declared(inner) == name), None)
+
+
+def unnamed_package(path: Path) -> Path | None:
+    """The folder of the package that a file in `urdf` or the like lies in, if nothing names it."""
+    if path.parent.name not in _OF_DESCRIPTIONS:
+        return None
+    folder = path.parent.parent
+    return None if (folder / "package.xml").exists() else folder
 
 
 def folders_of_packages(path: Path) -> Iterator[Path]:

@@ -226,3 +226,13 @@ def test_what_cannot_be_set_is_told(tmp_path: Path, given: str, words: str) -> N
     arm(tmp_path)
     with pytest.raises(ConfigError, match=words):
         propose(Request("robot.urdf", tmp_path, overrides=(given,)))
+
+
+def test_one_base_parameter_has_another_criterion(tmp_path: Path) -> None:
+    """A flywheel: its condition number is always 1, which `optimize` would refuse."""
+    upright = joint("wheel", "base", "disc", GOOD).replace('axis xyz="0 1 0"', 'axis xyz="0 0 1"')
+    written(tmp_path, link("base"), upright, link("disc", shape=""))
+    proposal = propose(Request("robot.urdf", tmp_path, ("wheel",)))
+    assert proposal.settled.problem.base.rank == 1
+    assert parse_spec(proposal.text).criterion.kind == "log_det"
+    assert "of one base parameter is always 1" in proposal.text
