@@ -80,6 +80,11 @@ class RobotSpec(Section):
     package_dirs: tuple[str, ...] = Field(
         (), description="folders in which package:// names of the URDF are looked up"
     )
+    density: Positive | None = Field(
+        None,
+        description="links without mass take mass and inertia of their shapes at this density "
+        "[kg/m³]; default: they have none",
+    )
     joints: Literal["all"] | tuple[str, ...] = Field("all", description="moved joints")
     posture: dict[str, Finite] = Field(
         default_factory=dict,

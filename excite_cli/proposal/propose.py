@@ -18,6 +18,7 @@ from excite_cli.proposal.pace import Pace, choose_pace
 from excite_cli.proposal.posture import FirstPosture, first_posture
 from excite_cli.proposal.settle import Comments, Settled, Tree, settle
 from excite_cli.proposal.shapes import Shapes, choose_shapes
+from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.model import build_robot
 from excite_cli.robot.package_search import package_folders
@@ -31,6 +32,11 @@ _MARGIN = 0.01
 _SECONDS = 60.0
 # A diagnosis holds the last one out, and what tells runs apart needs two beside it.
 _MOTIONS = 3
+_DENSITY = 1000.0
+_ASSUMED = (
+    "[kg/m³] the URDF has no masses: its shapes' hulls are taken at this density. Motions show the "
+    "parameters whatever they are; limits of torque are guesses until masses are known"
+)
 _OF_PAIRS = (("by_meshes",), ("ignore",))
 _OWN_OPTION = {
     "robot": "--urdf and the other options",
@@ -96,6 +102,10 @@ def propose(request: Request) -> Proposal:
         description = load_description(request.urdf, dirs, request.folder, arguments)
     source = description.path.name
     shapes = choose_shapes(description)
+    assumed = not shapes.facts.mass > 0
+    if assumed:
+        description = with_assumed_inertias(description, _DENSITY)
+        shapes = choose_shapes(description)
     facts = shapes.facts
     _require_inertias(facts, source)
     choice = choose_joints(facts.joints, source, request.joints)
@@ -110,6 +120,10 @@ def propose(request: Request) -> Proposal:
     srdf = known[0] if request.srdf else chosen_srdf(known, description)
     disabled = disabled_pairs(description, srdf, names, shapes.visual)
     tree, comments = _draft(request, dirs, shapes, choice, joints, posture, pace)
+    if assumed:
+        tree["robot"]["density"] = _DENSITY
+        comments["robot", "density"] = _ASSUMED
+        notes.append(f"density: {_ASSUMED}")
     if shapes.any and disabled.pairs:
         tree["constraints"]["self_collision"]["ignore"] = list(map(list, disabled.pairs))
         comments["constraints", "self_collision", "ignore"] = disabled.in_words
@@ -283,13 +297,13 @@ def _inside(others: dict[str, float], facts: UrdfSurvey) -> dict[str, float]:
 
 
 def _require_inertias(facts: UrdfSurvey, source: str) -> None:
-    if facts.inertial_links == 0:
-        raise RobotError(
-            f"{source} has no <inertial> at all, so there are no inertial parameters to plan for: "
-            "use a URDF with the masses of its links."
-        )
-    if facts.mass <= 0:
-        raise RobotError(f"{source} has no mass: every <mass> is 0. Give the links their masses.")
+    if facts.mass > 0:
+        return
+    what = "no <inertial> at all" if facts.inertial_links == 0 else "no mass: every <mass> is 0"
+    raise RobotError(
+        f"{source} has {what}, and no shapes that masses could be assumed of: use a URDF with the "
+        "masses of its links."
+    )
 
 
 def _written(folder: Path, start: Path) -> str:

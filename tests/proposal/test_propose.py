@@ -77,9 +77,22 @@ def test_without_collision_geometry_distances_are_not_asked_for(tmp_path: Path) 
     assert any("no collision geometry" in note for note in proposal.notes)
 
 
-def test_without_inertias_one_sentence_says_so(tmp_path: Path) -> None:
+def test_without_inertias_those_of_the_shapes_are_assumed(tmp_path: Path) -> None:
     arm(tmp_path, mass=-1)
-    with pytest.raises(RobotError, match=r"^robot\.urdf has no <inertial> at all"):
+    proposal = propose(Request("robot.urdf", tmp_path))
+    assert parse_spec(proposal.text).robot.density == 1000.0
+    assert any("the URDF has no masses" in note for note in proposal.notes)
+    box = 1000.0 * 0.05 * 0.05 * 0.16
+    masses = [inertia.mass for inertia in proposal.settled.problem.robot.model.inertias[1:]]
+    assert masses == pytest.approx([box, box])
+
+
+def test_without_inertias_and_shapes_one_sentence_says_so(tmp_path: Path) -> None:
+    written(tmp_path, link("base", -1, ""), joint("j", "base", "l", GOOD), link("l", -1, ""))
+    with pytest.raises(RobotError, match=r"^robot\.urdf has no <inertial> at all, and no shapes"):
+        propose(Request("robot.urdf", tmp_path))
+    written(tmp_path, link("base", 0, ""), joint("j", "base", "l", GOOD), link("l", 0, ""))
+    with pytest.raises(RobotError, match=r"^robot\.urdf has no mass: every <mass> is 0"):
         propose(Request("robot.urdf", tmp_path))
 
 
