@@ -15,6 +15,7 @@ from excite_cli.proposal.propose import Proposal, Request
 from excite_cli.proposal.propose import propose as propose_config
 from excite_cli.robot.description import EXAMPLE_PREFIX as EXAMPLE_PREFIX
 from excite_cli.robot.description import example_robots as example_robots
+from excite_cli.robot.description import is_named as is_named
 from excite_cli.robot.description import load_description
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.answer import Answer
@@ -39,11 +40,12 @@ def propose(
 ) -> Proposal:
     """A config for a robot of which nothing but the URDF is known: `excite init`.
 
-    `urdf` is a path (relative to `folder`, where the config will lie) or
-    `example-robot-data:<name>`; `joints` those to move, none for a choice of ours; `package_dirs`
-    and `xacro_args` as under `robot` in a config; `srdf` a file with postures and pairs not to
-    check, else one beside the URDF is taken; `overrides` (`key.path=value`) stand in place of what
-    is chosen. The `text` of what is returned is the YAML file, `notes` say what was chosen and why.
+    `urdf` is a path (relative to `folder`, where the config will lie), `example-robot-data:<name>`
+    or `robot_descriptions:<name>`; `joints` those to move, none for a choice of ours;
+    `package_dirs` and `xacro_args` as under `robot` in a config; `srdf` a file with postures and
+    pairs not to check, else one beside the URDF is taken; `overrides` (`key.path=value`) stand in
+    place of what is chosen. The `text` of what is returned is the YAML file, `notes` say what was
+    chosen and why.
 
     Raises
     ------
@@ -88,8 +90,8 @@ def save_proposal(
 ) -> Answer:
     """Write the config that `propose` gives for a robot to `output` (default: <robot>.yaml here).
 
-    `robot` is `example-robot-data:<name>` or a file (URDF, xacro, MJCF, SDF). What is returned says
-    what was chosen.
+    `robot` is `example-robot-data:<name>`, `robot_descriptions:<name>` or a file (URDF, xacro,
+    MJCF, SDF). What is returned says what was chosen.
 
     Raises
     ------
@@ -100,10 +102,8 @@ def save_proposal(
     """
     if base not in ("fixed", "floating"):
         raise ConfigError(f"--base {base}: allowed are fixed and floating.")
-    known = str(robot).startswith(EXAMPLE_PREFIX)
-    name = (
-        str(robot).removeprefix(EXAMPLE_PREFIX) if known else Path(robot).stem.removesuffix(".urdf")
-    )
+    known = is_named(str(robot))
+    name = str(robot).partition(":")[2] if known else Path(robot).stem.removesuffix(".urdf")
     path = Path(f"{name}.yaml") if output is None else Path(output)
     with held({"output": path}, overwrite, () if known else (robot,)):
         folder = path.resolve().parent

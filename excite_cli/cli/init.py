@@ -14,7 +14,10 @@ from excite_cli.cli.console import Terminal
 def init(
     robot: Annotated[
         str | None,
-        typer.Option("--robot", help="A robot of example-robot-data; see `excite robots`."),
+        typer.Option(
+            "--robot",
+            help="A robot of example-robot-data (see `excite robots`), or robot_descriptions:NAME.",
+        ),
     ] = None,
     urdf: Annotated[
         Path | None, typer.Option("--urdf", help="A file: URDF, xacro, MJCF or SDF.")
@@ -63,7 +66,7 @@ def init(
 
     Example:  excite init --robot ur10 --set sequence.motions=5
     """
-    from excite_cli.api.proposing import EXAMPLE_PREFIX, save_proposal
+    from excite_cli.api.proposing import EXAMPLE_PREFIX, is_named, save_proposal
     from excite_cli.api.threads import single_threaded
     from excite_cli.cli.init_questions import Answers, ask
     from excite_cli.errors import ConfigError
@@ -73,7 +76,7 @@ def init(
         raise ConfigError("--robot and --urdf both name a robot: give one of them.")
     chosen = tuple(filter(None, (name.strip() for name in (joints or "").split(","))))
     if robot is not None:
-        answers = Answers(f"{EXAMPLE_PREFIX}{robot.removeprefix(EXAMPLE_PREFIX)}", output, chosen)
+        answers = Answers(robot if is_named(robot) else f"{EXAMPLE_PREFIX}{robot}", output, chosen)
     elif urdf is not None:
         answers = Answers(str(urdf), output, chosen)
     elif sys.stdin.isatty() and sys.stderr.isatty() and not (as_json or quiet):

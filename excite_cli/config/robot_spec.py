@@ -72,7 +72,7 @@ class RobotSpec(Section):
 
     urdf: str = Field(
         description="URDF, xacro, MJCF or SDF: path relative to this file, or "
-        "example-robot-data:<name>"
+        "example-robot-data:<name>, or robot_descriptions:<name>"
     )
     xacro_args: dict[str, str | int | float | bool] = Field(
         default_factory=dict, description="arguments of a xacro file, {name: value}"

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from excite_cli.errors import RobotError, nearest
 from excite_cli.given_files import require_stored
+from excite_cli.robot.descriptions_package import PREFIX, Found, find_description
 from excite_cli.robot.formats.base import Asked
 from excite_cli.robot.formats.catalogue import as_urdf
 from excite_cli.robot.loops import Loop, closed_loops, loops_in_words
@@ -105,11 +106,12 @@ def load_description(
     relative_to: Path | None = None,
     arguments: Mapping[str, object] | None = None,
 ) -> RobotDescription:
-    """Read and check a URDF, xacro, MJCF or SDF, given by path or as `example-robot-data:<name>`.
+    """Read and check a URDF, xacro, MJCF or SDF, given by path or by a package's name for it.
 
     Parameters
     ----------
-    urdf: path (relative to `relative_to`) or `example-robot-data:<name>`
+    urdf: path (relative to `relative_to`), `example-robot-data:<name>` or
+        `robot_descriptions:<name>`
     package_dirs: folders that hold the packages named by `package://`
     relative_to: folder that relative paths start from; default the working directory
     arguments: of xacro
@@ -128,30 +130,12 @@ def load_description(
     for given, folder in zip(package_dirs, extra, strict=True):
         if not Path(folder).is_dir():
             raise RobotError(f"robot.package_dirs: there is no folder {given} ({folder}).")
-    if urdf.startswith(EXAMPLE_PREFIX):
-        known = example_robots()
-        name = urdf.removeprefix(EXAMPLE_PREFIX)
-        if name not in known:
-            raise RobotError(
-                f"robot.urdf: example-robot-data has no robot '{name}'."
-                f"{nearest(name, known)} `excite robots` lists all {len(known)}."
-            )
-        path = known[name]
-    else:
-        path = (root / urdf).resolve()
-        if path.exists():
-            require_stored(path)
-        if not path.is_file():
-            offered = [f"{EXAMPLE_PREFIX}{name}" for name in example_robots()]
-            meant = "" if "/" in urdf else nearest(f"{EXAMPLE_PREFIX}{urdf}", offered, 0.93)
-            raise RobotError(
-                f"robot.urdf: there is no file {path}.{meant} Give a path relative to the YAML "
-                f"file, or {EXAMPLE_PREFIX}<name>."
-            )
-    found = as_urdf(path, _read(path), Asked(extra, arguments or {}))
+    file = _file(urdf, root)
+    path, dirs = file.path, (*extra, *file.package_dirs)
+    found = as_urdf(path, _read(path), Asked(dirs, {**file.arguments, **(arguments or {})}))
     tree = parsed(path, found.text)
     followers, loops = mimics(path, tree), closed_loops(tree)
-    packages = (*extra, str(_share_folder(path)), str(path.parent), *found.folders)
+    packages = (*dirs, str(_share_folder(path)), str(path.parent), *found.folders)
     return RobotDescription(
         name=path.stem.removesuffix(".urdf"),
         source=urdf,
@@ -165,6 +149,37 @@ def load_description(
         loops=loops,
         ignored=found.ignored,
     )
+
+
+def is_named(urdf: str) -> bool:
+    """Whether a robot is given by the name that a package has for it, not by a file."""
+    return urdf.startswith((EXAMPLE_PREFIX, PREFIX))
+
+
+def _file(urdf: str, root: Path) -> Found:
+    """The file that `robot.urdf` means; relative paths start from `root`."""
+    if urdf.startswith(PREFIX):
+        return find_description(urdf)
+    if urdf.startswith(EXAMPLE_PREFIX):
+        known = example_robots()
+        name = urdf.removeprefix(EXAMPLE_PREFIX)
+        if name not in known:
+            raise RobotError(
+                f"robot.urdf: example-robot-data has no robot '{name}'."
+                f"{nearest(name, known)} `excite robots` lists all {len(known)}."
+            )
+        return Found(known[name])
+    path = (root / urdf).resolve()
+    if path.exists():
+        require_stored(path)
+    if not path.is_file():
+        offered = [f"{EXAMPLE_PREFIX}{name}" for name in example_robots()]
+        meant = "" if "/" in urdf else nearest(f"{EXAMPLE_PREFIX}{urdf}", offered, 0.93)
+        raise RobotError(
+            f"robot.urdf: there is no file {path}.{meant} Give a path relative to the YAML "
+            f"file, {EXAMPLE_PREFIX}<name> or {PREFIX}<name>."
+        )
+    return Found(path)
 
 
 def require_limits(description: RobotDescription) -> None:
