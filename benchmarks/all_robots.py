@@ -6,9 +6,8 @@ interrupted and gone on with; the page docs/robots.md is made of all that are th
 
 Run: python -m benchmarks.all_robots --sources FOLDER [--only WORD …] [--workers 2] [--resume]
      python -m benchmarks.all_robots --sources FOLDER --page-only
-where FOLDER is what this makes (the robots' data files; no code of these packages is run):
-     python -m benchmarks.all_robots --print-install | sh
-Without --sources: the robots of example-robot-data alone.
+where FOLDER is for the packages' files (2.3 GB): where it is not there, pip fills it. No code of
+these packages is run. Without --sources: the robots of example-robot-data alone.
 """
 
 import argparse
@@ -19,7 +18,7 @@ from pathlib import Path
 
 from benchmarks.robots.journey import ROOT, travelled
 from benchmarks.robots.page import page
-from benchmarks.robots.sources import INSTALL, Source, sources
+from benchmarks.robots.sources import Source, fetch, sources
 
 PAGE = ROOT / "docs" / "robots.md"
 SEED = 8101
@@ -28,7 +27,6 @@ SEED = 8101
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--sources", type=Path, help="folder of the packages' files")
-    parser.add_argument("--print-install", action="store_true", help="how to make that folder")
     parser.add_argument("--only", nargs="+", help="robots whose name has one of these words")
     parser.add_argument("--seed", type=int, default=SEED, help="of what is planted")
     parser.add_argument("--workers", type=int, default=2)
@@ -36,9 +34,8 @@ def main() -> None:
     parser.add_argument("--page-only", action="store_true")
     parser.add_argument("--folder", type=Path, default=Path("all_robots"), help="of results")
     options = parser.parse_args()
-    if options.print_install:
-        print(INSTALL)
-        return
+    if options.sources is not None and not options.sources.exists():
+        fetch(options.sources)
     known = sources(options.sources and options.sources.resolve())
     records = options.folder.resolve() / "records"
     records.mkdir(parents=True, exist_ok=True)

@@ -109,10 +109,10 @@ def _travel(source: Source, steps: _Steps, seed: int) -> None:
     effects = [word for text in plant["effects"] for word in ("--effect", text)]
     played = ("robot.yaml", "motions.h5", "-o", "measured.h5", "--seed", str(seed), "--overwrite")
     steps.excite("simulate", *played, *effects)
-    record["diagnosis"] = _judged(steps.excite("diagnose", "robot.yaml", "measured.h5"), plant)
+    record["diagnosis"] = judged(steps.excite("diagnose", "robot.yaml", "measured.h5"), plant)
 
 
-def _judged(answer: dict[str, Any], plant: dict[str, Any]) -> Record:
+def judged(answer: dict[str, Any], plant: dict[str, Any]) -> Record:
     """What was named, and whether that is the planted effect alone."""
     there = Plant(
         Name(plant["kind"], tuple(plant["joints"])),

@@ -6,7 +6,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from benchmarks.robots.sources import INSTALL, Source
+from benchmarks.robots.sources import PACKAGES, Source
 
 Record = dict[str, Any]
 _OPENING = """\
@@ -49,8 +49,10 @@ def page(found: list[tuple[Source, Record]], seed: int) -> str:
         "|---|---|---:|---:|---:|---:|---:|---:|---|---|---|",
     ]
     lines += [_row(source, record) for source, record in found]
-    lines += ["", "The packages, of which only data files are read, no code is run:", ""]
-    lines += ["```", INSTALL.replace(" --target", " \\\n    --target"), "```"]
+    lines += [
+        "",
+        f"Packages, of which data files are read and no code is run: {', '.join(PACKAGES)}.",
+    ]
     return "\n".join(lines) + "\n"
 
 

