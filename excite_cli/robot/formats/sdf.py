@@ -2,7 +2,8 @@
 
 Poses are in the frames that `relative_to` names, else a link's in its model's, a joint's in its
 child link's. A URDF's link stands at its joint, an SDF's anywhere: each is shifted to the joint
-that leads to it. What a URDF cannot hold is left out and told: loops, joints of several axes.
+that leads to it. What a URDF cannot hold is left out and told: joints of several axes; loops are
+cut as `robot.loops` has it.
 """
 
 import math
@@ -26,6 +27,7 @@ from excite_cli.robot.formats.urdf_parts import (
     mesh,
     words,
 )
+from excite_cli.robot.loops import TAG
 
 Array = NDArray[np.float64]
 Element = ElementTree.Element
@@ -123,18 +125,14 @@ class _Writer:
 
     def _tree(self) -> str:
         """The link that carries most others, once every link is led to by one joint."""
-        cut = []
         for name, joint in self.joints.items():
             child, parent = self._end(joint, "child"), self._end(joint, "parent")
             if child == _WORLD or child in self.leading or self._above(parent, child):
-                cut.append(name)
+                loop = ElementTree.SubElement(self.robot, TAG, name=name)
+                ElementTree.SubElement(loop, "link1", link=parent)
+                ElementTree.SubElement(loop, "link2", link=child)
             else:
                 self.leading[child] = name
-        if cut:
-            self.notes.append(
-                f"closed loops are cut at {', '.join(cut)}: the joints within move on their own "
-                "here"
-            )
         roots = [name for name in self.links if name not in self.leading]
         if any(self._parent(name) == _WORLD for name in self.leading):
             roots.append(_WORLD)

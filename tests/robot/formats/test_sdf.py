@@ -9,6 +9,8 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import RobotError
 from excite_cli.geometry.link_shapes import collision_model, placed_shapes
 from excite_cli.robot.description import RobotDescription, load_description
+from excite_cli.robot.loops import Loop
+from excite_cli.robot.mimic import Mimic
 from excite_cli.robot.model import build_robot
 
 
@@ -79,7 +81,9 @@ def test_what_a_urdf_cannot_hold_is_told(tmp_path: Path) -> None:
         link("base"),
         joint("j1", "base", "a", "<dynamics><spring_stiffness>3</spring_stiffness></dynamics>"),
         link("a"),
-        joint("loop", "base", "a"),
+        joint("j3", "base", "c"),
+        link("c"),
+        joint("loop", "c", "a"),
         joint("ball", "a", "b", kind="ball"),
         link("b"),
         link("loose"),
@@ -87,14 +91,15 @@ def test_what_a_urdf_cannot_hold_is_told(tmp_path: Path) -> None:
     )
     told = " | ".join(found.notes)
     for part in (
-        "closed loops are cut at loop",
+        "a closed loop is cut between c and a",
         "ball stays where it is, of type ball",
         "joined to nothing, left out: loose",
         "not part of the robot, left out: table",
         "the spring of j1 has no place in a URDF",
     ):
         assert part in told
-    assert found.xml.count("<joint") == 2
+    assert found.loops == (Loop(("c", "a"), ("j1", "j3")),)
+    assert found.xml.count("<joint") == 3
 
 
 def test_friction_couplings_and_turns_without_end(tmp_path: Path) -> None:
@@ -104,8 +109,7 @@ def test_friction_couplings_and_turns_without_end(tmp_path: Path) -> None:
     described(tmp_path, link("base"), joint("j1", "base", "a", friction), link("a"), endless,
               link("b"))  # fmt: skip
     found = load_description(str(tmp_path / "robot.sdf"))
-    assert found.mimicking == {"j2": "j1"}
-    assert 'multiplier="2.0" offset="0.5"' in found.xml
+    assert found.mimicking == {"j2": Mimic("j1", 2.0, 0.5)}
     assert 'damping="0.5" friction="0.25"' in found.xml
     assert 'lower="-1000000000.0"' in found.xml
 
