@@ -45,8 +45,8 @@ lint: $(STAMP)
 docs: $(STAMP)           ## the documentation, into site/; a warning is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-robots: $(STAMP)         ## every robot of example-robot-data, into docs/robots.md (an hour or two)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.all_robots --workers 2 --resume
+robots: $(STAMP)         ## robots of PyPI in four formats, init to diagnose, into docs/robots.md (hours)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.all_robots --sources robot-sources --workers 2 --resume
 
 bench: $(STAMP)          ## cost and gradient, growth, memory, whole motions, two workers
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.gradient

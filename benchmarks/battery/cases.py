@@ -65,7 +65,7 @@ Label = Callable[[int, int], tuple[Group, str]]
 
 
 @cache
-def _kinds() -> tuple[str, ...]:
+def kinds() -> tuple[str, ...]:
     """Kinds that four recordings of one robot show and that have no cases of their own."""
     own = {kind.kind for kind in HISTORY.values()}
     return tuple(
@@ -78,7 +78,7 @@ def _kinds() -> tuple[str, ...]:
 @cache
 def _deck(seed: int, number: int) -> tuple[tuple[Group, str], ...]:
     """Group and kind of 36 cases; kinds of several effects are drawn with the case."""
-    cards: list[tuple[Group, str]] = [("one", kind) for kind in _kinds()]
+    cards: list[tuple[Group, str]] = [("one", kind) for kind in kinds()]
     for k in range(number, number + 7):
         cards.append(("clean", ("any", "correlated")[k % 2]))
     for k in range(2):
@@ -91,7 +91,7 @@ def _deck(seed: int, number: int) -> tuple[tuple[Group, str], ...]:
 
 def label(seed: int, index: int) -> tuple[Group, str]:
     """Group and kind of a case, without making it."""
-    length = len(_kinds()) + 14
+    length = len(kinds()) + 14
     return _deck(seed, index // length)[index % length]
 
 
@@ -136,7 +136,7 @@ def ground_and_model(
     of: Arm,
     motions: Sequence[PlannedMotion],
     settings: SimulationSettings,
-    friction: tuple[EffectSpec, ...],
+    friction: tuple[EffectSpec, ...] | None,
 ) -> tuple[Ground, Array]:
     """What sizes are measured on, and a basis of what the declared model explains there."""
     declared = declared_effects(friction, of.robot)
@@ -243,7 +243,7 @@ def _two(
     excluded = set(_ALONE)
     if with_friction:
         excluded |= {"viscous_friction", "coulomb_friction"}
-    names = [name for name in _kinds() if name not in excluded]
+    names = [name for name in kinds() if name not in excluded]
     first_name, second_name = rng.choice(names, 2, replace=False)
     first = one_effect(kind_named(str(first_name)), of, ground, model, (_SEPARATE, np.inf), rng)
     if first is None:

@@ -24,7 +24,8 @@ from benchmarks.trust.fuzz_trial import Fuzzer
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.geometry.link_meshes import link_meshes
-from excite_cli.robot.description import check_mesh_paths, example_robots, load_description
+from excite_cli.robot.description import example_robots, load_description
+from excite_cli.robot.mesh_paths import check_mesh_paths
 from excite_cli.robot.model import build_robot, links_by_joint
 from excite_cli.robot.package_search import package_folders
 from excite_cli.robot.urdf_joints import survey

@@ -15,6 +15,7 @@ from excite_cli.proposal.propose import Proposal, Request
 from excite_cli.proposal.propose import propose as propose_config
 from excite_cli.robot.description import EXAMPLE_PREFIX as EXAMPLE_PREFIX
 from excite_cli.robot.description import example_robots as example_robots
+from excite_cli.robot.description import is_named as is_named
 from excite_cli.robot.description import load_description
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.answer import Answer
@@ -34,13 +35,17 @@ def propose(
     base: Base = "fixed",
     package_dirs: Sequence[str | Path] = (),
     xacro_args: Mapping[str, str] | None = None,
+    srdf: str | Path | None = None,
+    overrides: Sequence[str] = (),
 ) -> Proposal:
     """A config for a robot of which nothing but the URDF is known: `excite init`.
 
-    `urdf` is a path (relative to `folder`, where the config will lie) or
-    `example-robot-data:<name>`; `joints` those to move, none for a choice of ours; `package_dirs`
-    and `xacro_args` as under `robot` in a config. The `text` of
-    what is returned is the YAML file, `notes` say what was chosen and why.
+    `urdf` is a path (relative to `folder`, where the config will lie), `example-robot-data:<name>`
+    or `robot_descriptions:<name>`; `joints` those to move, none for a choice of ours;
+    `package_dirs` and `xacro_args` as under `robot` in a config; `srdf` a file with postures and
+    pairs not to check, else one beside the URDF is taken; `overrides` (`key.path=value`) stand in
+    place of what is chosen. The `text` of what is returned is the YAML file, `notes` say what was
+    chosen and why.
 
     Raises
     ------
@@ -55,8 +60,18 @@ def propose(
     >>> propose("data/smoke_arm.urdf").joints[:2]
     ('shoulder_yaw', 'shoulder_pitch')
     """
-    dirs, arguments = tuple(map(str, package_dirs)), dict(xacro_args or {})
-    return propose_config(Request(str(urdf), Path(folder), tuple(joints), base, dirs, arguments))
+    return propose_config(
+        Request(
+            str(urdf),
+            Path(folder),
+            tuple(joints),
+            base,
+            tuple(map(str, package_dirs)),
+            dict(xacro_args or {}),
+            None if srdf is None else Path(srdf),
+            tuple(overrides),
+        )
+    )
 
 
 @checked()
@@ -68,13 +83,15 @@ def save_proposal(
     base: str = "fixed",
     package_dirs: Sequence[str | Path] = (),
     xacro_args: Mapping[str, str] | None = None,
+    srdf: str | Path | None = None,
+    overrides: Sequence[str] = (),
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Answer:
     """Write the config that `propose` gives for a robot to `output` (default: <robot>.yaml here).
 
-    `robot` is `example-robot-data:<name>` or a file (URDF, xacro, MJCF). What is returned says
-    what was chosen.
+    `robot` is `example-robot-data:<name>`, `robot_descriptions:<name>` or a file (URDF, xacro,
+    MJCF, SDF). What is returned says what was chosen.
 
     Raises
     ------
@@ -85,10 +102,8 @@ def save_proposal(
     """
     if base not in ("fixed", "floating"):
         raise ConfigError(f"--base {base}: allowed are fixed and floating.")
-    known = str(robot).startswith(EXAMPLE_PREFIX)
-    name = (
-        str(robot).removeprefix(EXAMPLE_PREFIX) if known else Path(robot).stem.removesuffix(".urdf")
-    )
+    known = is_named(str(robot))
+    name = str(robot).partition(":")[2] if known else Path(robot).stem.removesuffix(".urdf")
     path = Path(f"{name}.yaml") if output is None else Path(output)
     with held({"output": path}, overwrite, () if known else (robot,)):
         folder = path.resolve().parent
@@ -105,6 +120,8 @@ def save_proposal(
             base=cast(Base, base),
             package_dirs=dirs,
             xacro_args=xacro_args,
+            srdf=srdf,
+            overrides=overrides,
         )
         write_text_atomically(path, found.text)
         return proposal_answer(found, source, str(path))

@@ -6,7 +6,7 @@ from excite_cli.config.load import load_spec, parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.result import Result, matches
-from excite_cli.robot.description import EXAMPLE_PREFIX
+from excite_cli.robot.description import is_named
 from excite_cli.store.fit_knowledge import fit_knowledge
 
 
@@ -31,7 +31,7 @@ def rebuilt_problem(
         found = {name: getattr(given, name) for name in ("urdf", "package_dirs", "xacro_args")}
         spec = spec.model_copy(update={"robot": spec.robot.model_copy(update=found)})
     urdf = spec.robot.urdf
-    if not urdf.startswith(EXAMPLE_PREFIX) and not (folder / urdf).is_file():
+    if not is_named(urdf) and not (folder / urdf).is_file():
         raise FileError(
             f"{name} was made with the URDF {urdf}, and there is none at "
             f"{(folder / urdf).resolve()}. Relative paths start from the config: give the YAML "

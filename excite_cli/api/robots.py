@@ -6,7 +6,7 @@ from excite_cli.api.arguments import checked
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import RobotError, nearest
 from excite_cli.robot.described import DescribedRobot, describe
-from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots
+from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots, is_named
 from excite_cli.robot.glance import known_robots
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.answer import Answer
@@ -39,7 +39,7 @@ def describe_robot(robot: str | Path) -> DescribedRobot:
 
 def _urdf(robot: str) -> str:
     """What robot.urdf would be: a file's path, or the prefix and a name."""
-    if robot.startswith(EXAMPLE_PREFIX) or Path(robot).is_file():
+    if is_named(robot) or Path(robot).is_file():
         return robot
     if Path(robot).is_dir():
         raise RobotError(f"{robot} is a folder. Give a URDF file, or a name: `excite robots`.")

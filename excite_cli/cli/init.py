@@ -14,10 +14,13 @@ from excite_cli.cli.console import Terminal
 def init(
     robot: Annotated[
         str | None,
-        typer.Option("--robot", help="A robot of example-robot-data; see `excite robots`."),
+        typer.Option(
+            "--robot",
+            help="A robot of example-robot-data (see `excite robots`), or robot_descriptions:NAME.",
+        ),
     ] = None,
     urdf: Annotated[
-        Path | None, typer.Option("--urdf", help="A file: URDF, xacro, or MJCF (MuJoCo).")
+        Path | None, typer.Option("--urdf", help="A file: URDF, xacro, MJCF or SDF.")
     ] = None,
     output: Annotated[
         Path | None,
@@ -40,6 +43,11 @@ def init(
         list[str] | None,
         typer.Option("--xacro-arg", metavar="NAME=VALUE", help="Of a xacro (may be repeated)."),
     ] = None,
+    srdf: Annotated[
+        Path | None,
+        typer.Option("--srdf", help="Postures and pairs not to check. Default: beside the URDF."),
+    ] = None,
+    overrides: options.Set = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -55,8 +63,10 @@ def init(
     Example:  excite init --robot ur10
 
     Example:  excite init --urdf arm.urdf.xacro --xacro-arg gripper=none
+
+    Example:  excite init --robot ur10 --set sequence.motions=5
     """
-    from excite_cli.api.proposing import EXAMPLE_PREFIX, save_proposal
+    from excite_cli.api.proposing import EXAMPLE_PREFIX, is_named, save_proposal
     from excite_cli.api.threads import single_threaded
     from excite_cli.cli.init_questions import Answers, ask
     from excite_cli.errors import ConfigError
@@ -66,7 +76,7 @@ def init(
         raise ConfigError("--robot and --urdf both name a robot: give one of them.")
     chosen = tuple(filter(None, (name.strip() for name in (joints or "").split(","))))
     if robot is not None:
-        answers = Answers(f"{EXAMPLE_PREFIX}{robot.removeprefix(EXAMPLE_PREFIX)}", output, chosen)
+        answers = Answers(robot if is_named(robot) else f"{EXAMPLE_PREFIX}{robot}", output, chosen)
     elif urdf is not None:
         answers = Answers(str(urdf), output, chosen)
     elif sys.stdin.isatty() and sys.stderr.isatty() and not (as_json or quiet):
@@ -84,6 +94,8 @@ def init(
             base=base,
             package_dirs=package_dirs or (),
             xacro_args=_pairs(xacro_args or ()),
+            srdf=srdf,
+            overrides=overrides or (),
             overwrite=overwrite,
             tell=terminal.tell,
         )

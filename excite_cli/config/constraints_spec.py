@@ -114,6 +114,11 @@ class SelfCollisionSpec(Section):
         "their meshes' distances instead of their capsules",
     )
     ignore: tuple[tuple[str, str], ...] = Field((), description="pairs of links not to check")
+    without_shapes: tuple[str, ...] = Field(
+        (),
+        description="links whose shapes are left out where their meshes are missing or cannot be "
+        "read: nothing then keeps these links apart, and verdicts say so",
+    )
 
 
 class BoxSpec(Section):

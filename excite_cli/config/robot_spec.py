@@ -71,13 +71,19 @@ class RobotSpec(Section):
     """Which robot, which of its joints move, and where the others stand."""
 
     urdf: str = Field(
-        description="URDF, xacro or MJCF: path relative to this file, or example-robot-data:<name>"
+        description="URDF, xacro, MJCF or SDF: path relative to this file, or "
+        "example-robot-data:<name>, or robot_descriptions:<name>"
     )
     xacro_args: dict[str, str | int | float | bool] = Field(
         default_factory=dict, description="arguments of a xacro file, {name: value}"
     )
     package_dirs: tuple[str, ...] = Field(
         (), description="folders in which package:// names of the URDF are looked up"
+    )
+    density: Positive | None = Field(
+        None,
+        description="links without mass take mass and inertia of their shapes at this density "
+        "[kg/m³]; default: they have none",
     )
     joints: Literal["all"] | tuple[str, ...] = Field("all", description="moved joints")
     posture: dict[str, Finite] = Field(

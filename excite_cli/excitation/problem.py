@@ -29,6 +29,7 @@ from excite_cli.excitation.reference_states import reference_rows, torque_metric
 from excite_cli.excitation.sampling import instants, with_sampling
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting, build_weighting
+from excite_cli.robot.mesh_paths import without_unusable
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.shown.record import Shown
 from excite_cli.trajectory.base import Basis, Trajectory
@@ -119,10 +120,10 @@ def build_problem(
         What the spec asks for does not fit the robot.
     """
     apart = spec.constraints.self_collision
-    robot = replace(
-        build_robot(spec.robot, relative_to),
-        visual_shapes=apart is not None and apart.shapes == "visual",
-    )
+    robot = build_robot(spec.robot, relative_to)
+    if apart is not None:
+        described = without_unusable(robot.description, apart.without_shapes)
+        robot = replace(robot, description=described, visual_shapes=apart.shapes == "visual")
     spec = _with_freedom(spec, robot)
     trajectory = build_trajectory(spec.trajectory)
     spec = with_sampling(spec, trajectory)

@@ -51,6 +51,8 @@ def fit_capsules(
         for pair in pairs:
             for link in pair:
                 _check_link(link, link_names(robot), f"constraints.self_collision.{key}")
+    for link in spec.without_shapes:
+        _check_link(link, joints, "constraints.self_collision.without_shapes")
     by_hand = [
         Capsule(
             link, joints[link], np.array(one.start), np.array(one.end), one.radius, (link,), True

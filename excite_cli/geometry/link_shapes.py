@@ -18,14 +18,15 @@ from scipy.spatial import ConvexHull, QhullError
 from excite_cli.errors import RobotError
 from excite_cli.geometry import gltf_scenes
 from excite_cli.geometry.capsule_fit import sphere_points
-from excite_cli.robot.description import check_mesh_paths
+from excite_cli.robot.description import RobotDescription
+from excite_cli.robot.mesh_paths import Kind, check_mesh_paths, located
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]
 
 _RIM = 32  # corners of a rim that stands for a circle
 _BALL = 240  # corners of a polyhedron that stands for a sphere
-_latest: tuple[pin.Model, bool, pin.GeometryModel] | None = None
+_latest: tuple[tuple[pin.Model, RobotDescription, bool], pin.GeometryModel] | None = None
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,8 @@ def collision_model(robot: Robot) -> pin.GeometryModel:
         A mesh is missing, lies outside the robot's folders, or cannot be read.
     """
     global _latest
-    if _latest is None or _latest[0] is not robot.model or _latest[1] != robot.visual_shapes:
+    asked = robot.model, robot.description, robot.visual_shapes
+    if _latest is None or any(a is not b for a, b in zip(_latest[0], asked, strict=True)):
         advice = " Repair the mesh, or drop constraints.self_collision."
         geometry = _geometry(robot, "collision", pin.GeometryType.COLLISION, advice)
         if robot.visual_shapes:
@@ -120,8 +122,8 @@ def collision_model(robot: Robot) -> pin.GeometryModel:
             for item in shown.geometryObjects:
                 if item.parentFrame not in has:
                     geometry.addGeometryObject(item)
-        _latest = robot.model, robot.visual_shapes, geometry
-    return _latest[2]
+        _latest = asked, geometry
+    return _latest[1]
 
 
 def visual_model(robot: Robot, advice: str = "") -> pin.GeometryModel:
@@ -130,13 +132,13 @@ def visual_model(robot: Robot, advice: str = "") -> pin.GeometryModel:
 
 
 def _geometry(
-    robot: Robot, kind: str, of_pin: pin.GeometryType, advice: str = ""
+    robot: Robot, kind: Kind, of_pin: pin.GeometryType, advice: str = ""
 ) -> pin.GeometryModel:
     described = robot.description
     check_mesh_paths(described, kind)
     try:
         return pin.buildGeomFromUrdfString(
-            robot.model, described.xml, of_pin, None, list(described.package_dirs)
+            robot.model, located(described, kind), of_pin, None, list(described.package_dirs)
         )
     except (RuntimeError, ValueError) as error:
         first = (str(error).strip().splitlines() or ["no reason given"])[0]

@@ -13,9 +13,9 @@ from typing import Any
 import coal
 import numpy as np
 
+from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import RobotError
 from excite_cli.geometry.capsule_cache import geometry_key
-from excite_cli.geometry.disk_cache import store_arrays, stored_arrays
 from excite_cli.geometry.link_shapes import collision_model
 from excite_cli.geometry.reasons import LinksApart, Reason, Why
 from excite_cli.robot.capsule import Capsule

@@ -8,26 +8,44 @@ from pathlib import Path
 from typing import Literal
 
 from excite_cli.config.commented_yaml import commented_yaml
-from excite_cli.config.load import parse_spec
-from excite_cli.errors import RobotError
+from excite_cli.config.load import apply_override, parse_spec, parsed_spec
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.errors import ConfigError, RobotError
+from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
 from excite_cli.proposal.joints import Choice, choose_joints
 from excite_cli.proposal.limits import MOST_ACCELERATION, JointPlan, plan_limits
 from excite_cli.proposal.pace import Pace, choose_pace
 from excite_cli.proposal.posture import FirstPosture, first_posture
 from excite_cli.proposal.settle import Comments, Settled, Tree, settle
-from excite_cli.robot.description import (
-    RobotDescription,
-    check_mesh_paths,
-    load_description,
-)
+from excite_cli.proposal.shapes import Shapes, choose_shapes
+from excite_cli.robot.assumed_inertias import with_assumed_inertias
+from excite_cli.robot.description import RobotDescription, load_description
+from excite_cli.robot.model import build_robot
 from excite_cli.robot.package_search import package_folders
 from excite_cli.robot.reference_postures import reference_posture
-from excite_cli.robot.urdf_joints import UrdfSurvey, survey
+from excite_cli.robot.srdf import read_srdf, srdf_near
+from excite_cli.robot.urdf_joints import UrdfSurvey
 from excite_cli.shown.record import Shown
 
 _TORQUE_SHARE = 0.8
 _MARGIN = 0.01
 _SECONDS = 60.0
+# A diagnosis holds the last one out, and what tells runs apart needs two beside it.
+_MOTIONS = 3
+_DENSITY = 1000.0
+_ASSUMED = (
+    "[kg/m³] the URDF has no masses: its shapes' hulls are taken at this density. Motions show the "
+    "parameters whatever they are; limits of torque are guesses until masses are known"
+)
+_OF_PAIRS = (("by_meshes",), ("ignore",))
+_OWN_OPTION = {
+    "robot": "--urdf and the other options",
+    "robot.urdf": "--urdf or --robot",
+    "robot.joints": "--joints",
+    "robot.base": "--base",
+    "robot.package_dirs": "--package-dirs",
+    "robot.xacro_args": "--xacro-arg",
+}
 
 
 @dataclass(frozen=True)
@@ -35,7 +53,8 @@ class Request:
     """What is requested.
 
     urdf: as robot.urdf says it; folder: that of the config, from which paths start; joints: to
-    move, empty for a choice of ours; package_dirs, xacro_args: as under robot.
+    move, empty for a choice of ours; package_dirs, xacro_args: as under robot; srdf: a file, else
+    those near the URDF are looked at; overrides: `key.path=value`, of what is proposed.
     """
 
     urdf: str
@@ -44,6 +63,8 @@ class Request:
     base: Literal["fixed", "floating"] = "fixed"
     package_dirs: tuple[str, ...] = ()
     xacro_args: Mapping[str, str] = field(default_factory=dict)
+    srdf: Path | None = None
+    overrides: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -80,27 +101,38 @@ def propose(request: Request) -> Proposal:
         dirs = tuple(dict.fromkeys((*dirs, *more)))
         description = load_description(request.urdf, dirs, request.folder, arguments)
     source = description.path.name
-    facts = survey(description)
+    shapes = choose_shapes(description)
+    assumed = not shapes.facts.mass > 0
+    if assumed:
+        description = with_assumed_inertias(description, _DENSITY)
+        shapes = choose_shapes(description)
+    facts = shapes.facts
     _require_inertias(facts, source)
     choice = choose_joints(facts.joints, source, request.joints)
     joints = plan_limits(choice.chosen)
-    if facts.has_shapes:
-        check_mesh_paths(description)
-    visual = _visual_shapes(description, facts)
     notes = [*description.notes, *choice.in_words()]
     for name, folder in packages.items():
         notes.append(f"meshes of {name} are taken from {folder}")
-    posture = first_posture(
-        joints, reference_posture(description, tuple(joint.name for joint in joints))
-    )
+    names = tuple(joint.name for joint in joints)
+    known = [read_srdf(request.srdf)] if request.srdf else srdf_near(description.path)
+    posture = first_posture(joints, reference_posture(known, description.path, names))
     pace = choose_pace(joints)
-    tree, comments = _draft(request, dirs, facts, choice, joints, posture, pace, visual)
+    srdf = known[0] if request.srdf else chosen_srdf(known, description)
+    disabled = disabled_pairs(description, srdf, names, shapes.visual)
+    tree, comments = _draft(request, dirs, shapes, choice, joints, posture, pace)
+    if assumed:
+        tree["robot"]["density"] = _DENSITY
+        comments["robot", "density"] = _ASSUMED
+        notes.append(f"density: {_ASSUMED}")
+    if shapes.any and disabled.pairs:
+        tree["constraints"]["self_collision"]["ignore"] = list(map(list, disabled.pairs))
+        comments["constraints", "self_collision", "ignore"] = disabled.in_words
+    if len(joints) == 1:
+        _with_a_criterion(tree, comments, request.folder)
+    _override(tree, comments, request.overrides)
     settled = settle(tree, comments, request.folder)
-    if visual:
-        bare = ", ".join(facts.unguarded)
-        notes.append(f"no collision geometry moves with {bare}: the visual shapes are taken there")
-    elif not facts.has_shapes:
-        notes.append(f"{source} has no collision geometry: self-collision is not checked")
+    notes += shapes.in_words(source)
+    notes += disabled.notes if shapes.any else ()
     notes.append(f"posture: {settled.comments['robot', 'posture']}")
     notes.append(f"motion: {settled.comments['trajectory',]}")
     still = [joint.name for joint in joints if joint.name not in settled.tree["robot"]["joints"]]
@@ -116,7 +148,7 @@ def propose(request: Request) -> Proposal:
     notes += [
         f"{path[2]}: {words}"
         for path, words in settled.comments.items()
-        if path[:2] == ("constraints", "self_collision") and path[2] in ("by_meshes", "ignore")
+        if path[:2] == ("constraints", "self_collision") and path[2:] in _OF_PAIRS
     ]
     text = commented_yaml(settled.tree, settled.comments, _header(request, description))
     parse_spec(text, "the proposed config")
@@ -126,12 +158,11 @@ def propose(request: Request) -> Proposal:
 def _draft(
     request: Request,
     dirs: tuple[str, ...],
-    facts: UrdfSurvey,
+    shapes: Shapes,
     choice: Choice,
     joints: tuple[JointPlan, ...],
     posture: FirstPosture,
     pace: Pace,
-    visual: bool,
 ) -> tuple[Tree, Comments]:
     """The config before its posture is known to be clear."""
     comments: Comments = {}
@@ -152,7 +183,7 @@ def _draft(
     robot["joints"] = [joint.name for joint in joints]
     if choice.in_words():
         comments["robot", "joints"] = "; ".join(choice.in_words())
-    robot["posture"] = {**_inside(posture.others, facts), **posture.moved}
+    robot["posture"] = {**_inside(posture.others, shapes.facts), **posture.moved}
     comments["robot", "posture"] = posture.words
     limits = _limits(joints, comments)
     if limits:
@@ -164,10 +195,8 @@ def _draft(
     if any(not math.isnan(joint.effort) for joint in joints):
         constraints["torque"] = {"scale": _TORQUE_SHARE}
         comments["constraints", "torque"] = "share of the effort limits, with the URDF's inertias"
-    if facts.has_shapes or visual:
-        shapes = {"shapes": "visual"} if visual else {}
-        constraints["self_collision"] = {"capsules": "auto", **shapes, "margin": _MARGIN}
-        comments["constraints", "self_collision", "margin"] = "[m] between capsules"
+    if shapes.any:
+        constraints["self_collision"] = _self_collision(shapes, comments)
     comments["constraints",] = "add surroundings: {floor: 0.0} and more; see docs/configuration.md"
     tree: Tree = {
         "robot": robot,
@@ -179,7 +208,7 @@ def _draft(
         "sampling": {"constraints": {"samples": pace.constraint_samples}},
         "constraints": constraints,
         "optimizer": {"max_seconds": _SECONDS},
-        "sequence": {"motions": 1},
+        "sequence": {"motions": _MOTIONS},
         "seed": 1,
     }
     why = (
@@ -189,19 +218,52 @@ def _draft(
     )
     comments["trajectory",] = f"{pace.duration:g} s, {why}"
     comments["optimizer",] = "per start of a motion; restarts: 16 may find better motions"
-    comments["sequence",] = "each further motion is planned on top of the earlier ones"
+    comments["sequence",] = (
+        "each on top of the earlier ones; a diagnosis fits all but the last and judges by that one"
+    )
     return tree, comments
 
 
-def _visual_shapes(description: RobotDescription, facts: UrdfSurvey) -> bool:
-    """Whether visual shapes have to stand for collision shapes, and can be read."""
-    if not facts.unguarded:
-        return False
-    try:
-        check_mesh_paths(description, "visual")
-    except RobotError:
-        return False
-    return True
+def _with_a_criterion(tree: Tree, comments: Comments, folder: Path) -> None:
+    """Another criterion where the condition number is always 1: of one base parameter."""
+    robot = build_robot(parsed_spec(tree, "the proposed config").robot, folder)
+    if find_base_parameters(robot).rank == 1:
+        tree["criterion"] = {"kind": "log_det"}
+        comments["criterion", "kind"] = "the condition number of one base parameter is always 1"
+
+
+def _override(tree: Tree, comments: Comments, overrides: tuple[str, ...]) -> None:
+    """Put what is given in place of what is proposed; whether it works is then tried as all else.
+
+    Raises
+    ------
+    ConfigError
+        A key is unknown, a value is not allowed, or there is an option for it.
+    """
+    for override in overrides:
+        key = override.partition("=")[0].strip()
+        if key in _OWN_OPTION:
+            raise ConfigError(f"--set {key}: give it with {_OWN_OPTION[key]}.")
+        apply_override(tree, override)
+        comments[tuple(key.split("."))] = "as given with --set"
+    parsed_spec(tree, "the proposed config with --set")
+
+
+def _self_collision(shapes: Shapes, comments: Comments) -> Tree:
+    """What is kept apart, with comments."""
+    where = ("constraints", "self_collision")
+    own: Tree = {"capsules": "auto"}
+    if shapes.visual:
+        own["shapes"] = "visual"
+    own["margin"] = _MARGIN
+    comments[*where, "margin"] = "[m] between capsules"
+    if shapes.without:
+        own["without_shapes"] = list(shapes.without)
+        comments[*where, "without_shapes"] = (
+            "NOT GUARDED: their meshes are missing or cannot be read; name the folder of their "
+            "package under robot.package_dirs"
+        )
+    return own
 
 
 def _limits(joints: tuple[JointPlan, ...], comments: Comments) -> Tree:
@@ -235,13 +297,13 @@ def _inside(others: dict[str, float], facts: UrdfSurvey) -> dict[str, float]:
 
 
 def _require_inertias(facts: UrdfSurvey, source: str) -> None:
-    if facts.inertial_links == 0:
-        raise RobotError(
-            f"{source} has no <inertial> at all, so there are no inertial parameters to plan for: "
-            "use a URDF with the masses of its links."
-        )
-    if facts.mass <= 0:
-        raise RobotError(f"{source} has no mass: every <mass> is 0. Give the links their masses.")
+    if facts.mass > 0:
+        return
+    what = "no <inertial> at all" if facts.inertial_links == 0 else "no mass: every <mass> is 0"
+    raise RobotError(
+        f"{source} has {what}, and no shapes that masses could be assumed of: use a URDF with the "
+        "masses of its links."
+    )
 
 
 def _written(folder: Path, start: Path) -> str:

@@ -6,6 +6,7 @@ capsules, and capsules of neighbours, whose meshes are kept apart instead. Links
 where the robot stands are reported and left out, as the check of the meshes leaves them out.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -143,11 +144,10 @@ def _without_tabled(
     ]
     if own is None or not found:
         return False
-    own.setdefault("ignore", []).extend(found)
+    _leave_out(own, comments, found)
     own["by_meshes"] = [pair for pair in own.get("by_meshes", ()) if pair not in found]
     if not own["by_meshes"]:
         del own["by_meshes"]
-    _explain(own, comments)
     return True
 
 
@@ -193,10 +193,9 @@ def _by_meshes(tree: Tree, comments: Comments, task: MotionTask) -> bool:
                     continue
                 here = meshes.distance([one], [other], robot.posture)
                 if here <= 0.0 and meshes.distance([one], [other], near) <= 0.0:
-                    own.setdefault("ignore", []).append([one, other])
+                    _leave_out(own, comments, [(one, other)])
                 elif joints <= 2 and here > _TABLED and robot.n > 1:
-                    own.setdefault("by_meshes", []).append([one, other])
-    _explain(own, comments)
+                    _keep_by_meshes(own, comments, (one, other))
     return (len(own.get("by_meshes", ())), len(own.get("ignore", ()))) != before
 
 
@@ -249,16 +248,12 @@ def _without_lasting_contacts(
         for pair in constraint.left_out or ():
             for links in pair.reason.apart:
                 if links.percent < 100 * _SELDOM_APART:
-                    own.setdefault("ignore", []).append([links.first, links.second])
+                    _leave_out(own, comments, [(links.first, links.second)])
         left_out = tuple((one, other) for one, other in own.get("ignore", ()))
         capsules = constraint.drawing.capsules
         near = near_at_posture(robot, capsules, _pairs(constraint), left_out, _TABLED)
-        if near:
-            own.setdefault("ignore", []).extend(map(list, near))
-    if own is None:
-        return False
-    _explain(own, comments)
-    return len(own.get("ignore", ())) != before
+        _leave_out(own, comments, near)
+    return own is not None and len(own.get("ignore", ())) != before
 
 
 def _pairs(constraint: Constraint) -> CollisionPairs:
@@ -269,18 +264,29 @@ def _pairs(constraint: Constraint) -> CollisionPairs:
     return CollisionPairs(checked, constraint.left_out or ())
 
 
-def _explain(own: Tree, comments: Comments) -> None:
-    """Every pair once, and why it is there."""
-    for key in ("by_meshes", "ignore"):
-        if key in own:
-            own[key] = [list(pair) for pair in dict.fromkeys(map(tuple, own[key]))]
-    if "by_meshes" in own:
-        comments["constraints", "self_collision", "by_meshes"] = (
-            "neighbours whose capsules are fatter than they are"
-        )
-    if "ignore" in own:
-        comments["constraints", "self_collision", "ignore"] = (
-            "NOT GUARDED: collision meshes that touch, or all but touch, where the robot stands or "
-            "in many postures, so the URDF has them misplaced or too coarse; look at these links "
-            "before a robot plays a motion"
-        )
+def _leave_out(own: Tree, comments: Comments, pairs: Iterable[Sequence[str]]) -> None:
+    """Add pairs to those that nothing keeps apart, and why."""
+    new = [list(pair) for pair in pairs if list(pair) not in own.get("ignore", ())]
+    if not new:
+        return
+    own.setdefault("ignore", []).extend(new)
+    place = ("constraints", "self_collision", "ignore")
+    if _TOUCHING not in comments.get(place, ""):
+        before = f"{comments[place]}; " if place in comments else ""
+        comments[place] = f"{before}{_TOUCHING}"
+
+
+def _keep_by_meshes(own: Tree, comments: Comments, pair: Sequence[str]) -> None:
+    """Add a pair to those that tables of their meshes keep apart."""
+    if list(pair) not in own.get("by_meshes", ()):
+        own.setdefault("by_meshes", []).append(list(pair))
+    comments["constraints", "self_collision", "by_meshes"] = (
+        "neighbours whose capsules are fatter than they are"
+    )
+
+
+_TOUCHING = (
+    "NOT GUARDED: collision meshes that touch, or all but touch, where the robot stands or in many "
+    "postures, so the URDF has them misplaced or too coarse; look at these links before a robot "
+    "plays a motion"
+)

@@ -1,8 +1,8 @@
-"""From a URDF's name to checked XML with every mesh found.
+"""From a robot's name or file to checked XML.
 
 `RobotDescription` proves that the file exists, is XML without a document type (no entity tricks),
-is one tree of links and joints of a sane size (`urdf_check`), and that every path it names stays
-inside the folders it may read: its own folder tree, the packages of `package_dirs`, and the
+and is one tree of links and joints of a sane size (`urdf_check`). It names the folders from which
+meshes may be read (`mesh_paths`): its own, the packages of `package_dirs`, and the
 example-robot-data package.
 Continuous joints become revolute ones without bounds, so that one coordinate is one velocity, and
 right angles that were rounded become exact.
@@ -18,17 +18,16 @@ from pathlib import Path
 
 from excite_cli.errors import RobotError, nearest
 from excite_cli.given_files import require_stored
+from excite_cli.robot.descriptions_package import PREFIX, Found, find_description
 from excite_cli.robot.formats.base import Asked
 from excite_cli.robot.formats.catalogue import as_urdf
 from excite_cli.robot.loops import Loop, closed_loops, loops_in_words
-from excite_cli.robot.mesh_trial import try_meshes
 from excite_cli.robot.mimic import Mimic, lost, mimics
 from excite_cli.robot.urdf_check import parsed
 
 EXAMPLE_PREFIX = "example-robot-data:"
 MAX_URDF_BYTES = 20_000_000
 UNBOUNDED = 1e9
-_LONGEST = 200  # characters of a mesh's name that are told
 # How far [rad] an angle is off a right one that was meant, and from where on that matters.
 _ROUNDED, _EXACT = 1e-4, 1e-8
 
@@ -56,7 +55,8 @@ class RobotDescription:
 
     `xml` is what is used of `urdf`, the text as given or as it was made of another format, which
     may have left out what is told in `notes`. `mimicking` names the joints that follow another
-    one, with what they follow; `loops` are closed ones, which are cut.
+    one, with what they follow; `loops` are closed ones, which are cut; `ignored` are pairs of links
+    whose contact the file itself rules out.
     """
 
     name: str
@@ -69,6 +69,7 @@ class RobotDescription:
     urdf: str
     notes: tuple[str, ...] = ()
     loops: tuple[Loop, ...] = ()
+    ignored: tuple[tuple[str, str], ...] = ()
 
 
 def example_robots_folder() -> Path:
@@ -105,11 +106,12 @@ def load_description(
     relative_to: Path | None = None,
     arguments: Mapping[str, object] | None = None,
 ) -> RobotDescription:
-    """Read and check a URDF, xacro or MJCF, given by path or as `example-robot-data:<name>`.
+    """Read and check a URDF, xacro, MJCF or SDF, given by path or by a package's name for it.
 
     Parameters
     ----------
-    urdf: path (relative to `relative_to`) or `example-robot-data:<name>`
+    urdf: path (relative to `relative_to`), `example-robot-data:<name>` or
+        `robot_descriptions:<name>`
     package_dirs: folders that hold the packages named by `package://`
     relative_to: folder that relative paths start from; default the working directory
     arguments: of xacro
@@ -128,30 +130,12 @@ def load_description(
     for given, folder in zip(package_dirs, extra, strict=True):
         if not Path(folder).is_dir():
             raise RobotError(f"robot.package_dirs: there is no folder {given} ({folder}).")
-    if urdf.startswith(EXAMPLE_PREFIX):
-        known = example_robots()
-        name = urdf.removeprefix(EXAMPLE_PREFIX)
-        if name not in known:
-            raise RobotError(
-                f"robot.urdf: example-robot-data has no robot '{name}'."
-                f"{nearest(name, known)} `excite robots` lists all {len(known)}."
-            )
-        path = known[name]
-    else:
-        path = (root / urdf).resolve()
-        if path.exists():
-            require_stored(path)
-        if not path.is_file():
-            offered = [f"{EXAMPLE_PREFIX}{name}" for name in example_robots()]
-            meant = "" if "/" in urdf else nearest(f"{EXAMPLE_PREFIX}{urdf}", offered, 0.93)
-            raise RobotError(
-                f"robot.urdf: there is no file {path}.{meant} Give a path relative to the YAML "
-                f"file, or {EXAMPLE_PREFIX}<name>."
-            )
-    found = as_urdf(path, _read(path), Asked(extra, arguments or {}))
+    file = _file(urdf, root)
+    path, dirs = file.path, (*extra, *file.package_dirs)
+    found = as_urdf(path, _read(path), Asked(dirs, {**file.arguments, **(arguments or {})}))
     tree = parsed(path, found.text)
     followers, loops = mimics(path, tree), closed_loops(tree)
-    packages = (*extra, str(_share_folder(path)), str(path.parent), *found.folders)
+    packages = (*dirs, str(_share_folder(path)), str(path.parent), *found.folders)
     return RobotDescription(
         name=path.stem.removesuffix(".urdf"),
         source=urdf,
@@ -163,7 +147,39 @@ def load_description(
         urdf=found.text,
         notes=(*found.notes, *lost(followers, tree), *loops_in_words(loops)),
         loops=loops,
+        ignored=found.ignored,
     )
+
+
+def is_named(urdf: str) -> bool:
+    """Whether a robot is given by the name that a package has for it, not by a file."""
+    return urdf.startswith((EXAMPLE_PREFIX, PREFIX))
+
+
+def _file(urdf: str, root: Path) -> Found:
+    """The file that `robot.urdf` means; relative paths start from `root`."""
+    if urdf.startswith(PREFIX):
+        return find_description(urdf)
+    if urdf.startswith(EXAMPLE_PREFIX):
+        known = example_robots()
+        name = urdf.removeprefix(EXAMPLE_PREFIX)
+        if name not in known:
+            raise RobotError(
+                f"robot.urdf: example-robot-data has no robot '{name}'."
+                f"{nearest(name, known)} `excite robots` lists all {len(known)}."
+            )
+        return Found(known[name])
+    path = (root / urdf).resolve()
+    if path.exists():
+        require_stored(path)
+    if not path.is_file():
+        offered = [f"{EXAMPLE_PREFIX}{name}" for name in example_robots()]
+        meant = "" if "/" in urdf else nearest(f"{EXAMPLE_PREFIX}{urdf}", offered, 0.93)
+        raise RobotError(
+            f"robot.urdf: there is no file {path}.{meant} Give a path relative to the YAML "
+            f"file, {EXAMPLE_PREFIX}<name> or {PREFIX}<name>."
+        )
+    return Found(path)
 
 
 def require_limits(description: RobotDescription) -> None:
@@ -239,56 +255,3 @@ def _without_continuous_joints(root: ElementTree.Element) -> str:
         limit.set("lower", str(-UNBOUNDED))
         limit.set("upper", str(UNBOUNDED))
     return ElementTree.tostring(root, encoding="unicode")
-
-
-def check_mesh_paths(description: RobotDescription, kind: str = "collision") -> None:
-    """Raise unless every mesh of the kind is in a folder that the URDF may read, and can be read.
-
-    kind: `collision` or `visual`; of the latter only those are refused that would end the process.
-
-    Raises
-    ------
-    RobotError
-        A mesh is missing, its path leaves the URDF's folder and packages, or it is damaged.
-    """
-    allowed = [Path(folder).resolve() for folder in description.package_dirs]
-    or_drop = ", or drop constraints.self_collision" if kind == "collision" else ""
-    meshes = []
-    for mesh in ElementTree.fromstring(description.xml).findall(f"link/{kind}/geometry/mesh"):
-        name = mesh.get("filename", "")
-        found = _found(name, description, allowed)
-        if found is None:
-            raise RobotError(
-                f"{description.path.name}: the {kind} mesh '{name[:_LONGEST]}' was not found. "
-                f"Looked in {', '.join(str(folder) for folder in allowed)}. Add the folder that "
-                f"holds the package to robot.package_dirs{or_drop}."
-            )
-        if not any(found.is_relative_to(folder) for folder in allowed):
-            raise RobotError(
-                f"{description.path.name}: the mesh path '{name[:_LONGEST]}' leaves the robot's "
-                "own folders. If that is meant, add its folder to robot.package_dirs."
-            )
-        meshes.append(found)
-    if not description.source.startswith(EXAMPLE_PREFIX):
-        try:
-            try_meshes(meshes, any_format=kind != "collision")
-        except RobotError as error:
-            raise RobotError(f"{description.path.name}: {error}") from error
-
-
-def mesh_file(path: Path) -> Path | None:
-    """The file that `path` leads to, by whatever links; None where there is none.
-
-    Names from a URDF may be anything: too long, with a NUL in them, or links in a circle.
-    """
-    try:
-        return path.resolve() if path.is_file() else None
-    except (OSError, ValueError, RuntimeError):
-        return None
-
-
-def _found(name: str, description: RobotDescription, allowed: list[Path]) -> Path | None:
-    places = [description.path.parent / name.removeprefix("file://")]
-    if name.startswith("package://"):
-        places = [folder / name.removeprefix("package://") for folder in allowed]
-    return next(filter(None, map(mesh_file, places)), None)

@@ -1,7 +1,7 @@
 """Meshes read for a try in a process of their own, before this one reads them.
 
 The library that reads meshes (assimp) can be led by a damaged file to end its process, to fill
-memory or to run on; nothing in this process can hold it then. `try_meshes` starts a process with
+memory or to run on; nothing in this process can hold it then. `faults` starts a process with
 limits of time and memory that reads the files as `coal` does, once for each content. The process is
 this module's `serve`, asked by lines on stdin.
 """
@@ -11,7 +11,6 @@ import contextlib
 import hashlib
 import json
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -19,8 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from excite_cli.errors import RobotError
-from excite_cli.measurement.memory_limit import address_space
+from excite_cli.robot.apart import OUT_OF_TIME, command, environment, limit_memory, set_alarm
 
 SUFFIXES = (".stl", ".dae", ".obj", ".ply")
 MAX_BYTES = 100 * 2**20  # of a mesh
@@ -28,13 +26,6 @@ MAX_TRIANGLES = 1_000_000
 _MAX_MEMORY = 2**30  # bytes that the reading of one robot's meshes may take
 _SECONDS, _BYTES_PER_SECOND = 1.0, 2**20  # processor time allowed: a base, and by size
 _SLOWEST = 20  # times the processor time, on a machine with much else to do
-# The parent's path of imports, so that a checkout finds itself; never (-P) the current folder,
-# where anything may lie.
-_BOOT = (
-    "import sys; sys.path[:] = sys.argv[1:]; from excite_cli.robot.mesh_trial import serve; serve()"
-)
-# Threads of linear algebra, of no use here, reserve much of the memory that there is.
-_ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
 _IDLE = 10.0  # s without a question after which the process ends
 
 
@@ -49,42 +40,45 @@ class Fault:
 _known: dict[str, Fault | None] = {}  # by content
 
 
-def try_meshes(paths: Sequence[Path], any_format: bool = False) -> None:
-    """See that every file can be read as a mesh without harm to the process.
+def faults(paths: Sequence[Path], any_format: bool = False) -> dict[Path, str]:
+    """Files that cannot be read as meshes, or not without harm; why, without a full stop.
 
-    any_format: it may be of any format, and hold anything, as long as reading it does no harm.
-
-    Raises
-    ------
-    RobotError
-        A file is of no known format or too large, or reading it fails in whatever way.
+    any_format: a file may be of any format, and hold anything, as long as reading it does no harm.
     """
-    contents = {path: _content(path, any_format) for path in dict.fromkeys(paths)}
-    for path, content in contents.items():
+    found: dict[Path, str] = {}
+    for path in dict.fromkeys(paths):
+        if refused := _refused(path, any_format):
+            found[path] = f"the mesh {path} {refused}"
+            continue
+        content = _content(path)
         if content not in _known:
             _known[content] = _trial.fault(path)
-    for path, content in contents.items():
         fault = _known[content]
         if fault is not None and (fault.harms or not any_format):
-            raise RobotError(
+            found[path] = (
                 f"the mesh {path} cannot be loaded: {fault.words}. Repair it, or convert it to "
-                "STL with another program."
+                "STL with another program"
             )
+    return found
 
 
-def _content(path: Path, any_format: bool) -> str:
-    """Format and hash of a file's bytes."""
-    suffix = path.suffix.lower()
-    if not any_format and suffix not in SUFFIXES:
-        raise RobotError(f"the mesh {path} is of no known format; read are {', '.join(SUFFIXES)}.")
+def _refused(path: Path, any_format: bool) -> str:
+    """Why a file is not even tried; empty where it is."""
+    if not any_format and path.suffix.lower() not in SUFFIXES:
+        return f"is of no known format; read are {', '.join(SUFFIXES)}"
     size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise RobotError(
-            f"the mesh {path} has {size / 2**20:.0f} MiB; up to {MAX_BYTES / 2**20:.0f} MiB are "
-            "read. Take a coarser one for collisions."
-        )
+    if size <= MAX_BYTES:
+        return ""
+    return (
+        f"has {size / 2**20:.0f} MiB; up to {MAX_BYTES / 2**20:.0f} MiB are read. Take a coarser "
+        "one for collisions"
+    )
+
+
+def _content(path: Path) -> str:
+    """Format and hash of a file's bytes."""
     with path.open("rb") as file:
-        return suffix + hashlib.file_digest(file, "blake2b").hexdigest()
+        return path.suffix.lower() + hashlib.file_digest(file, "blake2b").hexdigest()
 
 
 class _Trial:
@@ -103,18 +97,18 @@ class _Trial:
                 said = str(json.loads(answer))
                 return Fault(said) if said else None
             if status != 0:  # else it was idle and has just ended
-                how = "takes too long" if status in _OUT_OF_TIME else "fails"
+                how = "takes too long" if status in OUT_OF_TIME else "fails"
                 return Fault(f"reading it {how}", harms=True)
 
     def _asked(self, line: bytes, longest: float) -> tuple[bytes, int]:
         """The answer, or how the process ended; it is ended if it takes longer [s]."""
         if self._process is None:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", _BOOT, *sys.path],
+                command(__name__),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                env={**os.environ, **_ONE_THREAD},
+                env=environment(),
                 process_group=0,  # Ctrl-C is for the parent
             )
         process = self._process
@@ -152,22 +146,6 @@ class _Trial:
 
 _trial = _Trial()
 atexit.register(_trial.close)
-# Ended by the alarm of its processor time, or by the clock.
-_OUT_OF_TIME = (-27, -9)
-
-
-def _limit() -> None:
-    """Of the memory that this process may take; where the system has no such limit, none."""
-    try:
-        import resource
-    except ImportError:
-        return
-    limits = [(resource.RLIMIT_CORE, 0)]
-    if (taken := address_space()) is not None:
-        limits.append((resource.RLIMIT_AS, taken + 2 * _MAX_MEMORY))
-    for kind, most in limits:
-        with contextlib.suppress(ValueError, OSError):  # a lower one holds already
-            resource.setrlimit(kind, (most, most))
 
 
 def _peak() -> int:
@@ -179,17 +157,11 @@ def _peak() -> int:
     return peak if sys.platform == "darwin" else 1024 * peak
 
 
-def _set_alarm(seconds: float) -> None:
-    """End this process once it has computed for so long; 0: not."""
-    if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_PROF, seconds)
-
-
 def serve() -> None:
     """In the process: for each line [path, seconds] of stdin a line, empty for a good mesh."""
     import coal
 
-    _limit()
+    limit_memory(2 * _MAX_MEMORY)
     loader = coal.MeshLoader(coal.NODE_TYPE.BV_OBBRSS)
     idle = threading.Timer(_IDLE, os._exit, (0,))
     idle.daemon = True
@@ -197,9 +169,9 @@ def serve() -> None:
     for line in sys.stdin.buffer:
         idle.cancel()
         path, seconds = json.loads(line)
-        _set_alarm(seconds)
+        set_alarm(seconds)
         said = _said(loader, path)
-        _set_alarm(0)
+        set_alarm(0)
         print(json.dumps(said), flush=True)
         if _peak() > _MAX_MEMORY:
             return  # the next begins with a peak of its own

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.measurement.motors import Motors, motors_of
+from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.base_joints import BASE_JOINTS, on_base_joints
 from excite_cli.robot.carried_payload import Payload, add_payload, payload_on
 from excite_cli.robot.coupling import Coupling
@@ -257,7 +258,7 @@ def build_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
         A joint is unknown, the posture leaves the limits, or limits cross.
     """
     description = load_description(spec.urdf, spec.package_dirs, relative_to, spec.xacro_args)
-    return _built(description, spec)
+    return _built(_dense(description, spec), spec)
 
 
 def build_measured_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
@@ -276,10 +277,17 @@ def build_measured_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
     description = load_description(spec.urdf, spec.package_dirs, relative_to, spec.xacro_args)
     joints = "all" if spec.joints == "all" else (*BASE_JOINTS, *spec.joints)
     fixed = spec.model_copy(update={"base": "fixed", "rows": ("joints",), "joints": joints})
-    robot = _built(on_base_joints(description), fixed)
+    robot = _built(on_base_joints(_dense(description, spec)), fixed)
     count = len(BASE_JOINTS)
     rows = robot.rows if "joints" in spec.rows else robot.rows[:count]
     return replace(robot, rows=rows, base_joints=count)
+
+
+def _dense(description: RobotDescription, spec: RobotSpec) -> RobotDescription:
+    """With masses of links that have none, where a density is given."""
+    if spec.density is None:
+        return description
+    return with_assumed_inertias(description, spec.density)
 
 
 def _built(description: RobotDescription, spec: RobotSpec) -> Robot:

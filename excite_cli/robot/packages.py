@@ -7,6 +7,16 @@ from pathlib import Path
 
 from excite_cli.errors import RobotError
 
+# Folders of a package in which descriptions lie.
+_OF_DESCRIPTIONS = ("urdf", "xacro", "robots", "robot", "models", "model")
+# By variable: what lies between a folder that it names and the packages.
+_VARIABLES = {
+    "ROS_PACKAGE_PATH": "",
+    "AMENT_PREFIX_PATH": "share",
+    "GAZEBO_MODEL_PATH": "",
+    "GZ_SIM_RESOURCE_PATH": "",
+}
+
 
 def find_package(name: str, near: Path, package_dirs: Iterable[str] = ()) -> Path:
     """Folder of the package `name`, for a file `near` it.
@@ -18,28 +28,48 @@ def find_package(name: str, near: Path, package_dirs: Iterable[str] = ()) -> Pat
     RobotError
         There is none.
     """
-    for folder in (*map(Path, package_dirs), *folders_of_packages(near)):
-        for candidate in (folder / name, folder):
-            if _is_package(candidate, name):
-                return candidate
-        for inner in _folders_in(folder):
-            if _declared(inner) == name:
-                return inner
+    dirs = tuple(map(Path, package_dirs))
+    for folder in (*dirs, *folders_of_packages(near)):
+        found = package_in(folder, name)
+        if found is not None:
+            return found
+    given = ", ".join(map(str, dirs)) or "none given"
     raise RobotError(
-        f"the package '{name}' was not found above {near.parent}, nor by ROS_PACKAGE_PATH or "
-        "AMENT_PREFIX_PATH"
+        f"the package '{name}' was not found. Looked in package_dirs ({given}), above "
+        f"{near.parent}, and by {variables_in_words()}"
     )
 
 
+def package_in(folder: Path, name: str) -> Path | None:
+    """The package `name` that a folder holds, or is; by the folder's name or its package.xml."""
+    for candidate in (folder / name, folder):
+        if _is_package(candidate, name):
+            return candidate
+    return next((inner for inner in _folders_in(folder) if _declared(inner) == name), None)
+
+
+def unnamed_package(path: Path) -> Path | None:
+    """The folder of the package that a file in `urdf` or the like lies in, if nothing names it."""
+    if path.parent.name not in _OF_DESCRIPTIONS:
+        return None
+    folder = path.parent.parent
+    return None if (folder / "package.xml").exists() else folder
+
+
 def folders_of_packages(path: Path) -> Iterator[Path]:
-    """Folders that may hold packages: those above a file, one below these, and ROS's own."""
+    """Folders that may hold packages: those above a file, one below these, ROS's and Gazebo's."""
     for folder in path.parents:
         yield folder
         yield from _folders_in(folder)
-    for variable, inner in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
+    for variable, inner in _VARIABLES.items():
         for entry in filter(None, os.environ.get(variable, "").split(os.pathsep)):
             yield Path(entry) / inner
             yield Path(entry).parent / inner
+
+
+def variables_in_words() -> str:
+    """The variables of the environment that name folders of packages, with their values."""
+    return ", ".join(f"{name} ({os.environ.get(name) or 'not set'})" for name in _VARIABLES)
 
 
 def _folders_in(folder: Path) -> list[Path]:

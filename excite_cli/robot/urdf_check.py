@@ -53,8 +53,8 @@ def parsed(path: Path, text: str) -> ElementTree.Element:
     root = _tree(path, text)
     if root.tag != "robot":
         raise RobotError(
-            f"{path} is not a URDF: its root is <{_short(root.tag)}>, not <robot>. URDF, xacro and "
-            "MJCF are read."
+            f"{path} is not a URDF: its root is <{_short(root.tag)}>, not <robot>. URDF, xacro, "
+            "MJCF and SDF are read."
         )
     _check_structure(path, root)
     _check_axes(path, root)

@@ -23,12 +23,25 @@ def unjudged(problem: Problem) -> list[DroppedPair]:
     ]
 
 
+def _guarded(problem: Problem) -> set[str] | None:
+    """Links that capsules keep apart; None where self-collision is not asked for."""
+    capsules = [c.capsules for c in problem.constraints if isinstance(c, SelfCollision)]
+    return {link for of in capsules for one in of for link in one.links} if capsules else None
+
+
+def links_without_shapes(problem: Problem) -> list[str]:
+    """Links of `without_shapes` that have none indeed."""
+    own, guarded = problem.spec.constraints.self_collision, _guarded(problem)
+    if own is None or guarded is None:
+        return []
+    return [link for link in own.without_shapes if link not in guarded]
+
+
 def not_guarded(problem: Problem) -> list[str]:
     """Moved joints whose bodies have mass and no shape, where self-collision is asked for."""
-    capsules = [c.capsules for c in problem.constraints if isinstance(c, SelfCollision)]
-    if not capsules:
+    guarded = _guarded(problem)
+    if guarded is None:
         return []
-    guarded = {link for of in capsules for capsule in of for link in capsule.links}
     model, links = problem.robot.model, links_by_joint(problem.robot)
     return [
         joint
@@ -57,22 +70,32 @@ def counted(problem: Problem) -> list[str]:
     if not kept and not left:
         return []
     words = f"Verdicts speak of {kept} of {kept + left} pairs of bodies"
-    of = " of those that have shapes" if not_guarded(problem) else ""
+    bare = not_guarded(problem) or links_without_shapes(problem)
+    of = " of those that have shapes" if bare else ""
     return [f"{words}." if left else f"{words}, all{of} that could come near each other."]
 
 
 def unguarded_in_words(problem: Problem) -> list[str]:
     """A sentence on the bodies that have no shapes; empty where all have."""
-    bare, links = not_guarded(problem), links_by_joint(problem.robot)
-    if not bare:
-        return []
+    links, without = links_by_joint(problem.robot), links_without_shapes(problem)
+    bare = [joint for joint in not_guarded(problem) if not set(without) & set(links[joint])]
     told = ", ".join(f"{joint} ({', '.join(links[joint])})" for joint in bare)
-    return [
-        f"NOT GUARDED: what moves with {told} has no collision geometry, so no verdict speaks "
-        "of it. Add <collision> to the URDF, take the links' visual shapes "
-        "(constraints.self_collision.shapes: visual), or give capsules of your own "
-        "(constraints.self_collision.capsules)."
-    ]
+    sentences = []
+    if bare:
+        sentences.append(
+            f"NOT GUARDED: what moves with {told} has no collision geometry, so no verdict speaks "
+            "of it. Add <collision> to the URDF, take the links' visual shapes "
+            "(constraints.self_collision.shapes: visual), or give capsules of your own "
+            "(constraints.self_collision.capsules)."
+        )
+    if without:
+        sentences.append(
+            f"NOT GUARDED: the meshes of {', '.join(without)} are missing or cannot be read "
+            "(constraints.self_collision.without_shapes), so no verdict speaks of these links. "
+            "Give the folder of their package under robot.package_dirs, or capsules of your own "
+            "(constraints.self_collision.capsules)."
+        )
+    return sentences
 
 
 def pairs_data(problem: Problem) -> dict[str, Any]:
@@ -80,6 +103,7 @@ def pairs_data(problem: Problem) -> dict[str, Any]:
     return {
         "kept_apart": kept_apart(problem),
         "not_guarded": not_guarded(problem),
+        "links_without_shapes": links_without_shapes(problem),
         "not_kept_apart": [
             {
                 "pair": [pair.first, pair.second],

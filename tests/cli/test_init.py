@@ -5,6 +5,7 @@ from pathlib import Path
 from excite_cli.config.load import load_spec
 from tests.cli.program import BRIEF, Program
 from tests.proposal.robots import arm
+from tests.proposal.test_shapes import FINGERS, shape, with_gripper
 
 
 def test_a_config_that_works_unedited(excite: Program, tmp_path: Path) -> None:
@@ -77,3 +78,14 @@ def test_floating_base_measures_its_wrench(excite: Program, tmp_path: Path) -> N
     assert excite("init", "--urdf", "robot.urdf", "--base", "floating").returncode == 0
     robot = load_spec(tmp_path / "robot.yaml").robot
     assert (robot.base, robot.rows) == ("floating", ("base", "joints"))
+
+
+def test_what_init_writes_is_planned_and_checked(excite: Program, tmp_path: Path) -> None:
+    with_gripper(tmp_path, shape(FINGERS.format("palm")))
+    assert excite("init", "--urdf", "robot.urdf").returncode == 0
+    assert len(load_spec(tmp_path / "robot.yaml").constraints.self_collision.without_shapes) == 2
+    made = excite("optimize", "robot.yaml", "-o", "robot.h5", *BRIEF)
+    assert made.returncode == 0, made.stderr
+    checked = excite("check", "robot.yaml", "robot.h5")
+    assert checked.returncode == 0, checked.stderr
+    assert "NOT GUARDED: the meshes of palm, finger" in checked.stdout

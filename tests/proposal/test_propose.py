@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from excite_cli.config.load import parse_spec
-from excite_cli.errors import RobotError
+from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.start import clear_posture
 from excite_cli.excitation.task import MotionTask
@@ -13,6 +13,7 @@ from excite_cli.proposal.limbs import limbs
 from excite_cli.proposal.propose import Request, propose
 from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
 from excite_cli.robot.reference_postures import reference_posture
+from excite_cli.robot.srdf import srdf_near
 from excite_cli.robot.urdf_joints import survey
 from tests.proposal.robots import GOOD, arm, joint, link, written
 from tests.summary.two_arms import two_arms
@@ -76,9 +77,22 @@ def test_without_collision_geometry_distances_are_not_asked_for(tmp_path: Path) 
     assert any("no collision geometry" in note for note in proposal.notes)
 
 
-def test_without_inertias_one_sentence_says_so(tmp_path: Path) -> None:
+def test_without_inertias_those_of_the_shapes_are_assumed(tmp_path: Path) -> None:
     arm(tmp_path, mass=-1)
-    with pytest.raises(RobotError, match=r"^robot\.urdf has no <inertial> at all"):
+    proposal = propose(Request("robot.urdf", tmp_path))
+    assert parse_spec(proposal.text).robot.density == 1000.0
+    assert any("the URDF has no masses" in note for note in proposal.notes)
+    box = 1000.0 * 0.05 * 0.05 * 0.16
+    masses = [inertia.mass for inertia in proposal.settled.problem.robot.model.inertias[1:]]
+    assert masses == pytest.approx([box, box])
+
+
+def test_without_inertias_and_shapes_one_sentence_says_so(tmp_path: Path) -> None:
+    written(tmp_path, link("base", -1, ""), joint("j", "base", "l", GOOD), link("l", -1, ""))
+    with pytest.raises(RobotError, match=r"^robot\.urdf has no <inertial> at all, and no shapes"):
+        propose(Request("robot.urdf", tmp_path))
+    written(tmp_path, link("base", 0, ""), joint("j", "base", "l", GOOD), link("l", 0, ""))
+    with pytest.raises(RobotError, match=r"^robot\.urdf has no mass: every <mass> is 0"):
         propose(Request("robot.urdf", tmp_path))
 
 
@@ -105,16 +119,10 @@ def test_packages_are_found_above_the_urdf(tmp_path: Path) -> None:
     assert any(note.startswith("meshes of arm_description") for note in proposal.notes)
 
 
-def test_a_mesh_that_is_nowhere_is_named(tmp_path: Path) -> None:
-    shape = '<collision><geometry><mesh filename="package://none/a.stl"/></geometry></collision>'
-    written(tmp_path, link("base"), joint("j", "base", "l", GOOD), link("l", shape=shape))
-    with pytest.raises(RobotError, match=r"collision mesh 'package://none/a\.stl' was not found"):
-        propose(Request("robot.urdf", tmp_path))
-
-
 def test_reference_postures_are_read() -> None:
     description = load_description(EXAMPLE_PREFIX + "talos")
-    file, state, values = reference_posture(description, ("leg_left_4_joint",))
+    near = srdf_near(description.path)
+    file, state, values = reference_posture(near, description.path, ("leg_left_4_joint",))
     assert (file, state) == ("talos.srdf", "half_sitting")
     assert values["leg_left_4_joint"] == pytest.approx(0.859395)
 
@@ -194,3 +202,50 @@ def test_meshes_that_are_never_far_enough_apart_end_in_no_refusal(tmp_path: Path
     found = propose(Request(str(path), tmp_path))
     assert found.settled.tree["constraints"]["self_collision"]["ignore"] == [["base", "above"]]
     assert "NOT GUARDED" in found.text
+
+
+def test_what_is_given_stands_in_place_of_what_is_proposed(tmp_path: Path) -> None:
+    arm(tmp_path)
+    given = ("sequence.motions=5", "constraints.self_collision=null", "robot.posture.elbow=0.4")
+    proposal = propose(Request("robot.urdf", tmp_path, overrides=given))
+    spec = parse_spec(proposal.text)
+    assert spec.sequence.motions == 5
+    assert spec.constraints.self_collision is None
+    assert spec.robot.posture["elbow"] == 0.4
+    assert "motions: 5  # as given with --set" in proposal.text
+
+
+def test_what_is_given_yields_only_where_nothing_else_would_do(tmp_path: Path) -> None:
+    """A margin wider than the links are apart."""
+    arm(tmp_path)
+    wide = ("constraints.self_collision.margin=0.9",)
+    proposal = propose(Request("robot.urdf", tmp_path, overrides=wide))
+    own = parse_spec(proposal.text).constraints.self_collision
+    assert own is not None
+    assert own.margin < 0.9
+    assert "leaves no room for more" in proposal.text
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("robot.joints=[elbow]", r"^--set robot\.joints: give it with --joints\."),
+        ("sequence.motion=3", r"sequence\.motion.*Did you mean 'motions'"),
+        ("sequence.motions=0", "greater than or equal to 1"),
+        ("sequence", "key.path=value"),
+    ],
+)
+def test_what_cannot_be_set_is_told(tmp_path: Path, given: str, words: str) -> None:
+    arm(tmp_path)
+    with pytest.raises(ConfigError, match=words):
+        propose(Request("robot.urdf", tmp_path, overrides=(given,)))
+
+
+def test_one_base_parameter_has_another_criterion(tmp_path: Path) -> None:
+    """A flywheel: its condition number is always 1, which `optimize` would refuse."""
+    upright = joint("wheel", "base", "disc", GOOD).replace('axis xyz="0 1 0"', 'axis xyz="0 0 1"')
+    written(tmp_path, link("base"), upright, link("disc", shape=""))
+    proposal = propose(Request("robot.urdf", tmp_path, ("wheel",)))
+    assert proposal.settled.problem.base.rank == 1
+    assert parse_spec(proposal.text).criterion.kind == "log_det"
+    assert "of one base parameter is always 1" in proposal.text

@@ -98,8 +98,8 @@ def test_not_text(tmp_path: Path) -> None:
 
 
 def test_xml_with_another_root(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match="its root is <sdf>, not <robot>"):
-        built(tmp_path, "<sdf/>")
+    with pytest.raises(RobotError, match="its root is <html>, not <robot>"):
+        built(tmp_path, "<html/>")
 
 
 @pytest.mark.parametrize(

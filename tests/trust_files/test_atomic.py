@@ -11,9 +11,9 @@ import pytest
 
 from excite_cli import atomic
 from excite_cli.atomic import write_atomically, write_folder_atomically
+from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import FileError
 from excite_cli.export.motions import MOTION_EXPORTERS
-from excite_cli.geometry.disk_cache import store_arrays, stored_arrays
 from excite_cli.measurement.timed_motion import TimedMotion
 
 WRITERS = pytest.mark.parametrize("write", [write_atomically, write_folder_atomically])

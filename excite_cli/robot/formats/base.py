@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 
 @dataclass(frozen=True)
@@ -16,17 +17,27 @@ class Asked:
 
 @dataclass(frozen=True)
 class Urdf:
-    """A URDF's text, further folders that its meshes lie in, and what it cannot hold."""
+    """A URDF's text, with what was made for it and what it cannot hold.
+
+    folders: further ones that its meshes lie in; notes: what was left out; meshes: files that were
+    made in the cache; ignored: pairs of links whose contact the robot's author ruled out.
+    """
 
     text: str
     folders: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    meshes: tuple[str, ...] = ()
+    ignored: tuple[tuple[str, str], ...] = ()
 
 
 class RobotFormat(ABC):
-    """One way to describe a robot."""
+    """One way to describe a robot.
+
+    `foreign`: it is read by a library that a file may lead astray, so in a process of its own.
+    """
 
     name: str
+    foreign: ClassVar[bool] = True
 
     @abstractmethod
     def recognises(self, path: Path, text: str) -> bool:
@@ -43,3 +54,7 @@ class RobotFormat(ABC):
         MissingExtraError
             The library that reads it is not installed.
         """
+
+    def sources(self, path: Path, text: str) -> tuple[Path, ...] | None:
+        """All files whose content decides what becomes of `path`; None where nobody knows."""
+        return None

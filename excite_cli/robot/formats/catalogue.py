@@ -3,11 +3,13 @@
 from pathlib import Path
 
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.converted import converted
 from excite_cli.robot.formats.mjcf import Mjcf
 from excite_cli.robot.formats.plain_urdf import PlainUrdf
+from excite_cli.robot.formats.sdf import Sdf
 from excite_cli.robot.formats.xacro import Xacro
 
-FORMATS: tuple[RobotFormat, ...] = (Xacro(), Mjcf(), PlainUrdf())
+FORMATS: tuple[RobotFormat, ...] = (Xacro(), Mjcf(), Sdf(), PlainUrdf())
 
 
 def as_urdf(path: Path, text: str, asked: Asked) -> Urdf:
@@ -16,6 +18,7 @@ def as_urdf(path: Path, text: str, asked: Asked) -> Urdf:
     Raises
     ------
     RobotError, MissingExtraError
-        See `RobotFormat.urdf`.
+        See `converted`.
     """
-    return next(each for each in FORMATS if each.recognises(path, text)).urdf(path, text, asked)
+    form = next(each for each in FORMATS if each.recognises(path, text))
+    return converted(form, path, text, asked) if form.foreign else form.urdf(path, text, asked)

@@ -6,8 +6,6 @@ of its joints: X = T(p) R Π_i T(p_i) Rot(a_i, q_i − ref_i) T(−p_i), with th
 joint's origin, so that positions are MuJoCo's.
 """
 
-import hashlib
-import struct
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,12 +14,19 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
-from excite_cli.atomic import write_atomically
-from excite_cli.cache_folder import cache_folder
-from excite_cli.errors import FileError, MissingExtraError, RobotError
+from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.mjcf_sources import mjcf_sources
+from excite_cli.robot.formats.urdf_parts import (
+    add_inertial,
+    add_origin,
+    add_shape,
+    capsule,
+    ellipsoid,
+    mesh,
+    words,
+)
 from excite_cli.robot.loops import TAG
 
 Array = NDArray[np.float64]
@@ -30,7 +35,6 @@ Element = ElementTree.Element
 _FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
 _SITE = 6  # mjtObj
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)  # mjtGeom
-_BALL_POINTS = 200
 
 
 class Mjcf(RobotFormat):
@@ -63,27 +67,50 @@ class Mjcf(RobotFormat):
             raise RobotError(f"{path.name}: MuJoCo cannot compile it: {reason[:400]}") from error
         return _Writer(model, path).written()
 
+    def sources(self, path: Path, text: str) -> tuple[Path, ...] | None:
+        """Includes, meshes, textures and height fields."""
+        return mjcf_sources(path, text)
+
 
 class _Writer:
     """One compiled model as XML."""
 
     def __init__(self, model: Any, path: Path) -> None:
         self.m, self.path = model, path
+        self.root = 0
         self.robot = ElementTree.Element("robot", name=path.stem)
         self.notes: list[str] = []
-        self.folders: set[str] = set()
+        self.meshes: set[str] = set()
         self.efforts = self._efforts()
         self.followed = self._couplings()
 
     def written(self) -> Urdf:
-        root, kept = self._root()
-        if root == 0:
+        self.root, kept = self._root()
+        if self.root == 0:
             ElementTree.SubElement(self.robot, "link", name=self._body(0))
         for body in kept:
-            self._link(body, is_root=body == root)
+            self._link(body, is_root=body == self.root)
         self._told()
         text = ElementTree.tostring(self.robot, encoding="unicode")
-        return Urdf(text, tuple(sorted(self.folders)), tuple(self.notes))
+        folders = {str(Path(mesh).parent) for mesh in self.meshes}
+        return Urdf(
+            text,
+            tuple(sorted(folders)),
+            tuple(self.notes),
+            tuple(sorted(self.meshes)),
+            self._excluded(kept),
+        )
+
+    def _excluded(self, kept: list[int]) -> tuple[tuple[str, str], ...]:
+        """Pairs of links that <contact> excludes."""
+        signatures = [int(each) for each in self.m.exclude_signature]
+        pairs = ((each >> 16, each & 0xFFFF) for each in signatures)
+        there = {*kept, self.root}
+        return tuple(
+            (self._body(one), self._body(other))
+            for one, other in pairs
+            if one in there and other in there
+        )
 
     def _root(self) -> tuple[int, list[int]]:
         """The body that becomes the URDF's root (0: the world), and the bodies that are kept.
@@ -135,16 +162,9 @@ class _Writer:
         shift = self._offset(body)
         mass = float(self.m.body_mass[body])
         if mass > 0.0:
-            inertial = ElementTree.SubElement(link, "inertial")
             turn = _matrix(self.m.body_iquat[body])
-            _origin(inertial, self.m.body_ipos[body] - shift, np.eye(3))
-            ElementTree.SubElement(inertial, "mass", value=repr(mass))
-            # Written in the link's axes: no angles, no rounding of them.
             inertia = turn @ np.diag(self.m.body_inertia[body]) @ turn.T
-            names = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2),
-                     ("izz", 2, 2))  # fmt: skip
-            figures = {name: repr(float(inertia[i, j])) for name, i, j in names}
-            ElementTree.SubElement(inertial, "inertia", figures)
+            add_inertial(link, mass, self.m.body_ipos[body] - shift, inertia)
         self._shapes(link, body, shift)
         if not is_root:
             self._connected(body)
@@ -175,7 +195,7 @@ class _Writer:
                 kind = "revolute" if m.jnt_limited[j] else "continuous"
                 turn = turn @ pin.exp3(-ref * axis)
             joint = self._joint(self._name(j), kind, above, below, place, turn)
-            ElementTree.SubElement(joint, "axis", xyz=_words(axis))
+            ElementTree.SubElement(joint, "axis", xyz=words(axis))
             self._limit(joint, j)
             self._dynamics(joint, j)
             before, place, turn, above = np.array(m.jnt_pos[j]), np.zeros(3), np.eye(3), below
@@ -184,7 +204,7 @@ class _Writer:
         self, name: str, kind: str, parent: str, child: str, place: Array, turn: Array
     ) -> Element:
         joint = ElementTree.SubElement(self.robot, "joint", name=name, type=kind)
-        _origin(joint, place, turn)
+        add_origin(joint, place, turn)
         ElementTree.SubElement(joint, "parent", link=parent)
         ElementTree.SubElement(joint, "child", link=child)
         return joint
@@ -200,8 +220,8 @@ class _Writer:
         ElementTree.SubElement(joint, "limit", limit)
         if j in self.followed:
             driver, multiplier, offset = self.followed[j]
-            words = {"multiplier": repr(multiplier), "offset": repr(offset)}
-            ElementTree.SubElement(joint, "mimic", {"joint": self._name(driver), **words})
+            figures = {"multiplier": repr(multiplier), "offset": repr(offset)}
+            ElementTree.SubElement(joint, "mimic", {"joint": self._name(driver), **figures})
 
     def _dynamics(self, joint: Element, j: int) -> None:
         dof = int(self.m.jnt_dofadr[j])
@@ -282,12 +302,10 @@ class _Writer:
         for kind, chosen in (("collision", solid), ("visual", shown)):
             for g in chosen:
                 for place, turn, shape in self._geometry(g):
-                    item = ElementTree.SubElement(link, kind)
-                    _origin(item, place - shift, turn)
-                    ElementTree.SubElement(item, "geometry").append(shape)
+                    item = add_shape(link, kind, place - shift, turn, shape)
                     if kind == "visual":
                         material = ElementTree.SubElement(item, "material", name=f"colour_{g}")
-                        ElementTree.SubElement(material, "color", rgba=_words(self._colour(g)))
+                        ElementTree.SubElement(material, "color", rgba=words(self._colour(g)))
 
     def _colour(self, g: int) -> Array:
         material = int(self.m.geom_matid[g])
@@ -300,30 +318,23 @@ class _Writer:
         if kind == _SPHERE:
             yield place, turn, ElementTree.Element("sphere", radius=repr(float(size[0])))
         elif kind in (_CYLINDER, _CAPSULE):
-            figures = {"radius": repr(float(size[0])), "length": repr(2 * float(size[1]))}
-            yield place, turn, ElementTree.Element("cylinder", figures)
-            for side in (-1.0, 1.0) if kind == _CAPSULE else ():
-                ball = ElementTree.Element("sphere", radius=repr(float(size[0])))
-                yield place + side * size[1] * turn[:, 2], turn, ball
+            parts = list(capsule(float(size[0]), 2 * float(size[1])))
+            for height, part in parts if kind == _CAPSULE else parts[:1]:
+                yield place + height * turn[:, 2], turn, part
         elif kind == _BOX:
-            yield place, turn, ElementTree.Element("box", size=_words(2 * size))
+            yield place, turn, ElementTree.Element("box", size=words(2 * size))
         elif kind == _ELLIPSOID:
-            points = size * _sphere_points()
-            yield place, turn, self._mesh(points, ConvexHull(points).simplices)
+            yield place, turn, mesh(*ellipsoid(size), self.meshes)
         elif kind == _MESH:
-            mesh = int(m.geom_dataid[g])
-            vertices = slice(int(m.mesh_vertadr[mesh]), None)
-            points = m.mesh_vert[vertices][: int(m.mesh_vertnum[mesh])]
-            faces = m.mesh_face[int(m.mesh_faceadr[mesh]) :][: int(m.mesh_facenum[mesh])]
-            yield place, turn, self._mesh(np.array(points, dtype=float), np.array(faces))
+            number = int(m.geom_dataid[g])
+            vertices = slice(int(m.mesh_vertadr[number]), None)
+            points = m.mesh_vert[vertices][: int(m.mesh_vertnum[number])]
+            faces = m.mesh_face[int(m.mesh_faceadr[number]) :][: int(m.mesh_facenum[number])]
+            # As MuJoCo has it: scaled, recentred.
+            both = np.array(points, dtype=float), np.array(faces, dtype=np.intp)
+            yield place, turn, mesh(*both, self.meshes)
         elif kind not in (_PLANE, _HFIELD):
             self.notes.append(f"a shape of {self._body(int(m.geom_bodyid[g]))} is left out")
-
-    def _mesh(self, points: Array, faces: NDArray[Any]) -> Element:
-        """A mesh as MuJoCo has it (scaled, recentred), as a file in the cache."""
-        path = _stored(_stl(points, faces))
-        self.folders.add(str(path.parent))
-        return ElementTree.Element("mesh", filename=f"file://{path}")
 
     def _body(self, body: int) -> str:
         return str(self.m.body(body).name) or f"body_{body}"
@@ -335,53 +346,3 @@ class _Writer:
 def _matrix(quaternion: Array) -> Array:
     w, x, y, z = map(float, quaternion)
     return np.asarray(pin.Quaternion(w, x, y, z).normalized().matrix())
-
-
-def _origin(element: Element, place: Array, turn: Array) -> None:
-    figures = {"xyz": _words(place), "rpy": _words(pin.rpy.matrixToRpy(np.asarray(turn)))}
-    ElementTree.SubElement(element, "origin", figures)
-
-
-def _words(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
-
-
-def _sphere_points() -> Array:
-    k = np.arange(_BALL_POINTS) + 0.5
-    z, angle = 1 - 2 * k / _BALL_POINTS, np.pi * (1 + 5**0.5) * k
-    ring = np.sqrt(1 - z**2)
-    return np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])
-
-
-def _stl(points: Array, faces: NDArray[Any]) -> bytes:
-    """Binary STL of triangles `faces` (F, 3) of `points` (N, 3)."""
-    records = np.zeros(
-        len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")]
-    )
-    records["corners"] = points[faces]
-    return b"\0" * 80 + struct.pack("<I", len(faces)) + records.tobytes()
-
-
-def _fill(path: Path, content: bytes) -> None:
-    path.write_bytes(content)
-
-
-def _stored(content: bytes) -> Path:
-    """The file in the user's cache that holds `content`.
-
-    Raises
-    ------
-    RobotError
-        It cannot be written.
-    """
-    path = cache_folder() / "meshes" / f"{hashlib.sha256(content).hexdigest()[:32]}.stl"
-    try:
-        if not (path.is_file() and path.read_bytes() == content):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, lambda temporary: _fill(temporary, content))
-    except (OSError, FileError) as error:
-        raise RobotError(
-            f"meshes of MJCF are kept in {path.parent}, which cannot be written: {error}. Set "
-            "XDG_CACHE_HOME to a folder that can."
-        ) from error
-    return path

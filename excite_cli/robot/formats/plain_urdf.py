@@ -9,6 +9,7 @@ class PlainUrdf(RobotFormat):
     """The format that all others become; what no other recognises is taken for one."""
 
     name = "URDF"
+    foreign = False
 
     def recognises(self, path: Path, text: str) -> bool:
         """Any file."""

@@ -13,7 +13,7 @@ from typing import Any
 
 from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
-from excite_cli.robot.packages import find_package
+from excite_cli.robot.packages import find_package, unnamed_package
 
 _NAMESPACE = re.compile(r"xmlns:xacro\s*=")
 # Names that lead from a value to the interpreter's own objects.
@@ -32,27 +32,55 @@ class Xacro(RobotFormat):
         return bool(_NAMESPACE.search(text) and "<xacro:" in text)
 
     def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
-        """The expanded text; `$(find package)` as `find_package` does."""
+        """The expanded text; `$(find package)` as `find_package` does.
+
+        A package that is nowhere may be the one that the file lies in, whose folder was renamed
+        and lost its package.xml: it is tried, and told.
+        """
         library = _library()
         arguments = {name: _written(value) for name, value in asked.arguments.items()}
 
+        stand_ins: dict[str, Path] = {}
+
         def find(name: str) -> str:
-            return str(find_package(name, path, asked.package_dirs))
+            try:
+                return str(find_package(name, path, asked.package_dirs))
+            except RobotError:
+                own = unnamed_package(path)
+                if own is None:
+                    raise
+                stand_ins[name] = own
+                return str(own)
 
         substitution = library.substitution_args
         substitution._eval_find = substitution._eval_dict["find"] = find
         substitution._eval = _substituted
         library.safe_eval = _evaluated
         try:
-            document = library.process_file(str(path), mappings=arguments)
-            return Urdf(document.toxml())
+            text = library.process_file(str(path), mappings=arguments).toxml()
         except Exception as error:  # xacro raises whatever an expression raises
-            reason = " ".join(str(error).split()) or type(error).__name__
+            reason = _reason(error)
             raise RobotError(
                 f"{path.name}: xacro cannot expand it: {reason[:400]}. Arguments are given under "
                 "robot.xacro_args (init: --xacro-arg NAME=VALUE), folders of packages under "
                 "robot.package_dirs (init: --package-dirs)."
             ) from error
+        for name, folder in stand_ins.items():
+            text = text.replace(f"package://{name}/", f"file://{folder}/")
+        folders = tuple(sorted({str(folder) for folder in stand_ins.values()}))
+        notes = tuple(
+            f"the package '{name}' was not found: {folder}, which the file lies in, is taken for it"
+            for name, folder in stand_ins.items()
+        )
+        return Urdf(text, folders, notes)
+
+
+def _reason(error: BaseException) -> str:
+    """In words; of an error of ours that xacro wrapped, its own."""
+    ours: BaseException | None = error
+    while ours is not None and not isinstance(ours, RobotError):
+        ours = ours.__cause__ or ours.__context__
+    return " ".join(str(ours or error).split()) or type(error).__name__
 
 
 def _written(value: object) -> str:

@@ -1,8 +1,9 @@
-"""One robot in three formats: the same base parameters and torques."""
+"""One robot in four formats: the same base parameters and torques."""
 
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 
 from excite_cli.api.loading import load_problem
 from excite_cli.dynamics.base_parameters import find_base_parameters
@@ -58,6 +59,32 @@ def _mjcf() -> str:
     )
 
 
+def _sdf(form: str) -> str:
+    """Links stand askew of their joints; of version 1.4 axes are given in the model's frame."""
+    turn = pin.rpy.rpyToMatrix(0.3, -0.2, 0.5)
+    askew, at, parts, above = pin.SE3(turn, np.array([0.05, 0.02, -0.03])), 0.1, [], "base"
+    names = dict(zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), INERTIA, strict=True))
+    inertia = "".join(f"<{key}>{value}</{key}>" for key, value in names.items())
+    for k, (length, mass, axis) in enumerate(zip(LENGTHS, MASSES, AXES, strict=True)):
+        joint = pin.SE3(np.eye(3), np.array([0.0, 0.0, at]))
+        centre = pin.SE3(np.eye(3), np.array([0.01, -0.02, length / 2]))
+        parts.append(
+            f'<link name="l{k}">{_pose(joint * askew)}<inertial>{_pose(askew.inverse() * centre)}'
+            f"<mass>{mass}</mass><inertia>{inertia}</inertia></inertial></link>"
+            f'<joint name="j{k}" type="revolute"><parent>{above}</parent><child>l{k}</child>'
+            f"{_pose(askew.inverse())}<axis><xyz>{axis}</xyz><limit><lower>-1</lower>"
+            "<upper>1.5</upper><velocity>2</velocity><effort>50</effort></limit></axis></joint>"
+        )
+        above, at = f"l{k}", at + length
+    inside = "".join(parts)
+    return f'<sdf version="{form}"><model name="one"><link name="base"/>{inside}</model></sdf>'
+
+
+def _pose(place: pin.SE3) -> str:
+    figures = [*place.translation, *pin.rpy.matrixToRpy(place.rotation)]
+    return f"<pose>{' '.join(repr(float(x)) for x in figures)}</pose>"
+
+
 def _robot(folder: Path, name: str, text: str) -> Robot:
     (folder / name).write_text(text)
     config = folder / f"{name}.yaml"
@@ -69,6 +96,7 @@ def _robot(folder: Path, name: str, text: str) -> Robot:
 
 def test_base_parameters_and_torques_agree(tmp_path: Path) -> None:
     texts = {"one.urdf": _urdf(), "one.xacro": _xacro(), "one.xml": _mjcf()}
+    texts |= {"one.sdf": _sdf("1.9"), "older.sdf": _sdf("1.4")}
     robots = [_robot(tmp_path, name, text) for name, text in texts.items()]
     states = robots[0].draw_states(60, 1)
     first = find_base_parameters(robots[0])

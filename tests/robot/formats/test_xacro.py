@@ -87,3 +87,19 @@ def test_expressions_that_are_programs_are_refused(
 def test_arithmetic_of_eval(tmp_path: Path) -> None:
     path = _arm(tmp_path, mass="$(eval 2 * length + 1)")
     assert '<mass value="1.8"' in load_description(str(path)).xml
+
+
+def test_a_package_that_lost_its_name_is_the_one_the_file_lies_in(tmp_path: Path) -> None:
+    path = _arm(tmp_path, "arm_support")
+    mesh = '<collision><geometry><mesh filename="package://arm_support/m.stl"/></geometry>'
+    text = path.read_text().replace(
+        '<link name="base"/>', f'<link name="base">{mesh}</collision></link>'
+    )
+    path.write_text(text)
+    with pytest.raises(RobotError, match="the package 'arm_support' was not found"):
+        load_description(str(path))
+    (path.parents[1] / "package.xml").unlink()
+    found = load_description(str(path))
+    assert found.xml.count("<joint") == 2
+    assert f"file://{path.parents[1]}/m.stl" in found.xml
+    assert any("the package 'arm_support' was not found: " in note for note in found.notes)

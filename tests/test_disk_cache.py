@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.geometry.disk_cache import store_arrays, stored_arrays
+from excite_cli.disk_cache import store_arrays, stored_arrays
 
 ARRAYS = {"values": np.arange(6.0).reshape(2, 3), "names": np.array(["a", "of b"])}
 

@@ -1,0 +1,126 @@
+"""The page of all robots: how many came how far, and a row for each."""
+
+import statistics
+from collections import Counter
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from benchmarks.robots.sources import PACKAGES, Source
+
+Record = dict[str, Any]
+_OPENING = """\
+# Robots that nobody prepared
+
+Made by `python -m benchmarks.all_robots --sources FOLDER --resume`, with robots of packages of
+PyPI, in the formats they come in, and those of example-robot-data. For each, with nothing edited:
+`excite init`, `optimize`, `check`, `simulate` and `diagnose`, each a process with a limit of 900 s.
+Into the simulated robot goes an effect that its config does not declare, beside inertias that are
+10–30 % off: kind, joint and size are drawn by a seed, as in the diagnosis battery, among those that
+show on the motions (3–30 % of a joint's torque, some near the noise).
+
+*Motion*: `check` passes all motions with exit status 0; proved, if every constraint is proved at
+every instant. *Named alone*: the planted effect, or an alias set of at most three that holds it,
+is named, and nothing else. *Pairs*: pairs of links that the config says are not kept apart. Seconds
+are processor time, one thread; those of `init` are the first ones, with capsules and tables of
+meshes yet to be made. No robot was used to tune the diagnosis."""
+
+
+def page(found: list[tuple[Source, Record]], seed: int) -> str:
+    """Markdown of the records that are there."""
+    records = [record for _, record in found]
+    total = Counter(record["format"] for record in records)
+    lines = [
+        _OPENING,
+        "",
+        f"{date.today():%d %B %Y}, a two-core server, seed {seed}.",
+        "",
+        "| format | robots | motion | proved | named alone | named beside others | not named |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for form in (*total, "all"):
+        lines.append(_counted(form, [r for r in records if form in (r["format"], "all")]))
+    lines += [
+        "",
+        _times(records),
+        "",
+        "| robot | format | joints | base parameters | condition number | pairs | init [s] "
+        "| optimize [s] | effect | named | outcome |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---|---|---|",
+    ]
+    lines += [_row(source, record) for source, record in found]
+    lines += [
+        "",
+        f"Packages, of which data files are read and no code is run: {', '.join(PACKAGES)}.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _counted(form: str, records: list[Record]) -> str:
+    diagnosed = [r["diagnosis"] for r in records if "diagnosis" in r]
+    cells = [
+        form,
+        len(records),
+        sum("admissible" in r for r in records),
+        sum("admissible" in r and r["proved"] for r in records),
+        sum(d["alone"] for d in diagnosed),
+        sum(d["right"] and not d["alone"] for d in diagnosed),
+        sum(not d["right"] for d in diagnosed),
+    ]
+    return "| " + " | ".join(map(str, cells)) + " |"
+
+
+def _times(records: list[Record]) -> str:
+    def told(verb: str) -> str:
+        spent = [r["seconds"][verb] for r in records if verb in r["seconds"]]
+        return f"`{verb}` {statistics.median(spent):.0f} s ({max(spent):.0f} s)" if spent else ""
+
+    verbs = ("init", "optimize", "check", "simulate", "diagnose")
+    return "Median and longest: " + ", ".join(filter(None, map(told, verbs))) + "."
+
+
+def _row(source: Source, record: Record) -> str:
+    name = source.name + (f" (also {', '.join(source.also)})" if source.also else "")
+    plant, found = record.get("planted"), record.get("diagnosis")
+    seconds = record["seconds"]
+    cells = [
+        name,
+        record["format"],
+        record.get("joints", ""),
+        record.get("base_parameters", ""),
+        _figure(record.get("condition_number")),
+        record.get("ignored_pairs", ""),
+        seconds.get("init", ""),
+        seconds.get("optimize", ""),
+        "" if plant is None else _effect(plant),
+        "" if found is None else "; ".join(found["named"]) or "–",
+        _outcome(record),
+    ]
+    return "| " + " | ".join(str(cell).replace("|", "/") for cell in cells) + " |"
+
+
+def _effect(plant: Record) -> str:
+    few = plant["joints"] if len(plant["joints"]) < plant["moved"] else ["all joints"]
+    return f"{plant['kind']} of {', '.join(few)}"
+
+
+def _outcome(record: Record) -> str:
+    if "failed" in record:
+        return f"{record['failed']}: {_sentence(record['message'])}"
+    motion = "proved" if record["proved"] else "sampled in part"
+    found = record["diagnosis"]
+    if found["alone"]:
+        return f"{motion}; named alone"
+    if found["right"]:
+        return f"{motion}; named beside others"
+    return f"{motion}; {_sentence(found['sentence'])}"
+
+
+def _sentence(message: str) -> str:
+    """A message in one line, without the folders of this machine."""
+    words = [Path(word).name if word.startswith("/") else word for word in message.split()]
+    return " ".join(words)
+
+
+def _figure(value: float | None) -> str:
+    return "" if value is None else f"{value:.3g}" if value < 1000 else f"{value:.0f}"

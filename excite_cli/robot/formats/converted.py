@@ -1,0 +1,140 @@
+"""Conversion to a URDF in a process of its own, with limits; kept on disk where that is safe.
+
+What is kept is found again by the content of all files that the format says it read, by the
+arguments and by the program's version, and carries a digest (`disk_cache`). Meshes that the
+conversion wrote into the cache bear the hash of their content as a name and are compared to it.
+"""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from excite_cli import __version__
+from excite_cli.disk_cache import store_arrays, stored_arrays
+from excite_cli.errors import ExciteError, MissingExtraError, RobotError
+from excite_cli.robot.apart import OUT_OF_TIME, command, environment, limit_memory, set_alarm
+from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.kept_meshes import is_sound
+
+_SECONDS, _BYTES_PER_SECOND = 8.0, 2**20  # processor time allowed: a base, and by size of files
+_SLOWEST = 10  # times the processor time, on a machine with much else to do
+_MAX_MEMORY = 4 * 2**30  # bytes
+_FORM = "1"  # of what is kept; another one after a change of what formats write
+_OF_ERRORS = {each.__name__: each for each in (RobotError, MissingExtraError)}
+
+
+def converted(form: RobotFormat, path: Path, text: str, asked: Asked) -> Urdf:
+    """What `form.urdf` gives, or what it gave for the same content before.
+
+    Raises
+    ------
+    RobotError, MissingExtraError
+        As `RobotFormat.urdf`; or reading the file ends the process, takes too long or too much.
+    """
+    sources = form.sources(path, text)
+    key = None if sources is None else _key(form, path, sources, asked)
+    kept = None if key is None else _kept(key)
+    if kept is not None:
+        return kept
+    size = sum(source.stat().st_size for source in sources or (path,))
+    found = _answered(form, path, text, asked, _SECONDS + size / _BYTES_PER_SECOND)
+    if key is not None:
+        content = json.dumps(asdict(found)).encode()
+        store_arrays(key, {"urdf": np.frombuffer(content, dtype=np.uint8)})
+    return found
+
+
+def _key(form: RobotFormat, path: Path, sources: Sequence[Path], asked: Asked) -> str | None:
+    digest = hashlib.sha256(f"{form.name}|{__version__}|{_FORM}|{path}|".encode())
+    digest.update(json.dumps([asked.package_dirs, dict(asked.arguments)], default=str).encode())
+    for source in sources:
+        try:
+            with source.open("rb") as file:
+                content = hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError:
+            return None
+        digest.update(f"|{source}|{content}".encode())
+    return digest.hexdigest()
+
+
+def _kept(key: str) -> Urdf | None:
+    arrays = stored_arrays(key)
+    if arrays is None or "urdf" not in arrays:
+        return None
+    found = _urdf(json.loads(arrays["urdf"].tobytes()))
+    return found if all(is_sound(Path(mesh)) for mesh in found.meshes) else None
+
+
+def _urdf(content: dict[str, Any]) -> Urdf:
+    lists = {name: tuple(content[name]) for name in ("folders", "notes", "meshes")}
+    pairs = tuple((first, second) for first, second in content["ignored"])
+    return Urdf(content["text"], **lists, ignored=pairs)
+
+
+def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: float) -> Urdf:
+    """The answer of a process of its own, which may compute for so long [s]."""
+    question = {
+        "module": type(form).__module__,
+        "format": type(form).__name__,
+        "path": str(path),
+        "text": text,
+        "package_dirs": list(asked.package_dirs),
+        "arguments": dict(asked.arguments),
+        "seconds": seconds,
+    }
+    # Libraries leave their logs where they run: in a folder that goes with them.
+    with tempfile.TemporaryDirectory(prefix="excite-") as folder:
+        try:
+            run = subprocess.run(
+                command(__name__),
+                input=json.dumps(question).encode(),
+                capture_output=True,
+                env=environment(),
+                cwd=folder,
+                timeout=_SLOWEST * seconds,
+                process_group=0,  # Ctrl-C is for this process, which then ends the other
+                check=False,
+            )
+            status, said = run.returncode, run.stdout
+        except subprocess.TimeoutExpired:
+            status, said = OUT_OF_TIME[-1], b""
+    answer = json.loads(said) if status == 0 and said else {}
+    if "text" in answer:
+        return _urdf(answer)
+    if "error" in answer:
+        raise _OF_ERRORS.get(answer["error"], RobotError)(answer["message"])
+    how = "takes too long" if status in OUT_OF_TIME else "fails or takes too much memory"
+    raise RobotError(
+        f"{path.name}: reading it as {form.name} {how}. It is damaged, or too large: see whether "
+        "the program that wrote it opens it."
+    )
+
+
+def serve() -> None:
+    """In the process: the answer on stdout to the question on stdin."""
+    question = json.load(sys.stdin.buffer)
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # whatever libraries print
+    form = getattr(import_module(question["module"]), question["format"])()
+    path, asked = (
+        Path(question["path"]),
+        Asked(tuple(question["package_dirs"]), question["arguments"]),
+    )
+    limit_memory(_MAX_MEMORY)
+    set_alarm(question["seconds"])
+    try:
+        answer = asdict(form.urdf(path, question["text"], asked))
+    except ExciteError as error:
+        answer = {"error": type(error).__name__, "message": str(error)}
+    out.write(json.dumps(answer))
+    out.close()

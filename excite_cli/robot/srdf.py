@@ -1,0 +1,83 @@
+"""SRDF, what MoveIt and others write beside a URDF: postures, and pairs not to check.
+
+Files that lie near a URDF are not trusted, and passed over where they cannot be read.
+"""
+
+import math
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+from excite_cli.errors import RobotError
+from excite_cli.robot.description import MAX_URDF_BYTES
+
+NEVER = "never"  # the reason of pairs that were not seen to touch, in lower case
+
+
+@dataclass(frozen=True)
+class Srdf:
+    """A file's robot, joint values [rad or m] of its group states by name, and disabled pairs.
+
+    disabled: two links, and the reason as the file gives it.
+    """
+
+    path: Path
+    robot: str
+    states: dict[str, dict[str, float]]
+    disabled: tuple[tuple[str, str, str], ...]
+
+
+def srdf_near(urdf: Path) -> list[Srdf]:
+    """Those beside a URDF and in folders named `srdf` or `config` of its package."""
+    folders = [urdf.parent, *(urdf.parent / name for name in ("srdf", "config"))]
+    folders += [urdf.parent.parent / name for name in ("srdf", "config")]
+    paths = dict.fromkeys(path for folder in folders for path in sorted(folder.glob("*.srdf")))
+    found = []
+    for path in paths:
+        try:
+            found.append(read_srdf(path))
+        except RobotError:
+            continue
+    return found
+
+
+def read_srdf(path: Path) -> Srdf:
+    """The content of a file.
+
+    Raises
+    ------
+    RobotError
+        It is missing, not XML without a document type, or too large.
+    """
+    try:
+        if path.stat().st_size > MAX_URDF_BYTES:
+            raise RobotError(f"{path} is larger than {MAX_URDF_BYTES // 10**6} MB: not an SRDF.")
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RobotError(f"{path} cannot be read as text: {error}") from error
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise RobotError(f"{path} declares a document type or entities; an SRDF needs neither.")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise RobotError(f"{path} is not well-formed XML: {error}") from error
+    disabled = tuple(
+        (each.get("link1", ""), each.get("link2", ""), each.get("reason", ""))
+        for each in root.iter("disable_collisions")
+    )
+    return Srdf(path, root.get("name", ""), _states(root), disabled)
+
+
+def _states(root: ElementTree.Element) -> dict[str, dict[str, float]]:
+    states = {}
+    for state in root.iter("group_state"):
+        values = {}
+        for joint in state.findall("joint"):
+            try:
+                value = float(joint.get("value", ""))
+            except ValueError:  # a free-flyer's pose
+                continue
+            if math.isfinite(value):
+                values[joint.get("name", "")] = value
+        states[state.get("name", "")] = values
+    return states

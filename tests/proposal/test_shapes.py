@@ -1,0 +1,125 @@
+"""Meshes that are missing cost the links they belong to, told as not guarded, not the robot."""
+
+from pathlib import Path
+
+import pytest
+
+from excite_cli.config.load import parse_spec
+from excite_cli.errors import ConfigError, RobotError
+from excite_cli.excitation.problem import build_problem
+from excite_cli.proposal.propose import Request, propose
+from excite_cli.summary.pairs import kept_apart, not_guarded, pairs_data, pairs_in_words
+from tests.proposal.robots import BOX, GOOD, joint, link, written
+from tests.proposal.test_propose import TETRAHEDRON
+
+# Packages are looked for beside the folders above a robot, where other tests have theirs.
+FINGERS = "package://hand_description/meshes/{}.stl"
+
+
+def shape(name: str, kind: str = "collision") -> str:
+    return f'<{kind}><geometry><mesh filename="{name}"/></geometry></{kind}>'
+
+
+def with_gripper(folder: Path, hand: str, second: str = GOOD) -> Path:
+    """An arm of two boxes with a gripper of two links, of which `hand` is the first one's shape."""
+    return written(
+        folder,
+        link("base"),
+        joint("shoulder", "base", "upper", GOOD),
+        link("upper"),
+        joint("elbow", "upper", "lower", second),
+        link("lower"),
+        joint("mount", "lower", "palm", kind="fixed"),
+        link("palm", shape=hand),
+        joint("wrist", "palm", "finger", GOOD),
+        link("finger", shape=shape(FINGERS.format("finger"))),
+    )
+
+
+def test_a_package_that_is_nowhere_costs_its_links_only(tmp_path: Path) -> None:
+    with_gripper(tmp_path, shape(FINGERS.format("palm")))
+    proposal = propose(Request("robot.urdf", tmp_path))
+    (told,) = [note for note in proposal.notes if note.startswith("NOT GUARDED")]
+    assert "palm, finger: the package 'hand_description' of the collision mesh" in told
+    assert f"Looked in {tmp_path}" in told
+    for variable in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"):
+        assert variable in told
+    assert "--package-dirs" in told
+    own = parse_spec(proposal.text).constraints.self_collision
+    assert own is not None
+    assert own.without_shapes == ("palm", "finger")
+    problem = proposal.settled.problem
+    assert {"base – lower"} == {label for c in problem.constraints[-1:] for label in c.labels}
+    words = pairs_in_words(problem)
+    assert "NOT GUARDED: the meshes of palm, finger are missing" in words[0]
+    assert "speak of" in words[1]
+    assert "all of those that have shapes" in words[1]
+    assert pairs_data(problem)["links_without_shapes"] == ["palm", "finger"]
+    assert not_guarded(problem) == ["wrist"]
+
+
+def test_once_the_package_is_there_the_links_are_guarded(tmp_path: Path) -> None:
+    path = with_gripper(tmp_path, shape(FINGERS.format("palm")))
+    path.write_text(path.read_text().replace("hand_description", "late_hand"))
+    text = propose(Request("robot.urdf", tmp_path)).text
+    bare = build_problem(parse_spec(text), tmp_path)
+    meshes = tmp_path / "late_hand" / "meshes"
+    meshes.mkdir(parents=True)
+    for name in ("palm", "finger"):
+        (meshes / f"{name}.stl").write_text(TETRAHEDRON)
+    problem = build_problem(parse_spec(text), tmp_path)
+    assert not_guarded(problem) == []
+    assert pairs_data(problem)["links_without_shapes"] == []
+    assert kept_apart(problem) > kept_apart(bare)
+
+
+def test_visual_shapes_stand_for_collision_meshes_that_are_missing(tmp_path: Path) -> None:
+    seen = BOX.replace("collision", "visual")
+    with_gripper(tmp_path, shape(FINGERS.format("palm")) + seen)
+    problem = propose(Request("robot.urdf", tmp_path)).settled.problem
+    assert pairs_data(problem)["links_without_shapes"] == ["palm", "finger"]
+    path = tmp_path / "robot.urdf"
+    finger = link("finger", shape=shape(FINGERS.format("finger")))
+    path.write_text(path.read_text().replace(finger, finger.replace("</link>", f"{seen}</link>")))
+    problem = propose(Request("robot.urdf", tmp_path)).settled.problem
+    assert problem.spec.constraints.self_collision is not None
+    assert problem.spec.constraints.self_collision.shapes == "visual"
+    assert pairs_data(problem)["links_without_shapes"] == []
+
+
+def test_a_damaged_mesh_costs_its_link_only(tmp_path: Path) -> None:
+    (tmp_path / "palm.stl").write_text("no mesh")
+    (tmp_path / "finger.stl").write_text(TETRAHEDRON)
+    path = with_gripper(tmp_path, shape("palm.stl"))
+    path.write_text(path.read_text().replace(FINGERS.format("finger"), "finger.stl"))
+    proposal = propose(Request("robot.urdf", tmp_path))
+    assert any("palm.stl cannot be loaded" in note for note in proposal.notes)
+    assert pairs_data(proposal.settled.problem)["links_without_shapes"] == ["palm"]
+
+
+def test_a_link_that_misses_one_of_two_meshes_keeps_neither(tmp_path: Path) -> None:
+    with_gripper(tmp_path, shape(FINGERS.format("palm")) + BOX)
+    problem = propose(Request("robot.urdf", tmp_path)).settled.problem
+    assert "palm" in pairs_data(problem)["links_without_shapes"]
+
+
+def test_without_any_mesh_the_note_names_the_package(tmp_path: Path) -> None:
+    mesh = shape(FINGERS.format("palm"))
+    written(tmp_path, link("base", shape=""), joint("j", "base", "l", GOOD), link("l", shape=mesh))
+    notes = propose(Request("robot.urdf", tmp_path)).notes
+    assert any("the package 'hand_description'" in note for note in notes)
+    assert "robot.urdf has no collision geometry that can be read: self-collision is not " in (
+        " ".join(notes)
+    )
+
+
+def test_a_config_that_does_not_name_the_link_is_refused_with_a_way_on(tmp_path: Path) -> None:
+    """A mesh that gets lost must not silently cost a guard that was there."""
+    with_gripper(tmp_path, BOX)
+    text = "robot: {urdf: robot.urdf}\ntrajectory: {family: fourier, base_frequency: 0.6}\n"
+    text += "constraints: {self_collision: {}}\n"
+    with pytest.raises(RobotError, match=r"or list finger under .*without_shapes"):
+        build_problem(parse_spec(text), tmp_path)
+    named = text.replace("{self_collision: {}}", "{self_collision: {without_shapes: [fingr]}}")
+    with pytest.raises(ConfigError, match=r"no link 'fingr'. Did you mean 'finger'"):
+        build_problem(parse_spec(named), tmp_path)
