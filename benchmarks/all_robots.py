@@ -59,7 +59,8 @@ def _run(words: list[str], folder: Path) -> tuple[int, Any, str, float]:
     seconds = used.ru_utime + used.ru_stime
     if process.returncode < 0:
         return process.returncode, None, f"it took longer than {_LONGEST:g} s", seconds
-    message = told.partition("error: ")[2].strip() or told.strip()[-300:]
+    last = told.strip().rpartition("\n")[2]
+    message = json.loads(last)["error"] if process.returncode and last.startswith("{") else last
     try:
         return process.returncode, json.loads(answer) if answer.strip() else None, message, seconds
     except ValueError:
