@@ -40,9 +40,10 @@ def checked(
     findings += more
     parts: list[Run] = []
     for run in whole:
-        for mask in (mask_saturated, mask_stuck):
-            run, more = mask(run, joints)
-            findings += more
+        run, more = mask_saturated(run, joints, limits.revolute)
+        findings += more
+        run, more = mask_stuck(run, joints)
+        findings += more
         even, more = equidistant(run)
         parts += even
         findings += more
