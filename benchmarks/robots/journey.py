@@ -77,7 +77,11 @@ class _Steps:
             killed = f"it took longer than {_LONGEST:g} s"
             message = killed if process.returncode == -9 else f"signal {-process.returncode}"
             return process.returncode, None, message, seconds
-        message = told.rpartition("error: ")[2].strip() or told.strip()[-300:]
+        last = told.strip().rpartition("\n")[2]
+        if last.startswith("{"):  # with --json errors are
+            message = json.loads(last)["error"]
+        else:
+            message = told.strip()[-300:]
         return process.returncode, json.loads(answer) if answer.strip() else None, message, seconds
 
 

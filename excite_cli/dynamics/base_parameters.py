@@ -146,7 +146,8 @@ def base_parameters_as_given(
         The second draw contradicts the first (the rank is not decided), or nothing is identifiable.
     """
     per_sample = len(robot.rows)
-    count = samples or max(60, 4 * 10 * robot.n_bodies // per_sample + 20)
+    bodies = robot.n_bodies - robot.massless
+    count = samples or max(60, 4 * 10 * bodies // per_sample + 20)
     regressor = Regressor(robot)
     first = _stack(regressor, robot, count, _SEED)
     second = _stack(regressor, robot, count, _SEED + 1)

@@ -21,7 +21,7 @@ _AROUND = 5  # samples before and after that tell whether a joint moves
 def mask_saturated(run: Run, joints: tuple[str, ...], revolute: Mask) -> tuple[Run, list[Finding]]:
     """Mark torques at a plateau as not valid; say its level and its share of moving samples.
 
-    `revolute` (n,): which joints turn, and have torques in N·m.
+    `revolute` (n,): which joints turn; what moves others are forces.
     """
     if len(run.t) <= 2 * _AROUND:
         return run, []
@@ -37,11 +37,10 @@ def mask_saturated(run: Run, joints: tuple[str, ...], revolute: Mask) -> tuple[R
             if at is None:
                 continue
             level = side * float((side * values).max())
-            share = np.count_nonzero(at) / len(values)
+            share, unit = np.count_nonzero(at) / len(values), "N·m" if revolute[j] else "N"
             text = (
-                f"torque of {joint} stands at its {word} limit {level:.6g} "
-                f"{'N·m' if revolute[j] else 'N'} in {share:.1%} of moving samples: "
-                "saturated, or clipped when recorded; these samples are masked"
+                f"torque of {joint} stands at its {word} limit {level:.6g} {unit} in {share:.1%} "
+                "of moving samples: saturated, or clipped when recorded; these samples are masked"
             )
             findings.append(Finding("saturated", "warning", text, run.name, (joint,)))
             valid[np.flatnonzero(usable)[at], j] = False

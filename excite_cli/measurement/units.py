@@ -219,8 +219,9 @@ def _torque(
     share = largest / limits.effort
     j = int(np.argmax(share))
     if share[j] > 3:
+        unit = "N·m" if limits.revolute[j] else "N"
         text = (
-            f"torque of {joints[j]} reaches {largest[j]:.4g}, {share[j]:.3g} times its effort "
+            f"torque of {joints[j]} reaches {largest[j]:.4g} {unit}, {share[j]:.3g} times its effort "
             "limit: a placeholder in the URDF, or another unit"
         )
         return [Finding("torque_units", "note", text, where, (joints[j],))]

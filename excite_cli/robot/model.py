@@ -220,12 +220,12 @@ class Robot:
         rng = np.random.default_rng(seed)
         lower, upper = self.limits.ranges()
         speed = np.minimum(self.limits.velocity, _FASTEST)  # placeholders like 1e6 drown gravity
-        q = rng.uniform(lower, upper, (count, self.n))
-        v = rng.uniform(-speed, speed, (count, self.n))
-        a = rng.uniform(-3 * speed, 3 * speed, (count, self.n))
-        for x in (q, v, a):
-            x[:, : self.base_joints] = 0.0
-        return q, v, a
+        own = slice(self.base_joints, None)
+        drawn = ((lower, upper), (-speed, speed), (-3 * speed, 3 * speed))
+        shape = (count, self.n - self.base_joints)
+        q, v, a = (rng.uniform(low[own], high[own], shape) for low, high in drawn)
+        still = np.zeros((count, self.base_joints))
+        return np.hstack([still, q]), np.hstack([still, v]), np.hstack([still, a])
 
     def fingerprint(self) -> str:
         """Hash of what decides the regressor: URDF, moved joints, posture, base and rows.

@@ -9,6 +9,7 @@ import pytest
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.quality import raise_for_errors, sentence
+from excite_cli.measurement.saturation import mask_saturated
 from excite_cli.measurement.speed_lag import speed_lag
 from tests.measurement.recordings import JOINTS, check, only, recorded, without_speed
 
@@ -189,6 +190,8 @@ def test_saturated_torque(step: float) -> None:
     assert f"upper limit {level:.6g} N·m in {share:.1%}" in found.text
     np.testing.assert_array_equal(back.usable()[:, 0], tau[:, 0] < level)
     assert back.usable()[:, 1:].all()
+    _, findings = mask_saturated(spoiled, JOINTS, np.zeros(len(JOINTS), dtype=bool))
+    assert f"upper limit {level:.6g} N in {share:.1%}" in only(findings, "saturated").text
 
 
 def test_a_coarse_torque_at_rest_is_not_saturated() -> None:
