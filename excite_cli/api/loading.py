@@ -22,6 +22,7 @@ from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.merged_findings import merged
+from excite_cli.measurement.motors import motors_of
 from excite_cli.measurement.quality import raise_for_errors
 from excite_cli.robot.described import describe
 from excite_cli.robot.model import Robot, build_measured_robot, build_robot
@@ -196,7 +197,7 @@ def load_data(
         robot.joint_names[own],
         (limits.lower[own], limits.upper[own], limits.velocity[own], limits.effort[own]),
         (~robot.sliding[own]).astype(float),
-        robot.motors,
+        motors_of(problem.spec.robot.transmissions, robot.joint_names[own]),
         torques,
     )
     raise_for_errors(data)

@@ -328,10 +328,8 @@ def _absorbed(model: Model, traced: Traced) -> tuple[Absorbed, ...]:
 def _model(robot: Robot, base: BaseParameters, spec: Spec, still: bool) -> Model:
     """`still`: a joint does not move, and noise alone decides what only its motion shows."""
     prior, cad = None, standard_parameters(robot)
-    kept = spec.identification.inertias == "cad"
-    if kept or (still and cad[::10].any()):
-        uncertainty = spec.identification.uncertainty if kept else 1.0
-        prior = KeptInertias(cad, prior_rows(robot, cad, uncertainty))
+    if spec.identification.inertias == "cad" or (still and cad[::10].any()):
+        prior = KeptInertias(cad, prior_rows(robot, cad, spec.identification.uncertainty))
     declared = declared_effects(spec.effects, robot)
     declared = with_known_load(spec.identification, declared, robot)
     return Model(robot, base, declared, prior, spec.runs)

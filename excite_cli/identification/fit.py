@@ -196,7 +196,8 @@ def _settled(
         if prior is None and completion.known:
             weak = weak_directions(linear, base, completion)
             if len(weak.rows):
-                of_all = np.insert(weak.rows, [base.rank] * k, 0.0, axis=1)
+                rows_of_urdf = weak.rows / spec.uncertainty
+                of_all = np.insert(rows_of_urdf, [base.rank] * k, 0.0, axis=1)
                 linear = fit_rows(rows, spec.method, _together([*given, of_all]), sizes)
         if not follow:
             break

@@ -4,8 +4,9 @@ A joint that stands still, or one that hardly moves, leaves combinations of para
 alone decides, however large they come out. In units of what the URDF is worth if every standard
 parameter may be off by its own size (`InertialPrior`), A φ_B − b ~ N(0, 1), the data fix them with
 covariance Z = A C Aᵀ. Eigenvectors u of Z with a variance above one are known better from the
-URDF, and its rows uᵀA φ_B = uᵀb join the fit: unless the data say for sure that the URDF is wrong
-there, by no more than a placeholder can be. Where all that matters moves there are none.
+URDF, and its rows uᵀA φ_B = uᵀb join the fit, at what the URDF is taken to be worth
+(`identification.uncertainty`): unless the data say for sure that the URDF is wrong there, by no
+more than a placeholder can be. Where all that matters moves there are none.
 """
 
 from dataclasses import dataclass
