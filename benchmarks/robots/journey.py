@@ -78,10 +78,7 @@ class _Steps:
             message = killed if process.returncode == -9 else f"signal {-process.returncode}"
             return process.returncode, None, message, seconds
         last = told.strip().rpartition("\n")[2]
-        if last.startswith("{"):  # with --json errors are
-            message = json.loads(last)["error"]
-        else:
-            message = told.strip()[-300:]
+        message = json.loads(last)["error"] if last.startswith("{") else told.strip()[-300:]
         return process.returncode, json.loads(answer) if answer.strip() else None, message, seconds
 
 

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.errors import ConfigError, FileError
+from excite_cli.errors import FileError
 from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
 from excite_cli.identification.prepare import PreparedRun, prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Array, Dataset
+from excite_cli.robot.base_joints import BASE_ROWS
 
 
 def measured_stack(problem: Problem, data: Dataset) -> tuple[Stack, str]:
@@ -19,16 +20,13 @@ def measured_stack(problem: Problem, data: Dataset) -> tuple[Stack, str]:
     Filtered motion is sampled as sparsely as the cost grid of a planned one, so that a second of
     recorded motion weighs as much as a second of planned motion.
 
+    A base counts as standing still: what it sways is too little to tell anything.
+
     Raises
     ------
-    ConfigError
-        The measured rows of the problem hold no joint torque, which is all that data have.
     FileError
         A run is too short, or nothing in the data can be used.
     """
-    measured = set(problem.robot.rows.tolist()) & set(problem.robot.moved.tolist())
-    if not measured:
-        raise ConfigError("--prior: measured data are torques of joints; robot.rows has none.")
     processing = choose_processing(
         data.runs, problem.spec.measurement.filter, problem.spec.diagnosis.moving_speed
     )
@@ -59,16 +57,17 @@ def stack_of_runs(problem: Problem, runs: Sequence[PreparedRun]) -> tuple[Stack,
 def _rows(problem: Problem, objective: Objective, run: PreparedRun, every: int) -> Array:
     """Usable rows of every `every`-th averaged sample of a run."""
     robot = problem.robot
+    base = run.q.shape[1] - robot.n
     if problem.extension.fine:  # time derivatives first, then the average
-        block = objective.block_of(run.t, run.q, run.v, run.a)
+        block = objective.block_of(run.t, *(x[:, base:] for x in (run.q, run.v, run.a)))
         block = run.averaged(block.reshape(len(run.t), len(robot.rows), -1))[::every]
     else:
-        q, v, a = (run.averaged(x)[::every] for x in (run.q, run.v, run.a))
+        q, v, a = (run.averaged(x[:, base:])[::every] for x in (run.q, run.v, run.a))
         times: Array = np.arange(len(q), dtype=float) * (run.step * every)
         block = objective.block_of(times, q, v, a).reshape(len(q), len(robot.rows), -1)
-    place = {int(row): joint for joint, row in enumerate(robot.moved)}
+    names = dict(zip(BASE_ROWS, range(base), strict=False))
+    names |= {name: base + j for j, name in enumerate(robot.joint_names)}
     usable = np.zeros(block.shape[:2], dtype=bool)
-    for index, row in enumerate(robot.rows):
-        if int(row) in place:
-            usable[:, index] = run.usable[::every, place[int(row)]]
+    for index, row in enumerate(robot.row_names):
+        usable[:, index] = run.usable[::every, names[row]]
     return np.asarray(block[usable])

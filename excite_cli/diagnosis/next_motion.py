@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg import qr
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
@@ -27,7 +28,8 @@ from excite_cli.excitation.discrimination import (
 from excite_cli.excitation.extension import in_words, why_not_planned
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.stack import Stack
-from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.robot.base_joints import BASE_ROWS
+from excite_cli.robot.model import Array, Robot, build_measured_robot
 from excite_cli.shown.command import Command
 from excite_cli.shown.record import Shown
 
@@ -118,16 +120,21 @@ def plan_after(
     FileError
         The diagnosis belongs to another robot, or its numbers do not fit together.
     """
+    robot = build_measured_robot(spec.robot, folder)
+    _check_robot(diagnosis, robot)
     noise = np.asarray(diagnosis.information.noise, dtype=float)
-    if not (np.all(np.isfinite(noise)) and np.all(noise > 0)):
+    known = [name not in robot.unmeasured for name in diagnosis.joint_names]
+    if not (np.all(np.isfinite(noise[known])) and np.all(noise[known] > 0)):
         raise FileError("--after: the diagnosis has no noise level for every joint; make it anew.")
-    weights = {j: float(1.0 / x) for j, x in zip(diagnosis.joint_names, noise, strict=True)}
+    rows = [*BASE_ROWS, *diagnosis.joint_names[len(BASE_ROWS) :]]
+    told = zip(rows if robot.base_joints else diagnosis.joint_names, noise, known, strict=True)
+    weights = {name: float(1.0 / x) for name, x, measured in told if measured}
     weighting: dict[str, Any] = {"row_weights": weights}
     if spec.criterion.column_scaling == "none":
         # Rows in units of their noise differ by powers of ten; columns must not.
         weighting["column_scaling"] = "unit_norm"
-    robot = build_robot(spec.robot, folder)
-    _check_robot(diagnosis, robot)
+    if robot.base_joints:
+        return _on_a_base(diagnosis, spec, folder, weighting, fit)
     model = [effect_of(record, robot.joint_names) for record in diagnosis.information.model]
     planned = [effect for effect in model if not why_not_planned(effect, robot)]
     problem = build_problem(
@@ -165,16 +172,36 @@ def plan_after(
     return NextMotion(problem, problem, prior, "excite", tuple(said))
 
 
+def _on_a_base(
+    diagnosis: Diagnosis,
+    spec: Spec,
+    folder: Path,
+    weighting: dict[str, Any],
+    fit: FitKnowledge | None,
+) -> NextMotion:
+    """The inertias alone, of data with a wrench at the base: effects are not planned there."""
+    wanted = {"effects": (), "criterion": spec.criterion.model_copy(update=weighting)}
+    problem = build_problem(spec.model_copy(update=wanted), folder, fit)
+    triangle, rank = np.asarray(diagnosis.information.factor, dtype=float), problem.base.rank
+    others = triangle.shape[1] - rank
+    # What the effects take up of the data is not known of the inertias: their columns come first.
+    turned = np.asarray(qr(np.hstack([triangle[:, rank:], triangle[:, :rank]]), mode="r")[0])
+    rows = turned[others : others + rank, others:] * problem.column_scales
+    prior = Stack(np.ascontiguousarray(rows), len(rows))
+    said = ["the next motion excites the inertias, on top of the measured data"]
+    if diagnosis.effects:
+        said.append(
+            f"{len(diagnosis.effects)} effects that were found are kept apart from the inertias, "
+            "and not planned for: no column of a motion has their share of the wrench at the base"
+        )
+    return NextMotion(problem, problem, prior, "excite", tuple(said))
+
+
 def _check_robot(diagnosis: Diagnosis, robot: Robot) -> None:
     if diagnosis.fingerprint != robot.fingerprint():
         raise FileError(
             "--after: the diagnosis was made for another robot, other moved joints, posture or "
             "rows. Give the config that it was made with."
-        )
-    if robot.rows.tolist() != robot.moved.tolist():
-        raise FileError(
-            "--after: the data are torques of the joints; robot.rows has others. Plan with "
-            "rows: [joints]."
         )
 
 

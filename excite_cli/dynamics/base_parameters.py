@@ -19,6 +19,7 @@ from scipy.linalg import lstsq, qr
 
 from excite_cli.dynamics.near_right_angles import nearly_right, squared
 from excite_cli.dynamics.regressor import (
+    PARAMETERS_PER_BODY,
     Regressor,
     standard_parameter_names,
 )
@@ -108,6 +109,9 @@ def find_base_parameters(robot: Robot, samples: int | None = None) -> BaseParame
     RobotError
         The second draw contradicts the first (the rank is not decided), or nothing is identifiable.
     """
+    if robot.held is not None:  # one choice of columns, so that motions and data stack
+        kept = find_base_parameters(robot.held, samples).selection
+        return base_parameters_as_given(robot, samples, kept + PARAMETERS_PER_BODY * robot.massless)
     tilted = nearly_right(robot)
     right = base_parameters_as_given(squared(robot), samples)
     if not tilted:  # columns that are equally long but for rounding are then taken in one order
@@ -146,8 +150,7 @@ def base_parameters_as_given(
         The second draw contradicts the first (the rank is not decided), or nothing is identifiable.
     """
     per_sample = len(robot.rows)
-    bodies = robot.n_bodies - robot.massless
-    count = samples or max(60, 4 * 10 * bodies // per_sample + 20)
+    count = samples or max(60, 4 * 10 * robot.n_bodies // per_sample + 20)
     regressor = Regressor(robot)
     first = _stack(regressor, robot, count, _SEED)
     second = _stack(regressor, robot, count, _SEED + 1)

@@ -221,8 +221,8 @@ def _torque(
     if share[j] > 3:
         unit = "N·m" if limits.revolute[j] else "N"
         text = (
-            f"torque of {joints[j]} reaches {largest[j]:.4g} {unit}, {share[j]:.3g} times its effort "
-            "limit: a placeholder in the URDF, or another unit"
+            f"torque of {joints[j]} reaches {largest[j]:.4g} {unit}, {share[j]:.3g} times its "
+            "effort limit: a placeholder in the URDF, or another unit"
         )
         return [Finding("torque_units", "note", text, where, (joints[j],))]
     if 0 < share.max() < 0.01:

@@ -13,6 +13,8 @@ from excite_cli.errors import RobotError
 from excite_cli.robot.description import RobotDescription
 
 BASE_JOINTS = ("base_x", "base_y", "base_z", "base_yaw", "base_pitch", "base_roll")
+# Rows of a base that is held still that are theirs.
+BASE_ROWS = ("base_fx", "base_fy", "base_fz", "base_mz", "base_my", "base_mx")
 _AXES = ("1 0 0", "0 1 0", "0 0 1", "0 0 1", "0 1 0", "1 0 0")
 _WORLD = "base_stands_on"
 _FAR = "1e9"  # counts as no limit

@@ -43,7 +43,8 @@ class Robot:
     `rows` are the rows of the inverse dynamics that are measured; `moved` the velocity indices of
     the moved joints; `reference` the configuration (nq,) at which everything else stands. The
     inertias of `model` include that of the `payload`; `description` knows nothing of it. The first
-    `base_joints` joints are those of a base that moves (`base_joints.py`). With `visual_shapes`,
+    `base_joints` joints are those of a base that moves (`base_joints.py`), and `held` is the same
+    robot with that base held at its reference, for which motions are planned. With `visual_shapes`,
     the visual shapes of links without collision shapes count as such.
 
     Where joints follow others (`coupling`), `model` has all of them; `joint_names`, `rows` and
@@ -66,6 +67,7 @@ class Robot:
     payload: Payload | None = None
     visual_shapes: bool = False
     base_joints: int = 0
+    held: "Robot | None" = None
     coupling: Coupling | None = None
     motors: Motors | None = None
 
@@ -220,12 +222,12 @@ class Robot:
         rng = np.random.default_rng(seed)
         lower, upper = self.limits.ranges()
         speed = np.minimum(self.limits.velocity, _FASTEST)  # placeholders like 1e6 drown gravity
-        own = slice(self.base_joints, None)
-        drawn = ((lower, upper), (-speed, speed), (-3 * speed, 3 * speed))
-        shape = (count, self.n - self.base_joints)
-        q, v, a = (rng.uniform(low[own], high[own], shape) for low, high in drawn)
-        still = np.zeros((count, self.base_joints))
-        return np.hstack([still, q]), np.hstack([still, v]), np.hstack([still, a])
+        q = rng.uniform(lower, upper, (count, self.n))
+        v = rng.uniform(-speed, speed, (count, self.n))
+        a = rng.uniform(-3 * speed, 3 * speed, (count, self.n))
+        for x in (q, v, a):
+            x[:, : self.base_joints] = 0.0
+        return q, v, a
 
     def fingerprint(self) -> str:
         """Hash of what decides the regressor: URDF, moved joints, posture, base and rows.
@@ -272,15 +274,16 @@ def build_measured_robot(spec: RobotSpec, relative_to: Any = None) -> Robot:
     RobotError, ConfigError
         See `build_robot`; the robot has joints of the names of the base's.
     """
+    held = build_robot(spec, relative_to)
     if "base" not in spec.rows:
-        return build_robot(spec, relative_to)
+        return held
     description = load_description(spec.urdf, spec.package_dirs, relative_to, spec.xacro_args)
     joints = "all" if spec.joints == "all" else (*BASE_JOINTS, *spec.joints)
     fixed = spec.model_copy(update={"base": "fixed", "rows": ("joints",), "joints": joints})
     robot = _built(on_base_joints(_dense(description, spec)), fixed)
     count = len(BASE_JOINTS)
     rows = robot.rows if "joints" in spec.rows else robot.rows[:count]
-    return replace(robot, rows=rows, base_joints=count)
+    return replace(robot, rows=rows, base_joints=count, held=held)
 
 
 def _dense(description: RobotDescription, spec: RobotSpec) -> RobotDescription:
