@@ -19,6 +19,8 @@ WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 FORMS = [
     p for p in sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml")) if p.stem != "config"
 ]
+# Packages that messages tell to install and that are none of the program's own needs.
+OTHERS = {"robot_descriptions"}
 # Modules that a workflow installs itself or that are of the tools of development.
 TOOLS = {"pip", "build", "cibuildwheel", "pytest", "venv"}
 
@@ -163,7 +165,9 @@ def told_in(path: Path) -> list[str]:
 def test_what_messages_say_to_install_is_there() -> None:
     """The package by its name at pip, quoted for a shell, with an extra that has the library."""
     extras, name = PROJECT["project"]["optional-dependencies"], PROJECT["project"]["name"]
-    required = {re.split(r"[^\w-]", each)[0] for each in PROJECT["project"]["dependencies"]}
+    required = OTHERS | {
+        re.split(r"[^\w-]", each)[0] for each in PROJECT["project"]["dependencies"]
+    }
     pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md"]
     seen = set()
     for path in (*(ROOT / "excite_cli").rglob("*.py"), *pages):
