@@ -154,8 +154,9 @@ def fit(
     found = _record(regression, spec, linear, weak, prior)
     if not spec.consistent:
         return found
-    share = np.sqrt(np.clip(linear.samples / max(int(linear.count.sum()), 1), 0.0, 1.0))
-    factor = linear.factor * (share if share > 0 else 1.0)
+    data = linear if weak is None else weak.alone  # the prior of consistent sets is another one
+    share = np.sqrt(np.clip(data.samples / max(int(data.count.sum()), 1), 0.0, 1.0))
+    factor = data.factor * (share if share > 0 else 1.0)
     if more is not None:
         factor = triangle_of(np.concatenate([factor, more]))
     signs = np.array([p.nonnegative for p in effect_parameters(regression.effects)], bool)

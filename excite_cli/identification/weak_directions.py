@@ -30,11 +30,13 @@ _SURELY, _ABSURD = 5.0, 1e3
 class WeakDirections:
     """Rows [A b] (d, r+1) of d directions in units of standard deviations; `deviations` (r,).
 
-    The latter are those of the base parameters by the data alone, in usual sizes.
+    The latter are those of the base parameters by the data alone, in usual sizes; `alone` is that
+    fit.
     """
 
     rows: Array
     deviations: Array
+    alone: LinearFit
 
 
 def weak_directions(
@@ -53,4 +55,4 @@ def weak_directions(
     certain = (off > _SURELY * np.sqrt(np.maximum(variances, 0.0))) & (off < _ABSURD)
     weak = vectors[:, (variances > _WORSE) & ~certain].T
     rows = np.column_stack([weak @ whiten, weak @ target])
-    return WeakDirections(rows, np.sqrt(np.diag(covariance)) / usual)
+    return WeakDirections(rows, np.sqrt(np.diag(covariance)) / usual, linear)
