@@ -14,12 +14,12 @@ from pathlib import Path
 
 import coal
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.robot.description import RobotDescription
+from excite_cli.robot.formats.urdf_parts import origin_of
 from excite_cli.robot.mesh_paths import Kind, MeshFiles, unusable
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ def with_assumed_inertias(description: RobotDescription, density: float) -> Robo
 def _of_link(link: Element, kind: Kind, files: MeshFiles) -> _Moments | None:
     total = None
     for item in link.findall(kind):
-        place = _origin(item)
+        place = origin_of(item)
         for shape in item.findall("geometry/*"):
             own = _of_shape(shape, files)
             if own is not None:
@@ -102,13 +102,6 @@ def _give(link: Element, moments: _Moments, density: float) -> None:
              ("izz", 2, 2))  # fmt: skip
     figures = {name: repr(float(inertia[i, j])) for name, i, j in names}
     ElementTree.SubElement(inertial, "inertia", figures)
-
-
-def _origin(item: Element) -> pin.SE3:
-    origin = item.find("origin")
-    given = ("0 0 0" if origin is None else origin.get(key, "0 0 0") for key in ("xyz", "rpy"))
-    xyz, rpy = (np.array([float(x) for x in words.split()]) for words in given)
-    return pin.SE3(np.asarray(pin.rpy.rpyToMatrix(*rpy)), xyz)
 
 
 def _of_shape(shape: Element, files: MeshFiles) -> _Moments | None:
