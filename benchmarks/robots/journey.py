@@ -77,9 +77,17 @@ class _Steps:
             killed = f"it took longer than {_LONGEST:g} s"
             message = killed if process.returncode == -9 else f"signal {-process.returncode}"
             return process.returncode, None, message, seconds
-        last = told.strip().rpartition("\n")[2]
-        message = json.loads(last)["error"] if last.startswith("{") else told.strip()[-300:]
-        return process.returncode, json.loads(answer) if answer.strip() else None, message, seconds
+        given = json.loads(answer) if answer.strip() else None
+        return process.returncode, given, _message(told), seconds
+
+
+def _message(told: str) -> str:
+    """The error of a command with --json, else the end of what it told."""
+    last = (told.strip().splitlines() or [""])[-1]
+    try:
+        return str(json.loads(last)["error"])
+    except (ValueError, KeyError, TypeError):
+        return last[-300:]
 
 
 def travelled(source: Source, folder: Path, seed: int) -> Record:

@@ -26,6 +26,9 @@ _FINGERS = {"finger", "fingers", "thumb", "index", "pinky", "knuckle", "claw", "
 _AMONG_FINGERS = {"middle", "ring", "little"}
 _HANDS = {"hand", "gripper"}
 _WRISTS = {"yaw", "roll", "pitch", "wrist", "rotate", "flex"}
+_ON_GROUND = {"base", "world", "odom", "mobile", "virtual", "rootjoint", "root", "rootx", "rooty",
+              "rootz"}  # fmt: skip
+_GROUND = {"world", "odom", "map", "root", "base_footprint", "base_x", "base_y", "dummy"}
 _FINGER_SHARE = 0.1
 # A hand with this many fingers' joints, and at most so many others (a wrist), is a hand alone.
 _HAND, _WRIST = 8, 2
@@ -145,14 +148,11 @@ def _reason(joint: UrdfJoint, joints: tuple[UrdfJoint, ...]) -> str:
 
 def _planar_base(joint: UrdfJoint, joints: tuple[UrdfJoint, ...]) -> bool:
     """Whether it is one of the first joints, which slide or turn the whole robot on the ground."""
-    words = _words(joint.name)
-    on_ground = bool(words & {"base", "world", "odom", "mobile", "virtual", "rootjoint", "root"})
-    return (
-        on_ground
-        and joint.carried > 0.95
-        and len(joint.above) < 3
-        and joint.parent
-        in {"world", "odom", "map", "root", "base_footprint", "base_x", "base_y", "dummy"}
+    if not _words(joint.name) & _ON_GROUND or joint.carried <= 0.95 or len(joint.above) > 2:
+        return False
+    above = [other for other in joints if other.name in joint.above]
+    return joint.parent in _GROUND or (
+        bool(above) and all(_planar_base(other, joints) for other in above)
     )
 
 

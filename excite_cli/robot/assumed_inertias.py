@@ -14,12 +14,12 @@ from pathlib import Path
 
 import coal
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.robot.description import RobotDescription
+from excite_cli.robot.formats.urdf_parts import origin_of
 from excite_cli.robot.mesh_paths import Kind, MeshFiles, unusable
 
 Array = NDArray[np.float64]
@@ -59,11 +59,11 @@ def with_assumed_inertias(description: RobotDescription, density: float) -> Robo
     Collision shapes count, of links without any the visual ones; links whose shapes are missing or
     cannot be read stay without mass.
     """
-    root = ElementTree.fromstring(description.xml)
+    found: dict[str, _Moments] = {}
     files = MeshFiles(description)
     kinds: tuple[Kind, ...] = ("collision", "visual")
     lacking = {kind: unusable(description, kind) for kind in kinds}
-    for link in root.findall("link"):
+    for link in ElementTree.fromstring(description.xml).findall("link"):
         name = link.get("name", "")
         mass = link.find("inertial/mass")
         if mass is not None and float(mass.get("value", "0")) > 0:
@@ -72,15 +72,25 @@ def with_assumed_inertias(description: RobotDescription, density: float) -> Robo
         kind = next((kind for kind in usable if name not in lacking[kind]), None)
         moments = None if kind is None else _of_link(link, kind, files)
         if moments is not None and moments.volume > 0.0:
-            _give(link, moments, density)
-    text = ElementTree.tostring(root, encoding="unicode")
-    return replace(description, xml=text, urdf=text)
+            found[name] = moments
+    # The URDF is what exports start from.
+    xml, urdf = (_given(text, found, density) for text in (description.xml, description.urdf))
+    return replace(description, xml=xml, urdf=urdf)
+
+
+def _given(text: str, found: dict[str, _Moments], density: float) -> str:
+    """A URDF's text with an <inertial> for the links that were found."""
+    root = ElementTree.fromstring(text)
+    for link in root.findall("link"):
+        if link.get("name", "") in found:
+            _give(link, found[link.get("name", "")], density)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _of_link(link: Element, kind: Kind, files: MeshFiles) -> _Moments | None:
     total = None
     for item in link.findall(kind):
-        place = _origin(item)
+        place = origin_of(item)
         for shape in item.findall("geometry/*"):
             own = _of_shape(shape, files)
             if own is not None:
@@ -102,13 +112,6 @@ def _give(link: Element, moments: _Moments, density: float) -> None:
              ("izz", 2, 2))  # fmt: skip
     figures = {name: repr(float(inertia[i, j])) for name, i, j in names}
     ElementTree.SubElement(inertial, "inertia", figures)
-
-
-def _origin(item: Element) -> pin.SE3:
-    origin = item.find("origin")
-    given = ("0 0 0" if origin is None else origin.get(key, "0 0 0") for key in ("xyz", "rpy"))
-    xyz, rpy = (np.array([float(x) for x in words.split()]) for words in given)
-    return pin.SE3(np.asarray(pin.rpy.rpyToMatrix(*rpy)), xyz)
 
 
 def _of_shape(shape: Element, files: MeshFiles) -> _Moments | None:

@@ -19,6 +19,7 @@ from pathlib import Path
 from excite_cli.errors import RobotError, nearest
 from excite_cli.given_files import require_stored
 from excite_cli.robot.descriptions_package import PREFIX, Found, find_description
+from excite_cli.robot.dialects import put_into_standard
 from excite_cli.robot.formats.base import Asked
 from excite_cli.robot.formats.catalogue import as_urdf
 from excite_cli.robot.loops import Loop, closed_loops, loops_in_words
@@ -134,6 +135,7 @@ def load_description(
     path, dirs = file.path, (*extra, *file.package_dirs)
     found = as_urdf(path, _read(path), Asked(dirs, {**file.arguments, **(arguments or {})}))
     tree = parsed(path, found.text)
+    strange = put_into_standard(tree)
     followers, loops = mimics(path, tree), closed_loops(tree)
     packages = (*dirs, str(_share_folder(path)), str(path.parent), *found.folders)
     return RobotDescription(
@@ -145,7 +147,7 @@ def load_description(
         sha256=hashlib.sha256(found.text.encode()).hexdigest(),
         mimicking=followers,
         urdf=found.text,
-        notes=(*found.notes, *lost(followers, tree), *loops_in_words(loops)),
+        notes=(*found.notes, *strange, *lost(followers, tree), *loops_in_words(loops)),
         loops=loops,
         ignored=found.ignored,
     )
@@ -211,7 +213,7 @@ def _read(path: Path) -> str:
     try:
         if path.stat().st_size > MAX_URDF_BYTES:
             raise RobotError(f"{path} is larger than {MAX_URDF_BYTES // 10**6} MB: not a URDF.")
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8").rstrip("\0 \t\r\n")  # some files end so
     except (OSError, UnicodeDecodeError) as error:
         raise RobotError(f"{path} cannot be read as text: {error}") from error
     if "<!DOCTYPE" in text or "<!ENTITY" in text:

@@ -249,3 +249,21 @@ def test_one_base_parameter_has_another_criterion(tmp_path: Path) -> None:
     assert proposal.settled.problem.base.rank == 1
     assert parse_spec(proposal.text).criterion.kind == "log_det"
     assert "of one base parameter is always 1" in proposal.text
+
+
+def test_slides_and_turns_of_the_whole_robot_stay(tmp_path: Path) -> None:
+    """As MuJoCo's planar robots have them: three joints between the world and the trunk."""
+    bare = [f'<link name="{name}"/>' for name in ("world", "a", "b")]
+    written(
+        tmp_path,
+        *bare,
+        joint("rootz", "world", "a", GOOD, "prismatic"),
+        joint("rootx", "a", "b", GOOD, "prismatic"),
+        joint("rooty", "b", "trunk", GOOD),
+        link("trunk"),
+        joint("hip", "trunk", "leg", GOOD),
+        link("leg"),
+    )
+    proposal = propose(Request("robot.urdf", tmp_path))
+    assert proposal.joints == ("hip",)
+    assert proposal.left_out["joints of the base"] == ("rootz", "rootx", "rooty")

@@ -58,6 +58,15 @@ def test_they_are_those_of_mujoco(tmp_path: Path, name: str, kind: str) -> None:
     np.testing.assert_allclose(moments, theirs.inertia, rtol=2 * close)
 
 
+def test_exports_start_from_the_urdf_as_given(tmp_path: Path) -> None:
+    """With the masses, and its joints as they are."""
+    arm = link("arm", mass=-1)
+    written(tmp_path, link("base"), joint("j", "base", "arm", kind="continuous"), arm)
+    urdf = build_robot(RobotSpec(urdf="robot.urdf", density=1000.0), tmp_path).description.urdf
+    assert 'type="continuous"' in urdf
+    assert urdf.count("<mass") == 2
+
+
 def test_links_that_have_mass_keep_it(tmp_path: Path) -> None:
     written(tmp_path, link("base"), joint("j", "base", "arm", GOOD), link("arm", mass=0.7))
     dense = build_robot(RobotSpec(urdf="robot.urdf", density=1000.0), tmp_path)

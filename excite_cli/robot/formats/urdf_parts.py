@@ -21,6 +21,14 @@ def words(values: Array) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
+def origin_of(element: Element) -> pin.SE3:
+    """Where an element's <origin> places it."""
+    origin = element.find("origin")
+    given = ("0 0 0" if origin is None else origin.get(key, "0 0 0") for key in ("xyz", "rpy"))
+    xyz, rpy = (np.array([float(x) for x in text.split()]) for text in given)
+    return pin.SE3(np.asarray(pin.rpy.rpyToMatrix(*rpy)), xyz)
+
+
 def add_origin(element: Element, place: Array, turn: Array) -> None:
     """An <origin> at `place` (3,) [m], turned by `turn` (3, 3)."""
     figures = {"xyz": words(place), "rpy": words(pin.rpy.matrixToRpy(np.asarray(turn)))}

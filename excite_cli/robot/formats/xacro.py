@@ -26,9 +26,14 @@ class Xacro(RobotFormat):
     name = "xacro"
 
     def recognises(self, path: Path, text: str) -> bool:
-        """`.xacro`, or elements of `xmlns:xacro`; but no `.urdf`, in which such are left over."""
-        if path.suffix in (".xacro", ".urdf"):
-            return path.suffix == ".xacro"
+        """`.xacro`, or elements of `xmlns:xacro`.
+
+        In a `.urdf` such are left over, unless all of the robot is in what it includes.
+        """
+        if path.suffix == ".xacro":
+            return True
+        if path.suffix == ".urdf" and ("<xacro:include" not in text or "<joint" in text):
+            return False
         return bool(_NAMESPACE.search(text) and "<xacro:" in text)
 
     def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:

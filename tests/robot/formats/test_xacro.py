@@ -103,3 +103,14 @@ def test_a_package_that_lost_its_name_is_the_one_the_file_lies_in(tmp_path: Path
     assert found.xml.count("<joint") == 2
     assert f"file://{path.parents[1]}/m.stl" in found.xml
     assert any("the package 'arm_support' was not found: " in note for note in found.notes)
+
+
+def test_a_urdf_that_only_includes_is_a_xacro(tmp_path: Path) -> None:
+    path = _arm(tmp_path)
+    named = path.with_name("arm.urdf")
+    named.write_text(path.read_text())
+    assert load_description(str(named)).xml.count("<joint") == 2
+    left_over = path.read_text().replace("</robot>", '<joint name="mine"/></robot>')
+    named.write_text(left_over)
+    with pytest.raises(RobotError, match="joint 'mine' has the parent"):
+        load_description(str(named))
