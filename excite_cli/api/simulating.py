@@ -75,13 +75,14 @@ def simulate(
     with held({"output": output}, overwrite, inputs_of(problem, motions)):
         load_mujoco()
         robot = measured_case(problem).robot
+        whole = replace(robot, rows=robot.moved)  # friction is there, measured or not
         segments = load_motions(problem, motions, chosen, tell)
         if not segments:
             raise FileError("There is no motion to play.")
         planned, settings = _planned(problem, segments, settings, start, tell)
         takes = takes_of(planned, settings.repeat)
         planted = [each for text in effects for each in parse_planted(text, robot, takes)]
-        own = declared_effects(problem.spec.effects, robot) if declared else ()
+        own = declared_effects(problem.spec.effects, whole) if declared else ()
         if output is not None:
             _warn_of_conversion(problem.spec.measurement, tell)
         found = simulate_motions(

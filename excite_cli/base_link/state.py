@@ -20,7 +20,7 @@ from excite_cli.robot.base_joints import BASE_JOINTS
 from excite_cli.robot.link_frame import link_frame
 from excite_cli.robot.model import Robot
 
-_SLOWEST = 4.0  # s
+_SLOWEST = 4.0  # s, of a swing of the base that is told from drift
 _FARTHEST = 1.2  # rad: how far a base may pitch from its reference
 
 
@@ -79,14 +79,14 @@ def _from_imu(robot: Robot, run: Run, spec: ImuSpec) -> BaseState:
     force = channel_of(run, spec.accelerometer, 3, "measurement.base.imu.accelerometer")
     rate, force = rate @ rotation.T, force @ rotation.T
     turned = _integrated(rate - rate.mean(axis=0), run.step)
-    angles = _without_drift(turned.as_euler("ZYX"), run.duration)
+    angles = _without_drift(turned.as_euler("ZYX"), 1)
     spin = np.gradient(rate, run.step, axis=0)
     force = force - np.cross(spin, lever) - np.cross(rate, np.cross(rate, lever))
     gravity = reference_rotation(robot).T @ np.asarray(robot.model.gravity.linear)
     specific = Rotation.from_euler("ZYX", angles).apply(force)
     lean = _turn(specific.mean(axis=0), -gravity)
     speed = _integral(specific - specific.mean(axis=0), run.step)
-    moved = _without_drift(_integral(speed, run.step), run.duration)
+    moved = _without_drift(_integral(speed, run.step), 2 + round(run.duration / _SLOWEST))
     return BaseState(np.column_stack([moved, angles]), lean)
 
 
@@ -117,11 +117,11 @@ def _integral(x: Array, step: float) -> Array:
     return np.asarray(cumulative_trapezoid(x, dx=step, axis=0, initial=0.0))
 
 
-def _without_drift(x: Array, duration: float) -> Array:
-    """Without what is slower than a swing in `_SLOWEST` seconds."""
+def _without_drift(x: Array, degree: int) -> Array:
+    """Without the polynomial of that degree."""
     at = np.linspace(-1.0, 1.0, len(x))
-    degree = min(2 + round(duration / _SLOWEST), len(x) - 1)
-    return x - legendre.legval(at, legendre.legfit(at, x, degree)).T
+    fitted = legendre.legfit(at, x, min(degree, len(x) - 1))
+    return x - legendre.legval(at, fitted).T
 
 
 def _turn(a: Array, b: Array) -> Array:

@@ -135,8 +135,11 @@ def _place(named: NamedEffect, found: Diagnosis) -> str:
 
 
 def _first(named: NamedEffect) -> str:
-    """Its first number, which is its size."""
-    return _prefixed(next(iter(named.parameters.values())))
+    """Its first number, which is its size; of several alike (roll, pitch) the largest."""
+    linear = [p.name for p in catalogue()[named.effect.kind].parameters]
+    (start, first), *others = named.parameters.items()
+    alike = [x for name, x in others if {start, name} <= set(linear) and x.unit == first.unit]
+    return _prefixed(max([first, *alike], key=lambda each: abs(each.value)))
 
 
 def _prefixed(value: Value) -> str:

@@ -13,7 +13,7 @@ from excite_cli.diagnosis.in_runs import SeenRuns, changes, effects_of_runs
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.diagnosis.run_sets import sets_looked_at
 from excite_cli.effects.base import Effect, Signals
-from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named
+from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named, shows
 from excite_cli.effects.place import Place
 from excite_cli.effects.placing import places_named
 from excite_cli.errors import ConfigError, ExciteWarning
@@ -130,7 +130,8 @@ def _with(changed: list[tuple[Effect, int]], found: Effect) -> list[tuple[Effect
 def _places(kind: type[Effect], robot: Robot, spec: DiagnosisSpec) -> list[tuple[int, ...]]:
     if kind.carried and spec.carrying_links:
         return places_named(kind, spec.carrying_links, robot, "diagnosis.carrying_links")
-    return kind.places(robot)
+    places = kind.places(robot)
+    return [at for at in places if shows(kind(at), robot)] if robot.unmeasured else places
 
 
 def _searched(

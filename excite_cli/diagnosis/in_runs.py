@@ -21,6 +21,7 @@ from excite_cli.diagnosis.run_sets import (
     sets_looked_at,
 )
 from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.catalogue import shows
 from excite_cli.effects.place import Place
 from excite_cli.identification.declared_states import States, declared_sets
 from excite_cli.robot.model import Array, Robot
@@ -110,7 +111,7 @@ def changes(
     """
     if not kind.changes_between_runs or len(seen.trained) < 2:
         return []
-    places = kind.places(seen.robot)
+    places = [at for at in kind.places(seen.robot) if shows(kind(at), seen.robot)]
     sets = declared_sets(kind.kind, seen.states)
     tests = len(places) * sets_looked_at(len(seen.trained))
     found: list[tuple[Effect, int]] = []

@@ -8,6 +8,7 @@ from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.records import Round, Suspect
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.verdict import Verdict
+from excite_cli.diagnosis.words import joints_in_words
 from excite_cli.robot.model import Array
 
 _SUSPECTS = 5
@@ -47,9 +48,7 @@ def order_of(traced: Traced) -> list[int]:
 
 def _words(traced: Traced, i: int, joint_names: Sequence[str]) -> str:
     effect = traced.candidates[i].effect
-    where = ", ".join(joint_names[j] for j in effect.joints)
-    if len(effect.joints) == len(joint_names) > 2:
-        where = "all joints"
+    where = joints_in_words([joint_names[j] for j in effect.joints], len(joint_names))
     return f"{effect.kind} on {where}" + (f", by {effect.covariate}" if effect.covariate else "")
 
 

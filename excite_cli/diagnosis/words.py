@@ -1,6 +1,6 @@
 """A diagnosis in words, the same ones wherever it is reported."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate, Source
 from excite_cli.diagnosis.records import (
@@ -16,6 +16,7 @@ from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.fit_words import with_deviation
+from excite_cli.robot.base_joints import BASE_JOINTS
 
 # Effects that take off less than this part of the fall of the error are told with few words.
 SMALL_PART = 0.01
@@ -65,10 +66,16 @@ def other_name_of(kind: str) -> tuple[str, ...]:
     return known.same_as if known is not None else ()
 
 
+def joints_in_words(joints: Sequence[str], count: int) -> str:
+    """Names of joints, of `count` that there are."""
+    if tuple(joints) == BASE_JOINTS:
+        return "the base"
+    return "all joints" if len(joints) == count > 2 else ", ".join(joints)
+
+
 def place_in_words(record: EffectRecord, joints: int) -> str:
     """Where an effect is, on a robot with so many joints; with its column and runs, if any."""
-    whole = len(record.joints) == joints > 2
-    where = "all joints" if whole else ", ".join(record.joints)
+    where = joints_in_words(record.joints, joints)
     if record.link:
         where = f"{where}, frame of {record.link}"
     if record.covariate:

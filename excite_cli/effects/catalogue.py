@@ -154,14 +154,24 @@ def kind_named(name: str, where: str = "effects") -> type[Effect]:
 def declared_effects(specs: tuple[EffectSpec, ...] | None, robot: Robot) -> tuple[Effect, ...]:
     """Effects of the declared model; without `specs`, the friction of the URDF's <dynamics>.
 
+    Those that show in no measured row are none of it.
+
     Raises
     ------
     ConfigError
         A kind, joint or shape is unknown, or the joints do not fit the kind.
     """
     if specs is None:
-        return urdf_friction(robot)[0]
-    return tuple(effect for i, spec in enumerate(specs) for effect in _built(spec, i, robot))
+        found = urdf_friction(robot)[0]
+    else:
+        found = tuple(effect for i, spec in enumerate(specs) for effect in _built(spec, i, robot))
+    return tuple(effect for effect in found if shows(effect, robot))
+
+
+def shows(effect: Effect, robot: Robot) -> bool:
+    """Whether some row in which `effect` shows is measured."""
+    rows = effect.rows(robot.n)
+    return not {robot.joint_names[j] for j in rows} <= set(robot.unmeasured)
 
 
 def urdf_friction(robot: Robot) -> tuple[tuple[Effect, ...], Array]:

@@ -11,6 +11,7 @@ from excite_cli.diagnosis.words import (
     by_worth,
     counted,
     covariate_in_words,
+    joints_in_words,
     other_name_of,
     p_in_words,
     place_in_words,
@@ -138,4 +139,4 @@ def _absorbed(found: Diagnosis) -> Table:
 
 
 def _where(joints: Sequence[str], every: Sequence[str]) -> str:
-    return "all joints" if len(joints) == len(every) > 2 else ", ".join(joints)
+    return joints_in_words(joints, len(every))

@@ -18,6 +18,7 @@ from excite_cli.diagnosis.words import (
     counted,
     covariate_in_symbols,
     ends_in_words,
+    joints_in_words,
     p_in_words,
     place_in_words,
     rests_in_words,
@@ -130,7 +131,7 @@ def _absorbed(found: Diagnosis) -> Parts:
     rows = tuple(
         (
             each.kind,
-            ", ".join(each.joints) if len(each.joints) < 3 else "all joints",
+            joints_in_words(each.joints, len(found.joint_names)),
             ", ".join(each.by),
         )
         for each in found.absorbed

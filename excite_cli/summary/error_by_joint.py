@@ -59,9 +59,13 @@ def _errors(found: Diagnosis) -> dict[str, Errors]:
 
 
 def _joints(found: Diagnosis) -> Iterator[tuple[str, str]]:
-    """And their units of torque; files of earlier versions do not say whether joints slide."""
+    """Those whose torque was measured, with its unit.
+
+    Files of earlier versions do not say whether joints slide.
+    """
     units = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
-    return zip(found.joint_names, units, strict=True)
+    every = zip(found.joint_names, units, strict=True)
+    return ((joint, unit) for joint, unit in every if not isnan(found.after.rms[joint]))
 
 
 def _rms(error: Errors) -> dict[str, float]:

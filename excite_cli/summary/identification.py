@@ -1,6 +1,7 @@
 """What `excite identify` found, as tables and as data."""
 
 from collections.abc import Mapping
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +87,7 @@ def _error_table(found: Identification | StoredFit) -> Table:
             percent(found.training_error.relative[joint]),
         )
         for joint, unit in zip(joints, units, strict=True)
+        if not isnan(error.rms[joint])  # its torque was not measured
     )
     title = "Error of the torque on sealed data (raw: as recorded; training: where it was fitted)"
     names = ("joint", "moving", "all", "RMS", *floor_columns(floor), "raw RMS", "unit", "training")

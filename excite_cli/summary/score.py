@@ -1,6 +1,6 @@
 """A stored model beside new data, in sentences, tables and as data."""
 
-from math import isfinite
+from math import isfinite, isnan
 from typing import Any
 
 from excite_cli.diagnosis.words import place_in_words, title_of, value_in_words
@@ -112,6 +112,7 @@ def joints_table(found: Score) -> Table:
             max(found.runs, key=lambda run: _ratio(run, joint)).name if made else "",
         )
         for joint, unit in zip(found.joint_names, found.units, strict=True)
+        if not isnan(found.error.rms[joint])  # its torque was not measured
     )
     return Table(
         "Joints: error over all runs, and when the model was made",

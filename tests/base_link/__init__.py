@@ -1,0 +1,1 @@
+"""Tests of the base of a robot that stands."""

@@ -1,0 +1,117 @@
+"""How a base moved, from an inertial unit: accelerations and turns come back, drifts do not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from excite_cli.base_link.rows import with_base
+from excite_cli.base_link.state import base_state
+from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.config.wrench_spec import BaseStateSpec
+from excite_cli.errors import ConfigError, FileError
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.robot.model import Robot
+from tests.base_link.stander import FEET, Array, Swayed, stander, swayed
+
+STEP = 0.005
+UNIT = {"imu": {"link": "unit"}}
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return stander(tmp_path_factory.mktemp("urdf"))
+
+
+@pytest.fixture(scope="module")
+def log() -> Swayed:
+    return swayed(samples=1600, step=STEP)
+
+
+def accelerations(q: Array) -> Array:
+    return np.gradient(np.gradient(q, STEP, axis=0), STEP, axis=0)[100:-100]
+
+
+def test_a_unit_tells_how_the_base_accelerates_and_turns(robot: Robot, log: Swayed) -> None:
+    found = base_state(robot, log.run, BaseStateSpec.model_validate(UNIT))
+    truth = accelerations(log.q[:, :6])
+    rms = np.sqrt(np.mean((accelerations(found.q) - truth) ** 2, axis=0))
+    assert (rms < 0.05 * np.sqrt(np.mean(truth**2, axis=0))).all()
+    # What is slower than the polynomials is not known, and a base that stands has none of it.
+    assert np.abs(found.q - log.q[:, :6]).max() < 0.5 * np.abs(log.q[:, :6]).max()
+    assert found.lean is not None
+    assert np.linalg.norm(found.lean) < np.radians(0.1)
+
+
+def test_constant_errors_of_the_unit_do_no_harm(robot: Robot, log: Swayed) -> None:
+    biased = dict(log.run.extra)
+    biased["gyroscope"] = biased["gyroscope"] + [0.02, -0.03, 0.01]
+    biased["accelerometer"] = biased["accelerometer"] + [0.1, -0.05, 0.08]
+    spec = BaseStateSpec.model_validate(UNIT)
+    plain, found = (
+        base_state(robot, replace(log.run, extra=extra), spec).q
+        for extra in (log.run.extra, biased)
+    )
+    assert np.abs(accelerations(found) - accelerations(plain)).max() < 0.02
+
+
+def test_gravity_from_elsewhere_is_a_base_that_leans(robot: Robot, log: Swayed) -> None:
+    """The unit, and all that stands, turned by 3° of pitch: gravity turns the other way in it."""
+    tilt = Rotation.from_euler("y", 3.0, degrees=True)
+    axes = Rotation.from_euler("xyz", [0.4, 0.3, -1.0])
+    gravity = np.array([0.0, 0.0, 9.81])
+    turned = Rotation.from_euler("ZYX", log.q[:, 3:6])
+    change = turned.inv().apply(tilt.inv().apply(gravity) - gravity)
+    extra = dict(log.run.extra)
+    extra["accelerometer"] = extra["accelerometer"] + axes.inv().apply(change)
+    run = replace(log.run, extra=extra)
+    found = base_state(robot, run, BaseStateSpec.model_validate(UNIT))
+    assert found.lean == pytest.approx([0.0, np.radians(3.0), 0.0], abs=np.radians(0.1))
+    spec = MeasurementSpec.model_validate(
+        {"base": UNIT, "wrench": [{"channel": foot, "link": foot} for foot in FEET]}
+    )
+    _, told = with_base(robot, Dataset(robot.joint_names[6:], (run,)), spec, True)
+    assert [each.kind for each in told] == ["leaning"]
+    assert "leans by 3.0°" in told[0].text
+
+
+def test_a_base_of_which_nothing_is_said_stands(robot: Robot, log: Swayed) -> None:
+    found = base_state(robot, log.run, BaseStateSpec())
+    assert not found.q.any()
+    assert found.lean is None
+
+
+def test_a_pose_may_be_of_any_origin(robot: Robot, log: Swayed) -> None:
+    moved = dict(log.run.extra)
+    moved["pose"] = moved["pose"] + [5.0, -3.0, 1.0, 0, 0, 0, 0]
+    spec = BaseStateSpec(pose="pose")
+    found = base_state(robot, replace(log.run, extra=moved), spec).q
+    assert found == pytest.approx(log.q[:, :6], abs=1e-9)
+
+
+def test_a_base_on_its_side_has_axes_of_its_own(tmp_path: Path, log: Swayed) -> None:
+    """`base_orientation` is where it stands: coordinates count from there, along its axes."""
+    lying = stander(tmp_path, base_orientation=(0.0, 1.5707963267948966, 0.0))
+    reference = Rotation.from_euler("xyz", [0.0, np.pi / 2, 0.0])
+    pose = log.run.extra["pose"]
+    turned = reference * Rotation.from_quat(pose[:, 3:])
+    placed = np.column_stack([reference.apply(pose[:, :3]), turned.as_quat()])
+    run = replace(log.run, extra={"pose": placed})
+    assert base_state(lying, run, BaseStateSpec(pose="pose")).q == pytest.approx(
+        log.q[:, :6], abs=1e-9
+    )
+    with pytest.raises(FileError, match=r"pitches by 1.5\d rad from robot.base_orientation"):
+        base_state(lying, log.run, BaseStateSpec(pose="pose"))
+
+
+def test_a_unit_on_an_arm_is_refused(robot: Robot, log: Swayed) -> None:
+    spec = BaseStateSpec.model_validate({"imu": {"link": "left_hand"}})
+    with pytest.raises(ConfigError, match="'left_hand' moves in the base, with joint 'left_elbow'"):
+        base_state(robot, log.run, spec)
+
+
+def test_pose_and_unit_are_not_both_given() -> None:
+    with pytest.raises(ValueError, match="give pose or imu, not both"):
+        BaseStateSpec.model_validate({"pose": "pose", **UNIT})
