@@ -198,7 +198,7 @@ def load_data(
         (limits.lower[own], limits.upper[own], limits.velocity[own], limits.effort[own]),
         (~robot.sliding[own]).astype(float),
         motors_of(problem.spec.robot.transmissions, robot.joint_names[own]),
-        torques,
+        problem.spec.robot.rows,
     )
     raise_for_errors(data)
     if robot.base_joints:

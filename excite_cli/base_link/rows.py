@@ -19,6 +19,7 @@ from excite_cli.base_link.state import base_state
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.wrench_spec import WrenchSpec
 from excite_cli.dynamics.contact_frames import ContactFrame, contact_jacobians
+from excite_cli.measurement.base_channel import of_wrench
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.wrench_channels import channel_of
 from excite_cli.robot.base_joints import BASE_JOINTS
@@ -77,10 +78,7 @@ def with_base(
     findings: list[Finding] = []
     for run in data.runs:
         state = base_state(robot, run, spec.base)
-        wrenches = [
-            sign_of(each) * channel_of(run, each.channel, 6, "measurement.wrench")
-            for each in spec.wrench
-        ]
+        wrenches = [sign_of(each) * channel_of(run, of_wrench(each)) for each in spec.wrench]
         q = np.hstack([state.q, run.q])
         tau = np.hstack([np.zeros((len(run.t), count)), run.tau])
         for t, parts in enumerate(contact_jacobians(robot, frames, q)):

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from excite_cli.config.wrench_spec import BaseStateSpec, ImuSpec
 from excite_cli.errors import ConfigError, FileError
+from excite_cli.measurement.base_channel import of_base_state
 from excite_cli.measurement.dataset import Array, Run
 from excite_cli.measurement.wrench_channels import channel_of
 from excite_cli.robot.base_joints import BASE_JOINTS
@@ -45,10 +46,11 @@ def base_state(robot: Robot, run: Run, spec: BaseStateSpec) -> BaseState:
     ConfigError
         The unit's link is unknown or moves in the base.
     """
-    if spec.pose is not None:
-        found = BaseState(_from_pose(robot, channel_of(run, spec.pose, 7, "measurement.base.pose")))
-    elif spec.imu is not None:
-        found = _from_imu(robot, run, spec.imu)
+    measured = [channel_of(run, channel) for channel in of_base_state(spec)]
+    if spec.imu is not None:
+        found = _from_imu(robot, run, spec.imu, np.hstack(measured))
+    elif measured:
+        found = BaseState(_from_pose(robot, measured[0]))
     else:
         found = BaseState(np.zeros((len(run.t), len(BASE_JOINTS))))
     if np.abs(found.q[:, 4]).max(initial=0.0) > _FARTHEST:
@@ -72,12 +74,10 @@ def _from_pose(robot: Robot, pose: Array) -> Array:
     return np.column_stack([moved, np.unwrap(turned.as_euler("ZYX"), axis=0)])
 
 
-def _from_imu(robot: Robot, run: Run, spec: ImuSpec) -> BaseState:
+def _from_imu(robot: Robot, run: Run, spec: ImuSpec, readings: Array) -> BaseState:
     """A base that stands: what turns and moves comes back, constants are the sensors'."""
     rotation, lever = unit_on_base(robot, spec.link)
-    rate = channel_of(run, spec.gyroscope, 3, "measurement.base.imu.gyroscope")
-    force = channel_of(run, spec.accelerometer, 3, "measurement.base.imu.accelerometer")
-    rate, force = rate @ rotation.T, force @ rotation.T
+    rate, force = readings[:, :3] @ rotation.T, readings[:, 3:] @ rotation.T
     turned = _integrated(rate - rate.mean(axis=0), run.step)
     angles = _without_drift(turned.as_euler("ZYX"), 1)
     spin = np.gradient(rate, run.step, axis=0)

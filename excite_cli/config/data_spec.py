@@ -2,7 +2,7 @@
 
 from typing import ClassVar, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from excite_cli.config.section import (
     Finite,
@@ -143,16 +143,19 @@ class MeasurementSpec(Section):
     topic: str | None = Field(None, description="topic of a bag; default: the only JointState")
     filter: FilterSpec = FilterSpec()
 
-    @property
-    def of_base(self) -> frozenset[str]:
-        """Channels of the base and of what holds it, which belong to no joint."""
-        imu = self.base.imu
-        named = (
-            *(sensor.channel for sensor in self.wrench),
-            *((imu.gyroscope, imu.accelerometer) if imu else ()),
-            *((self.base.pose,) if self.base.pose else ()),
-        )
-        return frozenset(named)
+    @model_validator(mode="after")
+    def _each_channel_once(self) -> "MeasurementSpec":
+        names = [sensor.channel for sensor in self.wrench]
+        names += [self.base.pose] if self.base.pose else []
+        if self.base.imu is not None:  # one channel may hold both
+            names += {self.base.imu.gyroscope, self.base.imu.accelerometer}
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(
+                    f"the channel '{name}' is declared for two sensors of the base: give each its "
+                    "own (wrench: channel; base: pose, imu)"
+                )
+        return self
 
 
 class KnownPayloadSpec(Section):

@@ -42,9 +42,16 @@ class ImuSpec(Section):
     link: str | None = Field(
         None, description="link whose axes and origin are those of the unit; default: the root"
     )
-    gyroscope: str = Field("gyroscope", description="channel of ωx, ωy, ωz [rad/s]")
+    gyroscope: str = Field(
+        "gyroscope",
+        description="channel of ωx, ωy, ωz [rad/s]: a dataset (samples, 3), columns <channel>_x …, "
+        "or a topic of Imu",
+    )
     accelerometer: str = Field(
-        "accelerometer", description="channel of the specific force ax, ay, az [m/s²], 9.81 at rest"
+        "accelerometer",
+        description="channel of the specific force ax, ay, az [m/s²], 9.81 at rest. The name of "
+        "the gyroscope where one topic, or one dataset (samples, 6), columns <channel>_wx … "
+        "<channel>_az, has both",
     )
 
 
@@ -54,7 +61,7 @@ class BaseStateSpec(Section):
     pose: str | None = Field(
         None,
         description="channel of an estimator's x, y, z [m], qx, qy, qz, qw of the root of the "
-        "robot; the origin is taken from its mean",
+        "robot, or a topic of PoseStamped or Odometry; the origin is taken from its mean",
     )
     imu: ImuSpec | None = Field(
         None, description="taken where no pose is: the base sways about its reference"

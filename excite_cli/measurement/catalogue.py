@@ -1,6 +1,6 @@
 """Readers of measured files, and the one way from files to a `Dataset`."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,11 +11,12 @@ from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.given_files import require_stored
 from excite_cli.measurement.arrange import arrange, check_names, listed
 from excite_cli.measurement.bag_reader import BagReader
+from excite_cli.measurement.base_channel import channels_of_base
 from excite_cli.measurement.covariates import DeclaredCovariates
 from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.hdf5_reader import Hdf5Reader
-from excite_cli.measurement.joined_files import is_part, joined
+from excite_cli.measurement.joined_files import is_part, with_joined
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.motors import Motors
 from excite_cli.measurement.quality import checked
@@ -38,14 +39,15 @@ def read_dataset(
     limits: tuple[Array, Array, Array, Array] | None = None,
     revolute: Array | None = None,
     motors: Motors | None = None,
-    torques: bool = True,
+    rows: Collection[str] = ("joints",),
 ) -> Dataset:
     """Read measured files as one data set, converted and checked.
 
     `limits`: lower, upper, velocity, effort of the moved joints, (n,) each, infinite where there is
     none. `revolute` (n,): which joints turn (default all); angles in degrees are theirs. `motors`:
-    those that drive several joints together. Without `torques` those of no joint are read, as if
-    all were `without_torque`.
+    those that drive several joints together. `rows` are those of the robot that are measured
+    (`robot.rows`): without "joints" no torques of joints are read, as if all were `without_torque`;
+    with "base" the channels of the base must be there.
 
     Findings of severity `error` are returned with the others; `quality.raise_for_errors` turns
     them into an exception.
@@ -62,6 +64,7 @@ def read_dataset(
     if not paths:
         raise FileError("No measured file is given.")
     check_names(spec.names, joint_names if motors is None else (*joint_names, *motors.places))
+    torques = "joints" in rows
     if not torques:
         spec = spec.model_copy(update={"without_torque": joint_names, "coupling": {}})
     check_joints(spec, joint_names, torques)
@@ -75,13 +78,14 @@ def read_dataset(
     )
     channels: dict[str, str | None] = {str(key): name for key, name in spec.channels.items()}
     options = ReadOptions(
-        joint_names, spec.names, channels, spec.rate, spec.topic, torques, spec.of_base
-    )
+        joint_names, spec.names, channels, spec.rate, spec.topic, torques,
+        channels_of_base(spec) if "base" in rows else (),
+    )  # fmt: skip
     findings: list[Finding] = declared(spec, joint_names, motors)
     runs: list[Run] = []
     taken: set[str] = set()
     seen: set[str] = set()
-    covariates, spool = DeclaredCovariates(spec.covariates), Spool()
+    covariates, spool = DeclaredCovariates(spec.covariates, options.is_apart), Spool()
     noted: list[list[Finding]] = []
 
     def arranged() -> Iterator[tuple[Path, list[Run]]]:
@@ -114,19 +118,14 @@ def _recordings(paths: Sequence[Path], options: ReadOptions) -> Iterator[tuple[P
     Of one recording only: which file belongs to which of several cannot be known. It takes the
     place of the first.
     """
-    parts: list[tuple[Path, RawRun]] = []
     later: list[tuple[Path, list[RawRun]]] = []
     for path in paths:
         raws = reader_for(path).read(path, options)
-        parts += [(path, raw) for raw in raws if is_part(raw, options)]
-        whole = [raw for raw in raws if not is_part(raw, options)]
-        if parts:
-            later.append((path, whole))
-        elif whole:
-            yield path, whole
-    if parts:
-        later[0][1].append(joined(parts, options)[1])
-    yield from ((path, raws) for path, raws in later if raws)
+        if later or any(is_part(raw, options) for raw in raws):
+            later.append((path, raws))
+        else:
+            yield path, raws
+    yield from with_joined(later, options)
 
 
 def _checked(

@@ -5,7 +5,7 @@ an HDF5 array too), `<channel>_<number>` in any other array. They are often slow
 sample without a value takes it from its neighbours, linearly, and nothing else is filtered.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -44,9 +44,13 @@ def _of_array(name: str, values: Array) -> dict[str, Array]:
 
 @dataclass
 class DeclaredCovariates:
-    """The columns that a configuration declares, taken from one recording after the other."""
+    """The columns that a configuration declares, taken from one recording after the other.
+
+    Those that are `told` of need no word: they are declared as something else.
+    """
 
     names: tuple[str, ...]
+    told: Callable[[str], bool] = lambda name: False
     _known: dict[str, list[str]] = field(default_factory=dict)
     _untold: dict[str, None] = field(default_factory=dict)
 
@@ -56,7 +60,8 @@ class DeclaredCovariates:
         where = f"{run.origin.file}, run {run.name}" if run.origin.file else f"run {run.name}"
         self._known[where] = list(columns)
         if not self.names:
-            self._untold.update(dict.fromkeys(_worth_telling(raw)))
+            worth = (name for name in _worth_telling(raw) if not self.told(name))
+            self._untold.update(dict.fromkeys(worth))
         own = {name: columns[name].astype(float) for name in self.names if name in columns}
         return replace(run, covariates=own)
 

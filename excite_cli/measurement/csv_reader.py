@@ -34,21 +34,23 @@ class CsvReader(Reader):
         """
         table = read_table(path)
         columns = {_bare(name): values for name, values in table.columns.items()}
-        words = listed(list(columns))
+        words, samples = listed(list(columns)), len(next(iter(columns.values())))
+        apart = {name: columns.pop(name) for name in [*columns] if wanted.is_apart(name)}
         wanted = _by_fields(columns, wanted)
-        if not any((w := wanted.called(c)) and _joints(columns, w) for c in CHANNELS):
+        of_joints = any((w := wanted.called(c)) and _joints(columns, w) for c in CHANNELS)
+        if not of_joints and not apart:
             raise FileError(_no_columns(path, "q", wanted, words))
         time = wanted.called("t")
         stamped = time is not None and time in columns
         if stamped:
             t = columns.pop(str(time))
         else:
-            samples = len(next(iter(columns.values())))
             if wanted.rate is None:
                 words += nearest(time or "t", columns)
             t = times_from_rate(path, samples, wanted, words)
         channels, others = _by_channel(columns, wanted)
         numbered = all(name.isdigit() for name in channels["q"])
+        others |= apart
         return [RawRun("", t, channels, others, numbered, not stamped, table.findings)]
 
 

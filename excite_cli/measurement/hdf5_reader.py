@@ -206,8 +206,8 @@ def _by_channel(
     for key, array in arrays.items():
         channel = wanted.channel(key)
         matrix = array[:, None] if array.ndim == 1 and len(names) == 1 else array
-        if key in wanted.apart:
-            others[channel] = array
+        if wanted.is_apart(key):
+            others[key] = array
         elif matrix.ndim == 2 and matrix.shape[1] == len(names):
             columns[channel] = dict(zip(names, matrix.T, strict=True))
         elif channel in ("q", "dq", "tau"):

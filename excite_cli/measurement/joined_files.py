@@ -1,8 +1,8 @@
 """Files that hold channels of one recording each, joined to the recording.
 
-A logger may write positions, speeds and torques into files of their own. Where a file lacks
-positions or torques, it is joined with the others of that kind by its time stamps, which must be
-the same to the last digit: nothing is interpolated or guessed.
+A logger may write positions, speeds, torques and wrenches into files of their own. Where a file
+lacks positions, torques or sensors of the base, it is joined with the others of that kind by its
+time stamps, which must be the same to the last digit: nothing is interpolated or guessed.
 """
 
 from collections.abc import Sequence
@@ -21,18 +21,37 @@ _WORDS = {"q": "positions", "tau": "torques"}  # without which nothing can be sa
 
 
 def is_part(raw: RawRun, wanted: ReadOptions) -> bool:
-    """Whether it lacks positions or torques, if these are needed."""
+    """Whether it lacks positions, torques, or channels apart, of those that are needed."""
+    held = (any(map(channel.holds, raw.others)) for channel in wanted.apart)
+    return _lacks_joints(raw, wanted) or not all(held)
+
+
+def _lacks_joints(raw: RawRun, wanted: ReadOptions) -> bool:
     return any(not raw.columns.get(channel) for channel in wanted.needed)
 
 
-def joined(parts: Sequence[tuple[Path, RawRun]], wanted: ReadOptions) -> tuple[Path, RawRun]:
-    """One recording of all channels, named by what the files' names begin with alike.
+def with_joined(
+    files: Sequence[tuple[Path, list[RawRun]]], wanted: ReadOptions
+) -> list[tuple[Path, list[RawRun]]]:
+    """The recordings of `files`, parts of one joined in place of the first of them.
+
+    What lacks only channels apart stays as it is where there is no other part that could have them.
 
     Raises
     ------
     FileError
         Stamps differ, a channel is there twice, or positions or torques are in none of them.
     """
+    parts = [(path, raw) for path, raws in files for raw in raws if is_part(raw, wanted)]
+    if not any(_lacks_joints(raw, wanted) for _, raw in parts):
+        return list(files)
+    found = [(path, [raw for raw in raws if not is_part(raw, wanted)]) for path, raws in files]
+    found[[path for path, _ in files].index(parts[0][0])][1].append(_joined(parts, wanted))
+    return [(path, raws) for path, raws in found if raws]
+
+
+def _joined(parts: Sequence[tuple[Path, RawRun]], wanted: ReadOptions) -> RawRun:
+    """One recording of all channels, named by what the files' names begin with alike."""
     path, whole = parts[0]
     names = ", ".join(each.name for each, _ in parts)
     for other, raw in parts[1:]:
@@ -45,11 +64,11 @@ def joined(parts: Sequence[tuple[Path, RawRun]], wanted: ReadOptions) -> tuple[P
         for channel, by_joint in raw.columns.items():
             twice = sorted(set(columns.get(channel, {})) & set(by_joint))
             if twice:
-                raise FileError(
-                    f"{names}: '{channel}' of {twice[0]} is in more than one of these files. Give "
-                    "the files of one recording whose channels are apart, each channel once."
-                )
+                raise FileError(_twice(names, f"'{channel}' of {twice[0]}"))
             columns.setdefault(channel, {}).update(by_joint)
+        again = sorted(filter(wanted.is_apart, set(whole.others) & set(raw.others)))
+        if again:
+            raise FileError(_twice(names, f"'{again[0]}'"))
         others: dict[str, Array] = {**whole.others, **raw.others}
         findings = (*whole.findings, *raw.findings)
         whole = replace(whole, columns=columns, others=others, findings=findings)
@@ -67,4 +86,11 @@ def joined(parts: Sequence[tuple[Path, RawRun]], wanted: ReadOptions) -> tuple[P
     stems = [each.name.split(".")[0] for each, _ in parts]
     alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*stems, strict=False))
     name = "".join(letters[0] for letters in alike).rstrip("_-. ") or stems[0]
-    return path, replace(whole, name=name, numbered=all(each.isdigit() for each in positions))
+    return replace(whole, name=name, numbered=all(each.isdigit() for each in positions))
+
+
+def _twice(names: str, what: str) -> str:
+    return (
+        f"{names}: {what} is in more than one of these files. Give the files of one recording "
+        "whose channels are apart, each channel once."
+    )

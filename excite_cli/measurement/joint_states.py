@@ -8,18 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Finding
+from excite_cli.measurement.message_stamps import MessageStamps, Stamps, unstamped_finding
 from excite_cli.measurement.reader import FIELDS, SINCE_1970, RawRun, ReadOptions
 
 
 class _Messages:
     def __init__(self) -> None:
         self.places: list[int] = []
-        self.recorded: list[int] = []
-        self.stamped: list[int] = []
+        self.stamps = MessageStamps()
         self.values: dict[str, list[Array]] = {channel: [] for channel in FIELDS}
 
 
@@ -34,27 +33,27 @@ class JointStates:
     def add(self, recorded: int, message: Any) -> None:
         """Take a decoded message, recorded at `recorded` [ns]."""
         messages = self._by_names.setdefault(tuple(message.name), _Messages())
-        stamp = message.header.stamp
         messages.places.append(self._count)
         self._count += 1
-        messages.recorded.append(recorded)
-        messages.stamped.append(int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec))
+        messages.stamps.add(recorded, message.header.stamp)
         for channel, field in FIELDS.items():
             messages.values[channel].append(getattr(message, field))
 
-    def run(self, path: Path, wanted: ReadOptions) -> RawRun:
+    def run(self, path: Path, wanted: ReadOptions) -> tuple[RawRun, Stamps]:
         """The messages that hold the robot's joints, as recorded; t from the first stamp [s].
+
+        The stamps (T,) themselves, in ns, are given beside them.
 
         Raises
         ------
         FileError
-            No messages, or they carry no positions or no efforts, or no list of names holds the
-            robot's joints.
+            No messages, or they carry no positions, or no efforts if these are needed, or no list
+            of names holds the robot's joints.
         """
         if not self._by_names:
             raise FileError(f"{path}: topic {self.topic} has no messages.")
         chosen, findings = self._chosen(path, wanted)
-        parts = [self._arrays(path, names) for names in chosen]
+        parts = [self._arrays(path, names, wanted) for names in chosen]
         stamps = np.concatenate([part[0] for part in parts])
         # As recorded: whether stamps go back is for the checks to see and to say.
         order = np.argsort([place for names in chosen for place in self._by_names[names].places])
@@ -66,18 +65,18 @@ class JointStates:
                     for joint in chosen[0]
                 }
         if any(part[2] for part in parts):
-            text = "header stamps are empty: the time of recording is used, which is less even"
-            findings.append(Finding("stamps", "note", text))
+            findings.append(unstamped_finding(self.topic))
         stamps = stamps[order]
         # In whole nanoseconds up to here: an epoch in seconds leaves 0.2 µs of a double.
         t = (stamps - stamps[0]) * 1e-9
         if set(wanted.channels) & {"q", "dq", "tau"}:
             columns = self._renamed(path, columns, wanted)
         epoch = float(stamps[0]) * 1e-9  # of a simulator's clock it is no date
-        return RawRun(
+        run = RawRun(
             "", t, columns, {}, False, True, tuple(findings), self.topic,
             epoch if epoch > SINCE_1970 else None,
         )  # fmt: skip
+        return run, stamps
 
     def _chosen(
         self, path: Path, wanted: ReadOptions
@@ -88,7 +87,7 @@ class JointStates:
             return len({wanted.names.get(name, name) for name in names} & set(wanted.joints))
 
         def rank(names: tuple[str, ...]) -> tuple[int, int]:
-            return moved(names), len(self._by_names[names].recorded)
+            return moved(names), len(self._by_names[names].stamps)
 
         best = max(self._by_names, key=rank)
         chosen = [names for names in self._by_names if sorted(names) == sorted(best)]
@@ -106,33 +105,30 @@ class JointStates:
             text = f"topic {self.topic} changes the order of joints; matched by name"
             findings.append(Finding("order", "note", text))
         if left:
-            count = sum(len(self._by_names[names].recorded) for names in left)
+            count = sum(len(self._by_names[names].stamps) for names in left)
             joints = sorted({name for names in left for name in names})
             text = f"{count} messages of {', '.join(joints) or 'no joints'} left out"
             findings.append(Finding("left_out", "note", text))
         return chosen, findings
 
     def _arrays(
-        self, path: Path, names: tuple[str, ...]
-    ) -> tuple[NDArray[np.int64], dict[str, dict[str, Array]], bool]:
+        self, path: Path, names: tuple[str, ...], wanted: ReadOptions
+    ) -> tuple[Stamps, dict[str, dict[str, Array]], bool]:
         messages = self._by_names[names]
-        recorded = np.array(messages.recorded, dtype=np.int64)
-        stamped = np.array(messages.stamped, dtype=np.int64)
-        # A first stamp of 0 is a clock that starts there; more of them, a header left empty.
-        unstamped = bool(np.count_nonzero(stamped <= 0) > 1)
-        stamps = recorded if unstamped else stamped
+        stamps, unstamped = messages.stamps.chosen()
         columns: dict[str, dict[str, Array]] = {}
         for channel, field in FIELDS.items():
             sizes = {len(values) for values in messages.values[channel]}
             if sizes == {len(names)}:
                 matrix = np.array(messages.values[channel], dtype=float)
                 columns[channel] = dict(zip(names, matrix.T, strict=True))
-            elif sizes == {0} and channel == "dq":
+            elif sizes == {0} and channel not in wanted.needed:
                 pass
             elif sizes == {0}:
                 raise FileError(
-                    f"{path}: messages of topic {self.topic} carry no {field}; positions and "
-                    "efforts are needed. Record a driver that publishes both."
+                    f"{path}: messages of topic {self.topic} carry no {field}; needed: "
+                    f"{' and '.join(FIELDS[each] for each in wanted.needed)}. Record a driver that "
+                    "publishes them."
                 )
             else:
                 raise FileError(

@@ -13,6 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.errors import FileError
+from excite_cli.measurement.base_channel import BaseChannel
 from excite_cli.measurement.dataset import Array, Finding
 
 MAX_BYTES = 4 * 2**30  # of a file
@@ -30,7 +31,8 @@ class ReadOptions:
     `channels`: the file's name of t, q, dq, tau where it differs; None leaves a channel out.
     `rate` [Hz] of files without time stamps; `topic` of a bag; `joints` the robot's names with
     `names` (file's name -> joint), for readers that must choose between sources. Without `torques`
-    a file need not hold any. Channels `apart` belong to no joint, however many columns they have.
+    a file need not hold any. Channels `apart` belong to no joint, whatever they are called and
+    however many columns they have; without them nothing can be said either.
     """
 
     joints: tuple[str, ...]
@@ -39,12 +41,16 @@ class ReadOptions:
     rate: float | None = None
     topic: str | None = None
     torques: bool = True
-    apart: frozenset[str] = frozenset()
+    apart: tuple[BaseChannel, ...] = ()
 
     @property
     def needed(self) -> tuple[str, ...]:
         """Channels without which nothing can be said."""
         return ("q", "tau") if self.torques else ("q",)
+
+    def is_apart(self, column: str) -> bool:
+        """Whether a column or array of that name belongs to no joint."""
+        return any(channel.holds(column) for channel in self.apart)
 
     def called(self, channel: str) -> str | None:
         """The file's name of a channel; None if it is to be left out."""

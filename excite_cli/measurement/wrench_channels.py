@@ -1,43 +1,37 @@
-"""Channels of a log that belong to no joint, by name: six columns of a wrench, three of a gyro."""
-
-from collections.abc import Sequence
+"""Channels of a run that belong to no joint: six columns of a wrench, three of a gyroscope."""
 
 import numpy as np
 
 from excite_cli.errors import FileError, nearest
 from excite_cli.measurement.arrange import listed
+from excite_cli.measurement.base_channel import BaseChannel
 from excite_cli.measurement.dataset import Array, Run
 
-_PARTS = {
-    3: ("x", "y", "z"),
-    6: ("fx", "fy", "fz", "mx", "my", "mz"),
-    7: ("x", "y", "z", "qx", "qy", "qz", "qw"),
-}
 
-
-def channel_of(run: Run, name: str, width: int, where: str) -> Array:
-    """The channel `name` (T, width) of a run: one array, or columns `<name>_x` and so on.
+def channel_of(run: Run, channel: BaseChannel) -> Array:
+    """The values (T, width) of a channel: one array of the run, or columns `<name>_x` and so on.
 
     Raises
     ------
     FileError
         It is missing, of another width, or holds what is not finite.
     """
+    name, where, width = channel.name, channel.where, len(channel.parts)
     found = run.extra.get(name)
     if found is None:
-        columns = [run.extra.get(f"{name}_{part}") for part in _PARTS[width]]
-        there = [column for column in columns if column is not None]
+        there = [run.extra[column] for column in channel.columns if column in run.extra]
         if len(there) == width:
             found = np.column_stack(there)
     if found is None:
         raise FileError(
-            f"run '{run.label}' has no channel '{name}'{_parts(name, width)}, which {where} names."
-            f"{nearest(name, run.extra)} Further channels there: {listed(sorted(run.extra))}."
+            f"run '{run.label}' has no channel '{name}' (nor {channel.columns[0]} … "
+            f"{channel.columns[-1]}), which {where} names.{nearest(name, run.extra)} "
+            f"Further channels there: {listed(sorted(run.extra))}."
         )
     if found.shape != (len(run.t), width):
         raise FileError(
             f"run '{run.label}': channel '{name}' ({where}) has the shape {found.shape}; expected "
-            f"is ({len(run.t)}, {width}): {', '.join(_PARTS[width])}."
+            f"is ({len(run.t)}, {width}): {', '.join(channel.parts)}."
         )
     if not np.isfinite(found).all():
         bad = int(np.sum(~np.isfinite(found).all(axis=1)))
@@ -46,8 +40,3 @@ def channel_of(run: Run, name: str, width: int, where: str) -> Array:
             f"{len(found)} samples. Cut the run there, or fill them."
         )
     return np.asarray(found, dtype=float)
-
-
-def _parts(name: str, width: int) -> str:
-    parts: Sequence[str] = _PARTS[width]
-    return f" (nor {name}_{parts[0]} … {name}_{parts[-1]})"

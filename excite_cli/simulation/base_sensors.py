@@ -17,6 +17,7 @@ from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.wrench_spec import ImuSpec
 from excite_cli.dynamics.contact_frames import contact_jacobians
 from excite_cli.dynamics.inertial_unit import readings
+from excite_cli.measurement.base_channel import of_base_state, of_imu, of_wrench
 from excite_cli.measurement.dataset import Array, Run
 from excite_cli.robot.model import Robot
 from excite_cli.simulation.settings import SimulationSettings
@@ -51,12 +52,12 @@ class Instruments:
         extra = dict(run.extra)
         for k, spec in enumerate(self.measurement.wrench):
             held = wrenches[:, k] + noise * rng.normal(size=wrenches[:, k].shape)
-            extra[spec.channel] = sign_of(spec) * held
+            extra[of_wrench(spec).name] = sign_of(spec) * held
         moves = self.measurement.base
-        if moves.pose is not None:
-            extra[moves.pose] = _pose(robot, run)
-        elif moves.imu is not None:
+        if moves.imu is not None:
             extra |= self._unit(robot, run, moves.imu, gravity, rng)
+        else:
+            extra |= {channel.name: _pose(robot, run) for channel in of_base_state(moves)}
         dq = None if run.dq is None else run.dq[:, count:]
         return replace(run, q=run.q[:, count:], dq=dq, tau=tau, extra=extra)
 
@@ -71,7 +72,9 @@ class Instruments:
         settings = self.settings
         rates = rates + settings.rate_noise * rng.normal(size=rates.shape)
         forces = forces + settings.acceleration_noise * rng.normal(size=forces.shape)
-        return {spec.gyroscope: rates, spec.accelerometer: forces}
+        both = np.hstack([rates, forces])
+        names = [channel.name for channel in of_imu(spec)]
+        return dict(zip(names, np.split(both, len(names), axis=1), strict=True))
 
 
 def _pose(robot: Robot, run: Run) -> Array:
