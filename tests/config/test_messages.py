@@ -192,6 +192,9 @@ def test_keys_of_another_kind_are_not_offered(
     ("text", "path", "words"),
     [
         ("optimizer: {restarts: many}", "optimizer.restarts", "integer (given: 'many')"),
+        ("measurement: {wrench: [{channel: foot}, {channel: foot}]}", "measurement",
+         "'foot' is declared for two sensors of the base"),
+        ("measurement: {base: {imu: {gyroscope: wrench}}}", "measurement", "'wrench' is declared"),
         ("sequence: {motions: 1.5}", "sequence.motions", "(given: 1.5)"),
         ("sequence: {motions: 0}", "sequence.motions", "greater than or equal to 1"),
         ("seed: -1", "seed", "greater than or equal to 0 (given: -1)"),
