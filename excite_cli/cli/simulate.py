@@ -119,6 +119,25 @@ def simulate(
             "--encoder", rich_help_panel=_MEASURED, help="Resolution of the encoders, in rad (m)."
         ),
     ] = 2e-5,
+    wrench_noise: Annotated[
+        str | None,
+        typer.Option(
+            "--wrench-noise",
+            rich_help_panel=_MEASURED,
+            metavar="FORCE,MOMENT",
+            help="Noise of wrenches [N, N·m], where robot.rows has base. Default: 2,0.5.",
+        ),
+    ] = None,
+    imu_noise: Annotated[
+        str | None,
+        typer.Option(
+            "--imu-noise",
+            rich_help_panel=_MEASURED,
+            metavar="ACCELERATION,RATE",
+            help="Noise of the base's inertial unit [m/s², rad/s], where the config declares one. "
+            "Default: 0.02,0.001.",
+        ),
+    ] = None,
     inertia_error: Annotated[
         float,
         typer.Option(
@@ -173,6 +192,7 @@ def simulate(
     from excite_cli.api.simulating import SimulationSettings, parse_series, simulation_answer
     from excite_cli.api.simulating import simulate as simulate_motions
     from excite_cli.api.threads import single_threaded
+    from excite_cli.cli.base_noise import base_noise
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     start = start_from(posture, entry)
@@ -190,6 +210,7 @@ def simulate(
             pause=pause,
             torque_limits=torque_limits,
             covariates=parse_series(covariate or ()),
+            **base_noise(case.spec, wrench_noise, imu_noise),
         )
         with terminal.live("simulating") as line:
             found = simulate_motions(

@@ -16,6 +16,10 @@ WARM = (
     "--covariate", "temp=25,end:45,time_constant:600,noise:0.1", "--pause", "300",
     "--effect", "covariate_offset@elbow=0.2,reference:25;covariate:temp",
 )  # fmt: skip
+STANDING = (
+    "--set", "robot.base=floating", "--set", "robot.rows=[base]",
+    "--set", "measurement.base.imu.link=base",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -112,6 +116,11 @@ def test_people_get_tables_and_quiet_ones_nothing_else(excite: Program, two_moti
         (("--covariate", "temp=warm"), "'warm' is not a finite number"),
         (("--rate", "9000"), "rate: 9000 Hz cannot be recorded"),
         (("--set", "robot.joints=[elbow]"), "moves other joints than"),
+        ((*STANDING, "--wrench-noise", "2"), "--wrench-noise: '2' is not FORCE,MOMENT [N, N·m]"),
+        ((*STANDING, "--imu-noise", "0.1,-1"), "'0.1,-1' is not ACCELERATION,RATE"),
+        ((*STANDING, "--imu-noise", "0.1,inf"), "for example --imu-noise 0.02,0.001"),
+        (("--wrench-noise", "2,0.5"), "--wrench-noise: no wrench is measured; robot.rows"),
+        ((*STANDING[:4], "--imu-noise", "1,1"), "--imu-noise: no inertial unit is declared"),
     ],
 )
 def test_bad_input(
@@ -121,6 +130,23 @@ def test_bad_input(
     assert run.returncode == 2, run.stderr
     assert words in run.stderr.replace("\n", " ")
     assert not (excite.folder / "x.h5").exists()
+
+
+def test_noise_of_the_sensors_of_a_standing_robot(excite: Program, two_motions: Run) -> None:
+    found = {}
+    for name, wrench, imu in (("a", "0,0", "0,0"), ("b", "3,0.2", "0.1,0.01")):
+        run = excite(
+            "simulate", SMOKE, two_motions.path, "-o", f"{name}.h5", "--motion", "1", *STANDING,
+            "--wrench-noise", wrench, "--imu-noise", imu, "--torque-noise", "0",
+        )  # fmt: skip
+        assert run.returncode == 0, run.stderr
+        with h5py.File(excite.folder / f"{name}.h5") as file:
+            group = file["runs/motion_1"]
+            keys = ("wrench", "accelerometer", "gyroscope")
+            found[name] = np.hstack([group[key][()] for key in keys])
+    noise = (found["b"] - found["a"]).std(axis=0)
+    planted = np.repeat([3.0, 0.2, 0.1, 0.01], 3)
+    np.testing.assert_allclose(noise, planted, rtol=0.1)
 
 
 def test_a_config_that_converts_is_warned_about(excite: Program, two_motions: Run) -> None:
