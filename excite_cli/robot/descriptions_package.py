@@ -71,8 +71,8 @@ def _module(name: str) -> str:
     spec = find_spec(_PACKAGE)
     if spec is None or not spec.submodule_search_locations:
         raise MissingExtraError(
-            f"{PREFIX}{name} needs the package robot_descriptions, which is not installed. Run: "
-            "pip install robot_descriptions, or give a file of the robot (init: --urdf)."
+            f"{PREFIX}{name} needs the package robot_descriptions of PyPI, which is not installed. "
+            "Install it with pip, or give a file of the robot (init: --urdf)."
         )
     folder = Path(next(iter(spec.submodule_search_locations)))
     known = sorted(

@@ -73,5 +73,5 @@ def test_what_cannot_be_had_is_told_with_a_way_on(package: Path, name: str, word
 def test_without_the_package_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(descriptions_package, "_PACKAGE", "no_descriptions")
     find_description.cache_clear()
-    with pytest.raises(MissingExtraError, match="pip install robot_descriptions, or give a file"):
+    with pytest.raises(MissingExtraError, match="Install it with pip, or give a file"):
         load_description("robot_descriptions:ur10e_description")

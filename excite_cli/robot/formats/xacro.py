@@ -6,7 +6,8 @@ evaluated here, without builtins and without what leads to them.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -61,6 +62,7 @@ class Xacro(RobotFormat):
         substitution._eval_find = substitution._eval_dict["find"] = find
         substitution._eval = _substituted
         library.safe_eval = _evaluated
+        library.parse = partial(_parsed, library.parse)
         try:
             text = library.process_file(str(path), mappings=arguments).toxml()
         except Exception as error:  # xacro raises whatever an expression raises
@@ -78,6 +80,18 @@ class Xacro(RobotFormat):
             for name, folder in stand_ins.items()
         )
         return Urdf(text, folders, notes)
+
+
+def _parsed(parse: Callable[..., Any], given: Any, name: str | None = None) -> Any:
+    """The document, with what xacro took without its prefix until 2020: properties and includes."""
+    document = parse(given, name)
+    for element in document.documentElement.childNodes:
+        old = element.nodeName in ("property", "include") and element.hasAttribute(
+            "value" if element.nodeName == "property" else "filename"
+        )
+        if old:
+            element.tagName = element.nodeName = f"xacro:{element.nodeName}"
+    return document
 
 
 def _reason(error: BaseException) -> str:

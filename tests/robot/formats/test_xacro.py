@@ -114,3 +114,11 @@ def test_a_urdf_that_only_includes_is_a_xacro(tmp_path: Path) -> None:
     named.write_text(left_over)
     with pytest.raises(RobotError, match="joint 'mine' has the parent"):
         load_description(str(named))
+
+
+def test_properties_without_the_prefix_are_read(tmp_path: Path) -> None:
+    """As xacro took them until 2020, and ROS-Industrial's robots still have them."""
+    path = _arm(tmp_path, mass="${heavy}")
+    old = '<property name="heavy" value="7.5"/><xacro:arg'
+    path.write_text(path.read_text().replace("<xacro:arg", old, 1))
+    assert 'mass value="7.5"' in load_description(str(path)).xml
