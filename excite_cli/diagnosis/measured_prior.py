@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.errors import FileError
+from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
@@ -68,6 +68,12 @@ def _rows(problem: Problem, objective: Objective, run: PreparedRun, every: int) 
     names = dict(zip(BASE_ROWS, range(base), strict=False))
     names |= {name: base + j for j, name in enumerate(robot.joint_names)}
     usable = np.zeros(block.shape[:2], dtype=bool)
+    missing = [row for row in robot.row_names if row not in names]
+    if missing:
+        raise ConfigError(
+            f"--prior: the data have nothing of {', '.join(missing)}, which robot.rows asks for: "
+            "read them with `load_data` and a config whose measurement.wrench says where it is."
+        )
     for index, row in enumerate(robot.row_names):
         usable[:, index] = run.usable[::every, names[row]]
     return np.asarray(block[usable])

@@ -116,7 +116,7 @@ class Quantities:
         self, data: TrainingData, signals: Sequence[Signals], joint_names: Sequence[str]
     ) -> None:
         self._data, self._names = data, joint_names
-        self._base = signals[0].body.robot.base_joints  # known hardly beyond its noise
+        self._base = data.runs[0].base_rows  # known hardly beyond its noise
 
         def averaged(series: Sequence[Array]) -> list[Array]:
             return [run.averaged(x) for run, x in zip(data.runs, series, strict=True)]

@@ -270,7 +270,7 @@ def _quantities(
     covariates = [Covariate("time")]
     longest = float(max(x.t[-1] for x in signals))
     made: list[Callable[[Signals], Array]] = [lambda s: _powers(s.t, longest)]
-    first = signals[0].body.robot.base_joints  # how a base sways is known hardly beyond its noise
+    first = data.runs[0].base_rows  # how a base sways is known hardly beyond its noise
     for k, name in enumerate(joint_names[first:], first):
         fastest = max(float(np.abs(s.v[:, k]).max()) for s in signals) + 1e-12
         strongest = max(float(np.abs(s.a[:, k]).max()) for s in signals) + 1e-12

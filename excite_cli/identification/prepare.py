@@ -49,7 +49,8 @@ class PreparedRun:
     For fits every joint has averages of its own, which leave out invalid samples and those in
     which it stands or reverses; `tau_fit` (M, n) are those of the torque, `usable` (M, n) where
     enough is left. `rounding`: what is uncertain in them where torques are recorded in steps, per
-    joint (`rounding_of`). `before` (L, n): positions at the working rate until `t` begins.
+    joint (`rounding_of`). `before` (L, n): positions at the working rate until `t` begins. The first
+    `base_rows` joints are a base's.
     """
 
     run: RunId
@@ -71,6 +72,7 @@ class PreparedRun:
     covariates: Mapping[str, Array] = field(default_factory=dict)
     rounding: tuple[csr_matrix | None, ...] = ()
     before: Array | None = None
+    base_rows: int = 0
 
     def averaged(self, columns: Array) -> Array:
         """A applied along the first axis of (T, …)."""
@@ -154,6 +156,7 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
         usable=np.stack([each.filled for each in fit], axis=1),
         step=float((centers[1] - centers[0]) * h),
         start=run.start,
+        base_rows=run.base_rows,
         covariates={name: values[keep] for name, values in run.covariates.items()},
         before=past[len(past) % stride :: stride],
         rounding=() if run.torque_step is None else tuple(each.rounding for each in fit),
