@@ -49,8 +49,8 @@ class PreparedRun:
     For fits every joint has averages of its own, which leave out invalid samples and those in
     which it stands or reverses; `tau_fit` (M, n) are those of the torque, `usable` (M, n) where
     enough is left. `rounding`: what is uncertain in them where torques are recorded in steps, per
-    joint (`rounding_of`). `before` (L, n): positions at the working rate until `t` begins. The first
-    `base_rows` joints are a base's.
+    joint (`rounding_of`). `before` (L, n): positions at the working rate until `t` begins. The
+    first `base_rows` joints are a base's.
     """
 
     run: RunId
