@@ -57,6 +57,19 @@ def test_grippers_whose_fingers_follow(parts: tuple, base: str) -> None:
     assert_same_dynamics(coupled_robot(parts, base=base))
 
 
+@pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
+def test_followers_stay_where_they_are_led_while_the_robot_falls(parts: tuple) -> None:
+    robot = coupled_robot(parts, posture={"shoulder": 0.5})
+    plant = build_plant(robot, standard_parameters(robot))
+    data = plant.new_data()
+    data.qpos[:] = plant.coordinates(robot.posture)
+    for _ in range(400):
+        mujoco.mj_step(plant.model, data)
+    fallen = data.qpos[plant.motor]
+    assert np.abs(fallen - robot.posture).max() > 0.02
+    np.testing.assert_allclose(data.qpos, plant.coordinates(fallen), atol=1e-6)
+
+
 def test_a_follower_without_mass_is_told(tmp_path: Path) -> None:
     head, tail = urdf_of(HAND).split('<link name="right_finger">')
     rest = tail[tail.index("</inertial>") + len("</inertial>") :]
