@@ -71,7 +71,7 @@ def kinds() -> tuple[str, ...]:
     return tuple(
         name
         for name, kind in catalogue().items()
-        if not (kind.of_campaign or kind.follows_covariate or name in own)
+        if not (kind.of_campaign or kind.follows_covariate or kind.scope == "base" or name in own)
     )
 
 
