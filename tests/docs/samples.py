@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +20,16 @@ from excite_cli import (
     simulate,
     write_dataset,
 )
+from excite_cli.robot.model import Array
 from excite_cli.simulation.settings import SimulationSettings
 
 ROOT = Path(__file__).resolve().parents[2]
+_STANDING = "  base: floating\n  rows: [base]\n"
+_SENSORS = """
+measurement:
+  wrench: [{channel: /foot/wrench}]
+  base: {imu: {gyroscope: /imu, accelerometer: /imu}}
+"""
 _PLANNING = ["optimizer.max_iterations=8", "sequence.motions=3"]
 
 
@@ -43,6 +50,10 @@ class Samples:
             "measured.csv": self._csv,
             "deg.csv": self._degrees,
             "measured_bag": self._bag,
+            "standing.yaml": _standing_config,
+            "standing_positions.csv": self._standing_positions,
+            "standing_foot.csv": self._standing_foot,
+            "standing_bag": self._standing_bag,
             "fit.h5": self._fit,
             "diagnosis.h5": self._diagnosis,
         }
@@ -105,6 +116,42 @@ class Samples:
                 message = state(header=when, name=names, position=q, velocity=0 * q, effort=tau)
                 writer.write(connection, at, store.serialize_cdr(message, kind))
 
+    def _standing(self) -> Dataset:
+        """The arm on one foot, with an inertial unit."""
+        from excite_cli import read_result
+
+        self._made("arm.urdf", _urdf)
+        case = load_case(self._made("standing.yaml", _standing_config))
+        motions = read_result(self._made("arm.h5", self._motions))
+        return simulate(case, motions, (), SimulationSettings(rate=100.0), chosen=[1]).dataset
+
+    def _standing_positions(self, path: Path) -> None:
+        data = self._standing()
+        run, names = data.runs[0], [f"q_{name}" for name in data.joint_names]
+        _write_table(path, {"t": run.t, **dict(zip(names, run.q.T, strict=True))})
+
+    def _standing_foot(self, path: Path) -> None:
+        run = self._standing().runs[0]
+        both = {"foot_wrench": ("fx", "fy", "fz", "mx", "my", "mz"),
+                "imu": ("wx", "wy", "wz", "ax", "ay", "az")}  # fmt: skip
+        columns = {
+            f"{channel}_{part}": run.extra[channel][:, k]
+            for channel, parts in both.items()
+            for k, part in enumerate(parts)
+        }
+        _write_table(path, {"t": run.t, **columns})
+
+    def _standing_bag(self, path: Path) -> None:
+        from tests.measurement.standing_bags import IMU, WRENCH, States, Topic, write_standing
+
+        data = self._standing()
+        run = data.runs[0]
+        topics = {
+            "/foot/wrench": Topic(WRENCH, run.t, run.extra["foot_wrench"]),
+            "/imu": Topic(IMU, run.t, run.extra["imu"]),
+        }
+        write_standing(path, States(data.joint_names, run.t, run.q), topics)
+
     def _fit(self, path: Path) -> None:
         case = self._case()
         save_fit(path, case, identify(case, self._data()))
@@ -122,9 +169,22 @@ def _config(path: Path) -> None:
     path.write_text(text.replace(f"..{os.sep}data{os.sep}smoke_arm.urdf", "arm.urdf"), "utf-8")
 
 
+def _standing_config(path: Path) -> None:
+    _config(path)
+    text = path.read_text("utf-8").replace("robot:\n", f"robot:\n{_STANDING}", 1)
+    path.write_text(text + _SENSORS, "utf-8")
+
+
+def _write_table(path: Path, columns: Mapping[str, Array]) -> None:
+    table = np.column_stack(list(columns.values()))
+    np.savetxt(path, table, "%.17g", delimiter=",", header=",".join(columns), comments="")
+
+
 def _write_csv(path: Path, data: Dataset, angle: float, time: float) -> None:
     run, names = data.runs[0], data.joint_names
     sliding = np.array([name == "slide" for name in names])
-    table = np.column_stack([run.t * time, run.q * np.where(sliding, 1.0, angle), run.tau])
-    header = ["t", *(f"q_{name}" for name in names), *(f"tau_{name}" for name in names)]
-    np.savetxt(path, table, delimiter=",", header=",".join(header), comments="")
+    q = run.q * np.where(sliding, 1.0, angle)
+    columns = {"t": run.t * time}
+    columns |= {f"q_{name}": q[:, k] for k, name in enumerate(names)}
+    columns |= {f"tau_{name}": run.tau[:, k] for k, name in enumerate(names)}
+    _write_table(path, columns)
