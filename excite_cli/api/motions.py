@@ -15,6 +15,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
+from excite_cli.measurement.base_channel import channels_of_base
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.motion_files import motion_reader_for, read_motion
 from excite_cli.robot.model import Array, Robot
@@ -118,8 +119,12 @@ def is_motion(path: Path, spec: Spec | None = None) -> bool:
     FileError
         There is no such file.
     """
-    torque = spec.measurement.channels.get("tau") if spec is not None else None
-    return motion_reader_for(path, torque or "tau") is not None
+    measured = ["tau"]
+    if spec is not None:
+        measured = [spec.measurement.channels.get("tau") or "tau"]
+        if "base" in spec.robot.rows:
+            measured += [channel.name for channel in channels_of_base(spec.measurement)]
+    return motion_reader_for(path, tuple(measured)) is not None
 
 
 def _of_result(robot: Robot, result: Result, name: str, chosen: Sequence[int]) -> list[Segment]:
@@ -188,4 +193,8 @@ def _measured(problem: Problem | Case, data: Dataset) -> list[Segment]:
     spec = problem.spec
     processing = choose_processing(data.runs, spec.measurement.filter, spec.diagnosis.moving_speed)
     runs = prepare_all(data.runs, processing)
-    return [Segment(run.run.key, *through_samples(run.t, run.q, run.v, run.a)) for run in runs]
+    own = slice(data.runs[0].base_rows, None)  # what is planned are motions of the joints
+    return [
+        Segment(run.run.key, *through_samples(run.t, run.q[:, own], run.v[:, own], run.a[:, own]))
+        for run in runs
+    ]

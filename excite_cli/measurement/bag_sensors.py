@@ -117,9 +117,12 @@ class SensorMessages:
             They are too few, their clock starts anew, they leave a gap, or do not cover the run.
         """
         own, unstamped = self._stamps.chosen()
-        if len(own) < 2:
-            raise FileError(f"{self._where} has {len(own)} messages; at least 2 are needed.")
-        t, wanted = (own - stamps.min()) * 1e-9, (stamps - stamps.min()) * 1e-9
+        if len(np.unique(own)) < 2:
+            raise FileError(
+                f"{self._where} has {len(own)} messages with {len(np.unique(own))} different "
+                "stamps; at least 2 are needed."
+            )
+        t, wanted = (own - stamps[0]) * 1e-9, (stamps - stamps[0]) * 1e-9
         self._refuse_restart(t)
         t, order = np.unique(t, return_index=True)
         values = np.array(self._values, dtype=float)[order]
@@ -157,12 +160,14 @@ class SensorMessages:
 
     def _within(self, t: Array, wanted: Array) -> Mask:
         """Which instants lie between the first and the last message."""
-        early, late = t[0] - wanted.min(), wanted.max() - t[-1]
-        if max(early, late) > _RAGGED:
+        early, late = wanted < t[0], wanted > t[-1]
+        # By their number: a single stamp may be far off.
+        apart = float(np.median(np.abs(np.diff(wanted)))) if len(wanted) > 1 else 0.0
+        if max(np.count_nonzero(early), np.count_nonzero(late)) * apart > _RAGGED:
             raise FileError(
                 f"{self._where} has messages from {t[0]:.3f} to {t[-1]:.3f} s, joint states are "
-                f"there from 0 to {wanted.max():.3f} s, by their header stamps. Record both "
-                "throughout, by one clock."
+                f"there from {wanted.min():.3f} to {wanted.max():.3f} s, by their header stamps. "
+                "Record both throughout, by one clock."
             )
         steps = np.diff(t)
         usual = float(np.median(steps))
@@ -172,11 +177,11 @@ class SensorMessages:
         if missed.any():
             place = before[missed][np.argmax(steps[before[missed]])]
             raise FileError(
-                f"{self._where} has no message for {steps[place]:.3g} s at {t[place]:.3f} s (usual "
-                f"are {usual:.3g} s), while joint states go on: {len(set(before[missed]))} such "
-                "gaps. Cut the bag there, or record it again."
+                f"{self._where} has no message for {steps[place]:.3g} s at {t[place]:.3f} s, while "
+                f"joint states go on (usually every {usual:.3g} s; such gaps: "
+                f"{len(set(before[missed]))}). Cut the bag there, or record it again."
             )
-        return np.asarray((wanted >= t[0]) & (wanted <= t[-1]))
+        return np.asarray(~early & ~late)
 
     def _findings(self, unstamped: bool, t: Array, within: Mask) -> tuple[Finding, ...]:
         found = []

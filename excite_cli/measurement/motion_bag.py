@@ -19,7 +19,7 @@ class MotionBag(MotionReader):
     title = "rosbag2"
     suffixes = (".db3", ".mcap")
 
-    def recognises(self, path: Path, torque: str = "tau") -> bool:
+    def recognises(self, path: Path, measured: tuple[str, ...] = ("tau",)) -> bool:
         """Whether it is a bag, and holds a JointTrajectory; others are measured data."""
         folder = path.is_dir() and (path / "metadata.yaml").is_file()
         if not folder and not super().recognises(path):

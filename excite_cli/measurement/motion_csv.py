@@ -22,10 +22,10 @@ class MotionCsv(MotionReader):
     title = "CSV"
     suffixes = CsvReader.suffixes
 
-    def recognises(self, path: Path, torque: str = "tau") -> bool:
-        """Tables without torques; those with torques are measured data."""
+    def recognises(self, path: Path, measured: tuple[str, ...] = ("tau",)) -> bool:
+        """Tables without columns that only measured data have."""
         return super().recognises(path) and not any(
-            column.startswith(torque) for column in header_of(path)
+            column.startswith(measured) for column in header_of(path)
         )
 
     def read(self, path: Path) -> TimedMotion:

@@ -21,8 +21,8 @@ MOTION_READERS: tuple[MotionReader, ...] = (
 )
 
 
-def motion_reader_for(path: Path, torque: str = "tau") -> MotionReader | None:
-    """The reader of a motion file; None for what is none, as measured data with columns `torque`.
+def motion_reader_for(path: Path, measured: tuple[str, ...] = ("tau",)) -> MotionReader | None:
+    """The reader of a motion file; None for what is none, as data with columns `measured` ….
 
     Raises
     ------
@@ -30,7 +30,7 @@ def motion_reader_for(path: Path, torque: str = "tau") -> MotionReader | None:
         There is no such file.
     """
     require_stored(path)
-    return next((reader for reader in MOTION_READERS if reader.recognises(path, torque)), None)
+    return next((reader for reader in MOTION_READERS if reader.recognises(path, measured)), None)
 
 
 def read_motion(path: Path, joints: tuple[str, ...]) -> tuple[TimedMotion, str]:

@@ -16,10 +16,10 @@ class MotionReader(ABC):
     title: ClassVar[str]
     suffixes: ClassVar[tuple[str, ...]]
 
-    def recognises(self, path: Path, torque: str = "tau") -> bool:
+    def recognises(self, path: Path, measured: tuple[str, ...] = ("tau",)) -> bool:
         """Whether the file holds a motion in this format; by its name, where that says enough.
 
-        `torque`: how columns of torques begin, which only measured data have.
+        `measured`: how columns of torques or wrenches begin, which only measured data have.
         """
         return path.is_file() and path.name.lower().endswith(self.suffixes)
 

@@ -14,8 +14,10 @@ from excite_cli import (
     identify,
     load_case,
     load_data,
+    load_motions,
     simulate,
 )
+from excite_cli.api.motions import is_motion
 from excite_cli.measurement.dataset import Run
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.api.conftest import SMOKE
@@ -137,3 +139,19 @@ def test_a_sensor_that_is_in_no_file(
     path = saved(tmp_path / "some.csv", data.runs[0], data.joint_names, "q", "imu")
     with pytest.raises(FileError, match=r"run 'some' has no channel 'foot_wrench' \(nor foot_wren"):
         load_data(case, path)
+
+
+def test_a_log_without_torques_is_no_plan_but_its_motion_can_be_checked(
+    case: Case, played: tuple[Dataset, Path], tmp_path: Path
+) -> None:
+    data, _ = played
+    log = saved(tmp_path / "log.csv", data.runs[0], data.joint_names, "q", *PARTS)
+    plan = saved(tmp_path / "plan.csv", data.runs[0], data.joint_names, "q")
+    assert is_motion(plan, case.spec)
+    assert not is_motion(log, case.spec)
+    (measured,) = load_motions(case, log)
+    t = np.linspace(0.0, measured.trajectory.duration, 50)
+    q, *_ = measured.trajectory.states(t, measured.coefficients)
+    assert q.shape == (50, case.robot.n)
+    middle = data.runs[0].q[len(data.runs[0].q) // 2]  # as much is cut at both ends
+    np.testing.assert_allclose(0.5 * (q[24] + q[25]), middle, atol=0.02)

@@ -176,6 +176,27 @@ def test_empty_headers_fall_back_to_the_time_of_recording(tmp_path: Path) -> Non
     close(data.runs[0].extra["foot"], signals(T))
 
 
+def test_a_single_stamp_far_off_costs_no_more_than_itself(tmp_path: Path) -> None:
+    t = T.copy()
+    t[70] += 1000.0
+    states = States(JOINTS, t, STATES.q)
+    data = read(write_standing(tmp_path / "log", states, {"/foot": FOOT}))
+    assert "1 joint states outside are left out" in only(data.findings[:1], "ragged").text
+    assert len(data.runs) == 1
+    close(data.runs[0].extra["foot"][:70], signals(T[:70]))
+
+
+def test_topics_that_never_meet(tmp_path: Path) -> None:
+    early, late = OWN[OWN < 0.7], OWN[OWN > 0.8]
+    topics = {
+        "/foot": Topic(WRENCH, early, signals(early)),
+        "/imu": Topic(IMU, late, signals(late)),
+    }
+    path = write_standing(tmp_path / "log", STATES, topics)
+    with pytest.raises(FileError, match="at no instant all topics that `measurement` names are"):
+        read(path, base={"imu": {"gyroscope": "/imu", "accelerometer": "/imu"}})
+
+
 def _paused(t: np.ndarray) -> np.ndarray:
     return t[(t < 0.6) | (t > 0.7)]
 
@@ -192,12 +213,14 @@ def test_what_is_recorded_again_after_a_pause_of_all_is_no_gap(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("own", "words"),
     [
-        (_paused, r"/foot \(measurement.wrench\) has no message for 0\.104 s at 0\.597 s \(usual "
-                  r"are 0\.004 s\), while joint states go on: 1 such gaps"),
-        (lambda t: t[t < 0.4], r"messages from -0\.011 to 0\.397 s, joint states are there from 0 "
-                               r"to 1\.490 s.*by one clock"),
+        (_paused, r"/foot \(measurement.wrench\) has no message for 0\.104 s at 0\.597 s, while "
+                  r"joint states go on \(usually every 0\.004 s; such gaps: 1\)"),
+        (lambda t: t[t < 0.4], r"messages from -0\.011 to 0\.397 s, joint states are there from "
+                               r"0\.000 to 1\.490 s.*by one clock"),
         (lambda t: t + 3600.0, r"messages from 3599\.989 to"),
-        (lambda t: t[:1], "has 1 messages; at least 2"),
+        (lambda t: t[:1], "has 1 messages with 1 different stamps; at least 2 are needed"),
+        (lambda t: t[:9] * 0.0, "has 9 messages with 1 different stamps"),
+        (lambda t: t[:0], "has 0 messages"),
         (lambda t: np.concatenate([t, t]), r"go back by 1\.53 s at message 384: the clock start"),
     ],
 )  # fmt: skip

@@ -34,7 +34,7 @@ def test_a_hand_made_table_is_a_motion_and_one_with_torques_is_not(tmp_path: Pat
     assert motion_reader_for(measured) is None
     current = _file(tmp_path, "c.csv", "t,q_a,current_a\n0,1,2\n1,2,2\n")
     assert motion_reader_for(current) is not None
-    assert motion_reader_for(current, "current") is None
+    assert motion_reader_for(current, ("current",)) is None
 
 
 def test_joints_beyond_the_robots_are_named_and_numbers_go_by_order(tmp_path: Path) -> None:
