@@ -57,7 +57,7 @@ def main() -> None:
             list(pool.map(travel, wanted))
     paths = [(each, records / f"{_file(each)}.json") for each in known]
     there = [(each, json.loads(path.read_text())) for each, path in paths if path.exists()]
-    PAGE.write_text(page(there, options.seed), encoding="utf-8")
+    PAGE.write_text(page(there, known, options.seed), encoding="utf-8")
 
 
 def _file(source: Source) -> str:

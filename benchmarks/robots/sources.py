@@ -128,6 +128,11 @@ class Source:
     given: tuple[str, ...]
     also: tuple[str, ...] = ()
 
+    @property
+    def is_example(self) -> bool:
+        """Whether it is one of example-robot-data."""
+        return self.given[:1] == ("--robot",)
+
 
 def fetch(folder: Path) -> None:
     """Let pip put the packages' files into a new folder: wheels, which run nothing."""

@@ -29,7 +29,7 @@ from excite_cli.robot.formats.kept_meshes import is_sound
 _SECONDS, _BYTES_PER_SECOND = 8.0, 2**20  # processor time allowed: a base, and by size of files
 _SLOWEST = 10  # times the processor time, on a machine with much else to do
 _MAX_MEMORY = 4 * 2**30  # bytes
-_FORM = "1"  # of what is kept; another one after a change of what formats write
+_FORM = "2"  # of what is kept; another one after a change of what formats write
 _OF_ERRORS = {each.__name__: each for each in (RobotError, MissingExtraError)}
 
 

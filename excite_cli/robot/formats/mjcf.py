@@ -32,6 +32,7 @@ from excite_cli.robot.loops import TAG
 Array = NDArray[np.float64]
 Element = ElementTree.Element
 
+_HELD = 1e6  # [N·m·s/rad or N·s/m] damping beyond which a joint stands still
 _FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
 _SITE = 6  # mjtObj
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)  # mjtGeom
@@ -150,7 +151,12 @@ class _Writer:
         return range(first, first + int(self.m.body_jntnum[body])) if first >= 0 else range(0)
 
     def _movable(self, body: int) -> list[int]:
-        return [j for j in self._joints(body) if self.m.jnt_type[j] in (_SLIDE, _HINGE)]
+        single = [j for j in self._joints(body) if self.m.jnt_type[j] in (_SLIDE, _HINGE)]
+        return [j for j in single if not self._is_held(j)]
+
+    def _is_held(self, j: int) -> bool:
+        """Whether nothing moves a joint, for all its damping: some authors lock joints so."""
+        return bool(self.m.dof_damping[int(self.m.jnt_dofadr[j])] > _HELD)
 
     def _offset(self, body: int) -> Array:
         """Origin (3,) of a body's link in the body's frame: its last joint."""
@@ -283,6 +289,9 @@ class _Writer:
 
     def _told(self) -> None:
         m = self.m
+        held = [self._name(j) for j in range(m.njnt) if self._is_held(j)]
+        if held:
+            self.notes.append(f"their damping holds these joints: {', '.join(held)}")
         closed = [k for k in range(m.neq) if m.eq_type[k] in (0, 1) and m.eq_active0[k]]
         for k in closed:
             self._cut(k)

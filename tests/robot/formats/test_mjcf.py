@@ -125,3 +125,12 @@ def test_a_robot_that_floats_is_its_own_root(tmp_path: Path) -> None:
 def test_what_is_no_robot_is_refused(tmp_path: Path, bodies: str, words: str) -> None:
     with pytest.raises(RobotError, match=words):
         load_description(str(_written(tmp_path, bodies)))
+
+
+def test_joints_that_their_damping_holds_stay(tmp_path: Path) -> None:
+    held = '<joint name="{}_j" axis="0 1 0" damping="1e11"/>'
+    robot = build_robot(
+        RobotSpec(urdf=str(_written(tmp_path, _body("a", _body("b"), held)))),
+    )
+    assert robot.joint_names == ("b_j",)
+    assert "their damping holds these joints: a_j" in robot.description.notes
