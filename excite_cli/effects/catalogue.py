@@ -202,9 +202,14 @@ def carried_body(joint: int, runs: tuple[str, ...] = ()) -> Effect:
     return Payload((joint,), {}, runs)
 
 
-def drives_gain(joint: int) -> Effect:
-    """What the torque of a joint is measured in, beside what is taken for it."""
-    return TorqueGain((joint,))
+def scales(robot: Robot) -> tuple[Effect, ...]:
+    """What measured torques and the wrench at the base come in, beside what is taken for it.
+
+    One gain for every joint, and one for all rows of a base.
+    """
+    base, joints = range(robot.base_joints), range(robot.base_joints, robot.n)
+    every = [WrenchGain(tuple(base)), *(TorqueGain((j,)) for j in joints)]
+    return tuple(effect for effect in every if effect.joints and shows(effect, robot))
 
 
 def _built(spec: EffectSpec, index: int, robot: Robot) -> list[Effect]:

@@ -21,7 +21,7 @@ from excite_cli.config.data_spec import (
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.dynamics.pseudo_inertia import moved
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import carried_body, drives_gain
+from excite_cli.effects.catalogue import carried_body, scales
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.link_frame import LinkFrame, link_frame, own_link
@@ -55,18 +55,18 @@ def knowledge_of(spec: IdentificationSpec, declared: Sequence[Effect], robot: Ro
         The payload's link is unknown, or nothing moves it; no body has its inertia.
     """
     effects = tuple(declared)
-    known: list[tuple[list[Effect], Array, Array]] = []
+    known: list[tuple[Sequence[Effect], Array, Array]] = []
     payload = spec.known_payload
     if payload is not None:
         body, mean, covariance = known_body(payload, robot)
         effects = _with([body], effects)
         known.append(([body], mean, covariance))
     if payload is not None or spec.gain_std is not None:
-        gains = [drives_gain(j) for j in range(robot.n)]
+        gains = scales(robot)
         effects = _with(gains, effects)
         deviation = _ANY_GAIN if spec.gain_std is None else spec.gain_std
-        spread = deviation**2 * (np.eye(robot.n) + 1.0)
-        known.append((gains, np.zeros(robot.n), spread))
+        spread = deviation**2 * (np.eye(len(gains)) + 1.0)
+        known.append((gains, np.zeros(len(gains)), spread))
     starts = np.cumsum([0, *(len(effect.parameters) for effect in effects)])
     rows = [np.zeros((0, starts[-1]))]
     target = [np.zeros(0)]

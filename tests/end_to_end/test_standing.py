@@ -106,6 +106,22 @@ def test_what_is_missing_has_its_name_and_size(
         assert after < (0.99 if kind == "wrench_gain" else 0.7) * before
 
 
+def test_a_weighed_load_tells_the_scale_of_the_wrench(
+    excite: Installed, folder: Path, motions: Path
+) -> None:
+    """Without it, all masses would take it up."""
+    load = ("--effect", "payload@left_hand=5,cz:-0.1;runs:motion_2")
+    record(excite, folder / "base.yaml", motions, *SCALE, *load)
+    weighed = "{runs: [motion_2], mass: 5.0, center: [0, 0, -0.1], link: left_hand}"
+    found = excite.answer(
+        "identify", str(folder / "base.yaml"), "log.h5", "--set",
+        f"identification.known_payload={weighed}",
+    )  # fmt: skip
+    (gain,) = [x for x in found["parameters"] if x["name"].startswith("wrench_gain.gain")]
+    assert abs(gain["value"] - 0.04) < 3.0 * gain["std"]
+    assert gain["std"] < 0.005
+
+
 def test_nothing_is_missing_where_nothing_is(
     excite: Installed, folder: Path, motions: Path
 ) -> None:
