@@ -159,6 +159,5 @@ def test_the_loop_goes_on(excite: Installed, tmp_path: Path, folder: Path, motio
     assert again["effects"] == []
     brief = ("--motions", "1", "--set", "optimizer.max_iterations=30")
     planned = excite.answer("optimize", first, "--after", "found.h5", "-o", "next.h5", *brief)
-    alone = excite.answer("optimize", first, "-o", "alone.h5", *brief)
-    conditions = [answer["motions"][0]["stacked_condition_number"] for answer in (planned, alone)]
-    assert conditions[0] < conditions[1]
+    (motion,) = planned["motions"]
+    assert motion["stacked_condition_number"] < 0.9 * motion["condition_number"]
