@@ -29,6 +29,7 @@ from excite_cli.diagnosis.rearranged import (
     positions_changed,
     torques_changed,
 )
+from excite_cli.diagnosis.standing_legs import refuse_standing
 from excite_cli.diagnosis.torque_scale import check_scale
 from excite_cli.diagnosis.torque_shares import RoughModel, Samples, samples_of
 from excite_cli.errors import FileError
@@ -39,7 +40,7 @@ from excite_cli.identification.split import split
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Array, Robot
 
-_SAMPLES = 600
+_SAMPLES, _FEW = 600, 200
 _GOOD = 0.03  # data that leave less than this on every joint are what they say they are
 _WORSE = 0.3  # log of the share by which no joint may fit worse; or share of the whole gain
 _FITS = 0.6  # share that the joints concerned may have left, in the median
@@ -61,14 +62,15 @@ def check_plausibility(
     Raises
     ------
     FileError
-        Columns are in another order, or torques or positions of joints have the opposite sign,
-        whatever the inertias.
+        The robot stands and is declared to hang; columns are in another order, or torques or
+        positions of joints have the opposite sign, whatever the inertias.
     """
     if declared.trust:
         return ()
     names, samples, model = robot.joint_names, samples_of(runs, _SAMPLES), RoughModel(robot)
     if not len(samples.q):
         return ()  # nobody moves: there is nothing to judge
+    refuse_standing(robot, samples.thinned(_FEW))
     scale = check_scale(robot, samples, declared, names)
     if any(found.kind == "no_gravity" for found in scale):
         return scale  # order and signs are judged by the whole torque

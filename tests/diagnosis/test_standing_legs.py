@@ -1,0 +1,121 @@
+"""A biped that squats on a floor in MuJoCo, its log read as if it hung."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.diagnosis.standing_legs import refuse_standing
+from excite_cli.diagnosis.torque_shares import Samples
+from excite_cli.errors import FileError
+from excite_cli.robot.model import Robot, build_robot
+from tests.base_link.stander import Array
+
+_LIMITS = '<limit lower="-2.5" upper="2.5" velocity="5" effort="900"/>'
+_THIGH, _SHANK = 0.35, 0.35
+SIDES, PARTS = ("left", "right"), ("hip", "knee", "ankle")
+JOINTS = tuple(f"{side}_{part}" for side in SIDES for part in PARTS)
+
+
+def _link(name: str, mass: float, center: str, shape: str = "") -> str:
+    return (
+        f'<link name="{name}"><inertial><origin xyz="{center}"/><mass value="{mass}"/>'
+        '<inertia ixx="0.05" iyy="0.04" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial>'
+        f"{shape}</link>"
+    )
+
+
+def _joint(name: str, parent: str, child: str, place: str) -> str:
+    return (
+        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{place}"/><axis xyz="0 1 0"/>{_LIMITS}</joint>'
+    )
+
+
+def _leg(side: str, y: float) -> str:
+    sole = (
+        '<collision><origin xyz="0.02 0 -0.03"/><geometry><box size="0.24 0.12 0.02"/></geometry>'
+        "</collision>"
+    )
+    return "".join(
+        [
+            _link(f"{side}_thigh", 5.0, "0 0 -0.15"),
+            _link(f"{side}_shank", 3.0, "0 0 -0.15"),
+            _link(f"{side}_foot", 1.0, "0.02 0 -0.02", sole),
+            _joint(f"{side}_hip", "pelvis", f"{side}_thigh", f"0 {y} 0"),
+            _joint(f"{side}_knee", f"{side}_thigh", f"{side}_shank", f"0 0 {-_THIGH}"),
+            _joint(f"{side}_ankle", f"{side}_shank", f"{side}_foot", f"0 0 {-_SHANK}"),
+        ]
+    )
+
+
+URDF = (
+    f'<robot name="biped">{_link("pelvis", 30.0, "0.02 0 0.2")}{_leg("left", 0.12)}'
+    f"{_leg('right', -0.12)}</robot>"
+)
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    path = tmp_path_factory.mktemp("biped") / "biped.urdf"
+    path.write_text(URDF, encoding="utf-8")
+    return build_robot(RobotSpec(urdf=str(path)))
+
+
+def squatting(standing: bool) -> Samples:
+    """On the floor, or with the pelvis held in the air: positions and torques of the motors."""
+    extra = '<mujoco><compiler fusestatic="false" discardvisual="true"/></mujoco></robot>'
+    spec = mujoco.MjSpec.from_string(URDF.replace("</robot>", extra))
+    pelvis = spec.body("pelvis")
+    height = _THIGH + _SHANK + 0.04
+    pelvis.pos = [0, 0, height]
+    if standing:
+        pelvis.add_freejoint()
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2, 2, 0.1])
+    for name in JOINTS:
+        motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        motor.gainprm[0], motor.biasprm[1], motor.biasprm[2] = 3000.0, -3000.0, -100.0
+        motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+    model = spec.compile()
+    model.opt.timestep = 1e-3
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    data = mujoco.MjData(model)
+    dofs = [model.joint(name).dofadr[0] for name in JOINTS]
+    places = [model.joint(name).qposadr[0] for name in JOINTS]
+    rows: list[tuple[Array, Array, Array, Array]] = []
+    for k in range(6000):
+        bend = 0.4 - 0.35 * np.cos(0.8 * data.time)
+        data.ctrl[:] = np.tile([-bend, 2.0 * bend, -bend], 2) * min(1.0, data.time)
+        mujoco.mj_step(model, data)
+        if k > 2500 and k % 20 == 0:
+            rows.append(
+                (data.qpos[places].copy(), data.qvel[dofs].copy(), data.qacc[dofs].copy(),
+                 data.actuator_force.copy())
+            )  # fmt: skip
+    if standing:
+        assert data.qpos[2] > 0.6 * height  # it has not fallen
+        assert data.ncon >= 4
+    q, v, a, tau = (np.array(x) for x in zip(*rows, strict=True))
+    yes = np.ones(q.shape, bool)
+    return Samples(q, v, a, tau, yes, yes)
+
+
+def test_legs_that_carry_are_told_from_legs_that_hang(robot: Robot) -> None:
+    words = (
+        r"stands on left_foot and right_foot, not of one that hangs .* \(1\d\d N at left_foot, "
+        r"1\d\d N at right_foot; it weighs 471 N\) explain 8\d% of what the URDF leaves. Declare "
+        r"robot.base: floating"
+    )
+    with pytest.raises(FileError, match=words):
+        refuse_standing(robot, squatting(standing=True))
+    refuse_standing(robot, squatting(standing=False))
+
+
+def test_wrong_masses_and_loads_do_not_stand(robot: Robot) -> None:
+    """What hangs and is not as the URDF says is pulled down by it, or little."""
+    hanging = squatting(standing=False)
+    heavier = Samples(**{**vars(hanging), "tau": 1.6 * hanging.tau})
+    lighter = Samples(**{**vars(hanging), "tau": 0.5 * hanging.tau})
+    opposite = Samples(**{**vars(hanging), "tau": -hanging.tau})
+    for each in (heavier, lighter, opposite):
+        refuse_standing(robot, each)
