@@ -127,6 +127,8 @@ def _reason(joint: UrdfJoint, joints: tuple[UrdfJoint, ...]) -> str:
         return "rotors"
     if _planar_base(joint, joints):
         return "joints of the base"
+    if joint.carried <= 0.0 and any(other.carried > 0.0 for other in joints):
+        return "joints that move no mass"
     if joint.carried >= _FINGER_SHARE:
         return ""
     if words & _SENSORS:

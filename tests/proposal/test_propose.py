@@ -267,3 +267,18 @@ def test_slides_and_turns_of_the_whole_robot_stay(tmp_path: Path) -> None:
     proposal = propose(Request("robot.urdf", tmp_path))
     assert proposal.joints == ("hip",)
     assert proposal.left_out["joints of the base"] == ("rootz", "rootx", "rooty")
+
+
+def test_a_joint_that_moves_no_mass_stays(tmp_path: Path) -> None:
+    """It shows no parameter, and no simulator plays it."""
+    written(
+        tmp_path,
+        link("base"),
+        joint("shoulder", "base", "upper", GOOD),
+        link("upper"),
+        joint("flange", "upper", "tip", GOOD),
+        '<link name="tip"/>',
+    )
+    proposal = propose(Request("robot.urdf", tmp_path))
+    assert proposal.joints == ("shoulder",)
+    assert proposal.left_out["joints that move no mass"] == ("flange",)
