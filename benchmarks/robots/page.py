@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.robots.sources import PACKAGES, Source
+from excite_cli.effects.catalogue import catalogue
 
 Record = dict[str, Any]
 _OPENING = """\
@@ -46,6 +47,7 @@ def page(found: list[tuple[Source, Record]], listed: list[Source], seed: int) ->
         lines.append(_counted(form, [r for r in records if form in (r["format"], "all")]))
     lines += [
         "",
+        *_same_columns(records),
         _times(records),
         "",
         "| robot | format | joints | base parameters | condition number | pairs | init [s] "
@@ -83,6 +85,26 @@ def _counted(form: str, records: list[Record]) -> str:
         sum(not d["right"] for d in diagnosed),
     ]
     return "| " + " | ".join(map(str, cells)) + " |"
+
+
+def _same_columns(records: list[Record]) -> list[str]:
+    """Of those named beside others, who has the kinds that together are what was planted."""
+    count = 0
+    for record in records:
+        found = record.get("diagnosis")
+        if found is None or found["alone"] or not found["right"]:
+            continue
+        plant = record["planted"]
+        together = catalogue()[plant["kind"]].same_as
+        words = {f"{kind} of {', '.join(plant['joints'])}" for kind in together}
+        count += bool(words) and set(found["named"]) == words
+    if not count:
+        return []
+    return [
+        f"Of those named beside others {count} are asymmetric friction, told as Coulomb friction "
+        "and an offset, which are the same columns.",
+        "",
+    ]
 
 
 def _times(records: list[Record]) -> str:
