@@ -151,7 +151,7 @@ class Marks:
 
 def caption_of(instants: Instants, instant: int, duration: float) -> str:
     """`2.40 of 8 s, nearest: torso - arm_left_3_link, 12 mm`."""
-    words = f"{instants.times[instant]:.2f} of {duration:g} s"
+    words = f"{instants.times[instant]:.2f} of {duration:.4g} s"
     if instants.nearest is None:
         return words
     distance = 1000 * instants.nearest.distances[instant]
