@@ -47,7 +47,7 @@ def page(found: list[tuple[Source, Record]], listed: list[Source], seed: int) ->
         lines.append(_counted(form, [r for r in records if form in (r["format"], "all")]))
     lines += [
         "",
-        *_same_columns(records),
+        *_beside(records),
         _times(records),
         "",
         "| robot | format | joints | base parameters | condition number | pairs | init [s] "
@@ -87,24 +87,25 @@ def _counted(form: str, records: list[Record]) -> str:
     return "| " + " | ".join(map(str, cells)) + " |"
 
 
-def _same_columns(records: list[Record]) -> list[str]:
-    """Of those named beside others, who has the kinds that together are what was planted."""
-    count = 0
-    for record in records:
-        found = record.get("diagnosis")
-        if found is None or found["alone"] or not found["right"]:
-            continue
-        plant = record["planted"]
-        together = catalogue()[plant["kind"]].same_as
-        words = {f"{kind} of {', '.join(plant['joints'])}" for kind in together}
-        count += bool(words) and set(found["named"]) == words
-    if not count:
+def _beside(records: list[Record]) -> list[str]:
+    """What stands beside the planted effect where it is not named alone."""
+    found = [(r["planted"], r["diagnosis"]) for r in records if "diagnosis" in r]
+    several = [(plant, d) for plant, d in found if d["right"] and not d["alone"]]
+    if not several:
         return []
-    return [
-        f"Of those named beside others {count} are asymmetric friction, told as Coulomb friction "
-        "and an offset, which are the same columns.",
-        "",
-    ]
+    same = sum(_is_the_same(plant, d["named"]) for plant, d in several)
+    wrong = sum(d["wrong"] for _, d in found)
+    words = f"{same} of those named beside others are asymmetric friction, told as Coulomb friction"
+    words += " and an offset, which are the same columns. " if same else ""
+    return [f"{words if same else ''}Robots with a wrong name: {wrong} of {len(found)}.", ""]
+
+
+def _is_the_same(plant: dict[str, Any], named: list[str]) -> bool:
+    """Whether kinds are named that together are the planted one's columns."""
+    together = catalogue()[plant["kind"]].same_as
+    return bool(together) and set(named) == {
+        f"{kind} of {', '.join(plant['joints'])}" for kind in together
+    }
 
 
 def _times(records: list[Record]) -> str:
