@@ -8,6 +8,8 @@ friction beside it is told as it is in the robot, not as the sensor shows it.
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
+
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
 from excite_cli.effects.c_code import real
 from excite_cli.effects.simulated_robot import SimulatedRobot
@@ -34,13 +36,12 @@ class TorqueGain(Effect):
     changes_between_runs: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
-        """torque_j, (T, 1, 1)."""
+        """torque_j, (T, len(joints), 1)."""
         return signals.torque[:, list(self.joints), None]
 
     def in_c(self, values: Array, columns: Sequence[str]) -> str:
         """g torque_j."""
-        j = self.joints[0]
-        return f"tau[{j}] += {real(values[0])} * torque[{j}];"
+        return "\n".join(f"tau[{j}] += {real(values[0])} * torque[{j}];" for j in self.joints)
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
@@ -50,4 +51,6 @@ class TorqueGain(Effect):
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂torque_j = weight."""
-        return Cotangents(torque=signals.only(self.joints[0], weights[:, 0, 0]))
+        torque = np.zeros_like(signals.q)
+        torque[:, list(self.joints)] = weights[:, :, 0]
+        return Cotangents(torque=torque)
