@@ -70,10 +70,10 @@ def check_plausibility(
     names, samples, model = robot.joint_names, samples_of(runs, _SAMPLES), RoughModel(robot)
     if not len(samples.q):
         return ()  # nobody moves: there is nothing to judge
-    refuse_standing(robot, samples.thinned(_FEW))
     scale = check_scale(robot, samples, declared, names)
     if any(found.kind == "no_gravity" for found in scale):
         return scale  # order and signs are judged by the whole torque
+    refuse_standing(robot, samples.thinned(_FEW))
     foreign = check_runs(model, runs)
     if foreign:
         return (*scale, *foreign)
