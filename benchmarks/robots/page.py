@@ -21,10 +21,10 @@ Into the simulated robot goes an effect that its config does not declare, beside
 show on the motions (3–30 % of a joint's torque, some near the noise).
 
 *Motion*: `check` passes all motions with exit status 0; proved, if every constraint is proved at
-every instant. *Named alone*: the planted effect, or an alias set of at most three that holds it,
-is named, and nothing else. *Pairs*: pairs of links that the config says are not kept apart. Seconds
-are processor time, one thread; those of `init` are the first ones, with capsules and tables of
-meshes yet to be made.
+every instant. *Named alone*: the planted effect, or an alias set of at most three that holds it, or
+the effects that together are the same columns, is named, and nothing else. *Pairs*: pairs of links
+that the config says are not kept apart. Seconds are processor time, one thread; those of `init` are
+the first ones, with capsules and tables of meshes yet to be made.
 
 The list was made before its robots were tried, but for the first. Where one showed a fault of
 `init` or of a format, that was mended for all, and the robot run again; none led to a change of the
@@ -88,15 +88,14 @@ def _counted(form: str, records: list[Record]) -> str:
 
 
 def _beside(records: list[Record]) -> list[str]:
-    """What stands beside the planted effect where it is not named alone."""
+    """How many are named as the parts that they are made of, and how many get wrong names."""
     found = [(r["planted"], r["diagnosis"]) for r in records if "diagnosis" in r]
-    several = [(plant, d) for plant, d in found if d["right"] and not d["alone"]]
-    if not several:
+    if not found:
         return []
-    same = sum(_is_the_same(plant, d["named"]) for plant, d in several)
+    same = sum(d["alone"] and _is_the_same(plant, d["named"]) for plant, d in found)
     wrong = sum(d["wrong"] for _, d in found)
-    words = f"{same} of those named beside others are asymmetric friction, told as Coulomb friction"
-    words += " and an offset, which are the same columns. " if same else ""
+    words = f"{same} of those named alone are asymmetric friction, told as Coulomb friction and an "
+    words += "offset: the same columns, which the answer says too. " if same else ""
     return [f"{words if same else ''}Robots with a wrong name: {wrong} of {len(found)}.", ""]
 
 

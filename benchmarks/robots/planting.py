@@ -86,7 +86,7 @@ def words(planted: Planted, robot: Robot, takes: dict[str, tuple[str, ...]]) -> 
     others = [f"{name}:{numbers[name]!r}" for name in allowed_names(kind) if name in numbers]
     joints = (
         "all"
-        if effect.scope == "robot"
+        if effect.joints == tuple(range(robot.n))
         else ",".join(robot.joint_names[joint] for joint in effect.joints)
     )
     runs = f";runs:{'|'.join(effect.runs)}" if effect.runs else ""

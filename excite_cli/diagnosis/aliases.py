@@ -7,10 +7,12 @@ The data themselves may also be undecided where the divergence is larger: then t
 energies of the two fits differ by less than 6.
 
 Two named effects of one joint may be told from neither of them a single one, nor a named one from
-two others together (`joint_aliases`): the same with the columns of two side by side.
+two others together (`joint_aliases`): the same with the columns of two side by side. A kind that is
+another name of effects that are all there (`same_as`) is told from none of them by any motion: that
+is no doubt about them.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -20,6 +22,8 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.diagnosis.schur import SHARED, Schur
+from excite_cli.effects.base import Effect
+from excite_cli.effects.place import Place
 from excite_cli.robot.model import Array
 
 UNDECIDED = 3.0  # KL divergence [nats]
@@ -37,7 +41,7 @@ class Alias:
 def aliases_of(
     named: int,
     rest: Sequence[int],
-    taken: set,
+    taken: Collection[Place],
     candidates: Sequence[Candidate],
     white: Evidence,
     inflation: float,
@@ -45,8 +49,9 @@ def aliases_of(
 ) -> list[Alias]:
     """Candidates that could replace `named` beside the `rest`, nearest first, one per place.
 
-    Places in `taken` are named already. By how much there is more of it in some runs is no other
-    name of what all runs have: where `rest` lacks what refines it, that stands for what is lacking.
+    Places in `taken` are named or declared already. By how much there is more of it in some runs is
+    no other name of what all runs have: where `rest` lacks what refines it, that stands for what is
+    lacking.
 
     A candidate with more parameters than the named one has more to explain it with and is no alias;
     `allowed(rest, d)` vetoes impossible signs.
@@ -56,7 +61,7 @@ def aliases_of(
     found: dict[tuple, Alias] = {}
     rows = set(candidates[named].rows)
     for i, c in enumerate(candidates):
-        if c.place in taken or not rows & set(c.rows):
+        if c.place in taken or not rows & set(c.rows) or other_name(c.effect, taken):
             continue
         if c.effect.is_change and c.place._replace(runs=()) == candidates[named].place:
             continue
@@ -71,6 +76,12 @@ def aliases_of(
             if best is None or divergence < best.divergence:
                 found[c.place] = Alias(i, divergence)
     return sorted(found.values(), key=lambda alias: alias.divergence)
+
+
+def other_name(effect: Effect, taken: Collection[Place]) -> tuple[Place, ...]:
+    """The places, all of them `taken`, whose effects together are the same columns; () if not."""
+    parts = tuple(Place(kind, effect.joints, effect.runs) for kind in effect.same_as)
+    return parts if all(part in taken for part in parts) else ()
 
 
 Members = tuple[int, ...]

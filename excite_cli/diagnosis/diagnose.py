@@ -9,7 +9,7 @@ import numpy as np
 
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
-from excite_cli.diagnosis.aliases import joint_aliases
+from excite_cli.diagnosis.aliases import joint_aliases, other_name
 from excite_cli.diagnosis.before_after import Played, both_models, on_sealed
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines
@@ -219,7 +219,7 @@ def _diagnosed(
         skeleton=skeleton_of(robot),
         recorded=recorded(dataset),
         large_rests=rests,
-        joint_aliases=_joint_aliases(traced, doubts, robot),
+        joint_aliases=_joint_aliases(traced, doubts, model),
         trained=trained.errors(after),
         inertia_names=standard_parameter_names(robot),
         path=_path(traced, candidates, errors),
@@ -305,17 +305,24 @@ def _unexplained(traced: Traced, robot: Robot) -> tuple[list[Unexplained], Depen
 
 
 def _joint_aliases(
-    traced: Traced, doubts: Mapping[int, Approximation], robot: Robot
+    traced: Traced, doubts: Mapping[int, Approximation], model: Model
 ) -> tuple[JointAlias, ...]:
     shown = [i for i in traced.chosen if i not in doubts]
+    sides = [
+        [[traced.candidates[i].effect for i in side] for side in both]
+        for both in joint_aliases(traced.chosen, traced.judge, shown)
+    ]
+    # Beside a declared effect one that was found may be the rest of another name of both.
+    there = {each.place: each for each in (*model.declared, *traced.effects)}
+    own = {traced.candidates[i].place for i in shown}
+    for c in traced.candidates:
+        parts = other_name(c.effect, there)
+        if len(own & set(parts)) == 1:
+            sides.append([[there[place] for place in parts], [c.effect]])
+    names = model.robot.joint_names
     return tuple(
-        JointAlias(
-            *(
-                tuple(record_of(traced.candidates[i].effect, robot.joint_names) for i in side)
-                for side in sides
-            )
-        )
-        for sides in joint_aliases(traced.chosen, traced.judge, shown)
+        JointAlias(*(tuple(record_of(each, names) for each in side) for side in both))
+        for both in sides
     )
 
 

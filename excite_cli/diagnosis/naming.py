@@ -36,7 +36,7 @@ def named_effects(
     start = len(parameters) - sum(traced.candidates[i].width for i in traced.chosen)
     found: list[NamedEffect] = []
     strength: list[float] = []
-    taken = {traced.candidates[i].place for i in traced.chosen}
+    taken = {effect.place for effect in (*model.declared, *traced.effects)}
     rivals: list[Rival] = []
     at = start
     for i in traced.chosen:

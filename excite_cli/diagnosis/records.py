@@ -9,6 +9,7 @@ from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.verdict import SealedVerdict, Verdict
 from excite_cli.effects.base import Value
+from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.dataset import Finding
@@ -140,10 +141,20 @@ class FrictionLine:
 
 @dataclass(frozen=True)
 class JointAlias:
-    """Effects that the data cannot tell from those that are `named`; one side is a pair."""
+    """Effects that the data cannot tell from those that are `named`; one side is a pair.
+
+    No motion can, where the one is another name of the pair.
+    """
 
     named: tuple[EffectRecord, ...]
     others: tuple[EffectRecord, ...]
+
+    @property
+    def same_torque(self) -> bool:
+        """Whether the one is the same columns as the pair, of any data."""
+        one, several = sorted((self.named, self.others), key=len)
+        kind = catalogue().get(one[0].kind)
+        return kind is not None and set(kind.same_as) == {each.kind for each in several}
 
 
 @dataclass(frozen=True)

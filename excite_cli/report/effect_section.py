@@ -126,7 +126,10 @@ def _jointly(named: NamedEffect, alias: JointAlias, everything: int) -> str:
         " with ".join(f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in side)
         for side in (alias.others, beside)
     )
-    return f" These data cannot tell it{f' with {company}' if company else ''} from: {others}."
+    whole = f"it{f' with {company}' if company else ''}"
+    if alias.same_torque:
+        return f" {whole.capitalize()} is the same torque as {others}: no motion tells them apart."
+    return f" These data cannot tell {whole} from: {others}."
 
 
 def _picture(trace: EffectTrace) -> Picture:

@@ -72,7 +72,10 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             if each.approximates
         ],
         "joint_aliases": [
-            {name: [_record(one) for one in side] for name, side in vars(each).items()}
+            {
+                **{name: [_record(one) for one in side] for name, side in vars(each).items()},
+                "same_torque": each.same_torque,
+            }
             for each in found.joint_aliases
         ],
         "friction_lines": [asdict(each) for each in found.friction_lines],

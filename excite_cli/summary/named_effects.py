@@ -79,6 +79,8 @@ def _joint_alias(alias: JointAlias, everything: int) -> str:
         " with ".join(what_and_where(one, everything) for one in side)
         for side in (alias.named, alias.others)
     )
+    if alias.same_torque:
+        return f"{named} is the same torque as {others}: no motion tells them apart"
     return f"{named} cannot be told from: {others}"
 
 

@@ -14,6 +14,7 @@ from benchmarks.robots.planting import words
 from benchmarks.robots.sources import Source, sources
 from excite_cli.api.loading import load_case
 from excite_cli.effects.catalogue import kind_named
+from excite_cli.effects.payload import Payload
 from excite_cli.simulation.planted import Planted
 
 SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
@@ -66,6 +67,14 @@ def test_what_counts(effects: list[dict[str, Any]], right: bool, alone: bool) ->
     assert (found["right"], found["alone"]) == (right, alone)
 
 
+def test_an_effect_told_as_the_parts_that_it_is_made_of_is_named_alone() -> None:
+    plant = {**PLANT, "kind": "asymmetric_friction"}
+    parts = [named("coulomb_friction", "elbow"), named("torque_offset", "elbow")]
+    assert judged(answer(*parts), plant)["alone"]
+    assert not judged(answer(*parts, named("spring", "elbow")), plant)["alone"]
+    assert not judged(answer(parts[0]), plant)["right"]
+
+
 def test_what_is_only_called_an_approximation_does_not_count() -> None:
     one = named("spring", "elbow")
     found = judged(answer(one, approximations=[one]), PLANT)
@@ -87,6 +96,13 @@ def test_effects_are_the_same_once_they_are_read_again() -> None:
                 values = np.array([1.0])
             text = words(Planted(kind(joints, shape), values), robot, takes)
             assert text.startswith(f"{name}@")
+
+
+def test_a_payload_of_one_of_two_arms_stays_where_it_is() -> None:
+    robot = load_case(SMOKE.with_name("talos_arms.yaml"), ()).robot
+    values = np.array([1.5, 0.0, 0.0, 0.15, 0.02, 0.0, 0.02, 0.0, 0.0, 0.01])
+    for joints in Payload.places(robot):
+        assert robot.joint_names[joints[0]] in words(Planted(Payload(joints), values), robot, {})
 
 
 RECORDS = [

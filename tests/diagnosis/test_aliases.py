@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.aliases import Alias, aliases_of, joint_aliases
+from excite_cli.diagnosis.aliases import Alias, aliases_of, joint_aliases, other_name
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
@@ -60,6 +60,20 @@ def found(away: float, inflation: float = 1.0, seed: int = 0, size: float = SIZE
     _, candidates, white = case(away, size, seed)
     taken = {candidates[NAMED].place}
     return aliases_of(NAMED, [], taken, candidates, white, inflation, anything)
+
+
+def test_another_name_of_what_is_there_is_no_alias() -> None:
+    """Asymmetric friction is Coulomb friction and an offset: no doubt about either of them."""
+    _, candidates, white = case(0.1)
+    offset = TorqueOffset((0,)).place
+    own = candidates[NAMED].place
+    candidates[NEAR] = replace(candidates[NEAR], effect=AsymmetricFriction((0,)))
+    for taken, expected in (({own}, [NEAR]), ({own, offset}, [])):
+        found = aliases_of(NAMED, [], taken, candidates, white, 1.0, anything)
+        assert [alias.candidate for alias in found] == expected
+    assert other_name(AsymmetricFriction((0,)), {own, offset}) == (own, offset)
+    assert other_name(AsymmetricFriction((1,)), {own, offset}) == ()
+    assert other_name(CoulombFriction((0,)), {own, offset}) == ()
 
 
 def test_a_nearly_collinear_candidate_is_an_alias_and_others_are_not() -> None:

@@ -17,6 +17,7 @@ from excite_cli.diagnosis.records import (
     Unexplained,
 )
 from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words, title_of
+from excite_cli.effects.asymmetric_friction import AsymmetricFriction
 from excite_cli.effects.base import Value
 from excite_cli.measurement.dataset import Finding
 from excite_cli.report.assembly import Source, page_of
@@ -166,6 +167,20 @@ def test_evidence_tells_of_pairs(diagnosis: Diagnosis, beside: tuple[str, ...], 
         captions.append(charts_of(section)[0].caption)
     assert told.replace("armature", title_of("armature")) in captions[0]
     assert captions[1] == captions[2]
+
+
+def test_evidence_tells_of_another_name_of_the_same_torque(
+    diagnosis: Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = diagnosis.effects[0].effect
+    offset, other = (EffectRecord(k, ("elbow",)) for k in ("torque_offset", "asymmetric_friction"))
+    monkeypatch.setattr(AsymmetricFriction, "same_as", (own.kind, offset.kind))
+    found = replace(diagnosis, joint_aliases=(JointAlias((own, offset), (other,)),))
+    section = effect_section(found)
+    assert section is not None
+    told = charts_of(section)[0].caption
+    assert f"It with {title_of('torque_offset')} on elbow is the same torque as" in told
+    assert "no motion tells them apart" in told
 
 
 def test_residuals_tell_sealed_from_training(sections: dict[str, Section]) -> None:

@@ -96,8 +96,22 @@ def test_pairs_that_cannot_be_told_from_one_effect() -> None:
         {
             "named": [{"kind": "spring", "joints": ["elbow"]}],
             "others": [{"kind": kind, "joints": ["elbow"]} for kind in ("armature", "ripple")],
+            "same_torque": False,
         }
     ]
+
+
+def test_another_name_of_the_same_torque_is_told_as_such() -> None:
+    parts = [EffectRecord(kind, ("elbow",)) for kind in ("torque_offset", "coulomb_friction")]
+    other = EffectRecord("asymmetric_friction", ("elbow",))
+    alias = JointAlias(tuple(parts), (other,))
+    found = replace(make_diagnosis(), joint_aliases=(alias,))
+    told = "on elbow is the same torque as asymmetric_friction on elbow: no motion tells them apart"
+    assert told in " ".join(printed(found).split())
+    (data,) = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
+    assert data["same_torque"]
+    assert JointAlias((other,), tuple(parts)).same_torque
+    assert not JointAlias((parts[0],), (other,)).same_torque
 
 
 def test_nothing_is_missing_only_where_nothing_large_is_left(doubted: Diagnosis) -> None:
