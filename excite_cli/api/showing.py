@@ -6,5 +6,7 @@ from excite_cli.shown.answer import Answer as Answer
 from excite_cli.shown.command import Command as Command
 from excite_cli.shown.note import Level as Level
 from excite_cli.shown.note import Note as Note
+from excite_cli.shown.note import Tell as Tell
+from excite_cli.shown.note import saying as saying
 from excite_cli.shown.table import Part as Part
 from excite_cli.shown.table import Table as Table

@@ -7,6 +7,7 @@ from typing import Any
 import typer
 
 from excite_cli import __version__
+from excite_cli.cli.campaign import campaign
 from excite_cli.cli.check import check
 from excite_cli.cli.compare import compare
 from excite_cli.cli.compare_random import compare_random
@@ -56,6 +57,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "compare": compare,
     "replay": replay,
     "study": study,
+    "campaign": campaign,
     "export": export,
     "report": report,
     "view": view,
@@ -68,6 +70,7 @@ _GROUPS = {
     "Plan motions": ("optimize", "check", "compare-random", "verify-gradient"),
     "Inspect and export": ("report", "view", "export"),
     "From measured data": ("simulate", "identify", "diagnose", "score", "compare", "replay"),
+    "The whole loop": ("campaign",),
     "Many cases": ("study",),
 }
 _ORDER = [name for names in _GROUPS.values() for name in names]

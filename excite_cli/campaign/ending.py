@@ -1,0 +1,98 @@
+"""What still matters after a round, and whether the campaign ends."""
+
+from dataclasses import replace
+from math import isfinite
+
+from excite_cli.campaign.records import Campaign
+from excite_cli.campaign.schedule import pace_of
+from excite_cli.diagnosis.records import Diagnosis
+
+# How much more of a joint's torque, or in N·m, may be left on the newest motion than on those that
+# the model was fitted to.
+_AS_GOOD = 1.5
+_SMALL = 0.002  # of the torque: less is not looked at
+_IN_VAIN = 3  # rounds that tried to tell a pair of effects apart
+
+
+def left_on_newest(found: Diagnosis) -> list[str]:
+    """Joints whose torque the model misses more on the newest motion than where it was fitted."""
+    trained, sealed = found.trained, found.after
+    if trained is None:
+        return []
+    said = []
+    for joint in found.joint_names:
+        left, usual = sealed.relative_moving.get(joint), trained.relative_moving.get(joint)
+        if left is None or usual is None or not (isfinite(left) and isfinite(usual)):
+            continue
+        share = left / max(usual, _SMALL)
+        size = sealed.rms_moving.get(joint, 0.0) / max(trained.rms_moving.get(joint, 0.0), 1e-300)
+        if min(share, size) > _AS_GOOD:
+            said.append(
+                f"{joint}: {left:.2%} of its torque is missed on {found.sealed_run}, "
+                f"{share:.1f} times as much as on the motions before"
+            )
+    return said
+
+
+def still_open(found: Diagnosis, pairs: tuple[str, ...]) -> tuple[str, ...]:
+    """What still matters, in sentences; `pairs`: effects that a motion could tell apart."""
+    said = [f"{pair}: not told apart yet" for pair in pairs]
+    said += [f"{joint}: more than noise is left of its torque" for joint in found.joints_left]
+    said += left_on_newest(found)
+    if not found.good:
+        said.append("what was found does not lower the error on the newest motion")
+    return tuple(said)
+
+
+def ended(campaign: Campaign, until: float | None) -> Campaign:
+    """The campaign with how it ended, if it did.
+
+    `until`: the share of one sample's noise to which torques are to be known (sequence.until).
+    """
+    last = campaign.rounds[-1] if campaign.rounds else None
+    if last is None or last.learned is None:
+        return campaign
+    learned, asked = last.learned, campaign.asked
+    lacking = list(learned.open)
+    if pace_of(last.number, asked.from_speed) < 1.0:
+        lacking.append("the motions are not played at their own pace yet")
+    if last.number < 2:
+        lacking.append("no motion has looked for what the first ones do not show")
+    elif until is not None and not (learned.torque_deviation or 0.0) <= until:
+        lacking.append(
+            f"torques are known to {learned.torque_deviation:.2g} of one sample's noise, and "
+            f"{until:.2g} is asked for"
+        )
+    if not lacking:
+        text = (
+            f"Nothing that matters is left: the model, found without {last.motions[-1].name}, "
+            f"predicts it as well as the motions that it was fitted to ({learned.after:.2%} of the "
+            "torque is missed)"
+        )
+        told = f", and no effect could be another ({', '.join(learned.effects)})"
+        return replace(campaign, ended="complete", reason=text + told * bool(learned.effects) + ".")
+    why = ""
+    if last.number >= asked.most_rounds:
+        why = f"the budget of {asked.most_rounds} rounds (--max-rounds) is spent"
+    elif 0.0 < asked.most_seconds <= campaign.seconds:
+        why = f"the robot moved for {campaign.seconds:.0f} s (--max-seconds)"
+    if why:
+        text = f"Not finished, {why}. Open: {'; '.join(lacking)}."
+        return replace(campaign, ended="budget", reason=text)
+    return _in_vain(campaign)
+
+
+def _in_vain(campaign: Campaign) -> Campaign:
+    """Ended where several motions could not tell apart what alone is open."""
+    last = campaign.rounds[-_IN_VAIN:]
+    learned = [each.learned for each in last if each.learned is not None]
+    if len(learned) < _IN_VAIN:
+        return campaign
+    pairs = set(learned[0].pairs).intersection(*(each.pairs for each in learned[1:]))
+    if not pairs or any(len(each.open) > len(each.pairs) for each in learned):
+        return campaign
+    text = (
+        f"Not finished: {_IN_VAIN} rounds did not tell apart {'; '.join(sorted(pairs))}. Nothing "
+        "else is open."
+    )
+    return replace(campaign, ended="stuck", reason=text)

@@ -1,0 +1,47 @@
+"""Who has a motion measured: a program, people who carry files, or a simulated robot."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+
+from excite_cli.errors import ExciteError
+
+
+class NotMeasuredError(ExciteError):
+    """A motion was not measured; the campaign can be gone on with."""
+
+    exit_status = 1
+
+
+@dataclass(frozen=True)
+class Take:
+    """One motion to be measured.
+
+    `motion`: CSV of t, q, v, a, from rest to rest; `data`: where its log is to be written;
+    `seconds`: how long the motion is; `diary`: where what a program says is kept.
+    """
+
+    name: str
+    motion: Path
+    data: Path
+    seconds: float
+    diary: Path
+
+
+class Measure(ABC):
+    """A way to have motions measured."""
+
+    suffix: str  # of the logs
+
+    def settle(self, take: Take) -> None:  # noqa: B027
+        """Wait for what a campaign that was killed has left at work on this take."""
+
+    @abstractmethod
+    def take(self, take: Take) -> None:
+        """Have `take.motion` played, and its log written to `take.data`.
+
+        Raises
+        ------
+        NotMeasuredError
+            There is no log, and why.
+        """

@@ -1,0 +1,108 @@
+"""What a campaign has done so far: its rounds, the motions of each, and what they told."""
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+Purpose = Literal["first", "separate", "excite", "explore"]
+# Why a campaign ended.
+End = Literal["", "complete", "budget", "stuck"]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What was asked of a campaign when it began.
+
+    `from_speed`: pace of the first round, as a share of the motions' own; `most_rounds` and
+    `most_seconds` (of motion; 0: no bound) are its budget. `plain`: without motions that explore.
+    """
+
+    from_speed: float = 1.0
+    most_rounds: int = 8
+    most_seconds: float = 0.0
+    entry: bool = True
+    plain: bool = False
+
+
+@dataclass(frozen=True)
+class PlayedMotion:
+    """A motion of a round: where it is planned, and its log once there is a good one.
+
+    `plan` and `data` are names of files in the campaign's folder, `index` is that of the motion in
+    its plan. `pace`: share of its own pace; `seconds`: how long the robot moves, ways included.
+    `rejected`: why takes of it were no log of it.
+    """
+
+    name: str
+    purpose: Purpose
+    plan: str
+    index: int
+    pace: float
+    seconds: float = 0.0
+    data: str = ""
+    rejected: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What the diagnosis after a round says.
+
+    Mean relative errors of the torque on the newest motion, which took no part, where joints move:
+    of the declared model (`before`) and with all effects found (`after`). `effects`: what is named,
+    and where. `open`: what still matters, in sentences. `torque_deviation`: to how much of one
+    sample's noise torques are predicted at random states.
+    """
+
+    before: float
+    after: float
+    effects: tuple[str, ...]
+    open: tuple[str, ...]
+    pairs: tuple[str, ...] = ()
+    torque_deviation: float | None = None
+
+
+@dataclass(frozen=True)
+class Round:
+    """Motions that are planned together, and what was learned from them and all before."""
+
+    number: int
+    motions: tuple[PlayedMotion, ...]
+    learned: Learned | None = None
+
+    @property
+    def missing(self) -> PlayedMotion | None:
+        """The first motion that has no log yet."""
+        return next((each for each in self.motions if not each.data), None)
+
+    def with_motion(self, motion: PlayedMotion) -> "Round":
+        """With another record of the motion of that name."""
+        motions = tuple(motion if each.name == motion.name else each for each in self.motions)
+        return replace(self, motions=motions)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """All of it, as it is kept on disk after every step."""
+
+    config: str
+    config_folder: str
+    fingerprint: str
+    asked: Asked
+    rounds: tuple[Round, ...] = ()
+    ended: End = ""
+    reason: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def motions(self) -> tuple[PlayedMotion, ...]:
+        """Every motion that is measured, in order."""
+        return tuple(m for each in self.rounds for m in each.motions if m.data)
+
+    @property
+    def seconds(self) -> float:
+        """How long the robot moved [s]."""
+        return sum(each.seconds for each in self.motions)
+
+    def with_round(self, last: Round) -> "Campaign":
+        """With another record of the round of that number, or one more."""
+        before = tuple(each for each in self.rounds if each.number != last.number)
+        return replace(self, rounds=(*before, last))

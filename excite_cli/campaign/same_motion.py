@@ -1,0 +1,95 @@
+"""Whether a log is that of the motion that was to be played.
+
+Planned and measured positions are laid on each other at the lag at which they agree best. Joints
+are judged whose planned positions deviate by more than `_MOVES` from their mean; what they are off
+is told as a share of that deviation.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import correlate
+
+from excite_cli.robot.model import Array
+
+_RATE = 100.0  # Hz
+_MOVES = 5e-3  # rad or m, RMS: less may be hidden by how well a robot holds still
+_OFF = 0.3  # of a joint's deviation: arms that swing, and gears that give, are off by a tenth
+_WHOLE = 0.95  # of the motion's duration
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Lag of the log [s]; of every joint that moves, how far it is off, as a share; what is wrong.
+
+    `reason` is empty where the log is that of the motion.
+    """
+
+    lag: float
+    off: dict[str, float]
+    reason: str = ""
+
+
+def compared(
+    planned: tuple[Array, Array], measured: tuple[Array, Array], joint_names: Sequence[str]
+) -> Compared:
+    """Times (T,) and positions (T, n) that were planned and measured."""
+    (t, q), (t_log, q_log) = (_resampled(*each) for each in (planned, measured))
+    seconds, logged = t[-1] - t[0], t_log[-1] - t_log[0]
+    away = q - q.mean(axis=0)
+    deviation = np.sqrt(np.square(away).mean(axis=0))
+    moving = np.flatnonzero(deviation > _MOVES)
+    if not len(moving):
+        return Compared(0.0, {})
+    if logged < _WHOLE * seconds:
+        reason = f"it lasts {logged:.1f} s, and the motion {seconds:.1f} s: it is not whole"
+        return Compared(0.0, {}, reason)
+    first = _best_start(q[:, moving], q_log[:, moving], deviation[moving])
+    at = np.clip(first + np.arange(len(q)), 0, len(q_log) - 1)
+    difference = q_log[at] - q
+    off = {
+        joint_names[j]: float(np.sqrt(np.square(difference[:, j]).mean()) / deviation[j])
+        for j in moving.tolist()
+    }
+    worst = max(off, key=lambda name: off[name])
+    reason = ""
+    if off[worst] > _OFF:
+        far = sum(each > _OFF for each in off.values())
+        index = list(joint_names).index(worst)
+        held = np.ptp(q_log[at, index]) < 0.1 * np.ptp(q[:, index])
+        reason = (
+            f"{far} of {len(off)} joints are not where the motion has them, most {worst}: off by "
+            f"{off[worst]:.0%} of its deviation"
+            + (", it stood still" if held else "")
+            + f" (allowed: {_OFF:.0%}). "
+            + (
+                "The log is of another motion, or was played at another speed"
+                if far == len(off)
+                else "The log is of another motion, or the robot could not follow"
+            )
+        )
+    return Compared(float(first) / _RATE, off, reason)
+
+
+def _resampled(t: Array, q: Array) -> tuple[Array, Array]:
+    """On a grid of `_RATE`; instants may have gaps."""
+    grid = np.arange(t[0], t[-1] + 0.5 / _RATE, 1.0 / _RATE)
+    return grid, np.column_stack([np.interp(grid, t, each) for each in q.T])
+
+
+def _best_start(q: Array, log: Array, deviation: Array) -> int:
+    """Sample of the log at which the motion begins: the least sum of squares of all joints.
+
+    A log may begin late or end early by a twentieth of the motion: there the robot is at rest.
+    """
+    spare = int((1.0 - _WHOLE) * len(q))
+    wide = np.pad(log, ((spare, spare), (0, 0)), mode="edge") / deviation
+    plan = q / deviation
+    count = len(wide) - len(plan) + 1
+    if count < 1:
+        return -spare
+    squares = np.concatenate([[0.0], np.cumsum(np.square(wide).sum(axis=1))])
+    own = squares[len(plan) :] - squares[:count]
+    mixed = sum(correlate(wide[:, j], plan[:, j], mode="valid") for j in range(q.shape[1]))
+    return int(np.argmin(own - 2.0 * np.asarray(mixed))) - spare

@@ -1,0 +1,181 @@
+"""`excite campaign`: plan, have it measured, diagnose, plan the next."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from excite_cli.cli import options
+from excite_cli.cli.console import Terminal
+from excite_cli.errors import ConfigError
+
+_MEASURED, _BUDGET, _SIMULATED = "Measured by", "Pace and budget", "Simulated robot"
+
+
+def campaign(
+    config: options.Config,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the campaign.")] = Path(
+        "campaign"
+    ),
+    measure: Annotated[
+        str | None,
+        typer.Option(
+            "--measure",
+            rich_help_panel=_MEASURED,
+            metavar="COMMAND",
+            help="Program that plays {motion} and writes the log {data}; or: simulate.",
+        ),
+    ] = None,
+    inbox: Annotated[
+        Path | None,
+        typer.Option(
+            "--inbox",
+            rich_help_panel=_MEASURED,
+            help="Folder for people who carry files: motions are laid there, logs awaited.",
+        ),
+    ] = None,
+    log: Annotated[
+        str, typer.Option("--log", rich_help_panel=_MEASURED, help="Suffix of the logs.")
+    ] = ".csv",
+    timeout: Annotated[
+        float | None,
+        typer.Option(
+            "--timeout",
+            rich_help_panel=_MEASURED,
+            min=0.001,
+            help="Seconds for one motion. Default: five times the motion and a minute.",
+        ),
+    ] = None,
+    retries: Annotated[
+        int,
+        typer.Option(
+            "--retries", rich_help_panel=_MEASURED, min=0, help="Further tries for a motion."
+        ),
+    ] = 2,
+    no_entry: Annotated[
+        bool,
+        typer.Option(
+            "--no-entry",
+            rich_help_panel=_MEASURED,
+            help="Do not enter motions from rest at robot.posture, and go back to it.",
+        ),
+    ] = False,
+    from_speed: Annotated[
+        float,
+        typer.Option(
+            "--from-speed",
+            rich_help_panel=_BUDGET,
+            min=0.01,
+            max=1.0,
+            help="Pace of the first round, as a share; it doubles from round to round.",
+        ),
+    ] = 1.0,
+    max_rounds: Annotated[
+        int, typer.Option("--max-rounds", rich_help_panel=_BUDGET, min=1, help="Rounds at most.")
+    ] = 8,
+    max_seconds: Annotated[
+        float,
+        typer.Option(
+            "--max-seconds",
+            rich_help_panel=_BUDGET,
+            min=0.0,
+            help="Seconds of motion after which no round begins; 0: no bound.",
+        ),
+    ] = 0.0,
+    plain: Annotated[
+        bool,
+        typer.Option(
+            "--plain",
+            rich_help_panel=_BUDGET,
+            help="No motions that look for what nobody has found: the model's own alone.",
+        ),
+    ] = False,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--effect",
+            rich_help_panel=_SIMULATED,
+            metavar="KIND@JOINT=VALUE…",
+            help="With --measure simulate: an effect of the robot, as for `excite simulate`.",
+        ),
+    ] = None,
+    inertia_error: Annotated[
+        float,
+        typer.Option(
+            "--inertia-error",
+            rich_help_panel=_SIMULATED,
+            help="With --measure simulate: deviation of its inertias from the URDF.",
+        ),
+    ] = 0.2,
+    seed: options.Seed = None,
+    overrides: options.Set = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the campaign in the folder.")
+    ] = False,
+    workers: options.Workers = 1,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
+) -> None:
+    """Plan motions, have them measured, diagnose, and plan the next, until nothing is left.
+
+    The program of --measure gets a motion (CSV: t, q, v, a, from rest to rest), plays it, and
+    writes a log that the config reads; exit status 0 means measured. Its log must be whole and of
+    that motion; else it is told, set aside, and the motion tried again. In every round one motion
+    tells apart or excites what is known, and one shows what nobody has found yet; that one takes no
+    part in the diagnosis and judges it.
+
+    It ends when the newest motion is predicted as well as those that the model was fitted to, and
+    no effect found could be another; or when the budget is spent. Exit status 1: something is open,
+    and the answer says what; or a motion was not measured.
+
+    Everything is in the folder, after every step: campaign.html (the page of all rounds),
+    model.yaml (the config with what was found), plans, motions, logs and diagnoses. --resume goes
+    on after any interruption, and measures nothing twice.
+
+    Examples:
+      excite campaign ur10.yaml --measure 'python play.py {motion} {data}' --from-speed 0.3
+      excite campaign ur10.yaml --measure 'python play.py {motion} {data}' --resume
+      excite campaign ur10.yaml --inbox to_the_robot --log .h5
+      excite campaign ur10.yaml --measure simulate --effect spring@elbow_joint=15
+    """
+    from excite_cli.api.campaigning import MODEL, PAGE, Asked, campaign_answer
+    from excite_cli.api.campaigning import campaign as run_campaign
+    from excite_cli.api.loading import load_case
+    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import working
+    from excite_cli.cli.measured_by import measured_by
+    from excite_cli.cli.start_line import start_line
+
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    if (measure is None) == (inbox is None):
+        raise ConfigError(
+            "say who measures: --measure 'COMMAND {motion} {data}', --measure simulate, or "
+            "--inbox FOLDER; one of them."
+        )
+    if measure != "simulate" and (effect or inertia_error != 0.2):
+        raise ConfigError("--effect and --inertia-error belong to --measure simulate.")
+    asked = Asked(from_speed, max_rounds, max_seconds, not no_entry, plain)
+    with (
+        single_threaded(),
+        working(workers, scheduler, 1, terminal.tell) as place,
+        terminal.live("campaign") as line,
+    ):
+        case = load_case(config, options.changes(overrides, seed=seed))
+        way = measured_by(
+            case, measure, inbox, log, timeout, tuple(effect or ()), inertia_error, terminal.tell
+        )
+        found = run_campaign(
+            case,
+            way,
+            output,
+            asked,
+            retries=retries,
+            resume=resume,
+            workers=place,
+            progress=start_line(line, case.spec),
+            tell=terminal.tell,
+        )
+    terminal.show(campaign_answer(found, output, {"model": MODEL, "page": PAGE}))

@@ -1,0 +1,71 @@
+"""The rounds of a campaign, and how it ended, in words."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+from excite_cli.campaign.records import Campaign, Learned, Round
+from excite_cli.shown.answer import Answer
+from excite_cli.shown.table import Part, Table
+
+
+def round_in_words(number: int, learned: Learned) -> str:
+    """`round 2: 1.32% → 0.19% of the torque is missed on its newest motion; …`."""
+    named = ", ".join(learned.effects) or "no effect"
+    left = "; open: " + "; ".join(learned.open) if learned.open else "; nothing is open"
+    return (
+        f"round {number}: {learned.before:.2%} → {learned.after:.2%} of the torque is missed on "
+        f"the newest motion, with {named}{left}"
+    )
+
+
+def rounds_table(campaign: Campaign) -> Table:
+    """A row per round; seconds of motion add up to those of the campaign."""
+    return Table(
+        "Rounds (errors: of the torque on the newest motion, which took no part)",
+        ("round", "motions", "pace", "seconds", "before", "after", "torques known to", "effects"),
+        tuple(_row(each) for each in campaign.rounds),
+        words=("effects",),
+    )
+
+
+def _row(each: Round) -> tuple[str, ...]:
+    learned = each.learned
+    pace = f"{min(m.pace for m in each.motions):.0%}"
+    seconds = f"{sum(m.seconds for m in each.motions if m.data):.0f}"
+    measured = sum(bool(m.data) for m in each.motions)
+    count = str(measured) if measured == len(each.motions) else f"{measured} of {len(each.motions)}"
+    if learned is None:
+        return str(each.number), count, pace, seconds, "", "", "", ""
+    known = learned.torque_deviation
+    return (
+        str(each.number),
+        count,
+        pace,
+        seconds,
+        f"{learned.before:.2%}",
+        f"{learned.after:.2%}",
+        "" if known is None else f"{known:.2g}",
+        ", ".join(learned.effects),
+    )
+
+
+def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -> Answer:
+    """What `excite campaign` answers; `written`: what is in the folder, by what it is."""
+    count = len(campaign.motions)
+    total = (
+        f"{len(campaign.rounds)} rounds, {count} motions, {campaign.seconds:.0f} s of motion. "
+        "(torques known to: share of one sample's noise, at random states)"
+    )
+    files = tuple(f"{what}: {folder / name}" for what, name in written.items())
+    data = {
+        "ended": campaign.ended,
+        "reason": campaign.reason,
+        "rounds": [asdict(each) for each in campaign.rounds],
+        "motions": count,
+        "seconds": campaign.seconds,
+        "folder": str(folder),
+        **{what: str(folder / name) for what, name in written.items()},
+    }
+    table = rounds_table(campaign)
+    parts: tuple[Part, ...] = (campaign.reason, table, total, *files)
+    return Answer(parts, data, good=campaign.ended == "complete")

@@ -1,0 +1,128 @@
+"""What is open after a round, and when a campaign ends."""
+
+from dataclasses import replace
+
+import pytest
+
+from excite_cli.campaign.ending import ended, left_on_newest, still_open
+from excite_cli.campaign.records import Asked, Campaign, Learned, PlayedMotion, Round
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.identification.errors_of_torque import Errors
+from tests.diagnosis.synthetic_diagnosis import make_diagnosis
+
+
+def errors(share: float, rms: float, joints: tuple[str, ...]) -> Errors:
+    shares, sizes = dict.fromkeys(joints, share), dict.fromkeys(joints, rms)
+    return Errors(share, share, shares, shares, sizes, sizes, (share, share), {}, sizes)
+
+
+@pytest.fixture(scope="module")
+def found() -> Diagnosis:
+    """Nothing is left, and the newest motion is predicted as well as the others."""
+    diagnosis = make_diagnosis()
+    good = errors(0.01, 0.1, diagnosis.joint_names)
+    before = errors(0.05, 0.5, diagnosis.joint_names)
+    return replace(
+        diagnosis, trained=good, before=before, after=good, unexplained=(), large_rests=()
+    )
+
+
+def test_nothing_is_open_where_the_newest_motion_is_predicted(found: Diagnosis) -> None:
+    assert still_open(found, ()) == ()
+    assert still_open(found, ("a or b",)) == ("a or b: not told apart yet",)
+
+
+@pytest.mark.parametrize(
+    ("share", "rms", "open_"),
+    [
+        (0.014, 0.14, False),  # as chance makes it
+        (0.04, 0.4, True),
+        (0.04, 0.1, False),  # the same in N·m: the motion asks for less torque
+        (0.01, 0.4, False),  # the same share: the motion asks for more
+        (0.0019, 5.0, False),  # a share of no matter
+    ],
+)
+def test_what_is_missed_on_the_newest_motion(
+    found: Diagnosis, share: float, rms: float, open_: bool
+) -> None:
+    joints = found.joint_names
+    sealed = replace(found, after=errors(share, rms, joints))
+    assert [text.split(":")[0] for text in left_on_newest(sealed)] == list(joints) * open_
+
+
+def test_structure_that_is_left_is_open(found: Diagnosis) -> None:
+    left = replace(found, unexplained=make_diagnosis().unexplained)
+    assert still_open(left, ()) == ("elbow: more than noise is left of its torque",)
+
+
+def test_what_does_not_lower_the_error_is_open(found: Diagnosis) -> None:
+    useless = replace(found, before=found.after)
+    worse = replace(useless, after=errors(0.011, 0.1, found.joint_names))
+    assert "what was found does not lower the error on the newest motion" in still_open(worse, ())
+
+
+def campaign(
+    *rounds: tuple[tuple[str, ...], tuple[str, ...]], known: float = 0.1, **asked: float
+) -> Campaign:
+    """Rounds with (what is open, pairs); each of two motions of 10 s."""
+    made = tuple(
+        Round(
+            number,
+            tuple(
+                PlayedMotion(f"r{number}_m{k}", "excite", "p.h5", k, 1.0, 10.0, "log")
+                for k in (1, 2)
+            ),
+            Learned(0.1, 0.01, ("spring on elbow",), open_, pairs, known),
+        )
+        for number, (open_, pairs) in enumerate(rounds, start=1)
+    )
+    return Campaign("", "", "", Asked(**asked), made)  # type: ignore[arg-type]
+
+
+NOTHING: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+PAIR = (("a or b: not told apart yet",), ("a or b",))
+
+
+def test_it_ends_once_a_motion_looked_for_more_and_nothing_is_open() -> None:
+    assert ended(campaign(NOTHING), None).ended == ""
+    done = ended(campaign(NOTHING, NOTHING), None)
+    assert done.ended == "complete"
+    assert "found without r2_m2" in done.reason
+    assert "(spring on elbow)" in done.reason
+    assert ended(campaign(NOTHING, (("x",), ())), None).ended == ""
+    assert ended(campaign(), None).ended == ""
+
+
+def test_it_does_not_end_below_the_motions_own_pace() -> None:
+    assert ended(campaign(NOTHING, NOTHING, from_speed=0.3), None).ended == ""
+    assert ended(campaign(NOTHING, NOTHING, NOTHING, from_speed=0.3), None).ended == "complete"
+
+
+def test_it_does_not_end_before_the_precision_that_is_asked_for() -> None:
+    rounds = campaign(NOTHING, NOTHING, known=0.2)
+    assert ended(rounds, 0.1).ended == ""
+    assert ended(rounds, 0.2).ended == "complete"
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ({"most_rounds": 2}, "the budget of 2 rounds (--max-rounds) is spent. Open: x."),
+        ({"most_seconds": 40.0}, "the robot moved for 40 s (--max-seconds). Open: x."),
+    ],
+)
+def test_a_budget_that_is_spent_says_what_is_open(asked: dict[str, float], told: str) -> None:
+    done = ended(campaign(NOTHING, (("x",), ()), **asked), None)
+    assert done.ended == "budget"
+    assert told in done.reason
+
+
+def test_pairs_that_three_rounds_do_not_tell_apart_end_it() -> None:
+    assert ended(campaign(PAIR, PAIR), None).ended == ""
+    stuck = ended(campaign(PAIR, PAIR, PAIR), None)
+    assert stuck.ended == "stuck"
+    assert "a or b" in stuck.reason
+    other = (("c or d: not told apart yet",), ("c or d",))
+    assert ended(campaign(PAIR, PAIR, other), None).ended == ""
+    more = ((*PAIR[0], "x"), PAIR[1])
+    assert ended(campaign(PAIR, PAIR, more), None).ended == ""

@@ -1,0 +1,80 @@
+"""A log is told from that of another motion, of a part of one, of another speed or joint."""
+
+import numpy as np
+import pytest
+
+from excite_cli.campaign.same_motion import compared
+
+JOINTS = ("shoulder", "elbow", "wrist")
+
+
+def motion(seed: int, seconds: float = 8.0, rate: float = 125.0) -> tuple[np.ndarray, np.ndarray]:
+    """Three harmonics of random size per joint, from rest to rest by a window."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    window = np.sin(np.pi * t / seconds) ** 2
+    waves = sum(
+        rng.normal(size=3) * np.sin(2 * np.pi * k * t[:, None] / seconds + rng.normal(size=3))
+        for k in (1, 2, 3)
+    )
+    return t, window[:, None] * np.asarray(waves)
+
+
+def played(seed: int, lead: float = 0.0, lag: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """What encoders say: noise, a lag of the controller, and rest before and after."""
+    t, q = motion(seed)
+    log = np.arange(0.0, t[-1] + 2 * lead, 1.0 / 500.0)
+    at = [np.interp(log - lead - lag, t, each) for each in q.T]
+    noise = 1e-3 * np.random.default_rng(seed + 100).normal(size=(len(log), 3))
+    return log + 1234.5, np.column_stack(at) + noise
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("lead", "lag"), [(0.0, 0.0), (0.0, 0.05), (3.0, 0.08)])
+def test_its_own_log_is_known(seed: int, lead: float, lag: float) -> None:
+    found = compared(motion(seed), played(seed, lead, lag), JOINTS)
+    assert found.reason == ""
+    assert found.lag == pytest.approx(lead + lag, abs=0.03)
+    assert max(found.off.values()) < 0.05
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_log_of_another_motion_is_told(seed: int) -> None:
+    found = compared(motion(seed), played(seed + 50), JOINTS)
+    assert "of another motion" in found.reason
+    assert "allowed: 30%" in found.reason
+
+
+def test_half_a_log_is_told() -> None:
+    t, q = played(1)
+    half = len(t) // 2
+    found = compared(motion(1), (t[:half], q[:half]), JOINTS)
+    assert found.reason == "it lasts 4.0 s, and the motion 8.0 s: it is not whole"
+
+
+def test_a_log_that_begins_or_ends_a_little_late_or_early_is_whole() -> None:
+    t, q = played(1)
+    for part in (slice(150, None), slice(None, -150)):  # 0.3 s of 8 s
+        assert compared(motion(1), (t[part], q[part]), JOINTS).reason == ""
+
+
+def test_another_speed_is_told() -> None:
+    t, q = played(1)
+    assert "another speed" in compared(motion(1), (2.0 * t, q), JOINTS).reason
+
+
+def test_a_joint_that_stood_still_is_named() -> None:
+    t, q = played(1)
+    q[:, 1] = q[0, 1]
+    reason = compared(motion(1), (t, q), JOINTS).reason
+    assert "1 of 3 joints" in reason
+    assert "most elbow" in reason
+    assert "it stood still" in reason
+
+
+def test_joints_that_are_not_planned_to_move_are_not_judged() -> None:
+    t, q = motion(1)
+    q[:, 2] = 0.3
+    log, q_log = played(1)
+    q_log[:, 2] = 0.3 + 0.01 * np.sin(log)
+    assert compared((t, q), (log, q_log), JOINTS).reason == ""

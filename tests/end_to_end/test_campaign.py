@@ -1,0 +1,240 @@
+"""The loop closed by itself: a program measures, fails, hangs, is killed; the campaign goes on."""
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from excite_cli import load_case
+from tests.cli.program import SMOKE, Installed
+
+# Stands for a robot and whoever plays on it: notes what it played; MODE says what goes wrong.
+PLAY = """
+import os, shutil, sys, time
+from pathlib import Path
+from excite_cli import load_case, simulate
+from excite_cli.api.simulating import SimulationSettings
+
+motion, log = map(Path, sys.argv[1:3])
+mode = os.environ.get("MODE", "")
+if mode == "fails":
+    sys.exit("protective stop of joint elbow")
+if mode == "hangs":
+    time.sleep(60)
+if mode == "another robot":
+    log.write_text("t,q_left,q_right,tau_left,tau_right\\n" + "".join(
+        f"{k / 100},{k / 50},0.5,1,2\\n" for k in range(800)))
+    sys.exit()
+if mode == "another motion":
+    shutil.copy("other_log.h5", log)
+    sys.exit()
+with open("played.txt", "a") as file:
+    print(motion.stem, file=file)
+settings = SimulationSettings(rate=200.0, inertia_error=0.2, seed=4)
+simulate(load_case("smoke.yaml"), motion, [EFFECTS], settings, output=log)
+"""
+EFFECTS = ("spring@elbow=6", "coulomb_friction@shoulder_pitch=2")
+LINE = f"'{sys.executable}' play.py {{motion}} {{data}}"
+ASKED = (
+    "campaign", "smoke.yaml", "--measure", LINE, "--log", ".h5", "--no-entry", "--max-rounds", "4",
+    "--set", "optimizer.max_iterations=15", "--set", "optimizer.restarts=1",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Config and program."""
+    folder = tmp_path_factory.mktemp("campaigns")
+    text = SMOKE.read_text(encoding="utf-8")
+    (folder / "smoke.yaml").write_text(
+        text.replace("../data", str(SMOKE.parents[1] / "data")), encoding="utf-8"
+    )
+    effects = ", ".join(map(repr, EFFECTS))
+    (folder / "play.py").write_text(PLAY.replace("EFFECTS", effects), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def done(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory, cache: Path
+) -> tuple[Path, dict[str, Any]]:
+    """A campaign that nothing disturbed: its folder, and its answer."""
+    place = tmp_path_factory.mktemp("whole")
+    shutil.copytree(folder, place, dirs_exist_ok=True)
+    return place, Installed(place, cache).answer(*ASKED)
+
+
+def kinds(answer: dict[str, Any]) -> set[str]:
+    return set(answer["rounds"][-1]["learned"]["effects"])
+
+
+def test_it_ends_by_itself_with_what_the_robot_has(done: tuple[Path, dict[str, Any]]) -> None:
+    place, answer = done
+    assert answer["ended"] == "complete", answer["reason"]
+    assert kinds(answer) == {"spring on elbow", "coulomb_friction on shoulder_pitch"}
+    last = answer["rounds"][-1]["learned"]
+    assert last["after"] < 0.01 < last["before"]
+    names = [motion["name"] for each in answer["rounds"] for motion in each["motions"]]
+    assert (place / "played.txt").read_text().split() == names
+    assert answer["rounds"][-1]["motions"][-1]["purpose"] == "explore"
+    assert answer["seconds"] == pytest.approx(6.0 * len(names))
+
+
+def test_what_it_found_can_be_used(done: tuple[Path, dict[str, Any]]) -> None:
+    place, answer = done
+    declared = {each.kind for each in load_case(answer["model"]).spec.effects or ()}
+    assert {"spring", "coulomb_friction"} <= declared
+    page = Path(place / answer["page"]).read_text(encoding="utf-8")
+    assert "spring on elbow" in page
+    assert "Nothing that matters is left" in page
+    motion = place / "campaign" / "round_1_motion_1.csv"
+    assert motion.read_text().startswith("t,q_shoulder_yaw,")
+
+
+def test_killed_and_resumed_it_ends_the_same(
+    done: tuple[Path, dict[str, Any]], folder: Path, tmp_path: Path, cache: Path
+) -> None:
+    """Nothing is measured twice, wherever it was killed."""
+    place, answer = done
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    excite, rng = Installed(tmp_path, cache), random.Random(7)
+    whole = float((place / "campaign" / "campaign.json").stat().st_mtime)
+    seconds = whole - (place / "campaign" / "round_1.h5").stat().st_mtime
+    killed = 0
+    for _ in range(3):
+        resume = ("--resume",) if (tmp_path / "campaign" / "campaign.json").exists() else ()
+        process = excite.start(*ASKED, *resume)
+        try:
+            process.wait(rng.uniform(0.2, 0.6) * max(seconds, 5.0))
+        except subprocess.TimeoutExpired:
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
+            killed += 1
+    assert killed
+    again = excite.answer(*ASKED, "--resume")
+    assert without_ways(again) == without_ways(answer)
+    played = (tmp_path / "played.txt").read_text().split()
+    assert played == (place / "played.txt").read_text().split()
+
+
+def without_ways(answer: dict[str, Any]) -> dict[str, Any]:
+    """What came of it, without the folder."""
+    return {key: answer[key] for key in ("ended", "reason", "rounds", "motions", "seconds")}
+
+
+@pytest.fixture
+def begun(
+    done: tuple[Path, dict[str, Any]], folder: Path, tmp_path: Path, cache: Path
+) -> Installed:
+    """A campaign whose first motion is measured, and its second is not yet."""
+    place, _ = done
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    shutil.copytree(place / "campaign", tmp_path / "campaign")
+    state = tmp_path / "campaign" / "campaign.json"
+    content = json.loads(state.read_text())
+    content["rounds"] = content["rounds"][:1]
+    content["rounds"][0]["learned"] = None
+    for motion in content["rounds"][0]["motions"][1:]:
+        motion["data"] = ""
+    content.update(ended="", reason="")
+    state.write_text(json.dumps(content))
+    for log in (tmp_path / "campaign").glob("round_*_log.h5"):
+        if log.name != "round_1_motion_1_log.h5":
+            log.unlink()
+    shutil.copy(tmp_path / "campaign" / "round_1_motion_1_log.h5", tmp_path / "other_log.h5")
+    return Installed(tmp_path, cache)
+
+
+@pytest.mark.parametrize(
+    ("mode", "told"),
+    [
+        ("fails", "exit status 1. Its last line: protective stop of joint elbow."),
+        ("hangs", "still running after 2 s (the motion takes 6 s) and was ended."),
+        ("another robot", "round_1_motion_2_log.csv is no log of this robot: "),
+        ("another motion", "round_1_motion_2_log.h5 is no log of round_1_motion_2: "),
+    ],
+)
+def test_what_goes_wrong_is_told_and_nothing_is_lost(
+    begun: Installed, monkeypatch: pytest.MonkeyPatch, mode: str, told: str
+) -> None:
+    monkeypatch.setenv("MODE", mode)
+    more = ["--resume", "--retries", "0"]
+    more += ["--timeout", "2"] if mode == "hangs" else []
+    more += ["--log", ".csv"] if mode == "another robot" else []
+    run = begun(*ASKED, *more)
+    assert run.returncode == 1
+    words = " ".join(run.stderr.split())
+    assert told in words
+    assert "Everything before it is kept: see to the cause, then go on with --resume." in words
+    state = json.loads((begun.folder / "campaign" / "campaign.json").read_text())
+    logs = [motion["data"] for motion in state["rounds"][0]["motions"]]
+    assert logs == ["round_1_motion_1_log.h5", "", ""]
+    aside = list((begun.folder / "campaign").glob("*_rejected_1.*"))
+    assert len(aside) == (mode.startswith("another"))
+
+
+def test_what_failed_once_is_tried_again(begun: Installed) -> None:
+    """The first try is a log of another motion, as if the robot had played the last one again."""
+    play = begun.folder / "play.py"
+    once = """\
+if not os.path.exists("tried"):
+    open("tried", "w").close()
+    mode = "another motion"
+"""
+    text = play.read_text().replace('if mode == "fails"', once + 'if mode == "fails"', 1)
+    play.write_text(text)
+    run = begun(*ASKED, "--resume", "--max-rounds", "1", "--json")
+    assert "is no log of round_1_motion_2" in run.stderr
+    answer = json.loads(run.stdout)
+    (first,) = answer["rounds"]
+    assert [len(motion["rejected"]) for motion in first["motions"]] == [0, 1, 0]
+    assert run.returncode == 1  # the budget of one round is spent
+    assert answer["ended"] == "budget"
+    assert "(--max-rounds) is spent" in answer["reason"]
+    assert (begun.folder / "played.txt").read_text().split() == [
+        "round_1_motion_2", "round_1_motion_3",
+    ]  # fmt: skip
+
+
+def test_another_config_or_robot_is_told(begun: Installed) -> None:
+    run = begun(*ASKED, "--resume", "--set", "trajectory.harmonics=5")
+    assert run.returncode == 2
+    assert "the config is not the one that the campaign in campaign began with" in run.stderr
+    run = begun(*ASKED)
+    assert run.returncode == 2
+    assert "campaign holds a campaign already. Go on with --resume" in run.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ((), "say who measures: --measure 'COMMAND {motion} {data}', --measure simulate, or"),
+        (("--measure", "a {motion} {data}", "--inbox", "x"), "one of them."),
+        (("--measure", "play.py {motion}"), "{data} is missing"),
+        (("--inbox", "x", "--effect", "spring@elbow=1"), "belong to --measure simulate"),
+    ],
+)
+def test_what_cannot_be_asked(
+    folder: Path, cache: Path, arguments: tuple[str, ...], told: str
+) -> None:
+    run = Installed(folder, cache)("campaign", "smoke.yaml", *arguments)
+    assert run.returncode == 2
+    assert told in " ".join(run.stderr.split())
+    assert not (folder / "campaign").exists()
+
+
+def test_a_log_of_rows_that_are_missing_is_told(begun: Installed) -> None:
+    """It is that of the motion, but torques are not in it."""
+    play = begun.folder / "play.py"
+    play.write_text(play.read_text() + "\nimport h5py\nwith h5py.File(log, 'a') as file:\n"
+                    "    for run in file['runs'].values():\n        del run['tau']\n")  # fmt: skip
+    run = begun(*ASKED, "--resume", "--retries", "0")
+    assert run.returncode == 1
+    assert "has no dataset 'tau'" in run.stderr
