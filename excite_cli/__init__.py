@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from excite_cli.api.campaigning import run_campaign as run_campaign
     from excite_cli.api.changes import compare as compare
     from excite_cli.api.checking import check as check
     from excite_cli.api.comparing import compare_random as compare_random
@@ -51,6 +52,10 @@ if TYPE_CHECKING:
     from excite_cli.api.viewing import View as View
     from excite_cli.api.viewing import draw_motion as draw_motion
     from excite_cli.api.viewing import view_motions as view_motions
+    from excite_cli.campaign.measure import Measure as Measure
+    from excite_cli.campaign.measure import NotMeasuredError as NotMeasuredError
+    from excite_cli.campaign.measure import Take as Take
+    from excite_cli.campaign.records import Campaign as Campaign
     from excite_cli.config.spec import Spec as Spec
     from excite_cli.diagnosis.next_motion import NextMotion as NextMotion
     from excite_cli.diagnosis.records import Diagnosis as Diagnosis
@@ -90,6 +95,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "api.campaigning": ("run_campaign",),
     "api.changes": ("compare",),
     "api.checking": ("check",),
     "api.comparing": ("compare_random",),
@@ -118,6 +124,8 @@ _HOMES = {
     "api.studying": ("run_study",),
     "api.verifying": ("verify_gradient",),
     "api.viewing": ("Drawing", "Serving", "View", "draw_motion", "view_motions"),
+    "campaign.measure": ("Measure", "NotMeasuredError", "Take"),
+    "campaign.records": ("Campaign",),
     "config.spec": ("Spec",),
     "diagnosis.next_motion": ("NextMotion",),
     "diagnosis.records": ("Diagnosis", "NamedEffect"),

@@ -38,7 +38,7 @@ from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.errors import ExciteError, FileError, NoAdmissibleMotionError
 from excite_cli.excitation.extension import why_not_planned
-from excite_cli.excitation.invariant import invariants
+from excite_cli.excitation.invariant import design_for, invariants
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.measurement.motion_files import read_own_motion
@@ -76,7 +76,7 @@ class Simulated(Measure):
 
 
 @checked()
-def campaign(
+def run_campaign(
     case: Case,
     measure: Measure,
     folder: str | Path,
@@ -365,14 +365,16 @@ class _Loop:
             if separation is None
             else tuple(" or ".join(each.pair) for each in separation.directions[::2])
         )
-        count = len(found.joint_names)
+        count, model = len(found.joint_names), following.model
+        known = invariants(model, following.prior, design_for(model))
         learned = Learned(
             found.begins.mean_relative_moving,
             found.after.mean_relative_moving,
             tuple(what_and_where(each.effect, count) for each in found.effects),
             still_open(found, pairs),
             pairs,
-            invariants(following.model, following.prior).torque_deviation,
+            known.torque_deviation,
+            known.efficiency,
         )
         self._say(round_in_words(last.number, learned))
         return learned

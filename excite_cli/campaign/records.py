@@ -48,8 +48,9 @@ class Learned:
 
     Mean relative errors of the torque on the newest motion, which took no part, where joints move:
     of the declared model (`before`) and with all effects found (`after`). `effects`: what is named,
-    and where. `open`: what still matters, in sentences. `torque_deviation`: to how much of one
-    sample's noise torques are predicted at random states.
+    and where. `open`: what still matters, in sentences; `pairs`: effects that a motion could tell
+    apart. `torque_deviation`: to how much of one sample's noise torques are predicted at random
+    states; `efficiency`: how much an instant tells, as a share of what freely chosen states could.
     """
 
     before: float
@@ -58,6 +59,7 @@ class Learned:
     open: tuple[str, ...]
     pairs: tuple[str, ...] = ()
     torque_deviation: float | None = None
+    efficiency: float | None = None
 
 
 @dataclass(frozen=True)

@@ -141,8 +141,7 @@ def campaign(
       excite campaign ur10.yaml --inbox to_the_robot --log .h5
       excite campaign ur10.yaml --measure simulate --effect spring@elbow_joint=15
     """
-    from excite_cli.api.campaigning import MODEL, PAGE, Asked, campaign_answer
-    from excite_cli.api.campaigning import campaign as run_campaign
+    from excite_cli.api.campaigning import MODEL, PAGE, Asked, campaign_answer, run_campaign
     from excite_cli.api.loading import load_case
     from excite_cli.api.threads import single_threaded
     from excite_cli.api.working import working

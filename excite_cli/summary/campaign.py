@@ -22,7 +22,17 @@ def rounds_table(campaign: Campaign) -> Table:
     """A row per round; seconds of motion add up to those of the campaign."""
     return Table(
         "Rounds (errors: of the torque on the newest motion, which took no part)",
-        ("round", "motions", "pace", "seconds", "before", "after", "torques known to", "effects"),
+        (
+            "round",
+            "motions",
+            "pace",
+            "seconds",
+            "before",
+            "after",
+            "torques known to",
+            "efficiency",
+            "effects",
+        ),
         tuple(_row(each) for each in campaign.rounds),
         words=("effects",),
     )
@@ -35,7 +45,7 @@ def _row(each: Round) -> tuple[str, ...]:
     measured = sum(bool(m.data) for m in each.motions)
     count = str(measured) if measured == len(each.motions) else f"{measured} of {len(each.motions)}"
     if learned is None:
-        return str(each.number), count, pace, seconds, "", "", "", ""
+        return str(each.number), count, pace, seconds, *[""] * 5
     known = learned.torque_deviation
     return (
         str(each.number),
@@ -45,6 +55,7 @@ def _row(each: Round) -> tuple[str, ...]:
         f"{learned.before:.2%}",
         f"{learned.after:.2%}",
         "" if known is None else f"{known:.2g}",
+        "" if learned.efficiency is None else f"{learned.efficiency:.1%}",
         ", ".join(learned.effects),
     )
 
@@ -54,7 +65,8 @@ def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -
     count = len(campaign.motions)
     total = (
         f"{len(campaign.rounds)} rounds, {count} motions, {campaign.seconds:.0f} s of motion. "
-        "(torques known to: share of one sample's noise, at random states)"
+        "(torques known to: share of one sample's noise, at random states; efficiency: what an "
+        "instant tells, as a share of what freely chosen states could)"
     )
     files = tuple(f"{what}: {folder / name}" for what, name in written.items())
     data = {

@@ -89,7 +89,7 @@ def test_it_ends_by_itself_with_what_the_robot_has(done: tuple[Path, dict[str, A
 
 def test_what_it_found_can_be_used(done: tuple[Path, dict[str, Any]]) -> None:
     place, answer = done
-    declared = {each.kind for each in load_case(answer["model"]).spec.effects or ()}
+    declared = {each.kind for each in load_case(place / answer["model"]).spec.effects or ()}
     assert {"spring", "coulomb_friction"} <= declared
     page = Path(place / answer["page"]).read_text(encoding="utf-8")
     assert "spring on elbow" in page

@@ -1,0 +1,293 @@
+"""Whole campaigns on simulated robots, beside the same motion time spent without closing the loop.
+
+    python -m benchmarks.closed_loops [--only WORD …] [--folder FOLDER] [--page docs/campaigns.md]
+
+Five robots, each with inertias 10–30 % off its description and two or three effects that its config
+does not declare. Campaigns begin at a fraction of the motions' pace, so that one effect does not
+show in the first round. Beside each campaign: as many motions, planned in one go, as its seconds
+allow (`plain`), and random ones (`random`), at their own pace, diagnosed once. All models are then
+judged on two random motions that nobody has seen: what is missed of their torque where joints move.
+Every command is one that a user types. One file per robot, so that a run can be gone on with.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+from datetime import date
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from benchmarks.battery.scoring import Name, same
+from excite_cli import read_diagnosis
+from excite_cli.api.loading import load_problem
+from excite_cli.excitation.random_baseline import random_baseline
+from excite_cli.excitation.result import Result
+from excite_cli.store.result_file import read_result, write_result
+
+ROOT = Path(__file__).resolve().parents[1]
+_PROGRAM = "from excite_cli.cli.app import main; main()"
+_TEST_SEED = 4711
+_TEST_MOTIONS = 2
+_DRAWN = 4  # random motions per one that is played
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A robot: its config (or what `init` is given), and effects as `--effect` takes them.
+
+    `late`: the effect that shows only at speeds or torques of later rounds.
+    """
+
+    name: str
+    config: str
+    effects: tuple[str, ...]
+    late: str
+    from_speed: float = 0.25
+    more: tuple[str, ...] = ()
+
+    @property
+    def planted(self) -> tuple[Name, ...]:
+        """Names of all effects."""
+        return tuple(
+            Name(kind, tuple(joints.split(",")))
+            for kind, joints in (text.split("=")[0].split("@") for text in self.effects)
+        )
+
+
+LOOPS = (
+    Loop(
+        "UR10",
+        "configs/ur10.yaml",
+        (
+            "load_dependent_friction@elbow_joint=0.06",
+            "spring@wrist_1_joint=4",
+            "nonlinear_viscous_friction@shoulder_pan_joint=4,power:3",
+        ),
+        "nonlinear_viscous_friction",
+    ),
+    Loop(
+        "Panda",
+        "configs/panda.yaml",
+        (
+            "ripple@panda_joint2=1.5,periods:20",
+            "torque_offset@panda_joint4=0.8",
+            "nonlinear_viscous_friction@panda_joint1=2,power:3",
+        ),
+        "nonlinear_viscous_friction",
+    ),
+    Loop(
+        "TALOS' arms",
+        "configs/talos_arms.yaml",
+        (
+            "coulomb_friction@arm_left_4_joint=1.5",
+            "spring@arm_right_2_joint=4",
+            "nonlinear_viscous_friction@arm_right_1_joint=2,power:3",
+        ),
+        "nonlinear_viscous_friction",
+    ),
+    Loop(
+        "bench arm (MJCF)",
+        "data/bench_arm.xml",
+        (
+            "stribeck_friction@shoulder=4",
+            "armature@spin=0.03",
+            "nonlinear_viscous_friction@turn=1.5,power:3",
+        ),
+        "nonlinear_viscous_friction",
+    ),
+    Loop(
+        "standing TALOS",
+        "configs/talos_base.yaml",
+        ("base_tilt@all=0.01,pitch:0.0524", "coulomb_friction@arm_left_1_joint=2"),
+        "coulomb_friction",
+        more=("--set", "robot.rows=[base, joints]"),
+    ),
+)
+
+
+class Folder:
+    """Runs `excite` in the folder of one robot."""
+
+    def __init__(self, place: Path) -> None:
+        self.place = place
+        place.mkdir(parents=True, exist_ok=True)
+
+    def excite(self, *words: str, good: tuple[int, ...] = (0,)) -> Any:
+        """What `--json` answers."""
+        run = subprocess.run(
+            [sys.executable, "-P", "-c", _PROGRAM, *words, "--json"],
+            cwd=self.place,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if run.returncode not in good:
+            raise RuntimeError(f"excite {' '.join(words)}\n{run.stderr[-2000:]}")
+        return json.loads(run.stdout) if run.stdout.strip() else {}
+
+
+def closed(loop: Loop, folder: Folder) -> Record:
+    """The campaign, and what the same seconds give otherwise."""
+    config = _config(loop, folder)
+    settings = ("--seed", "1", *loop.more)
+    robot = tuple(word for text in loop.effects for word in ("--effect", text))
+    measured = ("--measure", "simulate", "--from-speed", str(loop.from_speed), *robot)
+    resume = ("--resume",) if (folder.place / "campaign" / "campaign.json").exists() else ()
+    whole = folder.excite("campaign", config, *measured, *settings, *resume, good=(0, 1))
+    problem = load_problem(folder.place / config, ["seed=1", *loop.more[1::2]])
+    count = max(3, ceil(whole["seconds"] / problem.trajectory.duration))
+    plain = ("--motions", str(count), "-o", "plain.h5", "--overwrite")
+    folder.excite("optimize", config, *settings, *plain)
+    _random(problem, folder.place / "plain.h5", folder.place / "random.h5", count, seed=1)
+    _random(problem, folder.place / "plain.h5", folder.place / "test.h5", _TEST_MOTIONS, _TEST_SEED)
+    play = (*robot, *settings, "--overwrite")
+    folder.excite("simulate", config, "test.h5", "-o", "test_log.h5", *play)
+    ways: Record = {}
+    last = whole["rounds"][-1]["number"]
+    found = {"campaign": f"campaign/round_{last}_diagnosis.h5"}
+    for way in ("plain", "random"):
+        folder.excite("simulate", config, f"{way}.h5", "-o", f"{way}_log.h5", *play)
+        found[way] = f"{way}_diagnosis.h5"
+        output = ("-o", found[way], "--overwrite")
+        folder.excite("diagnose", config, f"{way}_log.h5", *loop.more, *output, good=(0, 1))
+    for way, file in found.items():
+        scored = folder.excite("score", file, "test_log.h5", "--overwrite", good=(0, 1))
+        ways[way] = {"named": _named(folder.place / file), "missed": _missed(scored)}
+    ways["campaign"] |= {"seconds": whole["seconds"], "motions": whole["motions"]}
+    for way in ("plain", "random"):
+        ways[way] |= {"seconds": count * problem.trajectory.duration, "motions": count}
+    return {
+        "robot": loop.name,
+        "planted": list(loop.effects),
+        "rounds": whole["rounds"],
+        "ended": whole["ended"],
+        "reason": whole["reason"],
+        "ways": ways,
+    }
+
+
+def _config(loop: Loop, folder: Folder) -> str:
+    """The config in the folder; `init` makes it where there is none."""
+    if loop.config.endswith(".xml"):
+        folder.excite("init", "--urdf", str(ROOT / loop.config), "-o", "robot.yaml", "--overwrite")
+        return "robot.yaml"
+    text = (ROOT / loop.config).read_text(encoding="utf-8")
+    (folder.place / "robot.yaml").write_text(text.replace("../data", str(ROOT / "data")))
+    return "robot.yaml"
+
+
+def _random(problem: Any, like: Path, path: Path, count: int, seed: int) -> None:
+    """Random admissible motions, the best few of many, as a result file."""
+    found = random_baseline(problem, count, seed, candidates=_DRAWN * count, seconds=0.0)
+    model: Result = read_result(like)
+    motions = [
+        _as_motion(model, index, each.coefficients)
+        for index, each in enumerate(found.motions, start=1)
+    ]
+    write_result(path, replace(model, motions=tuple(motions)), problem)
+
+
+def _as_motion(model: Result, index: int, coefficients: Any) -> Any:
+    return replace(model.motions[0], index=index, coefficients=coefficients)
+
+
+def _named(file: Path) -> list[list[Any]]:
+    found = read_diagnosis(file)
+    return [
+        [[each.effect.kind, list(each.effect.joints)]]
+        + [[alias.kind, list(alias.joints)] for alias in each.aliases]
+        for each in found.named
+    ]
+
+
+def _missed(scored: Record) -> float:
+    runs = scored["runs"]
+    return float(sum(run["error"]["mean_relative_moving"] for run in runs) / len(runs))
+
+
+def right(loop: Loop, named: list[list[Any]], joints: int) -> tuple[list[bool], int]:
+    """Which of the planted effects are named, and how many names are of none of them."""
+    sets = [[Name(kind, tuple(where)) for kind, where in each] for each in named]
+    found = [any(same(plant, names[0], joints) for names in sets) for plant in loop.planted]
+    wrong = sum(not any(same(p, n, joints) for p in loop.planted for n in names) for names in sets)
+    return found, wrong
+
+
+def table(records: list[Record]) -> str:
+    """Markdown: a row per robot and way."""
+    lines = [
+        "| robot | way | motions | seconds | effects named | wrong names | missed, unseen motions |",
+        "|---|---|---:|---:|---|---:|---:|",
+    ]
+    by_name = {loop.name: loop for loop in LOOPS}
+    for record in records:
+        loop = by_name[record["robot"]]
+        for way, each in record["ways"].items():
+            found, wrong = right(loop, each["named"], -1)
+            lines.append(
+                f"| {record['robot']} | {way} | {each['motions']} | {each['seconds']:.0f} "
+                f"| {sum(found)} of {len(found)} | {wrong} | {each['missed']:.2%} |"
+            )
+    return "\n".join(lines)
+
+
+def rounds(records: list[Record]) -> str:
+    """Markdown: a row per round."""
+    lines = [
+        "| robot | round | pace | seconds | missed before | after | effects found so far |",
+        "|---|---:|---:|---:|---:|---:|---|",
+    ]
+    for record in records:
+        for each in record["rounds"]:
+            learned = each["learned"]
+            seconds = sum(motion["seconds"] for motion in each["motions"])
+            pace = min(motion["pace"] for motion in each["motions"])
+            lines.append(
+                f"| {record['robot']} | {each['number']} | {pace:.0%} | {seconds:.0f} "
+                f"| {learned['before']:.2%} | {learned['after']:.2%} "
+                f"| {', '.join(learned['effects'])} |"
+            )
+        lines.append(f"| {record['robot']} | ended | | | | | {record['reason']} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--only", nargs="+", help="robots whose name has one of these words")
+    parser.add_argument("--folder", type=Path, default=Path("closed_loops"))
+    parser.add_argument("--page", type=Path, help="write the page here")
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    records = []
+    for loop in LOOPS:
+        path = options.folder / f"{loop.name.replace(' ', '_')}.json"
+        wanted = not options.only or any(word in loop.name for word in options.only)
+        if wanted and not path.exists():
+            place = Folder((options.folder / path.stem).resolve())
+            path.write_text(json.dumps(closed(loop, place), indent=1))
+        if path.exists():
+            records.append(json.loads(path.read_text()))
+            print(table(records[-1:]), flush=True)
+    parts = (_OPENING, f"{date.today():%d %B %Y}.", table(records), "## Rounds", rounds(records))
+    text = "\n\n".join(parts) + "\n"
+    if options.page is not None:
+        options.page.write_text(text, encoding="utf-8")
+
+
+_OPENING = """\
+# Campaigns on simulated robots
+
+Made by `python -m benchmarks.closed_loops --page docs/campaigns.md`.
+"""
+
+if __name__ == "__main__":
+    main()
