@@ -225,7 +225,7 @@ def right(loop: Loop, named: list[list[Any]], joints: int) -> tuple[list[bool], 
 def table(records: list[Record]) -> str:
     """Markdown: a row per robot and way."""
     lines = [
-        "| robot | way | motions | seconds | effects named | wrong names | missed, unseen motions |",
+        "| robot | way | motions | seconds | effects named | wrong names | missed, unseen |",
         "|---|---|---:|---:|---|---:|---:|",
     ]
     by_name = {loop.name: loop for loop in LOOPS}

@@ -41,6 +41,7 @@ from excite_cli.excitation.extension import why_not_planned
 from excite_cli.excitation.invariant import design_for, invariants
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
+from excite_cli.excitation.stack import Stack
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.report.page import render
 from excite_cli.report.rounds_page import rounds_page
@@ -205,7 +206,8 @@ class _Loop:
         self._say(f"round 1: {count} motions")
         result = self._planned(problem, path)
         pace = pace_of(1, state.asked.from_speed)
-        return Round(1, self._motions(1, "first", path, result, pace))
+        motions = self._motions(1, "first", path, result, pace)
+        return Round(1, motions, _efficiency(problem, result))
 
     def _next(self, state: Campaign, number: int) -> Round:
         """A motion for what is known, and one for what is not."""
@@ -219,6 +221,7 @@ class _Loop:
         self._say(f"round {number}: {following.messages[0]}")
         path = self.folder / f"round_{number}.h5"
         result = self._planned(following, path)
+        efficiency = _efficiency(following.model, result)
         purpose: Purpose = "separate" if following.purpose == "separate" else "excite"
         motions = self._motions(number, purpose, path, result, pace)
         if not alone:
@@ -228,7 +231,7 @@ class _Loop:
             logs = [self.folder / each.data for each in state.motions]
             result = self._planned(problem, path, logs)
             motions += self._motions(number, "explore", path, result, pace, len(motions))
-        return Round(number, motions)
+        return Round(number, motions, efficiency)
 
     def _effects(self, found: Path) -> tuple[tuple[EffectSpec, ...], tuple[EffectSpec, ...]]:
         """What is declared or found, and what is neither, of effects that motions can show."""
@@ -366,7 +369,7 @@ class _Loop:
             else tuple(" or ".join(each.pair) for each in separation.directions[::2])
         )
         count, model = len(found.joint_names), following.model
-        known = invariants(model, following.prior, design_for(model))
+        known = invariants(model, following.prior)
         learned = Learned(
             found.begins.mean_relative_moving,
             found.after.mean_relative_moving,
@@ -374,7 +377,6 @@ class _Loop:
             still_open(found, pairs),
             pairs,
             known.torque_deviation,
-            known.efficiency,
         )
         self._say(round_in_words(last.number, learned))
         return learned
@@ -418,6 +420,14 @@ def _showing(spec: Spec, effects: tuple[EffectSpec, ...]) -> Spec:
     wanted = {"kind": "log_det", "column_scaling": "unit_norm"}
     criterion = spec.criterion.model_copy(update=wanted)
     return spec.model_copy(update={"effects": effects, "criterion": criterion})
+
+
+def _efficiency(problem: Problem, result: Result) -> float | None:
+    """Of the motions by themselves: how much an instant tells, of what free states could."""
+    stack, objective = Stack.empty(problem.columns), problem.objective()
+    for motion in result.motions:
+        stack = stack.with_rows(objective.block(motion.coefficients))
+    return invariants(problem, stack, design_for(problem)).efficiency
 
 
 def _set_aside(log: Path) -> Path | None:

@@ -50,7 +50,7 @@ class Learned:
     of the declared model (`before`) and with all effects found (`after`). `effects`: what is named,
     and where. `open`: what still matters, in sentences; `pairs`: effects that a motion could tell
     apart. `torque_deviation`: to how much of one sample's noise torques are predicted at random
-    states; `efficiency`: how much an instant tells, as a share of what freely chosen states could.
+    states.
     """
 
     before: float
@@ -59,15 +59,19 @@ class Learned:
     open: tuple[str, ...]
     pairs: tuple[str, ...] = ()
     torque_deviation: float | None = None
-    efficiency: float | None = None
 
 
 @dataclass(frozen=True)
 class Round:
-    """Motions that are planned together, and what was learned from them and all before."""
+    """Motions that are planned together, and what was learned from them and all before.
+
+    `efficiency`: how much an instant of those planned for the model tells of the inertias, as a
+    share of what freely chosen states could.
+    """
 
     number: int
     motions: tuple[PlayedMotion, ...]
+    efficiency: float | None = None
     learned: Learned | None = None
 
     @property

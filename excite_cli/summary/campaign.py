@@ -27,10 +27,10 @@ def rounds_table(campaign: Campaign) -> Table:
             "motions",
             "pace",
             "seconds",
+            "efficiency",
             "before",
             "after",
             "torques known to",
-            "efficiency",
             "effects",
         ),
         tuple(_row(each) for each in campaign.rounds),
@@ -44,18 +44,19 @@ def _row(each: Round) -> tuple[str, ...]:
     seconds = f"{sum(m.seconds for m in each.motions if m.data):.0f}"
     measured = sum(bool(m.data) for m in each.motions)
     count = str(measured) if measured == len(each.motions) else f"{measured} of {len(each.motions)}"
+    efficiency = "" if each.efficiency is None else f"{each.efficiency:.2%}"
     if learned is None:
-        return str(each.number), count, pace, seconds, *[""] * 5
+        return str(each.number), count, pace, seconds, efficiency, *[""] * 4
     known = learned.torque_deviation
     return (
         str(each.number),
         count,
         pace,
         seconds,
+        efficiency,
         f"{learned.before:.2%}",
         f"{learned.after:.2%}",
         "" if known is None else f"{known:.2g}",
-        "" if learned.efficiency is None else f"{learned.efficiency:.1%}",
         ", ".join(learned.effects),
     )
 
