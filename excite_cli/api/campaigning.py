@@ -207,7 +207,7 @@ class _Loop:
         result = self._planned(problem, path)
         pace = pace_of(1, state.asked.from_speed)
         motions = self._motions(1, "first", path, result, pace)
-        return Round(1, motions, _efficiency(problem, result))
+        return Round(1, motions, efficiency=_efficiency(problem, result))
 
     def _next(self, state: Campaign, number: int) -> Round:
         """A motion for what is known, and one for what is not."""
@@ -231,7 +231,7 @@ class _Loop:
             logs = [self.folder / each.data for each in state.motions]
             result = self._planned(problem, path, logs)
             motions += self._motions(number, "explore", path, result, pace, len(motions))
-        return Round(number, motions, efficiency)
+        return Round(number, motions, efficiency=efficiency)
 
     def _effects(self, found: Path) -> tuple[tuple[EffectSpec, ...], tuple[EffectSpec, ...]]:
         """What is declared or found, and what is neither, of effects that motions can show."""

@@ -71,8 +71,8 @@ class Round:
 
     number: int
     motions: tuple[PlayedMotion, ...]
-    efficiency: float | None = None
     learned: Learned | None = None
+    efficiency: float | None = None
 
     @property
     def missing(self) -> PlayedMotion | None:
