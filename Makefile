@@ -59,7 +59,7 @@ bench: $(STAMP)          ## cost and gradient, growth, memory, whole motions, tw
 FIGAROH ?= figaroh-env/bin/python
 peers: $(STAMP)          ## beside FIGAROH and finite differences (docs/peers.md), ten minutes
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.peers --figaroh-python $(FIGAROH) \
-	  --markdown docs/peers_table.md --readme README.md
+	  --markdown docs/peers_table.md --goals docs/results.md
 
 trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism (an hour; root)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.fuzz --count 10000
@@ -67,8 +67,8 @@ trust: $(STAMP)          ## broken and hostile files, kills, full disks, determi
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.disk
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.determinism
 
-real: $(STAMP)           ## logs of four real robots, into the table of the README (three minutes)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.real_robots --markdown README.md
+real: $(STAMP)           ## logs of four real robots, into the table of docs/results.md (three minutes)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.real_robots --markdown docs/results.md
 
 battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about 20 minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.diagnosis_battery --cases 130 --seed 5310
