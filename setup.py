@@ -25,7 +25,7 @@ class WheelOfItsPlatform(bdist_wheel):
 
 
 def page() -> str:
-    """The README; its links and pictures lead to the repository, which the registry does not hold."""
+    """The README with links and pictures that lead to the repository, as the registry lacks it."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     home = project["urls"]["Homepage"]
     text = (ROOT / "README.md").read_text(encoding="utf-8")

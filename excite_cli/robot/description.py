@@ -91,8 +91,9 @@ def example_robots_folder() -> Path:
     for folder in folders:
         if folder.is_dir():
             return folder
+    tried = " or ".join(map(str, folders))
     raise RobotError(
-        f"The robots of the package example-robot-data are not in {' or '.join(map(str, folders))}. "
+        f"The robots of the package example-robot-data are not in {tried}. "
         "Run: pip install example-robot-data (with conda: conda install example-robot-data)"
     )
 
