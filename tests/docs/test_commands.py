@@ -37,18 +37,7 @@ BRIEF_UR10 = (
 )
 # Tables of TALOS' meshes take minutes to make.
 WITHOUT_MESHES = ("--set", "constraints.self_collision=null")
-
-# GitHub's first page is kept free of comments for tests.
-README = """
-<!-- needs: configs/ data/ -->
-<!-- first: excite optimize configs/ur10.yaml --motions 2 -o motions.h5 -->
-<!-- first: excite simulate configs/ur10.yaml motions.h5 -o measured.h5 --effect coulomb_friction@elbow_joint=4 -->
-<!-- first: excite optimize configs/talos_arms.yaml --motions 1 -o talos_arms.h5 -->
-"""  # noqa: E501
-PAGES = [
-    read_page(ROOT / "README.md", README),
-    *map(read_page, sorted((ROOT / "docs").rglob("*.md"))),
-]
+PAGES = [read_page(path) for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))]
 WITH_COMMANDS = [page for page in PAGES if page.commands]
 
 
@@ -170,7 +159,8 @@ def test_commands_of_a_page(page: Page, samples: Samples, shared: Shared, tmp_pa
 
 def test_the_pages_that_matter_have_commands() -> None:
     names = {str(page.path.relative_to(ROOT)) for page in WITH_COMMANDS}
-    assert {"README.md", "docs/tutorial.md", "docs/how-to/robot.md", "docs/how-to/data.md"} <= names
+    assert {"README.md", "docs/tutorial.md", "docs/results.md", "docs/problem.md"} <= names
+    assert {"docs/how-to/robot.md", "docs/how-to/data.md"} <= names
     assert sum(len(page.commands) for page in WITH_COMMANDS) > 30
 
 

@@ -25,8 +25,20 @@ OTHERS = {"robot_descriptions"}
 TOOLS = {"pip", "build", "cibuildwheel", "pytest", "venv"}
 
 
+# Names of packages at conda-forge, where they are others than at PyPI.
+RENAMED = {
+    "pin": "pinocchio-python",
+    "coal": "coal-python",
+    "matplotlib": "matplotlib-base",
+    "mujoco": "mujoco-python",
+}
+
+
 def loaded(path: Path) -> Any:
     return yaml.safe_load(path.read_text(encoding="utf-8"))
+
+
+RECIPE = loaded(ROOT / "recipe" / "recipe.yaml")
 
 
 def commands(path: Path) -> list[str]:
@@ -108,10 +120,22 @@ def test_pythons_agree() -> None:
 
 
 def test_there_is_one_version() -> None:
-    assert PROJECT["project"]["dynamic"] == ["version"]
+    assert "version" in PROJECT["project"]["dynamic"]
     assert PROJECT["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "excite_cli.__version__"}
     assert loaded(ROOT / "CITATION.cff")["version"] == __version__
+    assert RECIPE["context"]["version"] == __version__
     assert f"\n## {__version__}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_recipe_of_conda_asks_for_the_same() -> None:
+    """What pip installs of the program, of figures and of the simulation, by conda's names."""
+    extras = PROJECT["project"]["optional-dependencies"]
+    asked = [*PROJECT["project"]["dependencies"], *extras["plot"], *extras["sim"]]
+    named = {RENAMED.get(name, name): floor for name, floor in (each.split(">=") for each in asked)}
+    run = [each.split(" >=") for each in RECIPE["requirements"]["run"] if each != "python"]
+    assert dict(run) == named
+    (backend,) = PROJECT["build-system"]["requires"]
+    assert backend.replace(">", " >") in RECIPE["requirements"]["host"]
 
 
 def test_there_is_one_home() -> None:

@@ -55,3 +55,15 @@ def test_without_a_compiler(tmp_path: Path) -> None:
         names = archive.namelist()
     assert "excite_cli/kernels/compiled.py" in names
     assert not any(name.endswith(".so") for name in names)
+
+
+def test_links_of_the_page_lead_to_the_repository(tmp_path: Path) -> None:
+    pytest.importorskip("setuptools")
+    with zipfile.ZipFile(wheel(tmp_path, "/bin/false")) as archive:
+        (name,) = (each for each in archive.namelist() if each.endswith("/METADATA"))
+        page = archive.read(name).decode()
+    home = re.findall(r"^Project-URL: Homepage, (.*)$", page, re.MULTILINE)[0]
+    links = re.findall(r"\]\(([^)]+)\)", page)
+    assert f"{home}/blob/main/docs/tutorial.md" in links
+    assert f"{home}/raw/main/docs/images/talos_arms.gif" in links
+    assert [link for link in links if not link.startswith("https://")] == []
