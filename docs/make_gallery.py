@@ -1,0 +1,119 @@
+"""Writes docs/gallery: logs of real robots from the repository, diagnosed, one page for each robot.
+
+Run: python -m docs.make_gallery [--robot tx40 …] [--from FOLDER]
+
+Every figure and every picture comes from the diagnoses of this run. Ten minutes of processor time;
+with `--from` diagnoses that FOLDER holds already (`excite diagnose … -o FOLDER/tx40-1.h5`, in the
+order of `benchmarks.real_robots`) are drawn, and the others are made there.
+"""
+
+import argparse
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import h5py
+from PIL import Image
+
+from benchmarks.real_robots import DATA, LOGS, Answer, Log, diagnosed, row, table
+from docs.gallery_page import HEAD, IN_FULL, OTHERWISE, Diagnosed, page
+from excite_cli import Diagnosis, load_case, load_data, read_diagnosis
+from excite_cli.diagnosis.next_motion import next_experiment
+from excite_cli.report.diagnosis_figures import figures_of
+from excite_cli.report.style import save_figure
+from excite_cli.shown.command import Command
+from excite_cli.summary.diagnosis_data import diagnosis_data
+
+TARGET = Path(__file__).parent / "gallery"
+ROBOTS = tuple(dict.fromkeys(log.folder for log in LOGS))
+_WIDTH, _COLOURS = 1170, 32  # px of a picture, and of its palette: line drawings stay small
+_INDEX = f"""{HEAD}
+
+# Gallery of real robots
+
+Logs of four robots, by their authors, each diagnosed from its URDF alone: from the log to the
+residual, to names, to the error before and after, and to what stays unexplained. Made by
+`make gallery` from the files in `data/`; every number and picture is of the run that made the page.
+Errors are relative, on data that the fit never saw, mean over joints, where joints move.
+
+"""
+
+
+def main() -> None:
+    """Diagnose, write the pages and the index."""
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
+    parser.add_argument("--robot", nargs="+", choices=ROBOTS, default=ROBOTS)
+    parser.add_argument("--from", dest="folder", type=Path, help="where diagnoses are kept")
+    arguments = parser.parse_args()
+    with TemporaryDirectory() as temporary:
+        kept = arguments.folder or Path(temporary)
+        kept.mkdir(parents=True, exist_ok=True)
+        rows = {robot: written(robot, kept, TARGET) for robot in arguments.robot}
+    if arguments.robot == ROBOTS:
+        (TARGET / "index.md").write_text(_index(rows), encoding="utf-8")
+
+
+def written(robot: str, kept: Path, target: Path) -> list[tuple[str, ...]]:
+    """Write the page and the pictures of a robot to `target`; rows of the table of real robots."""
+    target.mkdir(parents=True, exist_ok=True)
+    logs = [log for log in LOGS if log.folder == robot]
+    number, answers, rows = 0, [], []
+    for log in logs:
+        every = []
+        for options in log.runs:
+            number += 1
+            every.append(_found(log, options, kept / f"{robot}-{number}.h5"))
+        first, options = every[0], log.runs[0]
+        files = ("diagnose", f"data/{robot}/{robot}.yaml", f"data/{robot}/{log.file}")
+        pictures = drawn(first, f"{robot}-{len(answers) + 1}", target)
+        command = Command(("excite", *files, *options))
+        answers.append(Diagnosed(log.words, command, first, pictures))
+        rows.append(
+            row(log, [Answer(diagnosis_data(each, next_experiment(each))) for each in every])
+        )
+    case = load_case(DATA / robot / f"{robot}.yaml")
+    data = load_data(case, DATA / robot / logs[0].file, tell=lambda note: None)
+    text = page(_facts(robot), data, answers)
+    (target / f"{robot}.md").write_text(text, encoding="utf-8")
+    return rows
+
+
+def drawn(found: Diagnosis, kinds: Sequence[str], target: Path) -> dict[str, str]:
+    """Write figures of a diagnosis as small PNGs beside `target`; their names by figure."""
+    names = {}
+    for figure, draw in figures_of(found).items():
+        if not figure.startswith(tuple(kinds)):
+            continue
+        path = target.with_name(f"{target.name}-{figure}.png")
+        save_figure(draw(), path, "png")
+        with Image.open(path) as picture:
+            size = (_WIDTH, round(picture.height * _WIDTH / picture.width))
+            small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
+        small.quantize(_COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+        names[figure] = path.name
+    return names
+
+
+def _found(log: Log, options: Sequence[str], path: Path) -> Diagnosis:
+    if not path.exists():
+        diagnosed(log, (*options, "-o", str(path)))
+    return read_diagnosis(path)
+
+
+def _facts(robot: str) -> Mapping[str, str]:
+    """What the log's authors are told to have recorded."""
+    with h5py.File(DATA / robot / f"{robot}.h5") as file:
+        return {name: str(value) for name, value in file.attrs.items()}
+
+
+def _index(rows: Mapping[str, Sequence[tuple[str, ...]]]) -> str:
+    linked = [
+        (f"[{cells[0]}]({robot}.md)", *cells[1:])
+        for robot, every in rows.items()
+        for cells in every
+    ]
+    return _INDEX + table(linked) + "\n"
+
+
+if __name__ == "__main__":
+    main()
