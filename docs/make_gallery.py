@@ -56,22 +56,23 @@ def main() -> None:
 def written(robot: str, kept: Path, target: Path) -> list[tuple[str, ...]]:
     """Write the page and the pictures of a robot to `target`; rows of the table of real robots."""
     target.mkdir(parents=True, exist_ok=True)
+    for old in target.glob(f"{robot}-*.png"):
+        old.unlink()
     logs = [log for log in LOGS if log.folder == robot]
-    number, answers, rows = 0, [], []
+    config, number, answers, rows = Path("data", robot, f"{robot}.yaml"), 0, [], []
     for log in logs:
         every = []
         for options in log.runs:
             number += 1
             every.append(_found(log, options, kept / f"{robot}-{number}.h5"))
-        first, options = every[0], log.runs[0]
-        files = ("diagnose", f"data/{robot}/{robot}.yaml", f"data/{robot}/{log.file}")
-        pictures = drawn(first, f"{robot}-{len(answers) + 1}", target)
-        command = Command(("excite", *files, *options))
-        answers.append(Diagnosed(log.words, command, first, pictures))
-        rows.append(
-            row(log, [Answer(diagnosis_data(each, next_experiment(each))) for each in every])
-        )
-    case = load_case(DATA / robot / f"{robot}.yaml")
+        told = [Answer(diagnosis_data(each, next_experiment(each))) for each in every]
+        rows.append(row(log, told))
+        file = config.with_name(log.file)
+        command = Command(("excite", "diagnose", str(config), str(file), *log.runs[0]))
+        kinds = OTHERWISE if answers else IN_FULL
+        pictures = drawn(every[0], kinds, target / f"{robot}-{len(answers) + 1}")
+        answers.append(Diagnosed(log.words, command, every[0], rows[-1][-1], pictures))
+    case = load_case(DATA.parent / config)
     data = load_data(case, DATA / robot / logs[0].file, tell=lambda note: None)
     text = page(_facts(robot), data, answers)
     (target / f"{robot}.md").write_text(text, encoding="utf-8")

@@ -75,7 +75,7 @@ def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
         parts.append(approximation_table(found))
     parts += [friction_table(found.friction_lines)] if _has_curves(found) else []
     parts += changes_in_words(found)
-    parts += absorbed_parts(found) + unexplained_in_words(found)
+    parts += [*absorbed_parts(found), *unexplained_in_words(found)]
     parts += [text for texts in rests_in_words(found) for text in texts]
     parts += error_tables(found, verbose)
     above = above_the_floor(found.after, found.noise_floor)
