@@ -14,7 +14,7 @@ from excite_cli.summary.diagnosis import absorbed_parts, unexplained_in_words
 from excite_cli.summary.error_by_joint import error_tables
 from excite_cli.summary.error_path import path_parts
 from excite_cli.summary.friction_lines import friction_table
-from excite_cli.summary.named_effects import approximation_table, effect_parts, what_and_where
+from excite_cli.summary.named_effects import approximation_table, effect_parts
 
 HEAD = "<!-- Made by `python -m docs.make_gallery`; edit nothing here. -->"
 # Figures of the first answer, and of the others; torque in time has one for each sealed run.
@@ -156,13 +156,13 @@ def left_of(found: Diagnosis) -> dict[str, str]:
             large_rests=tuple(each for each in found.large_rests if each.joint == joint),
         )
         rests = [text for texts in rests_in_words(only) for text in texts]
-        stands = [
-            f"Approximated only: {what_and_where(each.effect, 0)} stands for "
-            f"{approximation_in_words(each.approximates)}."
-            for each in found.approximations
-            if joint in each.effect.joints and each.approximates
-        ]
-        words = " ".join([*unexplained_in_words(only), *rests, *stands]) or (
+        stands: dict[str, list[str]] = {}
+        for each in found.approximations:
+            if joint in each.effect.joints and each.approximates:
+                what = approximation_in_words(each.approximates)
+                stands.setdefault(what, []).append(each.effect.kind)
+        near = [f"Only approximated, by {', '.join(k)}: {what}." for what, k in stands.items()]
+        words = " ".join([*unexplained_in_words(only), *rests, *near]) or (
             "No structure, and no more than noise, was found in what is left of the training data."
         )
         share = found.after.relative_moving[joint]

@@ -15,6 +15,7 @@ from excite_cli.report.style import (
     new_figure,
     styled,
 )
+from excite_cli.robot.model import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,60 +34,65 @@ def draw_errors(
 
     `words` name the two errors; `floor` is the RMS that repeated periods differ by.
     """
-    kinds = list(dict.fromkeys(units.values()))
-    joints = {unit: [name for name in units if units[name] == unit] for unit in kinds}
-    figure = new_figure(1.3 + 0.24 * (len(units) + 1))
-    panels = figure.subplots(1, 1 + len(kinds), squeeze=False)[0]
-    relative = [
+    moving = [
         {name: 100 * each.relative_moving[name] for name in units}
         | {"mean": 100 * each.mean_relative_moving}
         for each in errors
     ]
-    _draw(panels[0], words, (relative[0], relative[1]), {})
-    panels[0].set_xlabel("RMS error / RMS torque, where the joint moves [%]")
-    for axes, unit in zip(panels[1:], kinds, strict=True):
-        first_rms, second_rms = ({n: each.rms[n] for n in joints[unit]} for each in errors)
-        _draw(axes, words, (first_rms, second_rms), floor or {})
-        axes.set_xlabel(f"RMS error, all samples [{unit}]")
+    panels = [("RMS error / RMS torque, where the joint moves [%]", moving, {})]
+    for unit in dict.fromkeys(units.values()):
+        rms = [{name: each.rms[name] for name in units if units[name] == unit} for each in errors]
+        panels.append((f"RMS error, all samples [{unit}]", rms, dict(floor or {})))
+    shown = [
+        (label, rows)
+        for label, values, level in panels
+        if (rows := _known(values[0], values[1], level))
+    ]
+    figure = new_figure(1.3 + 0.24 * (len(units) + 1))
+    drawn = figure.subplots(1, max(len(shown), 1), squeeze=False)[0]
+    for axes, (label, rows) in zip(drawn, shown, strict=False):
+        _draw(axes, words, rows)
+        axes.set_xlabel(label)
     figure.suptitle(title, x=0.12 / WIDTH, ha="left")
-    named = {label: handle for axes in panels
+    named = {label: handle for axes in drawn
              for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}  # fmt: skip
     figure.legend(named.values(), named, loc="outside lower center", ncols=len(named))
     return figure
 
 
-def _draw(
-    axes: "Axes",
-    words: tuple[str, str],
-    values: tuple[Mapping[str, float], Mapping[str, float]],
-    floor: Mapping[str, float],
-) -> None:
-    """A line per joint from the one value to the other; what is not known or zero is left out."""
-    first, second = (_positive(each) for each in values)
-    rows = range(len(values[1]))
-    level = _positive({name: floor.get(name, np.nan) for name in values[1]})
+def _known(
+    first: Mapping[str, float], second: Mapping[str, float], floor: Mapping[str, float]
+) -> dict[str, Array]:
+    """By joint both errors and the noise floor (3,), NaN where not known, or no logarithm.
+
+    Joints without either error are left out.
+    """
+    every = {
+        name: np.array([first[name], second[name], floor.get(name, np.nan)], dtype=float)
+        for name in second
+    }
+    every = {name: np.where(row > 0, row, np.nan) for name, row in every.items()}
+    return {name: row for name, row in every.items() if np.isfinite(row[:2]).any()}
+
+
+def _draw(axes: "Axes", words: tuple[str, str], known: Mapping[str, Array]) -> None:
+    """A line per joint from the one value to the other."""
+    first, second, level = np.array(list(known.values())).T
+    rows = range(len(known))
     axes.hlines(rows, np.fmin(first, second), np.fmax(first, second), color=GREY, linewidth=1.0)
     axes.plot(first, rows, "o", color=GREY, markerfacecolor="white", label=words[0])
     axes.plot(second, rows, "o", color=BLUE, label=words[1])
     if np.isfinite(level).any():
         axes.plot(level, rows, "|", color=GREEN, markersize=9, markeredgewidth=2,
                   label="noise floor")  # fmt: skip
-    axes.set_yticks(rows, list(values[1]))
+    axes.set_yticks(rows, list(known))
     axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.set_xscale("log")
+    values = [first, second, level]
+    low, high = np.nanmin(values) / 1.2, np.nanmax(values) * 1.2
     ticker = matplotlib_part("ticker")
-    known = np.concatenate([first, second, level])
-    known = known[np.isfinite(known)]
-    if len(known):
-        low, high = known.min() / 1.2, known.max() * 1.2
-        wide = np.log10(high / low)
-        axes.set_xlim(low, high)
-        subs = (1.0, 2.0, 5.0) if wide < 2.5 else (1.0,)
-        axes.xaxis.set_major_locator(ticker.LogLocator(subs=subs, numticks=50))
+    axes.set_xscale("log")
+    axes.set_xlim(low, high)
+    subs = (1.0, 2.0, 5.0) if high / low < 300 else (1.0,)
+    axes.xaxis.set_major_locator(ticker.LogLocator(subs=subs, numticks=50))
     axes.xaxis.set_minor_locator(ticker.NullLocator())
     axes.xaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
-
-
-def _positive(values: Mapping[str, float]) -> np.ndarray:
-    known = np.array(list(values.values()), dtype=float)
-    return np.where(np.isfinite(known) & (known > 0), known, np.nan)
