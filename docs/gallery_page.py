@@ -16,7 +16,7 @@ from excite_cli.summary.error_path import path_parts
 from excite_cli.summary.friction_lines import friction_table
 from excite_cli.summary.named_effects import approximation_table, effect_parts
 
-HEAD = "<!-- Made by `python -m docs.make_gallery`; edit nothing here. -->"
+HEAD = "---\nhide: [toc]\n---\n\n<!-- Made by `python -m docs.make_gallery`; edit nothing here. -->"
 # Figures of the first answer, and of the others; torque in time has one for each sealed run.
 IN_FULL = ("before_", "friction", "effects_1", "errors", "after_")
 OTHERWISE = ("effects_1", "errors")
@@ -118,7 +118,7 @@ def _names(first: Diagnosed) -> list[str]:
     doubts = [part for part in parts if isinstance(part, str) and "cannot be told" in part]
     return [
         "## Names",
-        *map(as_markdown, [*tables[:1], *small, *tables[1:]]),
+        *map(as_markdown, [*tables[:1], *small, *tables[1:]] if found.named else [*small, *tables]),
         *([f"What these data cannot tell apart:\n\n{bullets(doubts)}"] if doubts else []),
         *_pictures(first, "friction", "All friction of each joint over its speed"),
         *_pictures(first, "effects_1", "Evidence of the largest effects, one by one"),
@@ -129,12 +129,20 @@ def _after(first: Diagnosed) -> list[str]:
     found = first.found
     return [
         "## Before and after",
-        *map(as_markdown, error_tables(found, False)),
+        as_markdown(_errors(found)),
         *_pictures(first, "errors", "Errors of every joint before and after"),
         *map(escaped, map(ends_in_words, found.parts)),
         *map(as_markdown, path_parts(found, False)),
         *_pictures(first, "after_", "Measured torque, the model with what was found, the rest"),
     ]
+
+
+def _errors(found: Diagnosis) -> Table:
+    """The table of errors, without the words on who took them off: a page is narrow."""
+    (table,) = (part for part in error_tables(found, False) if isinstance(part, Table))
+    kept = [k for k, name in enumerate(table.columns) if name not in table.words]
+    columns, *rows = (tuple(row[k] for k in kept) for row in (table.columns, *table.rows))
+    return replace(table, columns=columns, rows=tuple(rows), words=())
 
 
 def _unexplained(found: Diagnosis) -> list[str]:
@@ -182,7 +190,7 @@ def _otherwise(each: Diagnosed) -> list[str]:
         *_answer(each),
         *(map(as_markdown, effect_parts(found, False)[:1]) if found.named else ()),
         *_pictures(each, "effects_1", "Evidence of the largest effects, one by one"),
-        *map(as_markdown, error_tables(found, False)),
+        as_markdown(_errors(found)),
         *_pictures(each, "errors", "Errors of every joint before and after"),
     ]
 

@@ -20,13 +20,22 @@ from docs.gallery_page import HEAD, IN_FULL, OTHERWISE, Diagnosed, page
 from excite_cli import Diagnosis, load_case, load_data, read_diagnosis
 from excite_cli.diagnosis.next_motion import next_experiment
 from excite_cli.report.diagnosis_figures import figures_of
-from excite_cli.report.style import save_figure
+from excite_cli.report.style import (
+    BLUE,
+    FORBIDDEN,
+    GREEN,
+    GREY,
+    PURPLE,
+    SEALED,
+    VERMILION,
+    save_figure,
+)
 from excite_cli.shown.command import Command
 from excite_cli.summary.diagnosis_data import diagnosis_data
 
 TARGET = Path(__file__).parent / "gallery"
 ROBOTS = tuple(dict.fromkeys(log.folder for log in LOGS))
-_WIDTH, _COLOURS = 1170, 32  # px of a picture, and of its palette: line drawings stay small
+_WIDTH = 1170  # px of a picture
 _INDEX = f"""{HEAD}
 
 # Gallery of real robots
@@ -90,9 +99,22 @@ def drawn(found: Diagnosis, kinds: Sequence[str], target: Path) -> dict[str, str
         with Image.open(path) as picture:
             size = (_WIDTH, round(picture.height * _WIDTH / picture.width))
             small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
-        small.quantize(_COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+        small.quantize(palette=_palette(), dither=Image.Dither.NONE).save(path, optimize=True)
         names[figure] = path.name
     return names
+
+
+def _palette() -> Image.Image:
+    """The colours of figures and some steps from each to white: a line keeps its own, if rare."""
+    steps = [
+        round(255 + (int(colour[at : at + 2], 16) - 255) * share)
+        for colour in ("#000000", GREY, BLUE, VERMILION, GREEN, PURPLE, SEALED, FORBIDDEN)
+        for share in (1.0, 0.75, 0.5, 0.3, 0.12)
+        for at in (1, 3, 5)
+    ]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([255, 255, 255, *steps])
+    return palette
 
 
 def _found(log: Log, options: Sequence[str], path: Path) -> Diagnosis:

@@ -48,9 +48,9 @@ def write_report(
     `files` are results, fits and diagnoses, in any order. The page is `output`, by default
     `<first file>-report.html` in the working directory; with `figures` (a folder, or NAME.pdf) the
     figures of motions and diagnoses are written there, in `format` (`png` | `svg` | `pdf`), and the
-    page only to an `output` that is given. The problem of a result is rebuilt from the config that it holds;
-    `config`, the YAML file, says where a relative URDF starts from. With `picture` the page shows
-    the robot.
+    page only to an `output` that is given. The problem of a result is rebuilt from the config that
+    it holds; `config`, the YAML file, says where a relative URDF starts from. With `picture` the
+    page shows the robot.
 
     Returns
     -------

@@ -92,7 +92,7 @@ def _draw(axes: "Axes", words: tuple[str, str], known: Mapping[str, Array]) -> N
     ticker = matplotlib_part("ticker")
     axes.set_xscale("log")
     axes.set_xlim(low, high)
-    subs = (1.0, 2.0, 5.0) if high / low < 300 else (1.0,)
+    subs = (1.0, 2.0, 5.0) if high / low < 60 else (1.0,)
     axes.xaxis.set_major_locator(ticker.LogLocator(subs=subs, numticks=50))
     axes.xaxis.set_minor_locator(ticker.NullLocator())
     axes.xaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
