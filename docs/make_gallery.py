@@ -106,10 +106,13 @@ def drawn(found: Diagnosis, kinds: Sequence[str], target: Path) -> dict[str, str
 
 def _palette() -> Image.Image:
     """The colours of figures and some steps from each to white: a line keeps its own, if rare."""
+    whole, light = (1.0, 0.75, 0.5, 0.3, 0.12), (1.0, 0.5)
+    dark = ("#000000", GREY, BLUE, VERMILION, GREEN, PURPLE)
     steps = [
         round(255 + (int(colour[at : at + 2], 16) - 255) * share)
-        for colour in ("#000000", GREY, BLUE, VERMILION, GREEN, PURPLE, SEALED, FORBIDDEN)
-        for share in (1.0, 0.75, 0.5, 0.3, 0.12)
+        for colours, shares in ((dark, whole), ((SEALED, FORBIDDEN), light))
+        for colour in colours
+        for share in shares
         for at in (1, 3, 5)
     ]
     palette = Image.new("P", (1, 1))
