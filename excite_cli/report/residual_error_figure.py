@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# A label, the two errors by joint, and the noise floor by joint.
+_Panel = tuple[str, list[dict[str, float]], dict[str, float]]
+
 
 @styled
 def draw_errors(
@@ -39,7 +42,7 @@ def draw_errors(
         | {"mean": 100 * each.mean_relative_moving}
         for each in errors
     ]
-    panels = [("RMS error / RMS torque, where the joint moves [%]", moving, {})]
+    panels: list[_Panel] = [("RMS error / RMS torque, where the joint moves [%]", moving, {})]
     for unit in dict.fromkeys(units.values()):
         rms = [{name: each.rms[name] for name in units if units[name] == unit} for each in errors]
         panels.append((f"RMS error, all samples [{unit}]", rms, dict(floor or {})))

@@ -31,10 +31,11 @@ def test_before_shows_the_declared_model_and_after_the_one_with_effects(
     diagnosis: Diagnosis,
 ) -> None:
     (run,) = {trace.run for trace in diagnosis.sealed_traces}
-    trace = diagnosis.sealed_traces[0]
-    assert trace.before is not None
-    figures = figures_of(diagnosis)
-    for name, model in (("before", trace.before), ("after", trace.predicted)):
+    trace, *others = diagnosis.sealed_traces
+    declared = trace.predicted + 3.0
+    assert not others
+    figures = figures_of(replace(diagnosis, sealed_traces=(replace(trace, before=declared),)))
+    for name, model in (("before", declared), ("after", trace.predicted)):
         upper = figures[f"{name}_{run}"]().axes[0]
         lines = {str(line.get_label()): np.asarray(line.get_ydata()) for line in upper.lines}
         for label, values in (("measured", trace.measured), ("model", model)):
