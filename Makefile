@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
 .PHONY: install run plan loop test suite sanitize lint lock floors dist release-check audit docs bench peers trust battery
-.PHONY: campaigns robots real clean
+.PHONY: campaigns robots real gallery clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
 
@@ -69,6 +69,9 @@ trust: $(STAMP)          ## broken and hostile files, kills, full disks, determi
 
 real: $(STAMP)           ## logs of four real robots, into the table of docs/results.md (three minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.real_robots --markdown docs/results.md
+
+gallery: $(STAMP)        ## the same logs, a page with pictures for each robot (ten minutes)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.make_gallery
 
 battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about 20 minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.diagnosis_battery --cases 130 --seed 5310

@@ -1,5 +1,6 @@
-"""Figures of motions as files: PNG, SVG or PDF in a folder, or the pages of one PDF."""
+"""Figures of motions and diagnoses as files: PNG, SVG or PDF in a folder, or one PDF."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -8,11 +9,13 @@ from typing import Any
 from excite_cli.api.outputs import held
 from excite_cli.api.report_files import Told
 from excite_cli.atomic import write_atomically
+from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.report.condition_figure import draw_condition_numbers, draw_spectrum
+from excite_cli.report.diagnosis_figures import figures_of
 from excite_cli.report.motion_figure import draw_margins, draw_motion, watched_constraints
 from excite_cli.report.style import save_figure, save_pages
 
@@ -25,23 +28,31 @@ def write_figures(
     asked: tuple[Path, str | None, bool],
     progress: Progress,
 ) -> tuple[Path, ...]:
-    """Write the figures of all result files to a folder or a PDF; returns the paths.
+    """Write the figures of all results and diagnoses to a folder or a PDF; returns the paths.
 
     `asked`: where, the format (default: png), and whether files are replaced.
 
     Raises
     ------
     FileError
-        There is no result file, the place does not suit the format, or something is there already.
+        There is nothing to draw, the place does not suit the format, or something is there already.
     """
     target, kind, overwrite = asked
     figures: dict[str, Callable[[], Any]] = {}
+    kinds = Counter(type(each.content) for each in told)
     for each in told:
+        own: dict[str, Callable[[], Any]] = {}
         if isinstance(each.content, Result):
-            prefix = f"{each.path.stem}_" if len(problems) > 1 else ""
-            figures |= _figures(each.content, problems[each.path], prefix)
+            own = _figures(each.content, problems[each.path])
+        elif isinstance(each.content, Diagnosis):
+            own = figures_of(each.content)
+        prefix = f"{each.path.stem}_" if kinds[type(each.content)] > 1 else ""
+        figures |= {f"{prefix}{name}": draw for name, draw in own.items()}
     if not figures:
-        raise FileError("--figures draws motions, and no result file was given. Leave it out.")
+        raise FileError(
+            "--figures draws motions and diagnoses, and none was given. Leave it out, or give a "
+            "result or a diagnosis."
+        )
     paths = _paths(target, kind, list(figures))
 
     def drawn() -> Iterator[Any]:
@@ -103,14 +114,14 @@ def _refuse_present(paths: list[Path]) -> None:
         )
 
 
-def _figures(result: Result, problem: Problem, prefix: str = "") -> dict[str, Callable[[], Any]]:
+def _figures(result: Result, problem: Problem) -> dict[str, Callable[[], Any]]:
     """What draws each figure, by its name, in reading order."""
     figures: dict[str, Callable[[], Any]] = {
-        f"{prefix}condition_numbers": partial(draw_condition_numbers, result),
-        f"{prefix}spectrum": partial(draw_spectrum, result, problem),
+        "condition_numbers": partial(draw_condition_numbers, result),
+        "spectrum": partial(draw_spectrum, result, problem),
     }
     for motion in result.motions:
-        figures[f"{prefix}motion_{motion.index}"] = partial(draw_motion, motion, problem)
+        figures[f"motion_{motion.index}"] = partial(draw_motion, motion, problem)
         if watched_constraints(problem):
-            figures[f"{prefix}margins_{motion.index}"] = partial(draw_margins, motion, problem)
+            figures[f"margins_{motion.index}"] = partial(draw_margins, motion, problem)
     return figures

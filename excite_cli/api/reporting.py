@@ -1,4 +1,4 @@
-"""One page about motions, fits and diagnoses, and figures of motions: `excite report`."""
+"""One page about motions, fits and diagnoses, and figures: `excite report`."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Report:
-    """The files that were written: the page, if one was requested, and figures of motions."""
+    """The files that were written: the page, if one was requested, and figures."""
 
     page: Path | None
     figures: tuple[Path, ...] = ()
@@ -47,10 +47,10 @@ def write_report(
 
     `files` are results, fits and diagnoses, in any order. The page is `output`, by default
     `<first file>-report.html` in the working directory; with `figures` (a folder, or NAME.pdf) the
-    figures of motions are written there, in `format` (`png` | `svg` | `pdf`), and the page only to
-    an `output` that is given. The problem of a result is rebuilt from the config that it holds;
-    `config`, the YAML file, says where a relative URDF starts from. With `picture` the page shows
-    the robot.
+    figures of motions and diagnoses are written there, in `format` (`png` | `svg` | `pdf`), and the
+    page only to an `output` that is given. The problem of a result is rebuilt from the config that
+    it holds; `config`, the YAML file, says where a relative URDF starts from. With `picture` the
+    page shows the robot.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""`excite report`: one page about motions, fits and diagnoses; figures of motions as files."""
+"""`excite report`: one page about motions, fits and diagnoses; figures of them as files."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -38,8 +38,8 @@ def report(
         typer.Option(
             "--figures",
             metavar="DIR",
-            help="Write figures of the motions to this folder, or to NAME.pdf; the page only with "
-            "-o.",
+            help="Write figures of motions and diagnoses to this folder, or to NAME.pdf; the page "
+            "only with -o.",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
@@ -75,7 +75,7 @@ def report(
       excite report ur10.h5 -o ur10.html
       excite report ur10.h5 fit.h5 diagnosis.h5 -o loop.html
       excite report ur10.h5 more.h5 -o compared.html
-      excite report ur10.h5 --figures ur10-figures --format svg
+      excite report ur10.h5 diagnosis.h5 --figures ur10-figures --format svg
     """
     from excite_cli.api.reporting import report_answer, write_report
     from excite_cli.api.threads import single_threaded

@@ -81,7 +81,8 @@ def diagnosis_sections(diagnosis: Diagnosis) -> tuple[Section, ...]:
     )
 
 
-def _units(diagnosis: Diagnosis) -> tuple[str, ...]:
+def torque_units(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """N·m of joints that turn, N of those that slide; N·m where an earlier file has neither."""
     if diagnosis.traces is None:
         return ("N·m",) * len(diagnosis.joint_names)
     return diagnosis.traces.torque_units
@@ -93,7 +94,7 @@ def _errors(diagnosis: Diagnosis) -> Section:
         ("before", "after"),
         diagnosis.before,
         diagnosis.after,
-        by_joint(diagnosis.joint_names, _units(diagnosis)),
+        by_joint(diagnosis.joint_names, torque_units(diagnosis)),
         diagnosis.noise_floor,
         "On sealed data; raw: after, on the torque as recorded, without any filter.",
     )
@@ -127,7 +128,7 @@ def _in_time(diagnosis: Diagnosis) -> Section:
             "all effects says, below what it and the declared model leave. Shaded: sealed."
         )
     )
-    blocks = residuals_in_time(traces, diagnosis.joint_names, _units(diagnosis))
+    blocks = residuals_in_time(traces, diagnosis.joint_names, torque_units(diagnosis))
     return Section("diagnosis-time", "Residual in time", blocks, lead)
 
 

@@ -37,13 +37,15 @@ def effect_section(found: Diagnosis) -> Section | None:
         return Section("diagnosis-evidence", "Evidence", (old,))
     large, small = by_worth(found.effects, found)
     blocks: list[Block] = []
-    whole = _combined(found, found.traces)
+    whole = friction_plots(found, found.traces)
     if whole:
         blocks.append(Charts(whole, "The parts of a joint's friction together"))
     if large:
-        blocks.append(Charts(_cards(found, found.traces, large), "One by one, the largest first"))
+        blocks.append(
+            Charts(effect_plots(found, found.traces, large), "One by one, the largest first")
+        )
     if small:
-        cards = _cards(found, found.traces, small)
+        cards = effect_plots(found, found.traces, small)
         what = counted(len(small), "small effect")
         text = f"{what} (each below {SMALL_PART:.0%} of the fall of the error)"
         blocks.append(Fold(text, (Charts(cards),)) if large else Charts(cards))
@@ -57,7 +59,10 @@ def effect_section(found: Diagnosis) -> Section | None:
     return Section("diagnosis-evidence", "Evidence", tuple(blocks), lead)
 
 
-def _cards(found: Diagnosis, traces: Traces, effects: Sequence[NamedEffect]) -> tuple[Plot, ...]:
+def effect_plots(
+    found: Diagnosis, traces: Traces, effects: Sequence[NamedEffect]
+) -> tuple[Plot, ...]:
+    """The evidence of each of the effects that has samples to draw."""
     units = dict(zip(found.joint_names, traces.torque_units, strict=True))
     charts: list[Plot] = []
     for named in effects:
@@ -144,7 +149,7 @@ def _over_speed(trace: EffectTrace) -> bool:
     return kind.function_of == ("speed",) and kind.scope == "joint"
 
 
-def _combined(found: Diagnosis, traces: Traces) -> tuple[Plot, ...]:
+def friction_plots(found: Diagnosis, traces: Traces) -> tuple[Plot, ...]:
     """For each joint with several effects over its speed: all of them at once."""
     units = dict(zip(found.joint_names, traces.torque_units, strict=True))
     charts = []

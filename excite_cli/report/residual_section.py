@@ -28,22 +28,30 @@ def residuals_in_time(
                 "the command again to have it."
             ),
         )
+    options = tuple(
+        (label, (Charts(charts),))
+        for label, charts in plots_in_time(traces, joint_names, units).items()
+    )
+    return options[0][1] if len(options) == 1 else (Choice("Run", options),)
+
+
+def plots_in_time(
+    traces: Sequence[TorqueTrace], joint_names: Sequence[str], units: Sequence[str]
+) -> dict[str, tuple[Plot, ...]]:
+    """A plot per joint, by the run and what it was for."""
     runs: dict[str, list[TorqueTrace]] = {}
     for trace in traces:
         runs.setdefault(trace.run, []).append(trace)
-    per_line = _BUDGET // (4 * len(joint_names) * len(runs))
+    per_line = _BUDGET // (4 * len(joint_names) * max(len(runs), 1))
     points = min(max(per_line, _FEWEST), _MOST)
-    options = []
+    found = {}
     for run, parts in runs.items():
         ordered = sorted(parts, key=lambda part: float(part.t[0]))
-        charts = tuple(
+        found[_label(run, parts)] = tuple(
             _card(ordered, j, name, unit, points)
             for j, (name, unit) in enumerate(zip(joint_names, units, strict=True))
         )
-        options.append((_label(run, parts), (Charts(charts),)))
-    if len(options) == 1:
-        return options[0][1]
-    return (Choice("Run", tuple(options)),)
+    return found
 
 
 def _label(run: str, parts: Sequence[TorqueTrace]) -> str:

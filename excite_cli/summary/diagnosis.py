@@ -75,7 +75,7 @@ def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
         parts.append(approximation_table(found))
     parts += [friction_table(found.friction_lines)] if _has_curves(found) else []
     parts += changes_in_words(found)
-    parts += _absorbed(found) + _unexplained(found)
+    parts += [*absorbed_parts(found), *unexplained_in_words(found)]
     parts += [text for texts in rests_in_words(found) for text in texts]
     parts += error_tables(found, verbose)
     above = above_the_floor(found.after, found.noise_floor)
@@ -125,7 +125,8 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
     )
 
 
-def _absorbed(found: Diagnosis) -> Parts:
+def absorbed_parts(found: Diagnosis) -> Parts:
+    """Candidates that would show as other values of parameters: a table, if there are any."""
     if not found.absorbed:
         return []
     rows = tuple(
@@ -146,7 +147,8 @@ def _absorbed(found: Diagnosis) -> Parts:
     return [table]
 
 
-def _unexplained(found: Diagnosis) -> Parts:
+def unexplained_in_words(found: Diagnosis) -> list[str]:
+    """A sentence for each joint whose residual has a form that no effect has."""
     return [
         f"Unexplained: the residual of {each.joint} still depends on "
         f"{', '.join(map(covariate_in_symbols, each.depends_on))} "

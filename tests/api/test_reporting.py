@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli import ConfigError, FileError, write_report
+from excite_cli import ConfigError, FileError, write_diagnosis, write_report
 from tests.api.conftest import SMOKE, Loop
+from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 
 
 def test_what_is_no_report_is_one_sentence(loop: Loop, tmp_path: Path) -> None:
@@ -30,8 +31,20 @@ def test_figures_have_a_format_and_a_place(loop: Loop, tmp_path: Path) -> None:
         write_report(loop.result, figures=tmp_path, format="gif")
     with pytest.raises(FileError, match="give a folder for them"):
         write_report(loop.result, tmp_path / "page.html", format="svg")
-    with pytest.raises(FileError, match="no result file was given"):
+    with pytest.raises(FileError, match="draws motions and diagnoses, and none was given"):
         write_report(loop.fit, figures=tmp_path)
+
+
+def test_figures_of_diagnoses_have_the_names_of_their_files(tmp_path: Path) -> None:
+    for name in ("one", "other"):
+        write_diagnosis(tmp_path / f"{name}.h5", make_diagnosis())
+    folder = tmp_path / "figures"
+    alone = write_report(tmp_path / "one.h5", figures=folder, format="svg").figures
+    assert alone == (folder / "errors.svg",)
+    both = [tmp_path / "one.h5", tmp_path / "other.h5"]
+    written = write_report(both, figures=folder, format="pdf").figures
+    assert [path.name for path in written] == ["one_errors.pdf", "other_errors.pdf"]
+    assert all(path.read_bytes().startswith(b"%PDF") for path in written)
 
 
 def test_a_page_of_a_fit(loop: Loop, tmp_path: Path) -> None:

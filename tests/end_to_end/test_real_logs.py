@@ -3,13 +3,20 @@
 Figures are those of the logs' authors: data sheets, publications, and fits with the effects known.
 """
 
+import re
+import shutil
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from benchmarks.real_robots import percent
+from docs.gallery_page import escaped
+from docs.make_gallery import written
 from excite_cli.api.loading import load_case, load_data
 from tests.cli.program import ROOT, Installed
+from tests.docs.test_links import broken
 
 DATA = ROOT / "data"
 
@@ -25,7 +32,8 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Any:
         key = (robot, file, *options)
         if key not in known:
             config = DATA / robot / f"{robot}.yaml"
-            known[key] = program.answer("diagnose", config, DATA / robot / file, *options)
+            output = ("-o", folder / f"{len(known)}.h5")
+            known[key] = program.answer("diagnose", config, DATA / robot / file, *options, *output)
         return known[key]
 
     return run
@@ -60,6 +68,29 @@ class TestTx40:
         found = coupled["joint_5", "joint_6"]
         assert found["viscous"]["value"] == pytest.approx(0.616, rel=0.1)
         assert found["coulomb"]["value"] == pytest.approx(1.95, rel=0.1)
+
+    def test_its_page_of_the_gallery_says_what_the_answer_says(
+        self, diagnosed: Any, tmp_path: Path
+    ) -> None:
+        answer = diagnosed("tx40", "tx40.h5")
+        shutil.copy(answer["output"]["diagnosis"], tmp_path / "tx40-1.h5")
+        rows = written("tx40", tmp_path, tmp_path / "pages")
+        page = tmp_path / "pages" / "tx40.md"
+        text = page.read_text(encoding="utf-8")
+        before, after = (answer["error"][when] for when in ("before", "after"))
+        for joint, share in after["relative_moving"].items():
+            (cells,) = re.findall(rf"^\| {joint} \| \S+ \| (\S+) \| (\S+) \|", text, re.MULTILINE)
+            assert cells == (f"{before['relative_moving'][joint]:.2%}", f"{share:.2%}")
+            assert f"- **{joint}**: {share:.1%} of its torque is left where it moves." in text
+        assert rows[0][1:3] == tuple(percent(e["mean_relative_moving"]) for e in (before, after))
+        told = re.findall(r"^\| (\w+) \| ([\w, ]+) \| ", text, re.MULTILINE)
+        small = re.findall(r"(\w+) on (joint_\d)", text)
+        for effect in answer["effects"]:
+            assert (effect["kind"], ", ".join(effect["joints"])) in {*told, *small}
+        for finding in answer["findings"]:
+            assert escaped(f"{finding['severity']}: {finding['text']}") in text
+        assert len(list(page.parent.glob("tx40-1-*.png"))) == text.count("](tx40-1-") == 5
+        assert broken(page) == []
 
 
 class TestUr10:
