@@ -16,11 +16,11 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Never
 
 import numpy as np
 from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
-from scipy.interpolate import CubicHermiteSpline
 
 ORDER = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 CHANNELS = {
@@ -42,16 +42,16 @@ class Doubt(Exception):
     """Why there is no measurement."""
 
 
-def read_motion(path: Path) -> tuple[list[str], np.ndarray, CubicHermiteSpline]:
-    """Joints, instants (T), and positions as a function of time, from rest to rest."""
+def read_motion(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Joints, instants (T) from 0, and positions (T, 6), from rest to rest."""
     table = np.genfromtxt(path, delimiter=",", names=True, deletechars="")
     joints = [name[2:] for name in table.dtype.names if name.startswith("q_")]
     q, v = (np.column_stack([table[f"{c}_{joint}"] for joint in joints]) for c in ("q", "dq"))
     if len(joints) != 6 or not all(map(str.__contains__, joints, ORDER)):
-        raise Doubt(f"joints are {', '.join(joints)}; the robot's are {', '.join(ORDER)}")
+        raise Doubt(f"the motion's joints are {', '.join(joints)}, the robot's {', '.join(ORDER)}")
     if np.abs(v[[0, -1]]).max() > 1e-3:
         raise Doubt("the motion does not begin and end at rest; `excite export --entry` makes it")
-    return joints, table["t"], CubicHermiteSpline(table["t"], q, v)
+    return joints, table["t"] - table["t"][0], q
 
 
 def packets(receive: RTDEReceiveInterface) -> Iterator[np.ndarray]:
@@ -98,47 +98,62 @@ def approach(control: RTDEControlInterface, receive: RTDEReceiveInterface, start
             raise Doubt("the robot does not get to the start")
 
 
-def play(control, receive, t, path, options) -> list[np.ndarray]:
-    """Play the motion in time with the controller's clock; every packet from before to after it."""
-    for instant in np.arange(t[0], t[-1], 0.2):
-        if not control.isJointsWithinSafetyLimits(list(path(instant))):
+def play(control, receive, t: np.ndarray, q: np.ndarray, options) -> list[np.ndarray]:
+    """Play the motion by the controller's clock; every packet from before its start to its end."""
+    for instant in np.arange(0.0, t[-1], 0.2):
+        if not control.isJointsWithinSafetyLimits(at(instant, t, q)):
             raise Doubt(f"at {instant:.1f} s the motion leaves the robot's safety limits")
-    approach(control, receive, path(t[0]), options.reach)
+    approach(control, receive, q[0], options.reach)
     control.setWatchdog(10.0)  # should this process die, the controller stops
     rows: list[np.ndarray] = []
     for row in packets(receive):
         if rows and row[0] - rows[-1][0] > SILENCE / 2:
-            raise Doubt("packets are missing; this computer or the network is too slow")
+            raise Doubt("packets are missing: this computer or the network is too slow")
         rows.append(row)
-        now = t[0] + row[0] - rows[0][0] - REST
-        target, due = path(np.clip([now, now - LOOKAHEAD], t[0], t[-1]))
-        off = np.abs(row[1:7] - due)
+        now = row[0] - rows[0][0] - REST
+        if now > t[-1] + REST:
+            control.servoStop()
+            control.stopScript()
+            break
+        off = np.abs(row[1:7] - at(now - LOOKAHEAD, t, q))
         if off.max() > options.tolerance:
             raise Doubt(f"{ORDER[off.argmax()]} is {off.max():.2f} rad off the motion")
-        if not control.servoJ(list(target), 0.0, 0.0, 1.0 / options.rate, LOOKAHEAD, GAIN):
+        if not control.servoJ(at(now, t, q), 0.0, 0.0, 1.0 / options.rate, LOOKAHEAD, GAIN):
             raise Doubt("the controller takes no more set points")
-        if now > t[-1] + REST:
-            return rows
-    raise AssertionError
+    return rows
+
+
+def at(instant: float, t: np.ndarray, q: np.ndarray) -> list[float]:
+    """Positions at an instant; the first and last ones before and after the motion."""
+    return [float(np.interp(instant, t, column)) for column in q.T]
 
 
 def measure(options: argparse.Namespace) -> None:
     """Play `options.motion`, and write `options.data` when all of it was measured."""
-    joints, t, path = read_motion(options.motion)
+    joints, t, q = read_motion(options.motion)
     variables = ["timestamp", *CHANNELS.values(), *STATE, *SPEED]
     receive = RTDEReceiveInterface(options.host, options.rate, variables)
     next(packets(receive))
     control = RTDEControlInterface(options.host, options.rate)
     try:
-        rows = play(control, receive, t, path, options)
-    finally:
+        rows = play(control, receive, t, q, options)
+    except Exception as error:
+        # A robot that cannot be reached lets `ur_rtde` wait for minutes; its watchdog stops it.
+        threading.Timer(3.0, give_up, (error,)).start()
         control.servoStop()
         control.stopScript()
+        give_up(error)
     partial = options.data.with_name(options.data.name + ".part")
     with partial.open("w", newline="") as file:
         names = [f"{channel}_{joint}" for channel in CHANNELS for joint in joints]
         csv.writer(file).writerows([["t", *names], *(row.tolist() for row in rows)])
     partial.replace(options.data)
+
+
+def give_up(error: Exception) -> Never:
+    """Say why there is no measurement, and end at once."""
+    print(f"not measured: {error}", file=sys.stderr, flush=True)
+    os._exit(1)
 
 
 def ended(number: int, _: object) -> None:
@@ -161,8 +176,7 @@ def main() -> None:
     try:
         measure(options)
     except Exception as error:
-        print(f"not measured: {error}", file=sys.stderr, flush=True)
-        os._exit(1)
+        give_up(error)
 
 
 if __name__ == "__main__":

@@ -11,24 +11,22 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import expm
 
-from excite_cli.robot.model import Array
 
 BANDWIDTH = 60.0  # rad/s, a lag of 2 / 60 s
-NOISE = 2e-3  # of the largest torque
+VISCOUS, COULOMB = 3.0, 4.0  # N·m s/rad, N·m, of every joint (N s/m, N of a sliding one)
+NOISE = 0.05  # N·m, standard deviation
 
 
 class TrackingArm:
-    """State q, v, a (n) after `step`s of `period` seconds; friction [N·m s/rad, N·m] per joint."""
+    """State q, v, a (n) after each `step` of `period` seconds."""
 
-    def __init__(
-        self, urdf: Path, joints: Sequence[str], period: float, viscous: float, coulomb: float
-    ) -> None:
+    def __init__(self, urdf: Path, joints: Sequence[str], period: float) -> None:
         whole = pin.buildModelFromUrdf(str(urdf))
         locked = [i for i in range(1, whole.njoints) if whole.names[i] not in joints]
         self.model = pin.buildReducedModel(whole, locked, pin.neutral(whole))
         self.data = self.model.createData()
         assert list(self.model.names)[1:] == list(joints)
-        self.joints, self.viscous, self.coulomb = tuple(joints), viscous, coulomb
+        self.joints = tuple(joints)
         w = BANDWIDTH
         # State, set point and its slope.
         flow = np.array([[0, 1, 0, 0], [-w * w, -2 * w, w * w, 0], [0, 0, 0, 1], [0, 0, 0, 0]])
@@ -36,20 +34,20 @@ class TrackingArm:
         self.period, self.random = period, np.random.default_rng(3)
         self.place(np.zeros(self.model.nv))
 
-    def place(self, q: Array) -> None:
+    def place(self, q: np.ndarray) -> None:
         """Stand at `q`."""
         self.q, self.target = np.array(q, float), np.array(q, float)
         self.v, self.a = np.zeros_like(self.q), np.zeros_like(self.q)
 
-    def step(self, target: Array) -> None:
+    def step(self, target: np.ndarray) -> None:
         """One period later, the set point having gone to `target`."""
         slope = (target - self.target) / self.period
         self.q, self.v, *_ = self.exact @ np.stack([self.q, self.v, self.target, slope])
         self.target = np.array(target, float)
         self.a = BANDWIDTH**2 * (self.target - self.q) - 2 * BANDWIDTH * self.v
 
-    def torque(self) -> Array:
+    def torque(self) -> np.ndarray:
         """At the joints, measured [N·m] (n)."""
         tau = pin.rnea(self.model, self.data, self.q, self.v, self.a)
-        tau = tau + self.viscous * self.v + self.coulomb * np.tanh(self.v / 1e-3)
-        return tau + NOISE * np.abs(tau).max() * self.random.standard_normal(len(tau))
+        tau = tau + VISCOUS * self.v + COULOMB * np.tanh(self.v / 1e-3)
+        return tau + NOISE * self.random.standard_normal(len(tau))

@@ -16,7 +16,6 @@ from itertools import count
 
 import numpy as np
 
-from excite_cli.robot.model import Array
 from tests.examples.tracking_arm import TrackingArm
 
 MOVEJ, SERVOJ, SERVO_STOP, SET_WATCHDOG, JOINTS_WITHIN, STOP_SCRIPT = 1, 11, 16, 35, 37, 255
@@ -45,7 +44,9 @@ class UrController:
     def __init__(self, arm: TrackingArm, version: tuple[int, int] = (3, 15)) -> None:
         self.arm, self.version = arm, version
         self.host = f"127.{os.getpid() % 200 + 20}.{os.getpid() // 200 % 250}.{next(_addresses)}"
-        self.scaling, self.protective_stop_at, self.hang_up_at = 1.0, np.inf, np.inf
+        self.scaling = 1.0
+        self.protective_stop_at, self.hang_up_at, self.mute_at = np.inf, np.inf, np.inf  # s
+        self.jam_at = np.inf
         self.limit = np.inf  # rad, of the safety planes
         self.commands: list[int] = []
         self.ended, self.moved = "", 0.0
@@ -139,10 +140,11 @@ class UrController:
                 self.fresh.wait(0.05)
                 self.fresh.clear()
             else:
-                time.sleep(5e-4)
+                time.sleep(self.arm.period)
             with self.lock:
                 self._tick()
-                self._tell()
+                if not (self.servoing and self.time - self.servoing > self.mute_at):
+                    self._tell()
 
     def _tick(self) -> None:
         self.time += self.arm.period
@@ -154,7 +156,8 @@ class UrController:
         if self.watched and self.servoing and time.monotonic() - self.fed > 1.0:
             self._end("watchdog")
         if self.running and self.servoing:
-            target = self._six()
+            jammed = self.time - self.servoing > self.jam_at
+            target = self.arm.target if jammed else self._six()
         else:  # movej, or standing
             far = 0.1 * self.arm.period
             target = self.arm.target + np.clip(self.goal - self.arm.target, -far, far)
@@ -163,7 +166,7 @@ class UrController:
         if self.servoing and self.time - self.servoing > self.hang_up_at:
             self._hang_up()
 
-    def _six(self) -> Array:
+    def _six(self) -> np.ndarray:
         return np.array([self.registers[f"input_double_register_{i}"] for i in range(6)])
 
     def _command(self, command: int) -> None:
