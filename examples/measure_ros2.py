@@ -36,35 +36,40 @@ class Robot:
     """Its joint states, as rows of time stamp, q, dq, effort (1 + 3n), and its controller."""
 
     def __init__(self, joints: list[str], states: str, action: str) -> None:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # else no goal could be cancelled
+        rclpy.init(
+            signal_handler_options=SignalHandlerOptions.NO
+        )  # else no goal could be cancelled
         self.node, self.joints = rclpy.create_node("excite_measure"), joints
         self.rows: list[list[float]] = []
         self.names: set[str] = set()
-        self.heard = time.monotonic()
         self.node.create_subscription(JointState, states, self._hear, 1000)
         self.client = ActionClient(self.node, FollowJointTrajectory, action)
         if not self.client.wait_for_server(timeout_sec=5.0):
             raise Doubt(f"there is no action server {action}")
+        self.heard = time.monotonic()
 
     def _hear(self, state: JointState) -> None:
         self.names.update(state.name)
         if not set(self.joints) <= set(state.name):
             return  # a gripper, say, that publishes its own
         at = [state.name.index(joint) for joint in self.joints]
-        channels = (np.resize(c or [np.nan], len(state.name)) for c in _channels(state))
-        stamp = state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec
-        self.rows.append([stamp, *(x for channel in channels for x in channel[at].tolist())])
+        row = [state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec]
+        for channel in (state.position, state.velocity, state.effort):
+            row += [channel[i] if i < len(channel) else np.nan for i in at]
+        self.rows.append(row)
         self.heard = time.monotonic()
 
     def listen(self) -> list[float]:
-        """Take what came in; the newest row."""
-        rclpy.spin_once(self.node, timeout_sec=0.1)
-        if time.monotonic() - self.heard > SILENCE:
-            missing = set(self.joints) - self.names
-            raise Doubt(f"no joint states of {', '.join(sorted(missing or self.joints))}")
-        if self.rows and not np.isfinite(self.rows[-1]).all():
+        """Wait for the next row."""
+        count = len(self.rows)
+        while len(self.rows) == count:
+            if time.monotonic() - self.heard > SILENCE:
+                missing = set(self.joints) - self.names
+                raise Doubt(f"no joint states of {', '.join(sorted(missing or self.joints))}")
+            rclpy.spin_once(self.node, timeout_sec=0.1)
+        if not np.isfinite(self.rows[-1]).all():
             raise Doubt("joint states lack positions, velocities or efforts")
-        return self.rows[-1] if self.rows else self.listen()
+        return self.rows[-1]
 
     def rest(self) -> None:
         """Record for a while."""
@@ -105,10 +110,6 @@ class Robot:
             raise Doubt(f"the controller gave up ({answer.error_code}): {answer.error_string}")
 
 
-def _channels(state: JointState) -> tuple[list[float], ...]:
-    return list(state.position), list(state.velocity), list(state.effort)
-
-
 def measure(options: argparse.Namespace) -> None:
     """Play `options.motion`, and write `options.data` when all of it was measured."""
     table = np.genfromtxt(options.motion, delimiter=",", names=True, deletechars="")
@@ -124,6 +125,7 @@ def measure(options: argparse.Namespace) -> None:
     if off > 2e-3:  # slowly, and from nearby only: the way there was checked by nobody
         still = np.stack([states[0, 0], 0 * states[0, 0], 0 * states[0, 0]])[None]
         robot.follow(np.array([1.0 + off / 0.1]), still, options.reach + options.tolerance)
+        robot.rest()
     robot.rows.clear()
     robot.rest()
     robot.follow(table["t"] - table["t"][0], states, options.tolerance)

@@ -78,7 +78,9 @@ def packets(receive: RTDEReceiveInterface) -> Iterator[np.ndarray]:
         if (receive.getRobotMode(), receive.getSafetyMode()) != (RUNNING, NORMAL):
             raise Doubt("the robot is not running in normal mode (off, brakes, reduced, recovery)")
         if receive.getSpeedScaling() * receive.getTargetSpeedFraction() < 0.99:
-            raise Doubt("speed is scaled down; set the slider to 100 %, and slow the motion instead")
+            raise Doubt(
+                "speed is scaled down; set the slider to 100 %, and slow the motion instead"
+            )
         last, heard = row[0], time.monotonic()
         yield row
 
@@ -86,8 +88,8 @@ def packets(receive: RTDEReceiveInterface) -> Iterator[np.ndarray]:
 def approach(control: RTDEControlInterface, receive: RTDEReceiveInterface, start, reach) -> None:
     """Go to the start at 0.1 rad/s, from nearby only: the way there was checked by nobody."""
     for count, row in enumerate(packets(receive)):
-        off = np.abs(row[1:7] - start).max()
-        if off < 2e-3:
+        off, speed = np.abs(row[1:7] - start).max(), np.abs(row[7:13]).max()
+        if off < 2e-3 and speed < 0.01:
             return
         if count == 0:
             if off > reach:
@@ -152,7 +154,7 @@ def measure(options: argparse.Namespace) -> None:
 
 def give_up(error: Exception) -> Never:
     """Say why there is no measurement, and end at once."""
-    print(f"not measured: {error}", file=sys.stderr, flush=True)
+    print(f"\nnot measured: {error}", file=sys.stderr, flush=True)  # amid words of `ur_rtde`
     os._exit(1)
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from tests.cli.conftest import cache
 from tests.cli.program import ROOT, Program
+from tests.examples.tracking_arm import COULOMB, VISCOUS
 
 __all__ = ["cache"]
 
@@ -31,9 +32,19 @@ class Planned:
     def seconds(self) -> float:
         return float(np.loadtxt(self.motion, delimiter=",", skiprows=1, usecols=0)[-1])
 
+    @property
+    def instants(self) -> int:
+        return len(self.motion.read_text().splitlines()) - 1
+
     def edited(self, path: Path, old: str, new: str) -> Path:
         """The motion with other words."""
         path.write_text(self.motion.read_text().replace(old, new))
+        return path
+
+    def half(self, path: Path) -> Path:
+        """The motion's first half, which does not end at rest."""
+        lines = self.motion.read_text().splitlines(keepends=True)
+        path.write_text("".join(lines[: len(lines) // 2]))
         return path
 
     def _header(self) -> list[str]:
@@ -52,6 +63,21 @@ def _planned(folder: Path, cache: Path, urdf: Path, *settings: str) -> Planned:
         run = excite(*command)
         assert run.returncode == 0, run.stderr
     return Planned(urdf, folder / "arm.yaml", folder / "motion.csv")
+
+
+def assert_friction_is_found(excite: Program, planned: Planned, data: Path, *settings: str) -> None:
+    """`excite identify` reads the log, and finds the friction that the arm has."""
+    friction = "effects=[{kind: viscous_friction}, {kind: coulomb_friction}]"
+    given = (x for words in (friction, *settings) for x in ("--set", words))
+    found = excite.answer("identify", planned.config, data, *given)
+    values = {line["name"]: (line["value"], line["std"]) for line in found["parameters"]}
+    for kind, planted in (("coulomb", COULOMB), ("viscous", VISCOUS)):
+        for joint in planned.joints:
+            value, std = values[f"{kind}_friction.{kind}[{joint}]"]
+            assert value == pytest.approx(planted, rel=0.01, abs=4.0 * std)
+            # What slides goes 0.05 m/s, too slow to show more.
+            assert std < 0.03 * planted or joint == "slide"
+    assert found["error"]["mean_relative_moving"] < 0.05
 
 
 @pytest.fixture(scope="session")

@@ -1,8 +1,8 @@
 """A controller of ROS 2 as the network sees it: a FollowJointTrajectory server and /joint_states.
 
-It is a node of real ROS 2, for where that is installed (see test_measure_ros2.py), and plays
-trajectories as `joint_trajectory_controller` answers for them: an order of joints of its own, holds where it is when a goal is
-cancelled, gives up where the path tolerance is broken. Real time.
+A node of real ROS 2, for where that is installed (test_measure_ros2.py). It answers as
+`joint_trajectory_controller` does: its joints have an order of their own, it holds where it is when
+a goal is cancelled, and gives up beyond the path tolerance. It plays in real time.
 
     python -m tests.examples.ros2_controller URDF JOINT,JOINT,… START,START,… [jam=SECONDS]
 """
@@ -16,7 +16,7 @@ import rclpy
 from control_msgs.action import FollowJointTrajectory
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor
 from sensor_msgs.msg import JointState
 
 from tests.examples.tracking_arm import TrackingArm
@@ -61,7 +61,12 @@ def main() -> None:
         at = [trajectory.joint_names.index(j) for j in arm.joints]
         t = [p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in trajectory.points]
         q = np.array([p.positions for p in trajectory.points])[:, at]
-        goal = {"t": [0.0, *t], "q": np.vstack([arm.target, q]), "begin": time.monotonic(), "off": 0.0}
+        goal = {
+            "t": [0.0, *t],
+            "q": np.vstack([arm.target, q]),
+            "begin": time.monotonic(),
+            "off": 0.0,
+        }
         with lock:
             playing["goal"] = goal
         result = FollowJointTrajectory.Result()
@@ -104,10 +109,7 @@ def main() -> None:
     executor = MultiThreadedExecutor(4)
     executor.add_node(node)
     print("ready", flush=True)
-    try:
-        executor.spin()
-    except (ExternalShutdownException, KeyboardInterrupt):
-        pass
+    executor.spin()
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import expm
 
-
 BANDWIDTH = 60.0  # rad/s, a lag of 2 / 60 s
 VISCOUS, COULOMB = 3.0, 4.0  # N·m s/rad, N·m, of every joint (N s/m, N of a sliding one)
 NOISE = 0.05  # N·m, standard deviation
@@ -48,6 +47,9 @@ class TrackingArm:
 
     def torque(self) -> np.ndarray:
         """At the joints, measured [N·m] (n)."""
-        tau = pin.rnea(self.model, self.data, self.q, self.v, self.a)
+        q = pin.integrate(
+            self.model, pin.neutral(self.model), self.q
+        )  # continuous joints: cos, sin
+        tau = pin.rnea(self.model, self.data, q, self.v, self.a)
         tau = tau + VISCOUS * self.v + COULOMB * np.tanh(self.v / 1e-3)
         return tau + NOISE * self.random.standard_normal(len(tau))

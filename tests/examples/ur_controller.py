@@ -6,6 +6,7 @@ is no simulator of the controller: URScript is not run. While it servos, its clo
 next set point, 50 ms at most, so that a slow machine plays the same motion.
 """
 
+import contextlib
 import os
 import socket
 import struct
@@ -49,7 +50,8 @@ class UrController:
         self.jam_at = np.inf
         self.limit = np.inf  # rad, of the safety planes
         self.commands: list[int] = []
-        self.ended, self.moved = "", 0.0
+        self.ended, self.moved = "", 0.0  # by what; rad/s, the fastest joint so far
+        self.moved_to: tuple[np.ndarray, float] | None = None  # of movej, at rad/s
         self.time, self.safety, self.servoing = 1000.0, 0, 0.0
         self.registers: dict[str, float] = {}
         self.running, self.executing, self.watched, self.fed = False, False, False, 0.0
@@ -68,9 +70,17 @@ class UrController:
             threading.Thread(target=self._accept, args=(server, serve), daemon=True).start()
         threading.Thread(target=self._run, daemon=True).start()
 
+    def stand(self, q: np.ndarray) -> None:
+        """Stand at `q` (6)."""
+        with self.lock:
+            self.arm.place(q)
+            self.goal = self.arm.q.copy()
+
     def close(self) -> None:
         self.closed = True
         for server, _ in self.servers:
+            with contextlib.suppress(OSError):
+                server.shutdown(socket.SHUT_RDWR)  # ends `accept`
             server.close()
         self._hang_up()
 
@@ -181,6 +191,7 @@ class UrController:
             self.registers["output_int_register_0"] = DONE
             if command == MOVEJ:
                 self.goal = self._six()
+                self.moved_to = self.goal, self.registers["input_double_register_6"]
             elif command == JOINTS_WITHIN:
                 self.registers["output_int_register_1"] = np.abs(self._six()).max() < self.limit
             elif command == SET_WATCHDOG:

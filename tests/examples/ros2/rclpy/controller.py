@@ -58,7 +58,7 @@ class Controller:
         times = [p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in points]
         self.t = np.array([-1e-9, *times])
         self.q = np.vstack([self.arm.target, np.array([p.positions for p in points])[:, at]])
-        self._see(f"accepted {len(points)}")
+        self._see(f"accepted {len(points)} for {times[-1]:.1f} s")
         return True
 
     def cancel(self) -> Future:
