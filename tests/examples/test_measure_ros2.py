@@ -61,12 +61,12 @@ def refusal(process: subprocess.Popen[str]) -> str:
     return stderr.strip()
 
 
-def assert_is_a_log(data: Path, planned: Planned) -> None:
+def assert_is_a_log(data: Path, planned: Planned, late: float) -> None:
     """From rest before the motion to rest after it."""
     log = np.genfromtxt(data, delimiter=",", names=True, deletechars="")
     t = log["t"]
     assert t[0] > 1.6e9  # stamps of the messages
-    assert t[-1] - t[0] == pytest.approx(planned.seconds + 1.0, abs=0.3)
+    assert t[-1] - t[0] == pytest.approx(planned.seconds + 1.0, abs=late)
     for still in (log[:20], log[-10:]):
         assert max(np.abs(still[f"dq_{joint}"]).max() for joint in planned.joints) < 0.02
 
@@ -81,7 +81,7 @@ def test_a_motion_is_played_recorded_and_identified(
         "accepted 1 for 1.5 s",
         f"accepted {smoke_arm.instants} for {smoke_arm.seconds:.1f} s",
     )
-    assert_is_a_log(tmp_path / "data.csv", smoke_arm)
+    assert_is_a_log(tmp_path / "data.csv", smoke_arm, late=0.1)
     assert_friction_is_found(excite, smoke_arm, tmp_path / "data.csv")
 
 
@@ -160,4 +160,4 @@ def test_on_ros(smoke_arm: Planned, tmp_path: Path, faults: tuple[str, ...], rea
         assert re.search(reason, run.stderr)
     else:
         assert run.returncode == 0, run.stderr
-        assert_is_a_log(data, smoke_arm)
+        assert_is_a_log(data, smoke_arm, late=1.0)  # in real time
