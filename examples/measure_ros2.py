@@ -100,7 +100,8 @@ class Robot:
                 off = np.abs(np.array(state[: len(planned)]) - planned)
                 if off.max() > tolerance:
                     raise Doubt(f"{self.joints[off.argmax()]} is {off.max():.2f} off the motion")
-        except Doubt:
+        except Exception:
+            ignore_signals()
             rclpy.spin_until_future_complete(self.node, sent, timeout_sec=2.0)
             if sent.done() and sent.result().accepted:
                 cancelled = sent.result().cancel_goal_async()
@@ -116,7 +117,9 @@ def measure(options: argparse.Namespace) -> None:
     joints = [name[2:] for name in table.dtype.names if name.startswith("q_")]
     states = np.array([[table[f"{c}_{j}"] for j in joints] for c in ("q", "dq", "ddq")])
     states = states.transpose(2, 0, 1)
-    if np.abs(states[[0, -1], 1]).max() > 1e-3:
+    if not np.isfinite(states).all() or not (np.diff(table["t"]) > 0.0).all():
+        raise Doubt(f"{options.motion} has gaps, or times that do not increase")
+    if not np.abs(states[[0, -1], 1]).max() < 1e-3:
         raise Doubt("the motion does not begin and end at rest; `excite export --entry` makes it")
     robot = Robot(joints, options.states, options.action)
     off = np.abs(np.array(robot.listen()[1 : len(joints) + 1]) - states[0, 0]).max()
@@ -137,8 +140,15 @@ def measure(options: argparse.Namespace) -> None:
     partial.replace(options.data)
 
 
+def ignore_signals() -> None:
+    """From here on the robot is being stopped, which a second signal must not prevent."""
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: None)
+
+
 def ended(number: int, _: object) -> None:
     """Turn a signal (time limit, Ctrl-C) into a doubt."""
+    ignore_signals()
     raise Doubt(f"stopped by {signal.Signals(number).name}")
 
 

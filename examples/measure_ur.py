@@ -49,7 +49,9 @@ def read_motion(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
     q, v = (np.column_stack([table[f"{c}_{joint}"] for joint in joints]) for c in ("q", "dq"))
     if len(joints) != 6 or not all(map(str.__contains__, joints, ORDER)):
         raise Doubt(f"the motion's joints are {', '.join(joints)}, the robot's {', '.join(ORDER)}")
-    if np.abs(v[[0, -1]]).max() > 1e-3:
+    if not np.isfinite(q).all() or not (np.diff(table["t"]) > 0.0).all():
+        raise Doubt(f"{path} has gaps, or times that do not increase")
+    if not np.abs(v[[0, -1]]).max() < 1e-3:
         raise Doubt("the motion does not begin and end at rest; `excite export --entry` makes it")
     return joints, table["t"] - table["t"][0], q
 
@@ -140,6 +142,7 @@ def measure(options: argparse.Namespace) -> None:
     try:
         rows = play(control, receive, t, q, options)
     except Exception as error:
+        ignore_signals()
         # A robot that cannot be reached lets `ur_rtde` wait for minutes; its watchdog stops it.
         threading.Timer(3.0, give_up, (error,)).start()
         control.servoStop()
@@ -158,8 +161,15 @@ def give_up(error: Exception) -> Never:
     os._exit(1)
 
 
+def ignore_signals() -> None:
+    """From here on the robot is being stopped, which a second signal must not prevent."""
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: None)
+
+
 def ended(number: int, _: object) -> None:
     """Turn a signal (time limit, Ctrl-C) into a doubt."""
+    ignore_signals()
     raise Doubt(f"stopped by {signal.Signals(number).name}")
 
 

@@ -54,7 +54,7 @@ class Planned:
 
 def _planned(folder: Path, cache: Path, urdf: Path, *settings: str) -> Planned:
     excite = Program(folder, cache)
-    brief = "--set", "optimizer.max_iterations=12", "--set", "optimizer.restarts=1"
+    brief = "--set", "optimizer.max_iterations=5", "--set", "optimizer.restarts=1"
     for command in (
         ("init", "--urdf", urdf, "-o", "arm.yaml", *settings),
         ("optimize", "arm.yaml", "-o", "arm.h5", "--motions", "1", *brief),

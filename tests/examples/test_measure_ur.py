@@ -1,5 +1,6 @@
 """`examples/measure_ur.py` as a user runs it, with the real `ur_rtde`, on a stand-in on sockets."""
 
+import signal
 import subprocess
 import sys
 import time
@@ -69,7 +70,7 @@ def test_a_motion_is_played_recorded_and_identified(
     [
         ("protective_stop_at", 1.5, "protective or emergency stop"),
         ("hang_up_at", 1.5, "the connection is lost"),
-        ("mute_at", 1.5, "the connection is lost"),
+        ("unplug_at", 1.5, "the connection is lost"),
         ("scaling", 0.5, "speed is scaled down"),
         ("limit", 0.1, "leaves the robot's safety limits"),
         ("jam_at", 1.5, "rad off the motion"),
@@ -92,6 +93,8 @@ def test_what_is_refused_before_anything_moves(
     robot: UrController, ur10: Planned, tmp_path: Path
 ) -> None:
     data = tmp_path / "data.csv"
+    gap = ur10.edited(tmp_path / "gap.csv", "0.5,", ",")
+    assert "has gaps" in refusal(started(robot, gap, data))
     other = ur10.edited(tmp_path / "other.csv", "elbow", "knee")
     assert "knee_joint" in refusal(started(robot, other, data))
     robot.stand(ur10.start + 0.3)
@@ -107,7 +110,8 @@ def test_a_signal_stops_the_robot(robot: UrController, ur10: Planned, tmp_path: 
         assert process.poll() is None
         time.sleep(0.01)
     process.terminate()
-    assert "stopped by SIGTERM" in refusal(process)
+    process.send_signal(signal.SIGINT)  # Ctrl-C reaches the command and what started it
+    assert "stopped by SIG" in refusal(process)
     assert (robot.servoing, robot.ended) == (0.0, "script")
 
 

@@ -46,8 +46,8 @@ class UrController:
         self.arm, self.version = arm, version
         self.host = f"127.{os.getpid() % 200 + 20}.{os.getpid() // 200 % 250}.{next(_addresses)}"
         self.scaling = 1.0
-        self.protective_stop_at, self.hang_up_at, self.mute_at = np.inf, np.inf, np.inf  # s
-        self.jam_at = np.inf
+        self.protective_stop_at, self.hang_up_at = np.inf, np.inf  # s after the first set point
+        self.unplug_at, self.jam_at, self.unplugged = np.inf, np.inf, False
         self.limit = np.inf  # rad, of the safety planes
         self.commands: list[int] = []
         self.ended, self.moved = "", 0.0  # by what; rad/s, the fastest joint so far
@@ -136,6 +136,8 @@ class UrController:
     def _take(self, names: list[str], body: bytes) -> None:
         form = ">" + "".join(_PACKED[_type(name)] for name in names)
         with self.lock:
+            if self.unplugged:
+                return
             self.registers.update(zip(names, struct.unpack(form, body), strict=True))
             command = int(self.registers["input_int_register_0"])
             if command and (not self.commands or self.commands[-1] != command):
@@ -153,7 +155,8 @@ class UrController:
                 time.sleep(self.arm.period)
             with self.lock:
                 self._tick()
-                if not (self.servoing and self.time - self.servoing > self.mute_at):
+                self.unplugged |= bool(self.servoing) and self.time - self.servoing > self.unplug_at
+                if not self.unplugged:
                     self._tell()
 
     def _tick(self) -> None:

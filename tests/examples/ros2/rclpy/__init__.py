@@ -7,27 +7,28 @@ it is told in the environment: STAND_IN, JSON of `controller.Controller`'s argum
 
 import time
 
-from rclpy.controller import Controller
 from rclpy.signals import SignalHandlerOptions
 
-_controller: list[Controller] = []
+_playing: list = []
 
 
-def controller() -> Controller:
-    """The one of this process."""
-    return _controller[0]
+def playing():
+    """The controller of this process."""
+    return _playing[0]
 
 
 def init(*, signal_handler_options: SignalHandlerOptions = SignalHandlerOptions.ALL) -> None:
     # With its own handlers, rclpy shuts down on a signal, and nothing can be cancelled any more.
     assert signal_handler_options is SignalHandlerOptions.NO
-    _controller.append(Controller.told())
+    from rclpy.controller import Controller  # Pinocchio is slow to import
+
+    _playing.append(Controller.told())
 
 
 class Node:
     def create_subscription(self, kind, topic, callback, qos_profile) -> None:
         if topic == "/joint_states":
-            controller().hearers.append(callback)
+            playing().hearers.append(callback)
 
 
 def create_node(node_name: str) -> Node:
@@ -35,7 +36,7 @@ def create_node(node_name: str) -> Node:
 
 
 def spin_once(node: Node, *, timeout_sec: float | None = None) -> None:
-    if not controller().period():
+    if not playing().period():
         time.sleep(timeout_sec or 0.0)
 
 

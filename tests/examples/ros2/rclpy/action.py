@@ -12,12 +12,12 @@ class ActionClient:
         return self.name == "/joint_trajectory_controller/follow_joint_trajectory"
 
     def send_goal_async(self, goal) -> Future:
-        accepted = rclpy.controller().accept(goal)
+        accepted = rclpy.playing().accept(goal)
         return Future(
             SimpleNamespace(
                 accepted=accepted,
-                get_result_async=lambda: rclpy.controller().result,
-                cancel_goal_async=rclpy.controller().cancel,
+                get_result_async=lambda: rclpy.playing().result,
+                cancel_goal_async=rclpy.playing().cancel,
             ),
             done=True,
         )
