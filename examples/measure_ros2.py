@@ -71,6 +71,10 @@ class Robot:
             raise Doubt("joint states lack positions, velocities or efforts")
         return self.rows[-1]
 
+    def off(self, start: np.ndarray) -> float:
+        """How far the joint is that is farthest from `start` (n) [rad, m]."""
+        return float(np.abs(np.array(self.listen()[1 : len(start) + 1]) - start).max())
+
     def rest(self) -> None:
         """Record for a while."""
         end = self.listen()[0] + REST
@@ -122,13 +126,14 @@ def measure(options: argparse.Namespace) -> None:
     if not np.abs(states[[0, -1], 1]).max() < 1e-3:
         raise Doubt("the motion does not begin and end at rest; `excite export --entry` makes it")
     robot = Robot(joints, options.states, options.action)
-    off = np.abs(np.array(robot.listen()[1 : len(joints) + 1]) - states[0, 0]).max()
-    if off > options.reach:
+    if (off := robot.off(states[0, 0])) > options.reach:
         raise Doubt(f"the robot is {off:.2f} off the start; bring it there, or raise --reach")
     if off > 2e-3:  # slowly, and from nearby only: the way there was checked by nobody
         still = np.stack([states[0, 0], 0 * states[0, 0], 0 * states[0, 0]])[None]
         robot.follow(np.array([1.0 + off / 0.1]), still, options.reach + options.tolerance)
         robot.rest()
+        if (off := robot.off(states[0, 0])) > 0.01:
+            raise Doubt(f"the robot does not get to the start, {off:.2f} are left")
     robot.rows.clear()
     robot.rest()
     robot.follow(table["t"] - table["t"][0], states, options.tolerance)

@@ -87,19 +87,24 @@ def test_a_motion_is_played_recorded_and_identified(
 
 
 @pytest.mark.parametrize(
-    ("fault", "value", "reason", "seen"),
+    ("faults", "reason", "seen"),
     [
-        ("jam", 1.0, r"the controller gave up \(-4\)|off the motion", "ended -4|cancelled"),
-        ("slow", 0.5, "off the motion", "cancelled True"),
-        ("silent", 1.0, "no joint states of ", "cancelled"),
-        ("effort", False, "lack positions, velocities or efforts", None),
-        ("off", 0.2, "the robot is 0.20 off the start", None),
+        ({"jam": 1.0}, r"the controller gave up \(-4\)|off the motion", "ended -4|cancelled"),
+        ({"slow": 0.5}, "off the motion", "cancelled True"),
+        ({"silent": 1.0}, "no joint states of ", "cancelled"),
+        ({"effort": False}, "lack positions, velocities or efforts", None),
+        ({"off": 0.2}, "the robot is 0.20 off the start", None),
+        (
+            {"off": 0.05, "jam": -1.0},
+            "does not get to the start",
+            "accepted 1 for 1.5 s\nended 0\n$",
+        ),
     ],
 )
 def test_doubts(
-    start: Start, tmp_path: Path, fault: str, value: Any, reason: str, seen: str | None
+    start: Start, tmp_path: Path, faults: dict[str, Any], reason: str, seen: str | None
 ) -> None:
-    assert re.search(reason, refusal(start(**{fault: value})))
+    assert re.search(reason, refusal(start(**faults)))
     assert not (tmp_path / "data.csv").exists()
     saw = tmp_path / "saw.txt"
     if seen is None:

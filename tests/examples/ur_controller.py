@@ -57,6 +57,7 @@ class UrController:
         self.running, self.executing, self.watched, self.fed = False, False, False, 0.0
         self.goal = self.arm.q.copy()
         self.lock, self.fresh, self.closed = threading.RLock(), threading.Event(), False
+        self.unanswered: list[socket.socket] = []
         self.clients: list[tuple[socket.socket, list[str]]] = []
         self.servers = [
             (socket.create_server((self.host, port)), serve)
@@ -90,6 +91,9 @@ class UrController:
                 client, _ = server.accept()
             except OSError:
                 return
+            if self.unplugged:
+                self.unanswered.append(client)
+                continue
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             threading.Thread(target=self._guarded, args=(serve, client), daemon=True).start()
 

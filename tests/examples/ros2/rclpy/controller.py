@@ -74,7 +74,7 @@ class Controller:
         if self.goal is None:
             self.arm.step(self.arm.target)
         else:
-            jammed = len(self.q) > 2 and now > self.jam
+            jammed = now > self.jam and (len(self.q) > 2 or self.jam < 0.0)
             target = np.array([np.interp(now, self.t, column) for column in self.q.T])
             self.arm.step(self.arm.target if jammed else target)
             if np.abs(target - self.arm.q).max() > self.goal.path_tolerance[0].position:
