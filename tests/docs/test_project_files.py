@@ -20,7 +20,7 @@ FORMS = [
     p for p in sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml")) if p.stem != "config"
 ]
 # Packages that messages tell to install and that are none of the program's own needs.
-OTHERS = {"robot_descriptions"}
+OTHERS = {"robot_descriptions", "ur_rtde"}
 # Modules that a workflow installs itself or that are of the tools of development.
 TOOLS = {"pip", "build", "cibuildwheel", "pytest", "venv"}
 
