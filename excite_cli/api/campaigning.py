@@ -48,6 +48,7 @@ from excite_cli.report.rounds_page import rounds_page
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.store.diagnosis_file import read_diagnosis
+from excite_cli.store.result_file import read_result
 from excite_cli.store.versions import versions
 from excite_cli.summary.campaign import campaign_answer as campaign_answer
 from excite_cli.summary.campaign import round_in_words
@@ -300,7 +301,7 @@ class _Loop:
             tell=lambda note: None,
         ).motions[0]
         motion = replace(motion, pace=min(motion.pace, exported.pace), seconds=exported.duration)
-        self._require_admissible(state, path)
+        self._require_admissible(motion, path)
         log = self.folder / f"{motion.name}_log{self.measure.suffix}"
         take = Take(motion.name, path, log, motion.seconds, log.with_suffix(".txt"))
         self.measure.settle(take)
@@ -323,9 +324,15 @@ class _Loop:
             "it is kept: see to the cause, then go on with --resume."
         )
 
-    def _require_admissible(self, state: Campaign, path: Path) -> None:
-        """What is played keeps every constraint, slowed and with its ways, by an own check."""
-        problem = problem_of(self.case, lambda note: None)
+    def _require_admissible(self, motion: PlayedMotion, path: Path) -> None:
+        """What is played keeps every constraint, slowed and with its ways, by an own check.
+
+        For the inertias that were possible when it was planned.
+        """
+        plan_of = read_result(self.folder / motion.plan).config
+        planned = parse_spec(plan_of, f"the config stored in {motion.plan}")
+        spec = self.case.spec.model_copy(update={"uncertainty": planned.uncertainty})
+        problem = problem_of(replace(self.case, spec=spec), lambda note: None)
         found = check(problem, path, meshes=False, tell=lambda note: None)
         if found.violations:
             raise NoAdmissibleMotionError(

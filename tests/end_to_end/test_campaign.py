@@ -45,6 +45,7 @@ LINE = f"'{sys.executable}' play.py {{motion}} {{data}}"
 ASKED = (
     "campaign", "smoke.yaml", "--measure", LINE, "--log", ".h5", "--no-entry", "--max-rounds", "4",
     "--set", "optimizer.max_iterations=15", "--set", "optimizer.restarts=1",
+    "--set", "diagnosis.kinds=[spring, coulomb_friction, viscous_friction]",
 )  # fmt: skip
 
 
