@@ -22,6 +22,7 @@ from excite_cli.diagnosis.words import (
     p_in_words,
     place_in_words,
     rests_in_words,
+    settled_in_words,
     value_in_words,
 )
 from excite_cli.identification.fit_words import above_the_floor
@@ -143,7 +144,7 @@ def _absorbed(found: Diagnosis) -> Parts:
         left=("effect", "where"),
         words=("absorbed by",),
     )
-    return [table]
+    return [table, *settled_in_words(found)]
 
 
 def _unexplained(found: Diagnosis) -> Parts:
