@@ -74,9 +74,13 @@ class Evidence:
         self._schurs: dict[tuple[int, ...], Schur] = {}
         self._candidates = CandidateBases(self.total, fixed, self.blocks)
         self._seen = grams.seen()[:, :-1] > 0.0
-        self._unweighed: Evidence | None = None
-        if prior is not None and weighed is not None and weighed.any():
-            self._unweighed = Evidence(grams, fixed, blocks, rows_of, prior - weighed)
+        self._weighed = prior is not None and weighed is not None and bool(weighed.any())
+        self._by_data = None if prior is None or weighed is None else prior - weighed
+
+    @cached_property
+    def _unweighed(self) -> "Evidence":
+        """The same without what was weighed."""
+        return Evidence(self.grams, self.fixed, self.blocks, self.rows_of, self._by_data)
 
     @property
     def torque(self) -> int:
@@ -170,11 +174,11 @@ class Evidence:
         return Schur(self._candidates, left, cross, self._told_by_weight(chosen, np.diag(left)))
 
     def _told_by_weight(self, chosen: Sequence[int], left: Array) -> NDArray[np.bool_]:
-        """Of which of the candidates' columns scales leave most of what is left, of next to none.
+        """Columns of candidates of which next to nothing is left without what was weighed.
 
-        Columns have one norm here and without the scales.
+        `left` is of each with it. Candidates have the same norms without it.
         """
-        if self._unweighed is None:
+        if not self._weighed:
             return np.zeros(len(left), bool)
         by_data = np.diag(self._unweighed.schur(chosen).matrix)
         own = np.diag(self.total)[self.fixed : self.torque]
@@ -228,7 +232,7 @@ class Evidence:
             seen[:, : self.fixed] = True
             alone = seen & (seen.sum(axis=0) == 1)
             lacking = ~seen & (seen.sum(axis=0) == len(seen) - 1)
-            if self._unweighed is not None:  # a gain is told by the fold alone that has the load
+            if self._weighed:  # a gain is told by the fold alone that has the load
                 lacking |= ~alone & (np.arange(len(at)) >= self.fixed)
             found = []
             for fold, x in enumerate(fitted):

@@ -284,8 +284,6 @@ class Judgement:
         """
         if not set(self.white.rows_of[one]) & set(self.white.rows_of[other]):
             return False
-        if self.told_by_weight(other, chosen):
-            return False
         gains = [self._left_out_gain(chosen, [i], slice(None)) for i in (one, other)]
         return gains[0] > gains[1] + _FAR_MORE
 
