@@ -15,6 +15,7 @@ from excite_cli.config.data_spec import (
 from excite_cli.config.load import load_spec, parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named, scales
@@ -113,12 +114,22 @@ def test_without_one_every_deviation_holds_that_of_the_gains(robot: Robot, data:
     assert abs(sure.value - MASS) > 4.0 * sure.std  # gains taken to be one: wrong, and sure of it
 
 
-def test_a_diagnosis_knows_it_too(robot: Robot, data: Dataset) -> None:
-    spec = spec_with(KNOWN).model_copy(
-        update={"diagnosis": spec_with(KNOWN).diagnosis.model_copy(update={"rounds": 0})}
-    )
+def test_a_diagnosis_finds_every_gain_by_it(robot: Robot, data: Dataset) -> None:
+    """Each alone is at odds with the inertias: only all of them explain what the payload shows."""
+    kinds = "diagnosis: {kinds: [torque_gain, torque_offset, payload]}\n"
+    spec = parse_spec(f"{SMOKE.read_text()}\n{LOADED}\nidentification: {{{KNOWN}}}\n{kinds}")
     found = diagnose(robot, find_base_parameters(robot), data, spec)
     assert ("payload", ("r2",)) in {(e.kind, e.runs) for e in found.declared}
+    told = {each.effect.joints: each for each in found.effects}
+    assert [each.effect.kind for each in found.effects] == ["torque_gain"] * robot.n
+    for name, gain in zip(robot.joint_names, GAINS, strict=True):
+        value = told[(name,)].parameters["gain"]
+        assert value.value == pytest.approx(gain, abs=0.01)
+        assert abs(value.value - gain) < 4.0 * value.std
+    assert {each.verdict for each in found.effects} == {SealedVerdict.WEIGHED}
+    assert found.after.mean_relative < 0.4 * found.before.mean_relative
+    assert found.path is not None
+    assert found.path.smallest == robot.n  # none of them may be left away
 
 
 def test_ten_parameters_of_a_body_that_hangs_on_a_link(robot: Robot) -> None:
