@@ -180,6 +180,15 @@ class KnownPayloadSpec(Section):
     )
 
 
+class TotalMassSpec(Section):
+    """The weighed robot: it tells the true scale of the wrench at its base."""
+
+    mass: Positive = Field(
+        description="of all that the robot consists of and carries in every run [kg]"
+    )
+    std: NonNegative = Field(0.0, description="one standard deviation of it [kg]")
+
+
 class IdentificationSpec(Section):
     """How parameters are found."""
 
@@ -202,6 +211,11 @@ class IdentificationSpec(Section):
     known_payload: KnownPayloadSpec | None = Field(
         None,
         description="a payload of known mass and centre on some runs, which determines the gains",
+    )
+    total_mass: TotalMassSpec | None = Field(
+        None,
+        description="the mass of the whole robot, which determines the gains where the wrench at "
+        "its base is measured",
     )
 
     @property

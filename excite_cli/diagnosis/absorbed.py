@@ -20,7 +20,7 @@ def absorbed_effects(
     joint_names: Sequence[str],
     chosen: Sequence[int],
 ) -> list[Absorbed]:
-    """Candidates of which the model leaves less than 0.1 % of their energy.
+    """Candidates of which the model leaves less than 0.1 % of their energy, and scales tell none.
 
     The model is the declared one with the chosen effects. `names` are those of the declared model's
     columns; effects that were found are named by their own parameters. What does not show in these
@@ -28,7 +28,7 @@ def absorbed_effects(
     stiffness is absorbed, so is its effect, though the preload may show as an offset).
     """
     at = evidence.columns(chosen)
-    factor = evidence.factor(chosen)
+    factor, schur = evidence.factor(chosen), evidence.schur(chosen)
     found: dict[tuple, Absorbed] = {}
     taken = {candidates[i].place for i in chosen}
     names = [*names, *_found_names([candidates[i] for i in chosen], joint_names)]
@@ -50,7 +50,7 @@ def absorbed_effects(
             rest = evidence.total[np.ix_(others, others)] - mixed.T @ solved
             bridge = cross - solved.T @ shared
             left -= bridge @ np.linalg.lstsq(rest, bridge, rcond=1e-9)[0]
-        if left > ABSORBED * own:
+        if left > ABSORBED * own or schur.told_by_weight(i):
             continue
         weight = np.abs(x)
         order = np.argsort(-weight)

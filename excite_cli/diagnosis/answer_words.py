@@ -10,6 +10,7 @@ from math import isnan
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.overfit import overfit_in_words
 from excite_cli.diagnosis.records import Diagnosis, FrictionLine, NamedEffect, mean_of_known
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import (
     counted,
     covariate_in_words,
@@ -77,7 +78,13 @@ def _missing(found: Diagnosis) -> str:
         whole = of_all[FRICTION] > _NEARLY_ALL
         what = "nearly all" if whole else f"{of_all[FRICTION]:.0%} of what"
         said.append(f"{_friction(found)} is {what} your model misses{_most_friction(found)}.")
-    others = [each for each in found.named if not _rubs(each)]
+    said += [
+        f"On {_place(each, found)}: {title_of(each.effect.kind)} ({_first(each)}), by what was "
+        "weighed."
+        for each in found.named
+        if _weighed(each)
+    ]
+    others = [each for each in found.named if not _rubs(each) and not _weighed(each)]
     fall = found.fall if found.fall > 0.0 else float("inf")
     worth = [each for each in others if each.takes_off >= _WORTH_SAYING * fall]
     worth.sort(key=lambda each: -each.takes_off)
@@ -93,9 +100,15 @@ def _missing(found: Diagnosis) -> str:
     return " ".join(said)
 
 
+def _weighed(named: NamedEffect) -> bool:
+    """Whether it rests on what was weighed, and no error need fall by it."""
+    return named.verdict is SealedVerdict.WEIGHED
+
+
 def _in_vain(found: Diagnosis) -> bool:
     """Whether effects that should be in the sealed data, too, lower nothing where joints move."""
-    return found.fall < 0.0 and not any(each.effect.runs for each in found.effects)
+    told = any(each.effect.runs or _weighed(each) for each in found.effects)
+    return found.fall < 0.0 and not told
 
 
 def _percent(found: Diagnosis) -> str:
@@ -180,11 +193,19 @@ def _next(found: Diagnosis) -> str:
     open_names = [each for each in found.effects if each.aliases]
     if not open_names:
         return "Next: go on with the model and its effects (--apply NEW.yaml)."
-    first = max(open_names, key=lambda each: 0.0 if isnan(each.takes_off) else each.takes_off)
+    by_motion = [each for each in open_names if not _weighed(each)]
+    first = max(
+        by_motion or open_names, key=lambda each: 0.0 if isnan(each.takes_off) else each.takes_off
+    )
     other = first.aliases[0]
     names = f"{title_of(first.effect.kind)} of {_place(first, found)} from {title_of(other.kind)}"
     if other.joints != first.effect.joints:
         names += f" of {place_in_words(other, len(found.joint_names))}"
+    if not by_motion:
+        return (
+            "Next: a run with a weighed payload (identification.known_payload), which tells "
+            f"{names}; no motion does."
+        )
     return f"Next: a motion that tells {names} (excite optimize … --after)."
 
 

@@ -39,10 +39,10 @@ def covariance_of(
                 rounded = rounding.T @ x
                 spread += rounded.T @ rounded
             forget()
-    if data.prior_precision is not None:
-        at = np.arange(len(data.prior_precision))
-        normal[at, at] += data.prior_precision
-        spread[at, at] += data.prior_precision
+    if data.prior is not None:
+        fixed = len(data.prior) - 1
+        normal[:fixed, :fixed] += data.prior[:-1, :-1]
+        spread[:fixed, :fixed] += data.prior[:-1, :-1]
     scale = np.sqrt(np.diag(normal))
     scale[scale < 1e-100] = 1.0
     normal = normal / np.outer(scale, scale)

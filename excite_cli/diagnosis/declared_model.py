@@ -1,4 +1,4 @@
-"""What a diagnosis knows before: the robot, the effects that are declared, a prior or none."""
+"""What a diagnosis knows before: robot, declared effects, a prior or none, what was weighed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -23,18 +23,34 @@ class KeptInertias:
 
 @dataclass(frozen=True)
 class Model:
-    """What is known before: robot, declared effects, a prior on the inertias, states of runs."""
+    """What is known before: robot, declared effects, a prior on the inertias, states of runs.
+
+    `weighed` (m, r + k + 1): rows [W target] in standard deviations, over the base parameters and
+    the parameters of the declared effects.
+    """
 
     robot: Robot
     base: BaseParameters
     declared: tuple[Effect, ...]
     prior: KeptInertias | None
     states: States = field(default_factory=dict)
+    weighed: Array | None = None
 
     @property
     def declared_width(self) -> int:
         """Number of linear parameters of the declared effects."""
         return width_of(self.declared)
+
+    @property
+    def weighed_columns(self) -> Array:
+        """As `weighed`, over the columns that are fitted: beside a prior, what differs from it."""
+        rank, width = self.base.rank, self.declared_width
+        rows = np.zeros((0, rank + width + 1)) if self.weighed is None else self.weighed
+        if self.prior is None:
+            return rows
+        of_phi = rows[:, :rank] @ self.base.mapping
+        rest = rows[:, -1:] - of_phi @ self.prior.mean[:, None]
+        return np.hstack([of_phi, rows[:, rank:-1], rest])
 
     def full_inertias(self, parameters: Array) -> Array:
         """Full φ (P,) nearest to the URDF's that agrees with the fitted inertial parameters."""

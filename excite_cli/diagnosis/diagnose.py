@@ -36,11 +36,12 @@ from excite_cli.diagnosis.records import (
 )
 from excite_cli.diagnosis.rounds import order_of, rounds_of
 from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors, sealed_errors
-from excite_cli.diagnosis.sealed_verdict import worth_on_sealed
+from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
 from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.unexplained import unexplained_structure
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameter_names, standard_parameters
@@ -60,7 +61,7 @@ from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split, with_ends_sealed
-from excite_cli.identification.torque_scale import assumed_scale, with_known_load
+from excite_cli.identification.torque_scale import assumed_scale, weighed
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.recorded import recorded
@@ -222,17 +223,27 @@ def _diagnosed(
         joint_aliases=_joint_aliases(traced, doubts, model),
         trained=trained.errors(after),
         inertia_names=standard_parameter_names(robot),
-        path=_path(traced, candidates, errors),
+        path=_path(traced, candidates, errors, worth),
         inertia_parts=_by_joint(robot, taken_off[INERTIAS]) if from_urdf else {},
         friction_lines=data_sheet_lines(model, traced, parameters, covariance),
     )
 
 
-def _path(traced: Traced, candidates: Sequence[int], errors: SealedErrors) -> ErrorPath | None:
-    """The error against the number of effects; `candidates` in the order in which they are told."""
-    order = order_of(traced)
+def _path(
+    traced: Traced, candidates: Sequence[int], errors: SealedErrors, worth: Mapping[int, Worth]
+) -> ErrorPath | None:
+    """The error against the number of effects; `candidates` in the order in which they are told.
+
+    What was weighed tells comes first and is in the smallest model, whatever the error says.
+    """
+    weighed = {i for i, each in worth.items() if each.verdict is SealedVerdict.WEIGHED}
+    order = sorted(order_of(traced), key=lambda i: i not in weighed)
     found = error_path(traced, order, errors)
-    return found and replace(found, effects=tuple(candidates.index(i) for i in order))
+    return found and replace(
+        found,
+        smallest=max(found.smallest, len(weighed)),
+        effects=tuple(candidates.index(i) for i in order),
+    )
 
 
 def _declared(model: Model, after: IdentifiedModel, robot: Robot) -> tuple[EffectRecord, ...]:
@@ -338,8 +349,9 @@ def _model(robot: Robot, base: BaseParameters, spec: Spec, still: bool) -> Model
     if spec.identification.inertias == "cad" or (still and cad[::10].any()):
         prior = KeptInertias(cad, prior_rows(robot, cad, spec.identification.uncertainty))
     declared = declared_effects(spec.effects, robot)
-    declared = with_known_load(spec.identification, declared, robot)
-    return Model(robot, base, declared, prior, spec.runs)
+    known = weighed(spec.identification, declared, robot, base)
+    rows = np.column_stack([known.rows, known.target])
+    return Model(robot, base, known.effects, prior, spec.runs, rows)
 
 
 def _column_names(model: Model) -> list[str]:

@@ -62,6 +62,8 @@ def approximations(
         found |= {k: Approximation(covariates=of) for k in functions_alike(traced, i)}
     plain = traced.judge.plain
     for i in (each for each in traced.chosen if each not in found):
+        if traced.judge.told_by_weight(i, traced.judge.without(i, traced.chosen)):
+            continue  # inertias could explain it all: how much it explains says nothing
         joint, explained = _strongest(traced, i)
         name = joint_names[joint]
         rest = plain.energy_on(traced.chosen, [joint])

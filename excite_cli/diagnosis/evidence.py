@@ -17,7 +17,14 @@ from scipy.linalg import eigh
 
 from excite_cli.diagnosis.cholesky import Cholesky
 from excite_cli.diagnosis.grams import Grams
-from excite_cli.diagnosis.schur import SHARED, CandidateBases, Gain, Schur, gain_of_columns
+from excite_cli.diagnosis.schur import (
+    ABSORBED,
+    SHARED,
+    CandidateBases,
+    Gain,
+    Schur,
+    gain_of_columns,
+)
 from excite_cli.robot.model import Array
 
 _RIDGE = 1e-11
@@ -25,14 +32,15 @@ _UNKNOWN = 1e-4  # of what all folds know
 _RIDGE_ALONE = 1e-6  # of its own energy: half a run may not determine all that a run does
 # Where the other side of a fold has less of such a column than this share, both sides fit it.
 _LEAST_SIDE = 0.1
+_BY_WEIGHT = 4.0  # times what the data leave: the deviation is half of theirs, or less
 _KEPT = 6  # projections that are kept: a step of a search asks for the same few again
 
 
 class Evidence:
     """Gram matrices per fold and joint of normalised columns; torque is the last.
 
-    `blocks[i]` are the columns of candidate i; the first `fixed` columns are the declared model,
-    with prior precision `prior` (fixed,) in the units of the raw columns.
+    `blocks[i]` are the columns of candidate i; the first `fixed` columns are the declared model.
+    `prior` and, as a part of it, `weighed` (fixed + 1, fixed + 1) as in `TrainingData`.
     """
 
     def __init__(
@@ -42,16 +50,19 @@ class Evidence:
         blocks: Sequence[NDArray[np.intp]],
         rows_of: Sequence[tuple[int, ...]],
         prior: Array | None = None,
+        weighed: Array | None = None,
     ) -> None:
         self.grams, self.fixed, self.blocks = grams, fixed, list(blocks)
         self.rows_of = list(rows_of)
         total = grams.total()
+        if prior is not None:
+            known = np.append(np.arange(fixed), len(total) - 1)
+            total[np.ix_(known, known)] += prior
         norms = np.sqrt(np.diag(total))
         norms[norms < 1e-100] = 1.0
         norms[-1] = 1.0
         self.norms = norms
         self.total = total / np.outer(norms, norms)
-        self.prior = np.zeros(fixed) if prior is None else np.asarray(prior)
         # Searches come back to the same models: what was solved once is kept.
         self._left_out: dict[tuple, Array] = {}
         self._without: dict[tuple[int, ...], Array] = {}
@@ -63,6 +74,13 @@ class Evidence:
         self._schurs: dict[tuple[int, ...], Schur] = {}
         self._candidates = CandidateBases(self.total, fixed, self.blocks)
         self._seen = grams.seen()[:, :-1] > 0.0
+        self._weighed = prior is not None and weighed is not None and bool(weighed.any())
+        self._by_data = None if prior is None or weighed is None else prior - weighed
+
+    @cached_property
+    def _unweighed(self) -> "Evidence":
+        """The same without what was weighed."""
+        return Evidence(self.grams, self.fixed, self.blocks, self.rows_of, self._by_data)
 
     @property
     def torque(self) -> int:
@@ -76,15 +94,10 @@ class Evidence:
         )
 
     def _normal(self, gram: Array, at: NDArray[np.intp]) -> Array:
+        """With a trace of diagonal for columns that say nothing."""
         normal = gram[np.ix_(at, at)].copy()
-        normal[np.diag_indices(len(at))] += self._ridge(at)
+        normal[np.diag_indices(len(at))] += _RIDGE
         return normal
-
-    def _ridge(self, at: NDArray[np.intp]) -> Array:
-        """Precision of the prior, and a trace for columns that say nothing."""
-        ridge = np.full(len(at), _RIDGE)
-        ridge[: self.fixed] += self.prior / self.norms[: self.fixed] ** 2
-        return ridge
 
     def factor(self, chosen: Sequence[int]) -> Cholesky:
         """Cholesky factor of the normal matrix (normalised columns) of a model."""
@@ -158,7 +171,19 @@ class Evidence:
         rest = slice(self.fixed, self.torque)
         left = self.total[rest, rest] - shared.T @ solved
         cross = self.total[rest, self.torque] - solved.T @ self.total[at, self.torque]
-        return Schur(self._candidates, left, cross)
+        return Schur(self._candidates, left, cross, self._told_by_weight(chosen, np.diag(left)))
+
+    def _told_by_weight(self, chosen: Sequence[int], left: Array) -> NDArray[np.bool_]:
+        """Columns of candidates of which next to nothing is left without what was weighed.
+
+        `left` is of each with it. Candidates have the same norms without it.
+        """
+        if not self._weighed:
+            return np.zeros(len(left), bool)
+        by_data = np.diag(self._unweighed.schur(chosen).matrix)
+        own = np.diag(self.total)[self.fixed : self.torque]
+        told = (left > SHARED * own) & (left > _BY_WEIGHT * by_data)
+        return np.asarray(told & (by_data < ABSORBED * own))
 
     @cached_property
     def _folds(self) -> Array:
@@ -207,6 +232,8 @@ class Evidence:
             seen[:, : self.fixed] = True
             alone = seen & (seen.sum(axis=0) == 1)
             lacking = ~seen & (seen.sum(axis=0) == len(seen) - 1)
+            if self._weighed:  # a gain is told by the fold alone that has the load
+                lacking |= ~alone & (np.arange(len(at)) >= self.fixed)
             found = []
             for fold, x in enumerate(fitted):
                 open_ = self._unknown_without(fold, at, alone[fold], lacking[fold])
@@ -226,7 +253,7 @@ class Evidence:
     ) -> Array:
         """Directions (k, d) of the parameters of which all other folds know next to nothing.
 
-        Columns that are there in this fold `alone`, and of those that it is `lacking`, alone of
+        Columns that are there in this fold `alone`, and of those that it may be `lacking`, alone of
         all, what the rest of the model could be taken for in the others.
         """
         open_ = np.eye(len(at))[:, alone]
@@ -272,7 +299,7 @@ class Evidence:
             index = (at[:, None], at)
             normal = self.total[index] - self._folds[:, at[:, None], at]
             diagonal = np.arange(len(at))
-            normal[:, diagonal, diagonal] += self._ridge(at)
+            normal[:, diagonal, diagonal] += _RIDGE
             rhs = self.total[at, self.torque] - self._folds[:, at, self.torque]
             self._without[chosen] = np.linalg.solve(normal, rhs[:, :, None])[:, :, 0]
         return self._without[chosen]

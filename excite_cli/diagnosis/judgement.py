@@ -3,11 +3,14 @@
 The price of a candidate is the χ² value that one of all the tests made would exceed by chance in a
 share α of diagnoses (Bonferroni), plus a little for unusual kinds: so a step that lowers residual
 energy + prices is a test with family-wise control. What joins must also lower the error on runs
-left out, be large enough to matter, and have a sign and a size that physics allows.
+left out, be large enough to matter, and have a sign and a size that physics allows. Where it takes
+scales to tell an effect from the inertias, these predict as well without it, and runs left out have
+no say.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +27,9 @@ from excite_cli.robot.model import Array
 _PARENT_PRICE = 4.5
 _FAR_MORE = 0.15  # of the error on runs left out: more than noise makes of it
 _TRANSFER = 0.06  # least share of the gain on fitted runs that runs left out must have
+# χ² that what acts on fewer rows must save beyond, where scales alone tell either: an offset of the
+# vertical force, or a gain of it, and one of the whole wrench differ by the noise.
+_ON_FEWER_ROWS = 25.0
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
 
 
@@ -114,7 +120,16 @@ class Judgement:
         key = (max(dof, 1), c.tests)
         if key not in self._thresholds:
             self._thresholds[key] = float(chi2.isf(self.rules.significance / c.tests, key[0]))
-        return self.rules.inflation * self._thresholds[key] + c.effect.surprise
+        surprise = c.effect.surprise + _ON_FEWER_ROWS * (candidate in self._on_fewer_rows)
+        return self.rules.inflation * self._thresholds[key] + surprise
+
+    @cached_property
+    def _on_fewer_rows(self) -> set[int]:
+        """Of candidates that scales alone tell from the declared model, those not on most rows."""
+        schur = self.white.schur(())
+        told = [i for i in range(len(self.candidates)) if schur.told_by_weight(i)]
+        most = max((len(self.candidates[i].rows) for i in told), default=0)
+        return {i for i in told if len(self.candidates[i].rows) < most}
 
     def price_beside(self, candidate: int, chosen: Sequence[int], dof: int) -> float:
         """As `price`; first-order friction is cheap beside what refines it."""
@@ -274,14 +289,32 @@ class Judgement:
 
     def loses(self, rest: Sequence[int], member: int, move: Sequence[int]) -> bool:
         """Whether runs left out would lose by the replacement what they gained by the member."""
+        if len(move) == 1 and self.told_by_weight(move[0], rest):
+            return False
         before = self._left_out_gain(rest, [member], slice(None))
         return self._left_out_gain(rest, move, slice(None)) < before - _FAR_MORE
+
+    def told_by_weight(self, candidate: int, others: Sequence[int]) -> bool:
+        """Whether it is a gain that scales alone tell from the model with the others."""
+        gain = self.candidates[candidate].effect.of_whole_torque
+        return gain and self.white.schur(others).told_by_weight(candidate)
+
+    def _weighs_little(self, candidate: int, others: Sequence[int]) -> bool:
+        """Whether all of its torque is too small to matter: what it explains, inertias explain."""
+        (column,) = self.plain.blocks[candidate]
+        own = self.plain.solve([*others, candidate])[-1] * self.plain.norms[column]
+        rows = self.plain.rows_of[candidate]
+        whole = sum(self.plain.grams.torque_energy(joint) for joint in rows)
+        return bool(abs(own) < _SMALLEST * np.sqrt(whole))
 
     def verdict(self, chosen: Sequence[int], added: Sequence[int]) -> Verdict:
         """Accepted, or why `added` may not join the chosen ones."""
         together = [*chosen, *added]
         if not self.allowed(self.plain.solve(together), together, added):
             return Verdict.IMPOSSIBLE_SIGN
+        if len(added) == 1 and self.told_by_weight(added[0], chosen):
+            little = self._weighs_little(added[0], chosen)
+            return Verdict.TOO_SMALL if little else Verdict.ACCEPTED
         if self.too_small(chosen, added):
             return Verdict.TOO_SMALL
         if self._leftover(chosen, added):
@@ -324,10 +357,12 @@ class Judgement:
         if any(i in self.parents[k] for k in rest):
             return not right_sign
         gain = self.white.gain_of(i, chosen)
+        if self.p_value(i, gain) > self.rules.significance or not right_sign:
+            return True
+        if self.told_by_weight(i, rest):
+            return self._weighs_little(i, rest)
         return (
-            self.p_value(i, gain) > self.rules.significance
-            or not right_sign
-            or self.left_out_gain(rest, [i]) < self.rules.gain
+            self.left_out_gain(rest, [i]) < self.rules.gain
             or self.too_small(rest, [i])
             or self._leftover(rest, [i])
         )

@@ -100,12 +100,15 @@ def training_data(
     parts = [
         (spool.keep(columns), spool.keep(tau)) for columns, tau in each(_declared, model, tasks)
     ]
-    precision = None
+    rows = model.weighed_columns
+    weighed = rows.T @ rows
+    prior = weighed.copy()
     if model.prior is not None:
-        precision = np.concatenate([model.prior.precision, np.zeros(model.declared_width)])
+        at = np.arange(len(model.prior.precision))
+        prior[at, at] += model.prior.precision
     runs = tuple(body.run for body in modelled)
     declared, torques = zip(*parts, strict=True)
-    return TrainingData(runs, tuple(folds), declared, torques, precision)
+    return TrainingData(runs, tuple(folds), declared, torques, prior, weighed)
 
 
 def _declared(

@@ -17,6 +17,7 @@ from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.diagnosis.separation import DataColumns, separated
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.dynamics.uncertain_inertias import FitKnowledge
 from excite_cli.effects.base import Effect
 from excite_cli.errors import FileError
@@ -206,7 +207,13 @@ def _check_robot(diagnosis: Diagnosis, robot: Robot) -> None:
 
 
 def _alias_pairs(diagnosis: Diagnosis) -> list[tuple[EffectRecord, EffectRecord]]:
-    return [(named.effect, alias) for named in diagnosis.effects for alias in named.aliases]
+    """Named effects and what stands for them, but for what takes a scale and no motion to tell."""
+    return [
+        (named.effect, alias)
+        for named in diagnosis.effects
+        if named.verdict is not SealedVerdict.WEIGHED
+        for alias in named.aliases
+    ]
 
 
 def _spec_of(effect: Effect, robot: Robot) -> EffectSpec:

@@ -346,10 +346,14 @@ class Diagnosis(Shown):
         """Whether what was found, if anything, lowers the mean error on the sealed data.
 
         Where nothing of it is in the sealed run, that error need not fall, but must not rise; it is
-        on the sealed ends of the runs that carry it that the error falls.
+        on the sealed ends of the runs that carry it that the error falls. Nor need it fall by what
+        rests on what was weighed.
         """
         absent = {(each.kind, each.runs) for each in self.assumed if not each.present}
-        if self.effects and all((e.effect.kind, e.effect.runs) in absent for e in self.effects):
+        if self.effects and all(
+            each.verdict is SealedVerdict.WEIGHED or (each.effect.kind, each.effect.runs) in absent
+            for each in self.effects
+        ):
             ends = all(_lower(part.before, part.after) for part in self.parts)
             return ends and _lower(self.before, self.after, 1.0 + _UNCHANGED)
         return not self.effects or _lower(self.before, self.after)

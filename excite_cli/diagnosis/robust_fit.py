@@ -62,9 +62,10 @@ def _solve(
     for at, own, product in each(_weighted, None, tasks):
         normal[np.ix_(at, at)] += own
         rhs[at] += product
-    if data.prior_precision is not None:
-        at = np.arange(len(data.prior_precision))
-        normal[at, at] += data.prior_precision
+    if data.prior is not None:
+        fixed = len(data.prior) - 1
+        normal[:fixed, :fixed] += data.prior[:-1, :-1]
+        rhs[:fixed] += data.prior[:-1, -1]
     scale = np.sqrt(np.diag(normal))
     scale[scale < 1e-100] = 1.0
     unit = normal / np.outer(scale, scale)

@@ -1,6 +1,6 @@
 """What a candidate adds to a model: the Schur complement of its Gram matrix.
 
-With N = G_SS + Λ (Λ the precision of a prior on the inertial columns, if there is one) and a
+With N = G_SS + Λ (Λ the precision of what is known without the data, if anything is) and a
 candidate c, the Schur complement Z = G_cc − G_cS N⁻¹ G_Sc is what is left of the candidate once the
 model has taken its part, z = G_cy − G_cS N⁻¹ G_Sy its product with the residual, and zᵀ Z⁻¹ z the
 energy that it explains: χ² distributed for unit noise if the candidate is not there.
@@ -59,14 +59,29 @@ class Schur:
     pass would outlive it.
     """
 
-    def __init__(self, candidates: CandidateBases, left: Array, cross: Array) -> None:
+    def __init__(
+        self,
+        candidates: CandidateBases,
+        left: Array,
+        cross: Array,
+        told_by_weight: NDArray[np.bool_],
+    ) -> None:
+        """`told_by_weight` (p,): columns that scales tell from the model, and data do not."""
         self._candidates, self.matrix, self.cross = candidates, left, cross
+        self._told = told_by_weight
+
+    def told_by_weight(self, candidate: int) -> bool:
+        """Whether scales alone tell a candidate of one column from the model."""
+        at = self._candidates.blocks[candidate] - self._candidates.fixed
+        return len(at) == 1 and bool(self._told[at[0]])
 
     def gain(self, *candidates: int, absorbed: float = ABSORBED) -> Gain:
         """χ², degrees of freedom and the largest share left of candidates taken together.
 
-        Directions of which less than `absorbed` is left do not count.
+        Directions of which less than `absorbed` is left do not count, but for what scales tell.
         """
+        if len(candidates) == 1 and self.told_by_weight(candidates[0]):
+            absorbed = SHARED
         e = self._candidates
         at = np.concatenate([e.blocks[i] for i in candidates]) - e.fixed
         return gain_of_columns(
@@ -76,7 +91,7 @@ class Schur:
     @cached_property
     def singles(self) -> "Singles":
         """Gain of every candidate alone."""
-        return Singles(self._candidates, self.matrix, self.cross)
+        return Singles(self._candidates, self.matrix, self.cross, self._told)
 
     def pair_chi2(self, first: Array, second: Array) -> Array:
         """χ² of pairs of candidates of one column each, without those that are collinear."""
@@ -113,7 +128,9 @@ def gain_of_columns(
 class Singles:
     """Gains of single candidates: those with one column all at once, the others when asked for."""
 
-    def __init__(self, candidates: CandidateBases, matrix: Array, cross: Array) -> None:
+    def __init__(
+        self, candidates: CandidateBases, matrix: Array, cross: Array, told: NDArray[np.bool_]
+    ) -> None:
         e = candidates
         self._given = candidates, matrix, cross
         self._first = np.array([b[0] for b in e.blocks], dtype=int) - e.fixed
@@ -121,15 +138,15 @@ class Singles:
         own = np.diag(e.total)[e.fixed : -1][self._first]
         left = np.diag(matrix)[self._first]
         self._share = left / np.maximum(own, 1e-300)
-        alive = self._share > ABSORBED
+        alive = self._share > np.where(told[self._first], SHARED, ABSORBED)
         products = cross[self._first]
         self._chi2 = np.where(alive, products**2 / np.where(alive, left, 1.0), 0.0)
+        self._alive = alive
         self._others: dict[int, Gain] = {}
 
     def __getitem__(self, i: int) -> Gain:
         if self._single[i]:
-            share = float(self._share[i])
-            return Gain(float(self._chi2[i]), int(share > ABSORBED), share)
+            return Gain(float(self._chi2[i]), int(self._alive[i]), float(self._share[i]))
         if i not in self._others:
             e, matrix, cross = self._given
             at = e.blocks[i] - e.fixed

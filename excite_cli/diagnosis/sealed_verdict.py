@@ -5,7 +5,9 @@ would take its place. What the effect removes is the difference of the mean rela
 torque, where joints move: of one that stands the stiction may be any, and no model says it. Blocks
 of the sealed part are drawn with replacement, the same for both errors, and say whether it is above
 or below zero beyond chance. An effect of several joints that removes error on one and adds it on
-another is not confirmed. Nothing is chosen or fitted by this.
+another is not confirmed. What only weighing tells from the inertias is not judged by this error,
+unless it rises on a joint: inertias would take it up and predict as well. Nothing is chosen or
+fitted by this.
 """
 
 from collections.abc import Sequence
@@ -53,7 +55,10 @@ def worth_on_sealed(
         lower = errors_without.mean_relative - errors.mean_relative
         verdict = sealed_verdict(removed, lower)
         on = [model.robot.joint_names[j] for j in traced.candidates[i].effect.joints]
-        if verdict is SealedVerdict.CONFIRMED and rises_on_one(on, errors_without, errors):
+        rises = rises_on_one(on, errors_without, errors)
+        if traced.judge.told_by_weight(i, rest) and not rises:
+            verdict = SealedVerdict.WEIGHED
+        elif verdict is SealedVerdict.CONFIRMED and rises:
             verdict = SealedVerdict.NOT_CONFIRMED
         found[i] = Worth(verdict, _removes(errors_without, errors))
     return found

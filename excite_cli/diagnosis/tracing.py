@@ -32,6 +32,7 @@ from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.catalogue import scales
 from excite_cli.effects.seen import Seen
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.prepare import PreparedRun
@@ -267,11 +268,25 @@ def _one_pass(
         model.declared,
     )
     judge = Judgement(white, plain, candidates, rules, sizes, found)
-    chosen = Search(judge, spec.rounds).run()
+    chosen = _searched(judge, spec.rounds, model)
     return Traced(
         data, tuple(candidates), noise, judge, tuple(chosen), fit.phi, tuple(signals),
         fit.levels, inflation, sizes,
     )  # fmt: skip
+
+
+def _searched(judge: Judgement, most: int, model: Model) -> list[int]:
+    """The best set found from the declared model, and from all gains if something was weighed.
+
+    A scale that all joints share, or nearly, takes the gains of all: each alone is at odds with the
+    inertias.
+    """
+    chosen = Search(judge, most).run()
+    if not model.weighed_columns.any():
+        return chosen
+    places = {effect.place for effect in scales(model.robot)}
+    gains = [i for i, c in enumerate(judge.candidates) if c.place in places]
+    return min(chosen, Search(judge, most).run(gains), key=judge.cost)
 
 
 def _seen(data: TrainingData, signals: Sequence[Signals]) -> Seen:

@@ -44,14 +44,18 @@ class TrainingData:
     """Parts of runs with the columns of the declared model.
 
     `declared[i]` (M_i, n, k): inertial columns, then those of the declared effects. `folds` says
-    which parts are left out together. With a `prior`, `tau` is what the URDF's inertias leave.
+    which parts are left out together. Beside kept inertias, `tau` is what the URDF's leave.
+
+    `prior` (k + 1, k + 1): Gram matrix of rows [W target] of unit variance, what is known of the
+    parameters without these data; `weighed`: the part of it that scales say. None: nothing.
     """
 
     runs: tuple[PreparedRun, ...]
     folds: tuple[int, ...]
     declared: tuple[Array, ...]
     tau: tuple[Array, ...]
-    prior_precision: Array | None = None
+    prior: Array | None = None
+    weighed: Array | None = None
 
     @property
     def n(self) -> int:
@@ -97,7 +101,8 @@ class TrainingData:
             int(starts[0]),
             [np.arange(*ends) for ends in pairwise(starts)],
             [c.rows for c in candidates],
-            self.prior_precision,
+            self.prior,
+            self.weighed,
         )
 
     def grams(

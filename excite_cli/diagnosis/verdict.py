@@ -17,8 +17,13 @@ class Verdict(StrEnum):
 
 
 class SealedVerdict(StrEnum):
-    """Whether the error on sealed data is lower with an effect, or higher, beyond chance."""
+    """Whether the error on sealed data is lower with an effect, or higher, beyond chance.
+
+    Or need not change: `WEIGHED`, where without the effect inertias that no scale would confirm
+    predict as well.
+    """
 
     CONFIRMED = "confirmed"
     NOT_CONFIRMED = "not confirmed"
     HARMFUL = "harmful"
+    WEIGHED = "rests on what was weighed"

@@ -39,7 +39,7 @@ def by_worth(
     """Those that carry at least `SMALL_PART` of the fall of the error, and the small ones.
 
     In each list what takes most off first; of what that is not known, what explains most. What is
-    harmful, or of unknown part, is never small.
+    harmful, of unknown part, or rests on what was weighed, is never small.
     """
     ranked = sorted(
         effects,
@@ -49,7 +49,8 @@ def by_worth(
     small = [
         each
         for each in ranked
-        if each.verdict is not SealedVerdict.HARMFUL and abs(each.takes_off) < least
+        if each.verdict not in (SealedVerdict.HARMFUL, SealedVerdict.WEIGHED)
+        and abs(each.takes_off) < least
     ]
     return [each for each in ranked if not any(each is other for other in small)], small
 
@@ -214,6 +215,26 @@ def sealed_in_words(named: NamedEffect) -> str:
     joint = max(moved, key=lambda name: abs(moved[name]))
     where = "" if named.effect.joints == (joint,) else f" on {joint}"
     return f"{named.verdict} {-100 * moved[joint]:+.2f} pp{where}"
+
+
+def settled_in_words(found: Diagnosis) -> list[str]:
+    """What a person may declare that tells sizes which inertias take up."""
+    if any(each.verdict is SealedVerdict.WEIGHED for each in found.effects):
+        return []  # and beside it, no other gain is told
+    kinds = dict.fromkeys(each.kind for each in found.absorbed)
+    known = [catalogue()[kind] for kind in kinds if kind in catalogue()]
+    return [f"{each.kind} is told by {each.settled_by}." for each in known if each.settled_by]
+
+
+def weighed_in_words(found: Diagnosis) -> list[str]:
+    """That sealed data are no test of what rests on what was weighed."""
+    return [
+        f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))} rests on "
+        "what was weighed (identification.total_mass, known_payload): other inertias would predict "
+        "as well without it, so that sealed data are no test of it."
+        for each in found.effects
+        if each.verdict is SealedVerdict.WEIGHED
+    ]
 
 
 def no_gain_in_words(found: Diagnosis) -> str:

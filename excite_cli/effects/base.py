@@ -84,6 +84,8 @@ class Effect(ABC):
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
     # Its columns are the whole torque of the model: other effects of its joints are in them.
     of_whole_torque: ClassVar[bool] = False
+    # What tells its size where inertias take it up, as a person may declare it.
+    settled_by: ClassVar[str] = ""
     # A body that one joint carries: part of the load of joints, and named by its link if one likes.
     carried: ClassVar[bool] = False
     on_base: ClassVar[bool] = False  # rows of a measured base may have it, which have no gears

@@ -17,6 +17,10 @@ class WrenchGain(TorqueGain):
     signature: ClassVar = "the residual has the shape of the wrench itself, in all of its rows"
     scope: ClassVar = "base"
     on_base: ClassVar = False
+    settled_by: ClassVar = (
+        "the weighed robot (identification.total_mass) or a weighed payload on a run "
+        "(identification.known_payload)"
+    )
     may_begin: ClassVar = True
     changes_between_runs: ClassVar = False
     excitable: ClassVar = False

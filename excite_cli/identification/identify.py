@@ -90,7 +90,7 @@ def identify(
     FileError
         A run is too short.
     """
-    known = knowledge_of(spec.identification, declared_effects(spec.effects, robot), robot)
+    known = knowledge_of(spec.identification, declared_effects(spec.effects, robot), robot, base)
     effects = known.effects
     check_declared_runs(spec, dataset)
     parts = split(dataset, sealed, spec.diagnosis.block, spec.identification.needed_runs)
@@ -108,8 +108,7 @@ def identify(
         (*spec.measurement.without_torque, *robot.unmeasured),
     )
     tell("fit")
-    known_rows = np.hstack([np.zeros((len(known.rows), base.rank)), known.rows])
-    found = fit(training, spec.identification, (known_rows, known.target))
+    found = fit(training, spec.identification, (known.rows, known.target))
     tell("errors on the sealed part")
     held_out = _regression(robot, base, effects, parts.sealed, processing)
     if follows_model(training):

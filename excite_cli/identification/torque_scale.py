@@ -1,11 +1,12 @@
-"""What is known of the torque's scale: how well the drives' gains are, and a payload on some runs.
+"""What is known of the torque's scale: how well the drives' gains are, and what was weighed.
 
     τ_measured,j = (1 + g_j) τ_j,    g ~ N(0, s² (1 + 1 1ᵀ))
 
-Without a payload that somebody weighed, one gain of all joints is a scale of all inertias, friction
+Without anything that somebody weighed, one gain of all joints is a scale of all inertias, friction
 and other loads: g is as uncertain as it is said to be, the joints' gains together as much as each
-beside the others, and so is everything that is found. A known payload's mass, centre and inertia
-are independent; what they make of its ten parameters is taken to first order.
+beside the others, and so is everything that is found. What was weighed is a payload on some runs,
+or the whole robot where the wrench at its base is measured. A known payload's mass, centre and
+inertia are independent; what they make of its ten parameters is taken to first order.
 """
 
 from collections.abc import Sequence
@@ -18,11 +19,13 @@ from excite_cli.config.data_spec import (
     KnownPayloadSpec,
     MeasurementSpec,
 )
+from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.dynamics.pseudo_inertia import moved
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import carried_body, scales
 from excite_cli.errors import ConfigError
+from excite_cli.identification.total_mass import total_mass_row
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.link_frame import LinkFrame, link_frame, own_link
 from excite_cli.robot.model import Array, Robot
@@ -36,9 +39,10 @@ _LEAST = 1e-4  # of the mass, and m: what was weighed and measured is no truer
 
 @dataclass(frozen=True)
 class Knowledge:
-    """Effects (the declared ones first), and what is known of their values: ‖rows θ − target‖².
+    """Effects (the declared ones first), and what is known: ‖rows θ − target‖².
 
-    In units of standard deviations; rows (m, k) over all their linear parameters.
+    In units of standard deviations; rows (m, r + k) over the base parameters and all linear
+    parameters of the effects.
     """
 
     effects: tuple[Effect, ...]
@@ -46,55 +50,69 @@ class Knowledge:
     target: Array
 
 
-def knowledge_of(spec: IdentificationSpec, declared: Sequence[Effect], robot: Robot) -> Knowledge:
-    """The declared effects, gains and a known payload beside them, and what is known of these.
+def knowledge_of(
+    spec: IdentificationSpec, declared: Sequence[Effect], robot: Robot, base: BaseParameters
+) -> Knowledge:
+    """As `weighed`, with gains beside, if anything tells them, and how uncertain they are.
 
     Raises
     ------
     ConfigError
-        The payload's link is unknown, or nothing moves it; no body has its inertia.
+        As `weighed`.
     """
-    effects = tuple(declared)
-    known: list[tuple[Sequence[Effect], Array, Array]] = []
-    payload = spec.known_payload
-    if payload is not None:
-        body, mean, covariance = known_body(payload, robot)
-        effects = _with([body], effects)
-        known.append(([body], mean, covariance))
-    if payload is not None or spec.gain_std is not None:
-        gains = scales(robot)
-        effects = _with(gains, effects)
-        deviation = _ANY_GAIN if spec.gain_std is None else spec.gain_std
-        spread = deviation**2 * (np.eye(len(gains)) + 1.0)
-        known.append((gains, np.zeros(len(gains)), spread))
-    starts = np.cumsum([0, *(len(effect.parameters) for effect in effects)])
-    rows = [np.zeros((0, starts[-1]))]
-    target = [np.zeros(0)]
-    for members, mean, covariance in known:
-        whiten = np.linalg.inv(half_of(covariance))
-        at = [
-            np.arange(starts[i], starts[i + 1]) for i in (effects.index(each) for each in members)
-        ]
-        wide = np.zeros((len(mean), starts[-1]))
-        wide[:, np.concatenate(at)] = whiten
-        rows.append(wide)
-        target.append(whiten @ mean)
-    return Knowledge(effects, np.concatenate(rows), np.concatenate(target))
+    known = weighed(spec, declared, robot, base)
+    if not len(known.target) and spec.gain_std is None:
+        return known
+    gains = scales(robot)
+    deviation = _ANY_GAIN if spec.gain_std is None else spec.gain_std
+    spread = deviation**2 * (np.eye(len(gains)) + 1.0)
+    return _with(known, gains, np.zeros(len(gains)), spread)
 
 
-def with_known_load(
-    spec: IdentificationSpec, declared: Sequence[Effect], robot: Robot
-) -> tuple[Effect, ...]:
-    """The declared effects, and the payload that somebody weighed among them."""
-    if spec.known_payload is None:
-        return tuple(declared)
-    return _with([known_body(spec.known_payload, robot)[0]], tuple(declared))
+def weighed(
+    spec: IdentificationSpec, declared: Sequence[Effect], robot: Robot, base: BaseParameters
+) -> Knowledge:
+    """The declared effects, a known payload beside them, and what scales said of it and the robot.
+
+    Raises
+    ------
+    ConfigError
+        The payload's link is unknown, or nothing moves it; no body has its inertia; the robot's
+        whole mass does not show.
+    """
+    width = base.rank + sum(len(effect.parameters) for effect in declared)
+    known = Knowledge(tuple(declared), np.zeros((0, width)), np.zeros(0))
+    if spec.total_mass is not None:
+        mass, std = spec.total_mass.mass, max(spec.total_mass.std, _LEAST * spec.total_mass.mass)
+        row = np.zeros((1, width))
+        row[0, : base.rank] = total_mass_row(robot, base) / std
+        known = Knowledge(known.effects, row, np.array([mass / std]))
+    if spec.known_payload is not None:
+        body, mean, covariance = known_body(spec.known_payload, robot)
+        known = _with(known, [body], mean, covariance)
+    return known
+
+
+def _with(known: Knowledge, more: Sequence[Effect], mean: Array, covariance: Array) -> Knowledge:
+    """And `more` effects, unless declared, whose parameters are N(mean, covariance)."""
+    new = [effect for effect in more if effect not in known.effects]
+    effects = (*known.effects, *new)
+    rows = np.pad(known.rows, ((0, 0), (0, sum(len(effect.parameters) for effect in new))))
+    widths = [len(effect.parameters) for effect in effects]
+    ends = rows.shape[1] - sum(widths) + np.cumsum([0, *widths])
+    at = [np.arange(*ends[i : i + 2]) for i in map(effects.index, more)]
+    whiten = np.linalg.inv(half_of(covariance))
+    wide = np.zeros((len(mean), rows.shape[1]))
+    wide[:, np.concatenate(at)] = whiten
+    return Knowledge(
+        effects, np.concatenate([rows, wide]), np.concatenate([known.target, whiten @ mean])
+    )
 
 
 def assumed_scale(measurement: MeasurementSpec, spec: IdentificationSpec) -> list[Finding]:
     """That what is found has the scale of constants that somebody gave, if nothing tells it."""
-    told = spec.known_payload is not None or spec.gain_std is not None
-    if told or measurement.torque == "link":
+    told = (spec.known_payload, spec.total_mass, spec.gain_std)
+    if any(each is not None for each in told) or measurement.torque == "link":
         return []
     of = "torque_constant and gear_ratio" if measurement.torque == "current" else "gear_ratio"
     text = (
@@ -154,7 +172,3 @@ def _ten(numbers: Array, frame: LinkFrame) -> Array:
 def _tensor(six: Sequence[float] | Array) -> Array:
     xx, xy, yy, xz, yz, zz = six
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _with(more: Sequence[Effect], effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
-    return (*effects, *(each for each in more if each not in effects))

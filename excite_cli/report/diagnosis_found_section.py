@@ -16,8 +16,10 @@ from excite_cli.diagnosis.words import (
     p_in_words,
     place_in_words,
     sealed_in_words,
+    settled_in_words,
     title_of,
     value_in_words,
+    weighed_in_words,
 )
 from excite_cli.report.page import Block, Section, Table, Text
 
@@ -64,7 +66,7 @@ def found_section(found: Diagnosis) -> Section:
                 right=frozenset({3, 4, 5}),
             )
         )
-    blocks += [Text(text) for text in changes_in_words(found)]
+    blocks += [Text(text) for text in (*weighed_in_words(found), *changes_in_words(found))]
     if found.absorbed:
         blocks.append(_absorbed(found))
     return Section("diagnosis-found", "What was found", tuple(blocks), _lead(found))
@@ -133,7 +135,12 @@ def _absorbed(found: Diagnosis) -> Table:
         ("effect", "where", "would show as"),
         tuple(rows),
         title=f"Not testable: {len(rows)} would show as other values of parameters",
-        note="No data of this kind of motion can tell them from a change of these parameters.",
+        note=" ".join(
+            [
+                "No data of this kind of motion can tell them from a change of these parameters.",
+                *settled_in_words(found),
+            ]
+        ),
         folded=len(rows) > 6,
     )
 

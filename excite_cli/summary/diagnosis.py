@@ -22,6 +22,7 @@ from excite_cli.diagnosis.words import (
     p_in_words,
     place_in_words,
     rests_in_words,
+    settled_in_words,
     value_in_words,
 )
 from excite_cli.identification.fit_words import above_the_floor
@@ -144,7 +145,7 @@ def absorbed_parts(found: Diagnosis) -> Parts:
         left=("effect", "where"),
         words=("absorbed by",),
     )
-    return [table]
+    return [table, *settled_in_words(found)]
 
 
 def unexplained_in_words(found: Diagnosis) -> list[str]:

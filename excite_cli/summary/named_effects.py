@@ -13,6 +13,7 @@ from excite_cli.diagnosis.words import (
     place_in_words,
     sealed_in_words,
     value_in_words,
+    weighed_in_words,
 )
 from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.cells import points
@@ -37,6 +38,7 @@ def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
             f"and {len(small)} small ones (each below {SMALL_PART:.0%} of the fall): {listed} "
             "(--verbose: sizes)"
         )
+    parts += weighed_in_words(found)
     parts += [text for named in found.named for text in other_names(named, everything)]
     return [*parts, *(_joint_alias(each, everything) for each in found.joint_aliases)]
 

@@ -129,6 +129,10 @@ LEVELS: dict[str, tuple[str, type[Section]]] = {
         "{known_payload: {runs: [a], mass: 1, center: [0, 0, 0], @: 1}}",
         data_spec.KnownPayloadSpec,
     ),
+    "identification.total_mass": (
+        f"{ROBOT}\nidentification: {{total_mass: {{mass: 1, @: 1}}}}",
+        data_spec.TotalMassSpec,
+    ),
     "diagnosis": (f"{ROBOT}\ndiagnosis: {{@: 1}}", data_spec.DiagnosisSpec),
 }
 

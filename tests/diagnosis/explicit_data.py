@@ -26,6 +26,10 @@ from excite_cli.robot.model import Array
 STEP = 0.02
 FIXED = 4
 FOLDS = (0, 1, 0, 2)
+# Rows [W target] of unit variance: a prior on single parameters, and sums that were weighed.
+NOTHING = np.zeros((0, FIXED + 1))
+PRIOR = np.column_stack([np.diag(np.sqrt([3.0, 0.0, 50.0, 0.5])), np.zeros(FIXED)])
+WEIGHED = np.array([[2.0, 2.0, 0.0, 0.0, 9.0], [0.0, 40.0, -1.0, 3.0, -5.0]])
 
 
 def anything(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
@@ -64,15 +68,14 @@ def prepared(
     )
 
 
-def random_data(seed: int, prior: bool = False, samples: int = 60) -> TrainingData:
-    """Four parts of two joints in three folds, some rows not usable."""
+def random_data(seed: int, known: Array = NOTHING, samples: int = 60) -> TrainingData:
+    """Four parts of two joints in three folds, some rows not usable; `known` was weighed."""
     rng = np.random.default_rng(seed)
     usable = [rng.random((samples, 2)) > 0.03 for _ in FOLDS]
     declared = tuple(rng.normal(size=(samples, 2, FIXED)) * [1, 5, 0.1, 2] for _ in FOLDS)
     tau = tuple(rng.normal(size=(samples, 2)) + d @ rng.normal(size=FIXED) for d in declared)
-    precision = np.array([3.0, 0.0, 50.0, 0.5]) if prior else None
     runs = tuple(prepared(u) for u in usable)
-    return TrainingData(runs, FOLDS, declared, tau, precision)
+    return TrainingData(runs, FOLDS, declared, tau, known.T @ known, known.T @ known)
 
 
 def random_candidates(seed: int, samples: int = 60) -> list[Candidate]:
@@ -104,24 +107,27 @@ def autoregression() -> NoiseModel:
 
 @dataclass(frozen=True)
 class Rows:
-    """All whitened rows: x (N, columns), y (N,), fold, joint and side (N,); blocks of columns."""
+    """All whitened rows: x (N, columns), y (N,), fold, joint and side (N,); blocks of columns.
+
+    `known` (m, FIXED + 1): rows [W target] that are in every fit and on no joint.
+    """
 
     x: Array
     y: Array
     fold: np.ndarray
     joint: np.ndarray
     blocks: list[np.ndarray]
-    prior: Array
+    known: Array
     side: np.ndarray
 
     def fitted(self, chosen: Sequence[int], kept: np.ndarray | None = None) -> Array:
-        """Least squares (with the prior as rows of their own) of the model on the rows kept."""
+        """Least squares of the model on the rows kept and what is known."""
         at = self.columns(chosen)
         kept = np.ones(len(self.y), bool) if kept is None else kept
-        prior = np.zeros((FIXED, len(at)))
-        prior[:, :FIXED] = np.diag(np.sqrt(self.prior))
-        x = np.concatenate([self.x[kept][:, at], prior])
-        y = np.concatenate([self.y[kept], np.zeros(FIXED)])
+        known = np.zeros((len(self.known), len(at)))
+        known[:, :FIXED] = self.known[:, :-1]
+        x = np.concatenate([self.x[kept][:, at], known])
+        y = np.concatenate([self.y[kept], self.known[:, -1]])
         scale = np.linalg.norm(x, axis=0)
         scale[scale == 0] = 1.0
         return np.linalg.lstsq(x / scale, y, rcond=1e-12)[0] / scale
@@ -130,13 +136,14 @@ class Rows:
         return np.concatenate([np.arange(FIXED), *(self.blocks[i] for i in chosen)]).astype(int)
 
     def energy(
-        self, chosen: Sequence[int], joints: Sequence[int] = (0, 1), with_prior: bool = False
+        self, chosen: Sequence[int], joints: Sequence[int] = (0, 1), with_known: bool = False
     ) -> float:
         """Of the residual on the rows of `joints`, fitted to everything."""
         theta = self.fitted(chosen)
         rest = self.y - self.x[:, self.columns(chosen)] @ theta
         own = float(np.sum(rest[np.isin(self.joint, joints)] ** 2))
-        return own + with_prior * float(self.prior @ theta[:FIXED] ** 2)
+        misfit = self.known[:, :-1] @ theta[:FIXED] - self.known[:, -1]
+        return own + with_known * float(misfit @ misfit)
 
     def left_out(self, chosen: Sequence[int], joints: Sequence[int]) -> list[float]:
         """Energy per fold on the rows of `joints`, fitted to the other folds."""
@@ -170,11 +177,12 @@ class Rows:
 
     def projected(self, column: int, chosen: Sequence[int]) -> float:
         """Energy of a column that the model cannot imitate, as a share of all of it."""
+        known = np.column_stack([self.known[:, :-1], np.zeros(len(self.known))])
         changed = Rows(
-            self.x, self.x[:, column], self.fold, self.joint, self.blocks, self.prior, self.side
+            self.x, self.x[:, column], self.fold, self.joint, self.blocks, known, self.side
         )  # fmt: skip
         whole = float(self.x[:, column] @ self.x[:, column])
-        return changed.energy(chosen, with_prior=True) / whole
+        return changed.energy(chosen, with_known=True) / whole
 
 
 def covariance_in_time(taps: Array, sigma: float, count: int) -> Array:
@@ -184,7 +192,12 @@ def covariance_in_time(taps: Array, sigma: float, count: int) -> Array:
     return sigma**2 * np.asarray(toeplitz(lags))
 
 
-def rows_of(data: TrainingData, candidates: Sequence[Candidate], noise: NoiseModel) -> Rows:
+def rows_of(
+    data: TrainingData,
+    candidates: Sequence[Candidate],
+    noise: NoiseModel,
+    known: Array = NOTHING,
+) -> Rows:
     """Whitened row by row: what those of the p rows before that are usable do not predict."""
     starts = FIXED + np.cumsum([0, *(c.width for c in candidates)])
     blocks = [np.arange(starts[i], starts[i + 1]) for i in range(len(candidates))]
@@ -209,7 +222,6 @@ def rows_of(data: TrainingData, candidates: Sequence[Candidate], noise: NoiseMod
                 folds.append(fold)
                 joints.append(joint)
                 sides.append(data.sides[part][t])
-    prior = np.zeros(FIXED) if data.prior_precision is None else data.prior_precision
     return Rows(
-        np.array(x), np.array(y), np.array(folds), np.array(joints), blocks, prior, np.array(sides)
+        np.array(x), np.array(y), np.array(folds), np.array(joints), blocks, known, np.array(sides)
     )  # fmt: skip

@@ -153,3 +153,31 @@ def test_what_lowers_nothing_is_told_so_with_the_warnings(plain: Diagnosis) -> N
     assert answer_in_words(warned).endswith(told)
     carried = replace(spring, effect=replace(spring.effect, runs=("motion_1",)))
     assert "does not lower" not in answer_in_words(found(plain, carried, left=(0.51, 0.51)))
+
+
+def test_what_rests_on_a_weight_is_told_whatever_the_error_does(plain: Diagnosis) -> None:
+    """And what no motion tells it from, if there is nothing for a motion to tell."""
+    size = {"gain": Value(0.04, 0.001, "1")}
+    offset = EffectRecord("torque_offset", ("slide",), {}, (1.0,))
+    gain = replace(
+        effect("torque_gain", "elbow", size, everywhere(plain, -1e-3)),
+        verdict=SealedVerdict.WEIGHED,
+    )
+    whole = found(plain, gain)
+    same = replace(whole, before=whole.after)
+    assert answer_in_words(same).startswith(
+        "On elbow: wrong gain of the measured torque (0.04), by what was weighed. 3.6% of the"
+    )
+    assert answer_in_words(same).endswith("Next: go on with the model and its effects "
+                                          "(--apply NEW.yaml).")  # fmt: skip
+    rival = replace(gain, aliases=(offset,))
+    told = answer_in_words(replace(same, effects=(rival,)))
+    assert told.endswith(
+        " Next: a run with a weighed payload (identification.known_payload), which tells wrong "
+        "gain of the measured torque of elbow from offset of the measured torque of slide; no "
+        "motion does."
+    )
+    spring = replace(effect("spring", "elbow", SPRING, everywhere(plain, 0.1)), aliases=(offset,))
+    told = answer_in_words(found(plain, rival, spring))
+    assert " Next: a motion that tells spring at the joint of elbow from offset" in told
+    assert "by what was weighed. On elbow: spring at the joint (6.9 kN·m/rad" in told

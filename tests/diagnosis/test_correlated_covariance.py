@@ -63,16 +63,25 @@ def test_covariance_is_that_of_many_fits(memory: float) -> None:
         assert (np.diag(naive) < 0.5 * np.diag(found)).all()
 
 
-def test_a_prior_counts_as_what_is_known_before() -> None:
-    """Inertias are drawn from the prior; the estimate's error has the covariance that is told."""
+@pytest.mark.parametrize("weighed", [False, True])
+def test_what_is_known_before_counts(weighed: bool) -> None:
+    """Inertias are drawn from it; the estimate's error has the covariance that is told.
+
+    A prior on each, or on what was weighed: sums of several, of a target that is not zero.
+    """
     data, candidates = design(3)
-    precision = np.array([100.0, 1e4, 5.0, 1000.0])
-    data = replace(data, prior_precision=precision)
+    rows, target = np.diag([10.0, 100.0, 5.0**0.5, 1000.0**0.5]), np.zeros(FIXED)
+    if weighed:
+        rows[1, :3], rows[3, 1:] = (20.0, 30.0, -3.0), (40.0, 1.0, 30.0)
+        target = np.array([30.0, -4.0, 100.0, 7.0])
+    both = np.column_stack([rows, target])
+    data = replace(data, prior=both.T @ both)
     levels = SIGMA / np.sqrt(1 - MEMORY**2)
     rng = np.random.default_rng(2)
     errors = []
     for _ in range(DRAWS):
-        truth = np.concatenate([rng.normal(size=FIXED) / np.sqrt(precision), [0.0]])
+        inertias = np.linalg.solve(rows, target + rng.normal(size=FIXED))
+        truth = np.concatenate([inertias, [0.0]])
         drawn = tuple(d @ truth[:FIXED] + noise(rng, MEMORY) for d in data.declared)
         found = replace(data, tau=drawn).evidence(candidates, NoiseModel.white(levels)).solve((0,))
         errors.append(found - truth)
@@ -80,3 +89,4 @@ def test_a_prior_counts_as_what_is_known_before() -> None:
     covariance = covariance_of(data, candidates, (0,), model, levels)
     scatter = np.std(np.array(errors), axis=0)
     assert np.sqrt(np.diag(covariance)) == pytest.approx(scatter, rel=0.12)
+    assert (np.abs(np.mean(errors, axis=0)) < 4.0 * scatter / np.sqrt(DRAWS)).all()

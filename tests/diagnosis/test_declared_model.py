@@ -62,3 +62,18 @@ def test_widths_are_those_of_linear_parameters(model: Model) -> None:
     assert width_of(effects) == 2 + 1 + 10
     assert replace(model, declared=effects).declared_width == 13
     assert model.declared_width == 0
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_what_was_weighed_is_said_of_the_columns_that_are_fitted(model: Model, kept: bool) -> None:
+    """It is as far from any φ, whether base parameters are fitted or changes of all inertias."""
+    rng = np.random.default_rng(6)
+    count, effects = 10 * model.robot.n_bodies, (catalogue()["spring"]((0,)),)
+    mean, change, own = rng.normal(size=count), rng.normal(size=count), rng.normal(size=2)
+    rows = rng.normal(size=(3, model.base.rank + 2 + 1))
+    prior = KeptInertias(mean, np.ones(count)) if kept else None
+    known = replace(model, declared=effects, prior=prior, weighed=rows).weighed_columns
+    fitted = change if kept else model.base.mapping @ (mean + change)
+    missed = rows @ np.concatenate([model.base.mapping @ (mean + change), own, [-1.0]])
+    assert known @ np.concatenate([fitted, own, [-1.0]]) == pytest.approx(missed)
+    assert replace(model, prior=prior).weighed_columns.shape == (0, len(fitted) + 1)

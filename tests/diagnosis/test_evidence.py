@@ -9,9 +9,15 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.schur import ABSORBED
+from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.armature import Armature
+from excite_cli.effects.torque_gain import TorqueGain
+from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import (
     FIXED,
+    NOTHING,
+    PRIOR,
+    WEIGHED,
     Rows,
     autoregression,
     random_candidates,
@@ -23,19 +29,19 @@ CHOSEN = [(), (0,), (2,), (1, 3), (3, 0, 2), (4,), (0, 1, 2, 3, 4)]
 WHITE = NoiseModel.white(np.array([0.5, 3.0]))
 
 
-@pytest.fixture(scope="module", params=["white", "autoregression", "prior"])
+@pytest.fixture(scope="module", params=["white", "autoregression", "prior", "weighed"])
 def both(request: pytest.FixtureRequest) -> tuple[Evidence, Rows]:
-    data = random_data(3, prior=request.param == "prior")
-    candidates = random_candidates(3)
+    known = {"prior": PRIOR, "weighed": WEIGHED}.get(request.param, NOTHING)
+    data, candidates = random_data(3, known), random_candidates(3)
     noise = WHITE if request.param == "white" else autoregression()
-    return data.evidence(candidates, noise), rows_of(data, candidates, noise)
+    return data.evidence(candidates, noise), rows_of(data, candidates, noise, known)
 
 
 @pytest.mark.parametrize("chosen", CHOSEN)
 def test_parameters_and_energies(both: tuple[Evidence, Rows], chosen: tuple[int, ...]) -> None:
     evidence, rows = both
     assert evidence.solve(chosen) == pytest.approx(rows.fitted(chosen), rel=1e-6, abs=1e-8)
-    assert evidence.energy(chosen) == pytest.approx(rows.energy(chosen, with_prior=True), rel=1e-8)
+    assert evidence.energy(chosen) == pytest.approx(rows.energy(chosen, with_known=True), rel=1e-8)
     for joints in ([0], [1], [0, 1]):
         assert evidence.energy_on(chosen, joints) == pytest.approx(
             rows.energy(chosen, joints), rel=1e-8
@@ -85,9 +91,9 @@ def test_gains_are_what_the_residual_loses(
 ) -> None:
     evidence, rows = both
     schur = evidence.schur(chosen)
-    before = rows.energy(chosen, with_prior=True)
+    before = rows.energy(chosen, with_known=True)
     for i in set(range(5)) - set(chosen):
-        after = rows.energy([*chosen, i], with_prior=True)
+        after = rows.energy([*chosen, i], with_known=True)
         gain = schur.gain(i)
         assert gain.chi2 == pytest.approx(before - after, rel=1e-6)
         assert gain.dof == len(rows.blocks[i])
@@ -106,7 +112,7 @@ def test_what_a_member_adds_is_what_the_others_lose_with_it(
     evidence, rows = both
     for i in chosen:
         rest = [k for k in chosen if k != i]
-        lost = rows.energy(rest, with_prior=True) - rows.energy(chosen, with_prior=True)
+        lost = rows.energy(rest, with_known=True) - rows.energy(chosen, with_known=True)
         gain, explicit = evidence.gain_of(i, chosen), evidence.schur(rest).gain(i)
         assert gain.chi2 == pytest.approx(lost, rel=1e-6)
         assert (gain.dof, gain.left) == (explicit.dof, pytest.approx(explicit.left, rel=1e-6))
@@ -115,11 +121,11 @@ def test_what_a_member_adds_is_what_the_others_lose_with_it(
 def test_gains_of_several_and_of_pairs(both: tuple[Evidence, Rows]) -> None:
     evidence, rows = both
     schur = evidence.schur((2,))
-    before = rows.energy((2,), with_prior=True)
+    before = rows.energy((2,), with_known=True)
     pairs = [(0, 1), (0, 3), (1, 3), (3, 4), (0, 4)]
     found = schur.pair_chi2(*np.array(pairs).T)
     for pair, value in zip(pairs, found, strict=True):
-        expected = before - rows.energy([2, *pair], with_prior=True)
+        expected = before - rows.energy([2, *pair], with_known=True)
         assert value == pytest.approx(expected, rel=1e-6)
         together = schur.gain(*pair)
         assert (together.chi2, together.dof) == (pytest.approx(expected, rel=1e-6), 2)
@@ -130,7 +136,7 @@ def test_covariance_is_the_inverse_of_the_normal_matrix(both: tuple[Evidence, Ro
     chosen = (0, 3)
     x = rows.x[:, rows.columns(chosen)]
     normal = x.T @ x
-    normal[np.arange(FIXED), np.arange(FIXED)] += rows.prior
+    normal[:FIXED, :FIXED] += rows.known[:, :-1].T @ rows.known[:, :-1]
     assert evidence.covariance(chosen) == pytest.approx(np.linalg.inv(normal), rel=1e-6, abs=1e-12)
 
 
@@ -206,3 +212,73 @@ def test_residuals_are_the_torque_less_the_model() -> None:
         expected[:, 0] -= candidates[2].columns[part][:, 0] @ theta[FIXED + 1 :]
         assert rest == pytest.approx(expected)
     assert np.array_equal(data.tau[0], random_data(4).tau[0])  # untouched
+
+
+GAIN, INERTIAS = 0.04, np.array([5.0, -3.0, 20.0, 8.0])
+MASSES = np.array([1.0, 1.0, 0.0, 1.0])  # their sum was weighed
+
+
+def weighed(std: float) -> Array:
+    return np.append(MASSES, MASSES @ INERTIAS)[None] / std
+
+
+def of_a_wrong_scale(std: float, seed: int = 4) -> tuple[TrainingData, Candidate, Array]:
+    """Torques that are too large by `GAIN` all alike, with the gain's column, and what is known."""
+    rng, known = np.random.default_rng(seed), weighed(std)
+    data = random_data(seed, known)
+    model = [d @ INERTIAS for d in data.declared]
+    tau = tuple((1.0 + GAIN) * own + rng.normal(size=own.shape) for own in model)
+    gain = Candidate(TorqueGain((0, 1)), (0, 1), tuple(own[:, :, None] for own in model))
+    return replace(data, tau=tau), gain, known
+
+
+@pytest.mark.parametrize("std", [1e-3, 0.3])
+def test_what_was_weighed_tells_a_gain_that_the_inertias_hold(std: float) -> None:
+    """Against stacked rows; of an exact one the weight's energy is far above that of the data."""
+    data, gain, known = of_a_wrong_scale(std)
+    evidence = data.evidence([gain], autoregression())
+    rows = rows_of(data, [gain], autoregression(), known)
+    told = evidence.schur(()).singles[0]
+    assert evidence.schur(()).told_by_weight(0)
+    saved = rows.energy((), with_known=True) - rows.energy((0,), with_known=True)
+    assert told.chi2 == pytest.approx(saved, rel=1e-5)
+    assert told.dof == evidence.schur(()).gain(0).dof == 1
+    assert evidence.energy((0,)) == pytest.approx(rows.energy((0,), with_known=True), rel=1e-4)
+    assert evidence.solve((0,)) == pytest.approx(rows.fitted((0,)), rel=1e-4)
+    assert evidence.solve((0,))[-1] == pytest.approx(GAIN, abs=4.0 * told.chi2**-0.5 * GAIN)
+
+
+def test_without_weight_a_gain_is_absorbed_and_beside_itself_it_is_not_told_again() -> None:
+    data, gain, _ = of_a_wrong_scale(0.3)
+    free = replace(data, prior=None, weighed=None).evidence([gain], WHITE)
+    kept = replace(data, weighed=None).evidence([gain], WHITE)  # by a prior, not a scale
+    assert free.schur(()).singles[0].dof == 0
+    assert not free.schur(()).told_by_weight(0)
+    assert not kept.schur(()).told_by_weight(0)
+    assert not data.evidence([gain, gain], WHITE).schur((0,)).told_by_weight(1)
+
+
+def test_data_that_tell_an_effect_themselves_are_not_said_to_need_a_weight() -> None:
+    data, gain, _ = of_a_wrong_scale(0.3)
+    (other, *_) = random_candidates(4)
+    schur = data.evidence([gain, other], WHITE).schur(())
+    assert [schur.told_by_weight(i) for i in (0, 1)] == [True, False]
+
+
+def test_a_gain_told_by_one_fold_is_fitted_on_one_side_of_it() -> None:
+    """A load that was weighed is in fold 1 alone: the others know neither it nor the gain."""
+    data, gain, _ = of_a_wrong_scale(1.0)
+    noise = replace(data, prior=None, weighed=None).evidence([], WHITE).left_out((), [0, 1])
+    there = [fold == 1 for fold in data.folds]
+    load = [d[:, :, :1] * here for d, here in zip(data.declared, there, strict=True)]
+    declared = tuple(
+        np.concatenate([d, c], axis=2) for d, c in zip(data.declared, load, strict=True)
+    )
+    torque = [d @ np.append(INERTIAS, 30.0) for d in declared]
+    tau = tuple(t + (1.0 + GAIN) * 30.0 * c[:, :, 0] for t, c in zip(data.tau, load, strict=True))
+    known = np.array([[0.0, 0.0, 0.0, 0.0, 1.0, 30.0]]) / 0.01
+    gain = replace(gain, columns=tuple(own[:, :, None] for own in torque))
+    data = replace(data, declared=declared, tau=tau, prior=known.T @ known, weighed=known.T @ known)
+    evidence = data.evidence([gain], WHITE)
+    assert evidence.left_out((0,), [0, 1]) == pytest.approx(noise, rel=0.1)
+    assert evidence.left_out((), [0, 1])[1] > 1.5 * noise[1]

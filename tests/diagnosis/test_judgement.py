@@ -12,6 +12,7 @@ from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
 from excite_cli.diagnosis.schur import Gain
+from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect
@@ -448,3 +449,66 @@ def test_effects_of_other_joints_are_not_compared() -> None:
     judge = judge_of(*planted(effects, np.eye(2), np.diag([9.0, 0.0])))
     assert judge.left_out_gain([], [0]) > 0.5
     assert not judge.carries_more([], 0, 1)
+
+
+WEIGHT = 1000.0
+
+
+def weighed(gain: float, std: float, on: Sequence[Effect]) -> Judgement:
+    """Torques too large by `gain`; the weight that joint 0 carries is known with `std`, if any.
+
+    Effects have the columns of that weight: each explains all of it, beside free inertias.
+    """
+    data, _ = planted([effect("torque_gain")], np.eye(1), np.zeros((1, 2)))
+    for declared, tau in zip(data.declared, data.tau, strict=True):
+        declared[:, 1, 0] = 0.0
+        tau[:, 1] *= 3.0  # the noise, beside which an effect of both rows looks smaller
+        tau += (1.0 + gain) * WEIGHT * declared[:, :, 0]
+    columns = tuple(WEIGHT * declared[:, :, :1] for declared in data.declared)
+    candidates = [Candidate(one, one.joints, tuple(c[:, list(one.joints)] for c in columns))
+                  for one in on]  # fmt: skip
+    known = np.array([[1.0, 0.0, 0.0, 0.0, WEIGHT]]) / std if std else np.zeros((0, FIXED + 1))
+    return judge_of(replace(data, prior=known.T @ known, weighed=known.T @ known), candidates)
+
+
+@pytest.mark.parametrize(
+    ("gain", "std", "expected"),
+    [
+        (0.04, 5.0, Verdict.ACCEPTED),
+        (-0.04, 5.0, Verdict.ACCEPTED),
+        (0.7, 50.0, Verdict.IMPOSSIBLE_SIGN),
+        (0.0015, 0.5, Verdict.TOO_SMALL),  # of 0.2 % that a name needs
+    ],
+)
+def test_a_gain_that_takes_a_weight_to_be_told_need_not_lower_the_error(
+    gain: float, std: float, expected: Verdict
+) -> None:
+    judge = weighed(gain, std, [effect("torque_gain")])
+    assert judge.told_by_weight(0, [])
+    assert judge.left_out_gain([], [0]) < 0.01
+    assert judge.verdict([], [0]) == expected
+    assert judge.fails(0, [], [0]) == (expected is not Verdict.ACCEPTED)
+
+
+@pytest.mark.parametrize("std", [0.0, 30.0])
+def test_without_a_weight_or_one_that_is_hardly_known_a_gain_has_no_name(std: float) -> None:
+    """40 of a gain beside 30 of the scales; or inertias take it up."""
+    judge = weighed(0.04, std, [effect("torque_gain")])
+    assert judge.told_by_weight(0, []) == (std > 0.0)
+    assert judge.fails(0, [], [0])
+    assert Search(judge).run() == []
+
+
+def test_of_what_a_weight_tells_as_well_the_gain_of_all_rows_is_named() -> None:
+    """An offset of the weight's row would do, and so would a gain of that row alone."""
+    effects = [effect("torque_offset", 0), effect("torque_gain", 0), effect("wrench_gain", 0, 1)]
+    for std in (5.0, 0.3):  # by 0.3, inertias are bent so that the error shows it as well
+        judge = weighed(0.04, std, effects)
+        assert Search(judge).run() == [2]
+        assert Search(judge).run([0]) == [2]
+    assert judge.left_out_gain([], [0]) > judge.left_out_gain([], [2]) + 0.2
+    for i, alone in enumerate(effects[:2]):
+        extra = judge.price(i, 1) - weighed(0.04, 0.3, [alone]).price(0, 1)
+        assert extra > 20.0  # as much as none of the three could save by chance
+    assert not judge.told_by_weight(0, [])  # an offset alone is judged by the error
+    assert not judge.told_by_weight(1, [2])  # what is named already is not told again

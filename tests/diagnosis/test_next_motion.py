@@ -8,6 +8,7 @@ import pytest
 
 from excite_cli.diagnosis.next_motion import NextMotion, next_experiment, plan_after
 from excite_cli.diagnosis.records import EffectRecord
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import worst_margins
 from excite_cli.excitation.result import Result
@@ -63,6 +64,10 @@ def test_purpose_and_command_without_planning() -> None:
     spaced = next_experiment(make_diagnosis(), "my arm.yaml", "it's $found.h5")["command"]
     assert shlex.split(spaced)[2:] == ["my arm.yaml", "--after", "it's $found.h5"]
     assert next_experiment(make_diagnosis(rivals=()))["purpose"] == "excite"
+    made = make_diagnosis()
+    (named,) = made.effects
+    weighed = replace(made, effects=(replace(named, verdict=SealedVerdict.WEIGHED),))
+    assert next_experiment(weighed)["purpose"] == "excite"  # no motion tells it
 
 
 def test_divergence_so_far_is_that_of_the_rows_themselves(separate: NextMotion) -> None:

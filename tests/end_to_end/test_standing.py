@@ -106,20 +106,71 @@ def test_what_is_missing_has_its_name_and_size(
         assert after < (0.99 if kind == "wrench_gain" else 0.7) * before
 
 
-def test_a_weighed_load_tells_the_scale_of_the_wrench(
+WEIGHED_LOAD = (
+    "identification.known_payload="
+    "{runs: [motion_2], mass: 5.0, center: [0, 0, -0.1], link: left_hand}"
+)
+CARRIED = ("--effect", "payload@left_hand=5,cz:-0.1;runs:motion_2")
+
+
+def weighed_robot(folder: Path) -> str:
+    """What scales say of the simulated robot, whose bodies are not those of the URDF."""
+    with h5py.File(folder / "log.h5") as file:
+        phi = np.array(json.loads(str(file.attrs["truth"]))["phi"])
+    return f"identification.total_mass={{mass: {phi[::10].sum():.4f}, std: 0.03}}"
+
+
+@pytest.mark.parametrize("load", [CARRIED, ()], ids=["a load", "the robot"])
+@pytest.mark.parametrize("scale", [SCALE, ()], ids=["wrong", "right"])
+def test_what_was_weighed_tells_the_scale_of_the_wrench(
+    excite: Installed, tmp_path: Path, folder: Path, motions: Path, load: tuple[str, ...],
+    scale: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Without it, all masses would take it up."""
+    record(excite, folder / "base.yaml", motions, *scale, *load)
+    known = WEIGHED_LOAD if load else weighed_robot(tmp_path)
+    data = (str(folder / "base.yaml"), "log.h5", "--set", known)
+    fitted, found = excite.answer("identify", *data), excite.answer("diagnose", *data)
+    size = 0.04 if scale else 0.0
+    (gain,) = [x for x in fitted["parameters"] if x["name"].startswith("wrench_gain.gain")]
+    assert abs(gain["value"] - size) < 3.0 * gain["std"]
+    assert gain["std"] < 0.005
+    assert not [each for each in found["absorbed"] if each["kind"] == "wrench_gain"]
+    assert [each["kind"] for each in found["effects"]] == ["wrench_gain"] * bool(scale)
+    assert not found["approximations"]
+    for named in found["effects"]:
+        told = named["parameters"]["gain"]
+        assert abs(told["value"] - size) < 3.0 * told["std"] + 0.002
+        assert told["std"] < 0.005
+        assert named["verdict"] == "rests on what was weighed"
+        # A load tells a scale from an offset of the vertical force, the robot's weight does not.
+        others = {each["kind"] for each in named["alias_set"]}
+        assert ("torque_offset" in others) == (not load)
+
+
+def test_a_scale_that_masses_take_up_is_told_with_what_settles_it(
     excite: Installed, folder: Path, motions: Path
 ) -> None:
-    """Without it, all masses would take it up."""
-    load = ("--effect", "payload@left_hand=5,cz:-0.1;runs:motion_2")
-    record(excite, folder / "base.yaml", motions, *SCALE, *load)
-    weighed = "{runs: [motion_2], mass: 5.0, center: [0, 0, -0.1], link: left_hand}"
-    found = excite.answer(
-        "identify", str(folder / "base.yaml"), "log.h5", "--set",
-        f"identification.known_payload={weighed}",
-    )  # fmt: skip
-    (gain,) = [x for x in found["parameters"] if x["name"].startswith("wrench_gain.gain")]
-    assert abs(gain["value"] - 0.04) < 3.0 * gain["std"]
-    assert gain["std"] < 0.005
+    record(excite, folder / "base.yaml", motions, *SCALE)
+    run = excite("diagnose", str(folder / "base.yaml"), "log.h5")
+    assert run.returncode == 0
+    assert "wrench_gain is told by the weighed robot (identification.total_mass)" in run.stdout
+
+
+@pytest.mark.parametrize(
+    ("planted", "kind", "size"), [(TILT, "base_tilt", 0.0524), (LOAD, "payload", 1.5)]
+)
+def test_a_weighed_robot_changes_nothing_of_what_is_found(
+    excite: Installed, tmp_path: Path, folder: Path, motions: Path, planted: tuple[str, ...],
+    kind: str, size: float,
+) -> None:  # fmt: skip
+    record(excite, folder / "base.yaml", motions, *planted)
+    known = ("--set", weighed_robot(tmp_path))
+    found = excite.answer("diagnose", str(folder / "base.yaml"), "log.h5", *known)
+    (effect,) = found["effects"]
+    assert effect["kind"] == kind
+    told = effect["parameters"]["mass" if kind == "payload" else "pitch"]
+    assert abs(told["value"] - size) < 3.0 * told["std"] + 0.02 * size
 
 
 def test_nothing_is_missing_where_nothing_is(

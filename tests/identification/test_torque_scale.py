@@ -6,16 +6,27 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from excite_cli.config.data_spec import IdentificationSpec, KnownPayloadSpec, MeasurementSpec
+from excite_cli.config.data_spec import (
+    IdentificationSpec,
+    KnownPayloadSpec,
+    MeasurementSpec,
+    TotalMassSpec,
+)
 from excite_cli.config.load import load_spec, parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import kind_named
+from excite_cli.effects.catalogue import kind_named, scales
 from excite_cli.errors import ConfigError
 from excite_cli.identification.identify import Identification, identify
-from excite_cli.identification.torque_scale import assumed_scale, knowledge_of, known_body
+from excite_cli.identification.torque_scale import (
+    assumed_scale,
+    knowledge_of,
+    known_body,
+    weighed,
+)
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.link_frame import link_frame
 from excite_cli.robot.model import Robot, build_robot
@@ -103,12 +114,22 @@ def test_without_one_every_deviation_holds_that_of_the_gains(robot: Robot, data:
     assert abs(sure.value - MASS) > 4.0 * sure.std  # gains taken to be one: wrong, and sure of it
 
 
-def test_a_diagnosis_knows_it_too(robot: Robot, data: Dataset) -> None:
-    spec = spec_with(KNOWN).model_copy(
-        update={"diagnosis": spec_with(KNOWN).diagnosis.model_copy(update={"rounds": 0})}
-    )
+def test_a_diagnosis_finds_every_gain_by_it(robot: Robot, data: Dataset) -> None:
+    """Each alone is at odds with the inertias: only all of them explain what the payload shows."""
+    kinds = "diagnosis: {kinds: [torque_gain, torque_offset, payload]}\n"
+    spec = parse_spec(f"{SMOKE.read_text()}\n{LOADED}\nidentification: {{{KNOWN}}}\n{kinds}")
     found = diagnose(robot, find_base_parameters(robot), data, spec)
     assert ("payload", ("r2",)) in {(e.kind, e.runs) for e in found.declared}
+    told = {each.effect.joints: each for each in found.effects}
+    assert [each.effect.kind for each in found.effects] == ["torque_gain"] * robot.n
+    for name, gain in zip(robot.joint_names, GAINS, strict=True):
+        value = told[(name,)].parameters["gain"]
+        assert value.value == pytest.approx(gain, abs=0.01)
+        assert abs(value.value - gain) < 4.0 * value.std
+    assert {each.verdict for each in found.effects} == {SealedVerdict.WEIGHED}
+    assert found.after.mean_relative < 0.4 * found.before.mean_relative
+    assert found.path is not None
+    assert found.path.smallest == robot.n  # none of them may be left away
 
 
 def test_ten_parameters_of_a_body_that_hangs_on_a_link(robot: Robot) -> None:
@@ -132,14 +153,38 @@ def test_ten_parameters_of_a_body_that_hangs_on_a_link(robot: Robot) -> None:
 
 
 def test_gains_are_uncertain_together_and_each(robot: Robot) -> None:
-    known = knowledge_of(IdentificationSpec(gain_std=0.1), (), robot)
+    base = find_base_parameters(robot)
+    known = knowledge_of(IdentificationSpec(gain_std=0.1), (), robot, base)
     assert [e.kind for e in known.effects] == ["torque_gain"] * robot.n
-    spread = np.linalg.inv(known.rows.T @ known.rows)
-    assert spread == pytest.approx(0.01 * (np.eye(robot.n) + 1.0))
+    assert not known.rows[:, : base.rank].any()
+    rows = known.rows[:, base.rank :]
+    assert np.linalg.inv(rows.T @ rows) == pytest.approx(0.01 * (np.eye(robot.n) + 1.0))
     assert not known.target.any()
     own: tuple[Effect, ...] = (kind_named("torque_gain")((2,)),)
-    assert len(knowledge_of(IdentificationSpec(gain_std=0.1), own, robot).effects) == robot.n
-    assert knowledge_of(IdentificationSpec(), own, robot).rows.shape == (0, 1)
+    assert len(knowledge_of(IdentificationSpec(gain_std=0.1), own, robot, base).effects) == robot.n
+    assert knowledge_of(IdentificationSpec(), own, robot, base).rows.shape == (0, base.rank + 1)
+
+
+def test_what_is_known_is_of_the_parameters_of_their_effects(robot: Robot) -> None:
+    """Deviations from the payload's ten are whitened, the other effects' and inertias are free."""
+    spec = IdentificationSpec(known_payload=KnownPayloadSpec(runs=("r2",), mass=2.0, center=CENTRE))
+    declared = (kind_named("spring")((0,)),)
+    base = find_base_parameters(robot)
+    found, more = (each(spec, declared, robot, base) for each in (weighed, knowledge_of))
+    body, mean, covariance = known_body(spec.known_payload, robot)  # type: ignore[arg-type]
+    assert found.effects == (*declared, body)
+    assert more.effects == (*declared, body, *scales(robot))
+    first = base.rank + 2
+    assert not found.rows[:, :first].any()
+    off = np.random.default_rng(1).normal(size=10) * np.sqrt(np.diag(covariance))
+    missed = found.rows[:, first:] @ (mean + off) - found.target
+    assert missed @ missed == pytest.approx(off @ np.linalg.solve(covariance, off), rel=1e-6)
+    assert np.array_equal(more.rows[:10, : first + 10], found.rows)
+    assert not more.rows[:10, first + 10 :].any()
+    assert not more.rows[10:, : first + 10].any()
+    same = weighed(spec, (body,), robot, base)  # declared already
+    assert same.effects == (body,)
+    assert same.rows[:, base.rank :] == pytest.approx(found.rows[:, first:])
 
 
 def test_what_is_assumed_is_told() -> None:
@@ -150,6 +195,7 @@ def test_what_is_assumed_is_told() -> None:
     assert note.severity == "note"
     assert not assumed_scale(link, IdentificationSpec())
     assert not assumed_scale(current, IdentificationSpec(gain_std=0.05))
+    assert not assumed_scale(current, IdentificationSpec(total_mass=TotalMassSpec(mass=30.0)))
 
 
 def test_the_run_with_the_known_payload_is_fitted_not_sealed(robot: Robot, data: Dataset) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import (
+    Absorbed,
     Approximation,
     Diagnosis,
     EffectRecord,
@@ -16,6 +17,7 @@ from excite_cli.diagnosis.records import (
     NamedEffect,
     Unexplained,
 )
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words, title_of
 from excite_cli.effects.asymmetric_friction import AsymmetricFriction
 from excite_cli.effects.base import Value
@@ -257,6 +259,27 @@ def test_verdicts_on_sealed_data_stand_in_the_table_and_on_the_card(
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert "On sealed data: confirmed -6.00 pp." in chart.caption
     assert found_section(diagnosis).lead.count("which took no part, goes from") == 1
+
+
+def test_what_was_weighed_and_what_would_settle_the_absorbed_is_told(diagnosis: Diagnosis) -> None:
+    """The one or the other: what is weighed settles nothing more."""
+    (named, *_) = diagnosis.effects
+    absorbed = (Absorbed("wrench_gain", ("elbow",), ("m[elbow]",), 0.0),)
+    free = found_section(replace(diagnosis, absorbed=absorbed))
+    weighed = replace(named, verdict=SealedVerdict.WEIGHED)
+    told = found_section(replace(diagnosis, effects=(weighed,), absorbed=absorbed))
+    notes = [
+        [
+            block.note
+            for block in each.blocks
+            if isinstance(block, Table)
+            if "Not test" in block.title
+        ]
+        for each in (free, told)
+    ]
+    assert ["identification.total_mass" in note for (note,) in notes] == [True, False]
+    texts = [block.text for block in told.blocks if isinstance(block, Text)]
+    assert any("sealed data are no test of it" in text for text in texts)
 
 
 def test_warnings_are_counted_on_top(diagnosis: Diagnosis) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
+    Absorbed,
     Approximation,
     Assumption,
     Diagnosis,
@@ -16,6 +17,7 @@ from excite_cli.diagnosis.records import (
     SealedEnds,
 )
 from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.effects.base import Value
 from excite_cli.shown.table import Table
 from excite_cli.summary.diagnosis import diagnosis_answer
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
@@ -248,3 +250,51 @@ def test_what_is_not_in_the_sealed_run_is_judged_where_it_is(
     assert of_single_runs(found, after, end).good is good
     there = replace(of_single_runs(found, after, end), assumed=())
     assert not there.good
+
+
+@pytest.fixture(scope="module")
+def weighed() -> Diagnosis:
+    """A gain that rests on what was weighed, beside a small effect that lowers the error."""
+    found = make_diagnosis()
+    gain = replace(
+        found.effects[0],
+        effect=EffectRecord("torque_gain", ("elbow",), {}, (0.04,)),
+        parameters={"gain": Value(0.04, 0.001, "1")},
+        verdict=SealedVerdict.WEIGHED,
+        parts=dict.fromkeys(found.joint_names, -1e-5),
+    )
+    return replace(found, effects=(gain,), before=found.after)
+
+
+def test_what_rests_on_a_weight_is_good_though_the_error_is_what_it_was(weighed: Diagnosis) -> None:
+    assert weighed.good
+    assert replace(weighed, before=replace(weighed.before, mean_relative=0.099)).good
+    assert not replace(weighed, before=replace(weighed.before, mean_relative=0.08)).good
+    vain = replace(weighed.effects[0], verdict=SealedVerdict.NOT_CONFIRMED)
+    for effects in ((vain,), (*weighed.effects, vain)):  # what else is named must lower it
+        assert not replace(weighed, effects=effects).good
+
+
+def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -> None:
+    (gain,) = weighed.effects
+    small = replace(gain, verdict=SealedVerdict.CONFIRMED)
+    begin = replace(weighed.before, mean_relative=0.5, mean_relative_moving=0.5)
+    text = printed(replace(weighed, effects=(gain, small, small), before=begin))
+    assert "2 small ones" in text
+    assert "- rests on what was weighed" not in text.split("small ones")[1]
+    assert (
+        "torque_gain on elbow rests on what was weighed (identification.total_mass, "
+        "known_payload): other inertias would predict as well without it"
+    ) in text
+    assert text.count("sealed data are no test of it") == 1
+
+
+def test_what_inertias_take_up_is_told_with_what_settles_it(weighed: Diagnosis) -> None:
+    kinds = ("torque_gain", "armature", "torque_gain", "wrench_gain", "kind_of_a_package")
+    absorbed = tuple(Absorbed(kind, ("elbow",), ("Izz[elbow]",), 0.0) for kind in kinds)
+    text = printed(replace(weighed, effects=(), absorbed=absorbed))
+    told = [line for line in text.splitlines() if " is told by " in line]
+    assert [line.split()[0] for line in told] == ["torque_gain", "wrench_gain"]
+    assert "identification.known_payload" in told[0]
+    assert "identification.total_mass" in told[1]
+    assert " is told by " not in printed(replace(weighed, absorbed=absorbed))  # weighed already
