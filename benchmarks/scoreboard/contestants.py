@@ -83,6 +83,7 @@ class Ran:
     output: str
     last: str
     processor: float
+    failed: bool
 
 
 def ran(words: Sequence[str | Path]) -> Ran:
@@ -98,11 +99,12 @@ def ran(words: Sequence[str | Path]) -> Ran:
             timeout=_LONGEST,
         )
         output, last = done.stdout, (done.stderr.strip().splitlines() or [""])[-1]
+        failed = done.returncode != 0
     except subprocess.TimeoutExpired:
-        output, last = "", f"no answer within {_LONGEST} s"
+        output, last, failed = "", f"no answer within {_LONGEST} s", True
     after = os.times()
     used = after.children_user + after.children_system
-    return Ran(output, last, used - before.children_user - before.children_system)
+    return Ran(output, last, used - before.children_user - before.children_system, failed)
 
 
 def excite(case: Case, stored: Path) -> tuple[dict[str, Any] | None, Ran]:

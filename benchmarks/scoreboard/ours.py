@@ -20,10 +20,9 @@ def diagnosed(case: Case, judge: Judge, folder: Path) -> list[Result]:
     if answer is None:
         return [Result(name, None, run.processor, lines, run.last) for name in (EXCITE, BODIES)]
     model = read_model(stored)
-    told = f"untouched {answer['error']['untouched']}" if False else ""
     names = None if case.is_real else verdicts(answer, case, judge.case.robot.n)
     return [
-        Result(name, judge.verdict(*predicted(each, judge)), run.processor, lines, told, names)
+        Result(name, judge.verdict(*predicted(each, judge)), run.processor, lines, names=names)
         for name, each in ((EXCITE, model.model), (BODIES, consistent_model(model)))
     ]
 
