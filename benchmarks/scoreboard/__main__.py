@@ -21,7 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from benchmarks.scoreboard.case import REAL, Case
 from benchmarks.scoreboard.contestants import Result, tools, tried
 from benchmarks.scoreboard.exchange import write_given
-from benchmarks.scoreboard.judge import Judge, judge_of
+from benchmarks.scoreboard.judge import judge_of
 from benchmarks.scoreboard.ours import diagnosed
 from benchmarks.scoreboard.plain_urdf import plain_urdf
 from benchmarks.scoreboard.record import Entry, merged, read_entries, write_entries
@@ -79,7 +79,7 @@ def entry(case: Case, arguments: argparse.Namespace) -> Entry:
         results += diagnosed(case, judge, folder)
     results += [
         tried(tool, judge, folder)
-        for tool in tools(arguments.figaroh, arguments.sysid)
+        for tool in tools(arguments.figaroh, arguments.sysid, case)
         if arguments.tools is None or tool.name in arguments.tools
     ]
     told = [f"{r.tool} {percent(r.verdict.mean) if r.verdict else r.told}" for r in results]

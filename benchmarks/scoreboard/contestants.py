@@ -15,7 +15,8 @@ from benchmarks.scoreboard.judge import Judge, Verdict
 
 FOLDER = Path(__file__).parent
 EXCITE, BODIES = "excite", "excite, bodies that can be"
-FIGAROH, SYSID, WLS, URDF = "FIGAROH", "mujoco.sysid", "least squares", "URDF untouched"
+FIGAROH, TOLD, SYSID = "FIGAROH", "FIGAROH, coupling told", "mujoco.sysid"
+WLS, URDF = "least squares", "URDF untouched"
 _PROGRAM = "from excite_cli.cli.app import main; main()"
 _LONGEST = 1800  # [s] of one tool on one log
 # Of FIGAROH what does better on the held-out data is taken: its decimation by 10, or none.
@@ -48,14 +49,18 @@ class Result:
     names: Mapping[str, int] | None = None
 
 
-def tools(figaroh: Path | None, sysid: Path | None) -> tuple[Tool, ...]:
-    """Those that can be run here."""
+def tools(figaroh: Path | None, sysid: Path | None, case: Case) -> tuple[Tool, ...]:
+    """Those that can be run here; where motors are coupled, FIGAROH told so as well."""
     own = Path(sys.executable)
     found = [Tool(WLS, FOLDER / "wls_driver.py", own), Tool(URDF, FOLDER / "urdf_driver.py", own)]
     if sysid is not None:
         found.insert(0, Tool(SYSID, FOLDER / "sysid_driver.py", sysid))
     if figaroh is not None:
-        found.insert(0, Tool(FIGAROH, FOLDER / "figaroh_driver.py", figaroh, _FIGAROH_WAYS))
+        driver = FOLDER / "figaroh_driver.py"
+        if case.coupled:
+            ways = tuple((*way, *case.coupled) for way in _FIGAROH_WAYS)
+            found.insert(0, Tool(TOLD, driver, figaroh, ways))
+        found.insert(0, Tool(FIGAROH, driver, figaroh, _FIGAROH_WAYS))
     return tuple(found)
 
 

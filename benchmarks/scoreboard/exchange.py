@@ -18,8 +18,7 @@ BEGIN, END = "# --- what a user writes", "# --- until here"
 class Recording:
     """t (T,) [s]; q, dq, tau (T, n) as recorded; `used` (T,): samples that a fit may use.
 
-    Of a recording with sealed parts the positions of these are there; in place of their torques is a
-    straight line.
+    Of sealed parts of a recording the positions are there; in place of torques is a straight line.
     """
 
     t: np.ndarray
@@ -83,11 +82,10 @@ def read_given(folder: Path) -> Given:
     told, asked = np.load(folder / "recordings.npz"), np.load(folder / "asked.npz")
     names = ("t", "q", "dq", "tau", "used")
     recordings = tuple(
-        Recording(*(told.get(f"{name}_{k}") for name in names)) for k in range(request["recordings"])
+        Recording(*(told.get(f"{name}_{k}") for name in names))
+        for k in range(request["recordings"])
     )
-    states = tuple(
-        States(*(asked[f"{x}_{k}"] for x in "qva")) for k in range(request["asked"])
-    )
+    states = tuple(States(*(asked[f"{x}_{k}"] for x in "qva")) for k in range(request["asked"]))
     return Given(folder / "robot.urdf", tuple(request["joints"]), recordings, states)
 
 

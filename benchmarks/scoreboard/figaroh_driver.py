@@ -1,12 +1,13 @@
 """FIGAROH's identification of a robot, run by FIGAROH's own interpreter and nothing else.
 
-    python figaroh_driver.py FOLDER ANSWER.npz CUT_OFF DECIMATION
+    python figaroh_driver.py FOLDER ANSWER.npz CUT_OFF DECIMATION [JOINT JOINT]
 
 Its pipeline as in its TX40 example: friction, armature and offset of every joint, its Butterworth
-filter, its decimation, base parameters by QR, weighted least squares. It takes one recording: several
-are put one after the other, and its sample mask leaves out what is sealed and the borders that its
-filters reach over. Predicted torques are its regressor times its base parameters, as in its own
-validation.
+filter, its decimation, base parameters by QR, weighted least squares. It takes one recording:
+several are put one after the other, and its sample mask leaves out what is sealed and the borders
+that its filters reach over. Predicted torques are its regressor times its base parameters, as in
+its own validation. Two joints that are named have coupled motors: the columns for these are those
+that the helper class of its TX40 example has.
 """
 
 import json
@@ -81,7 +82,25 @@ class Identification(BaseIdentification):
             mask=np.concatenate([inner(r, self.ends, self.margin) for r in recordings]),
         )
 
+    # --- until here, and more where motors are coupled
+    @property
+    def states(self):
+        return [self.processed_data[x] for x in ("velocities", "accelerations")]
 
+    def _compute_validation_metrics(self):
+        # It builds the regressor anew, without the columns that were added.
+        return None
+
+    def beside(self, rows, v, a, coupled):
+        """The regressor with armature, viscous and Coulomb friction of two coupled motors."""
+        one, other = (self.model.joints[self.model.getJointId(name)].idx_v for name in coupled)
+        more = np.zeros((self.model.nv, len(v), 3))
+        for j, k in ((one, other), (other, one)):
+            more[j] = np.stack([a[:, k], v[:, k], np.sign(v[:, one] + v[:, other])], axis=1)
+        return np.hstack([rows, more.reshape(-1, 3)])
+
+
+# --- what a user writes
 def inner(recording, ends: int, margin: int) -> np.ndarray:
     """Samples that lie `margin` inside of what may be used, and `ends` inside of the recording."""
     kept = np.zeros(len(recording.t), bool)
@@ -91,7 +110,9 @@ def inner(recording, ends: int, margin: int) -> np.ndarray:
     return kept
 
 
-def identified(given: Given, folder: Path, cut_off: float, decimation: int) -> Identification:
+def identified(
+    given: Given, folder: Path, cut_off: float, decimation: int, coupled
+) -> Identification:
     rate = float((len(given.recordings[0].t) - 1) / np.ptp(given.recordings[0].t))
     file = folder / "figaroh.yaml"
     file.write_text(json.dumps(config(given, rate, cut_off)))
@@ -100,6 +121,11 @@ def identified(given: Given, folder: Path, cut_off: float, decimation: int) -> I
     found.ends = round(1.5 / cut_off * rate)
     found.margin = 3 * decimation if decimation > 1 else 0
     found.initialize()
+    # --- until here, and more where motors are coupled
+    if coupled:
+        found.dynamic_regressor = found.beside(found.dynamic_regressor, *found.states, coupled)
+        found.standard_parameter |= {"Iam": 0.0, "fvm": 0.0, "fsm": 0.0}
+    # --- what a user writes
     found.solve(decimation > 1, decimation, plotting=False, wls=True)
     return found
 
@@ -107,7 +133,7 @@ def identified(given: Given, folder: Path, cut_off: float, decimation: int) -> I
 # --- until here
 
 
-def predicted(found: Identification, given: Given) -> list[np.ndarray]:
+def predicted(found: Identification, given: Given, coupled) -> list[np.ndarray]:
     at = {x: found.identif_config[f"act_idx{x}"] for x in "qv"}
     torques = []
     for s in given.asked:
@@ -118,6 +144,8 @@ def predicted(found: Identification, given: Given) -> list[np.ndarray]:
             full[:, index] = x
             states.append(full)
         rows = build_regressor_basic(found.robot, *states, found.identif_config)
+        if coupled:
+            rows = found.beside(rows, *states[1:], coupled)
         rows = build_regressor_reduced(rows, found._idx_eliminated)[:, found._base_indices]
         tau = (rows @ found.phi_base).reshape(found.model.nv, len(s.q)).T
         torques.append(tau[:, at["v"]])
@@ -127,10 +155,11 @@ def predicted(found: Identification, given: Given) -> list[np.ndarray]:
 def main() -> None:
     logging.disable(logging.WARNING)
     folder, cut_off, decimation = Path(sys.argv[1]), float(sys.argv[3]), int(sys.argv[4])
+    coupled = sys.argv[5:]
     given = read_given(folder)
-    found = identified(given, folder, cut_off, decimation)
+    found = identified(given, folder, cut_off, decimation, coupled)
     told = f"FIGAROH {metadata.version('figaroh')}, Pinocchio {metadata.version('pin')}"
-    write_answer(Path(sys.argv[2]), predicted(found, given), told=told)
+    write_answer(Path(sys.argv[2]), predicted(found, given, coupled), told=told)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ torque went through. Whether a joint moves, too, is decided by the states.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -28,7 +29,7 @@ class Verdict:
     """Relative errors (RMS/RMS) by joint where it moves, and the mean; NaN where it does not.
 
     `raw`: the same of the torque as recorded, over all samples, which no filter has touched.
-    `possible`: whether every link's pseudo-inertia is positive definite; None without link inertias.
+    `possible`: whether every link's pseudo-inertia is positive definite; None without links.
     """
 
     mean: float
@@ -43,9 +44,9 @@ class Judge:
 
     case: Loaded
     sealed: tuple[PreparedRun, ...]
-    recordings: tuple[Recording, ...] = field(default=())
+    recordings: tuple[Recording, ...]
 
-    def given(self, folder: "object") -> Given:
+    def given(self, folder: Path) -> Given:
         """What every tool is given, in `folder`."""
         asked = tuple(States(run.q, run.v, run.a) for run in self.sealed)
         return Given(folder / "robot.urdf", self.case.robot.joint_names, self.recordings, asked)

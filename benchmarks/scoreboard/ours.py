@@ -13,7 +13,7 @@ from excite_cli.store.model_file import consistent_model, read_model
 
 
 def diagnosed(case: Case, judge: Judge, folder: Path) -> list[Result]:
-    """The model that it tells its errors of, and the one with bodies that can be, for simulators."""
+    """The model that it tells its errors of, and the one with bodies that can be."""
     stored = folder / "diagnosis.h5"
     answer, run = excite(case, stored)
     lines = lines_of_config(case.config) + 1
@@ -41,7 +41,7 @@ def lines_of_config(config: Path) -> int:
 
 
 def verdicts(answer: dict[str, Any], case: Case, joints: int) -> dict[str, int]:
-    """How many of the named effects are true, true through an alias, wrong, …; `right`: 1 if all."""
+    """How many named effects are true, …, wrong; how many are `planted`, and how many `told`."""
     plants = [
         Plant(
             Name(each["kind"], tuple(each["joints"])),

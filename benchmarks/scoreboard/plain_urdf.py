@@ -1,8 +1,8 @@
 """A robot as a URDF of its moved bodies alone, for tools that move every joint they see.
 
-What is locked or fixed is lumped into the body that carries it, at the posture of the config; shapes
-are left out, and a continuous joint is a revolute one with wide limits, so that Pinocchio and MuJoCo
-count one position for each joint. Bodies without mass have no <inertial>.
+What is locked or fixed is lumped into the body that carries it, at the posture of the config;
+shapes are left out, and a continuous joint is a revolute one with wide limits, so that Pinocchio
+and MuJoCo count one position for each joint. Bodies without mass have no <inertial>.
 """
 
 import xml.etree.ElementTree as ElementTree

@@ -3,10 +3,9 @@
     python sysid_driver.py FOLDER ANSWER.npz
 
 Inertias of every moved body (`InertiaType.Pseudo`, its default bounds), armature, damping, friction
-loss and an offset of every joint, by its own Gauss-Newton (`sysid.optimize`, its defaults) on a
-custom residual: measured torque less `mj_inverse` at filtered states, scaled by `normalize_residual`.
-Its default residual plays motor commands forward, from the commanded torque to the position; logs of
-robots hold measured torques, with which an arm drifts away in a second.
+loss and an offset of every joint, by its own Gauss-Newton (`sysid.optimize`) on a custom residual:
+measured torque less `mj_inverse` at filtered states, scaled by `normalize_residual`. Its default
+residual plays commands forward and compares sensors; logs of robots hold measured torques.
 """
 
 import sys
@@ -59,22 +58,28 @@ def inverse(model, joints, q, v, a):
 
 
 def parameters(spec, joints, largest):
-    """Everything that is identified; a joint's friction and offset are at most its largest torque."""
+    """What is identified; friction and offset of a joint are at most its largest torque."""
     model, params = spec.compile(), ParameterDict()
     for name, most in zip(joints, largest, strict=True):
         body = model.body(model.joint(name).bodyid[0])
         params.add(
             sysid.body_inertia_param(
-                spec, model, body.name, InertiaType.Pseudo,
+                spec,
+                model,
+                body.name,
+                InertiaType.Pseudo,
                 modifier=lambda s, p, b=body.name: put_inertia(s, b, p),
-            )  # fmt: skip
+            )
         )
         for what, top in (("armature", 10.0), ("damping", 10.0 * most), ("frictionloss", most)):
             params.add(
                 Parameter(
-                    f"{name}_{what}", 0.01 * min(most, 1.0), 0.0, top,
+                    f"{name}_{what}",
+                    0.01 * min(most, 1.0),
+                    0.0,
+                    top,
                     modifier=lambda s, p, n=name, w=what: put(s.joint(n), w, p.value[0]),
-                )  # fmt: skip
+                )
             )
     params.add(Parameter("offset", 0.0 * largest, -largest, largest, modifier=lambda s, p: None))
     return params

@@ -11,6 +11,7 @@ from benchmarks.scoreboard.contestants import (
     EXCITE,
     FIGAROH,
     SYSID,
+    TOLD,
     URDF,
     WLS,
     Result,
@@ -18,7 +19,7 @@ from benchmarks.scoreboard.contestants import (
 from benchmarks.scoreboard.record import Entry
 
 PART = MarkedPart("scoreboard", "benchmarks.scoreboard")
-TOOLS = (EXCITE, BODIES, FIGAROH, SYSID, WLS, URDF)
+TOOLS = (EXCITE, BODIES, FIGAROH, TOLD, SYSID, WLS, URDF)
 _SHORT = (EXCITE, FIGAROH, SYSID, WLS, URDF)
 
 
@@ -32,9 +33,7 @@ def short_table(entries: Sequence[Entry]) -> str:
     ]
     common = answered([each for each in entries if not each.real])
     if common:
-        medians = [
-            float(np.median([mean(each.of(tool)) for each in common])) for tool in _SHORT
-        ]
+        medians = [float(np.median([mean(each.of(tool)) for each in common])) for tool in _SHORT]
         rows.append(row(f"{len(common)} simulated robots, median", medians))
     return table(["held-out error of the torque", *_SHORT], rows)
 
@@ -77,14 +76,15 @@ def by_joint(entry: Entry) -> str:
 
 def simulated(entries: Sequence[Entry]) -> str:
     """A row for each robot, and how often each tool is first."""
-    rows = [row(each.words, [mean(each.of(tool)) for tool in TOOLS]) for each in entries]
-    firsts = [sum(_is_first(each, tool) for each in entries) for tool in TOOLS]
+    tools = [tool for tool in TOOLS if tool != TOLD]
+    rows = [row(each.words, [mean(each.of(tool)) for tool in tools]) for each in entries]
+    firsts = [sum(_is_first(each, tool) for each in entries) for tool in tools]
     rows.append([f"first of {len(entries)}", *map(str, firsts)])
-    consistent = [_count(entries, tool, lambda r: possible(r) == "yes") for tool in TOOLS]
+    consistent = [_count(entries, tool, lambda r: possible(r) == "yes") for tool in tools]
     rows.append(["links can be", *consistent])
-    seconds = [_median([each.of(tool) for each in entries]) for tool in TOOLS]
+    seconds = [_median([each.of(tool) for each in entries]) for tool in tools]
     rows.append(["processor [s], median", *seconds])
-    return table(["simulated robot, planted effect", *TOOLS], rows)
+    return table(["simulated robot, planted effect", *tools], rows)
 
 
 def names(entries: Sequence[Entry]) -> str:
@@ -94,8 +94,8 @@ def names(entries: Sequence[Entry]) -> str:
     robots = sum(each.get("wrong", 0) > 0 for each in told)
     return (
         f"Names that excite gave: {total['told']} of {total['planted']} planted effects (friction "
-        f"of every joint, and one more each) are told; {total['wrong']} wrong names, on {robots} of "
-        f"{len(told)} robots. The other tools have a fixed model and name nothing."
+        f"of every joint, and one more each) are told; {total['wrong']} wrong names, on {robots} "
+        f"of {len(told)} robots. The other tools have a fixed model and name nothing."
     )
 
 

@@ -53,14 +53,15 @@ def fit(model, columns, recordings):
     parts = [each for recording in recordings for each in rows_of(model, columns, recording)]
     y, tau = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
     n = len(columns)
-    scale = np.maximum(np.linalg.norm(y, axis=0), 1e-12)
-    _, r, pivot = qr(y / scale, mode="economic", pivoting=True)
-    base = pivot[np.abs(np.diag(r)) > 1e-6 * abs(r[0, 0])]
-    weights = np.ones(n)
+    scale = np.linalg.norm(y, axis=0)
+    seen = np.flatnonzero(scale > 1e-8 * scale.max())
+    _, r, pivot = qr(y[:, seen] / scale[seen], mode="economic", pivoting=True)
+    base = seen[pivot[np.abs(np.diag(r)) > 1e-6 * abs(r[0, 0])]]
+    scaled, weights = y[:, base] / scale[base], np.ones(n)
     for _ in range(5):
         w = np.tile(1 / weights, len(tau))
-        found = np.linalg.lstsq(y[:, base] / scale[base] * w[:, None], tau.ravel() * w, rcond=None)[0]
-        weights = (tau - (y[:, base] / scale[base] @ found).reshape(tau.shape)).std(axis=0)
+        found = np.linalg.lstsq(scaled * w[:, None], tau.ravel() * w, rcond=None)[0]
+        weights = (tau - (scaled @ found).reshape(tau.shape)).std(axis=0)
     phi = np.zeros(y.shape[1])
     phi[base] = found / scale[base]
     return phi

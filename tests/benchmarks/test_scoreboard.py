@@ -148,7 +148,10 @@ def all_tools(name: str, real: bool, *errors: float) -> Entry:
 
 def test_the_least_error_is_bold_whoever_has_it() -> None:
     lines = short_table(
-        [all_tools("x", True, 0.1, 0.05, 0.2, 0.3, 0.8), all_tools("y", True, 0.1, 0.2, 0.3, 0.4, 1)]
+        [
+            all_tools("x", True, 0.1, 0.05, 0.2, 0.3, 0.8),
+            all_tools("y", True, 0.1, 0.2, 0.3, 0.4, 1),
+        ]
     ).splitlines()
     assert lines[2] == "| robot x | 10 % | **5.0 %** | 20 % | 30 % | 80 % |"
     assert "| **10 %** | 20 %" in lines[3]
@@ -162,9 +165,8 @@ def test_simulated_robots_are_one_row_of_medians_over_those_that_all_answered() 
 
 
 def test_a_tool_that_failed_says_why_and_has_no_figures() -> None:
-    told = by_joint(
-        entry("x", True, result(EXCITE, 0.1, possible=False), Result(SYSID, None, 4.0, 60, "too heavy"))
-    )
+    failed = Result(SYSID, None, 4.0, 60, "too heavy")
+    told = by_joint(entry("x", True, result(EXCITE, 0.1, possible=False), failed))
     ours, theirs = told.splitlines()[2:]
     assert "| no |" in ours
     assert "| 10 % | – |" in ours  # a joint that does not move has no error
