@@ -53,6 +53,7 @@ def main() -> None:
             except Exception as error:  # one log that cannot be made must not end the others
                 print(f"{case.name}: {type(error).__name__}: {error}", flush=True)
                 continue
+            entries = {each.name: each for each in read_entries(STORED)}
             entries[case.name] = merged(entries.get(case.name), new)
             write_entries(STORED, _ordered(entries))
     publish(_ordered(entries), arguments.readme)

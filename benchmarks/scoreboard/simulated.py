@@ -19,6 +19,7 @@ from excite_cli.api.loading import load_case
 ROBOTS = ("ur5", "ur10", "panda", "kinova", "talos_left_arm", "z1", "xarm7", "ur3 as MJCF")
 _PROGRAM = "from excite_cli.cli.app import main; main()"
 _FRICTION = ("viscous_friction", "coulomb_friction")
+_SHORT = ("constraints.self_collision=null", "optimizer.max_seconds=5", "optimizer.restarts=1")
 _EFFECTS = "\neffects:\n  - {kind: viscous_friction}\n  - {kind: coulomb_friction}\n"
 
 
@@ -51,8 +52,10 @@ def _planned(robot: str, folder: Path) -> tuple[Path, Path]:
     given: tuple[str | Path, ...] = ("--robot", robot)
     if robot.endswith(" as MJCF"):
         given = ("--urdf", _as_mjcf(robot.removesuffix(" as MJCF"), folder))
-    _excite("init", *given, "-o", config, "--overwrite", "--set", "optimizer.max_seconds=15")
-    _excite("optimize", config, "-o", motions, "--overwrite", "--no-progress")
+    _excite("init", *given, "-o", config, "--overwrite")
+    # Simulated robots do not collide, and motions need not be the best.
+    short = [word for text in _SHORT for word in ("--set", text)]
+    _excite("optimize", config, "-o", motions, "--overwrite", "--no-progress", *short)
     return config, motions
 
 

@@ -28,14 +28,20 @@ def short_table(entries: Sequence[Entry]) -> str:
 
     The least of a row is bold. Of simulated robots: the median over those that all tools answered.
     """
-    rows = [
-        row(each.words, [mean(each.of(tool)) for tool in _SHORT]) for each in entries if each.real
-    ]
+    rows = [_with_told(each) for each in entries if each.real]
     common = answered([each for each in entries if not each.real])
     if common:
         medians = [float(np.median([mean(each.of(tool)) for each in common])) for tool in _SHORT]
         rows.append(row(f"{len(common)} simulated robots, median", medians))
     return table(["held-out error of the torque", *_SHORT], rows)
+
+
+def _with_told(entry: Entry) -> list[str]:
+    """A row of a real log; beside FIGAROH's error that with what its authors know of the robot."""
+    cells = row(entry.words, [mean(entry.of(tool)) for tool in _SHORT])
+    if entry.of(TOLD) is not None:
+        cells[1 + _SHORT.index(FIGAROH)] += f" ({percent(mean(entry.of(TOLD)))} with coupling told)"
+    return cells
 
 
 def answered(entries: Sequence[Entry]) -> list[Entry]:

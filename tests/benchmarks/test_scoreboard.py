@@ -8,7 +8,16 @@ import pinocchio as pin
 import pytest
 from scipy.sparse import csr_matrix
 
-from benchmarks.scoreboard.contestants import BODIES, EXCITE, FIGAROH, SYSID, URDF, WLS, Result
+from benchmarks.scoreboard.contestants import (
+    BODIES,
+    EXCITE,
+    FIGAROH,
+    SYSID,
+    TOLD,
+    URDF,
+    WLS,
+    Result,
+)
 from benchmarks.scoreboard.exchange import (
     BEGIN,
     END,
@@ -155,6 +164,13 @@ def test_the_least_error_is_bold_whoever_has_it() -> None:
     ).splitlines()
     assert lines[2] == "| robot x | 10 % | **5.0 %** | 20 % | 30 % | 80 % |"
     assert "| **10 %** | 20 %" in lines[3]
+
+
+def test_what_a_tool_was_told_by_hand_stands_beside_what_it_does_alone() -> None:
+    told = short_table(
+        [entry("x", True, result(EXCITE, 0.1), result(FIGAROH, 0.4), result(TOLD, 0.2))]
+    )
+    assert "| 40 % (20 % with coupling told) |" in told
 
 
 def test_simulated_robots_are_one_row_of_medians_over_those_that_all_answered() -> None:
