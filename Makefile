@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
 .PHONY: install run plan loop test suite sanitize lint lock floors dist release-check audit docs bench peers trust battery
-.PHONY: campaigns robots real gallery clean
+.PHONY: campaigns robots real scoreboard gallery clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
 
@@ -60,6 +60,11 @@ FIGAROH ?= figaroh-env/bin/python
 peers: $(STAMP)          ## beside FIGAROH and finite differences (docs/peers.md), ten minutes
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.peers --figaroh-python $(FIGAROH) \
 	  --markdown docs/peers_table.md --goals docs/results.md
+
+SYSID ?= sysid-env/bin/python
+scoreboard: $(STAMP)     ## every tool on the same logs, one judge (docs/scoreboard.md), two hours
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.scoreboard --readme README.md \
+	  $(if $(wildcard $(FIGAROH)),--figaroh $(FIGAROH)) $(if $(wildcard $(SYSID)),--sysid $(SYSID))
 
 trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism (an hour; root)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.fuzz --count 10000
