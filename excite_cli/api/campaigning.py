@@ -352,7 +352,7 @@ class _Loop:
         for run in data.runs:
             found = compared(planned, (run.t, run.q[:, own]), data.joint_names[own])
             if found.reason:
-                return f"{log.name} is no log of {motion.name}: {found.reason}."
+                return f"{log.name} is no log of {motion.stem}: {found.reason}."
         return ""
 
     def _learned(self, state: Campaign, last: Round) -> Learned:

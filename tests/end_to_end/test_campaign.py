@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from excite_cli import load_case
-from tests.cli.program import SMOKE, Installed
+from tests.cli.program import SMOKE, Installed, Program
 
 # Stands for a robot and whoever plays on it: notes what it played; MODE says what goes wrong.
 PLAY = """
@@ -150,7 +150,7 @@ def begun(
         if log.name != "round_1_motion_1_log.h5":
             log.unlink()
     shutil.copy(tmp_path / "campaign" / "round_1_motion_1_log.h5", tmp_path / "other_log.h5")
-    return Installed(tmp_path, cache)
+    return Program(tmp_path, cache)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def begun(
     ],
 )
 def test_what_goes_wrong_is_told_and_nothing_is_lost(
-    begun: Installed, monkeypatch: pytest.MonkeyPatch, mode: str, told: str
+    begun: Program, monkeypatch: pytest.MonkeyPatch, mode: str, told: str
 ) -> None:
     monkeypatch.setenv("MODE", mode)
     more = ["--resume", "--retries", "0"]
@@ -181,7 +181,7 @@ def test_what_goes_wrong_is_told_and_nothing_is_lost(
     assert len(aside) == (mode.startswith("another"))
 
 
-def test_what_failed_once_is_tried_again(begun: Installed) -> None:
+def test_what_failed_once_is_tried_again(begun: Program) -> None:
     """The first try is a log of another motion, as if the robot had played the last one again."""
     play = begun.folder / "play.py"
     once = """\
@@ -204,7 +204,7 @@ if not os.path.exists("tried"):
     ]  # fmt: skip
 
 
-def test_another_config_or_robot_is_told(begun: Installed) -> None:
+def test_another_config_or_robot_is_told(begun: Program) -> None:
     run = begun(*ASKED, "--resume", "--set", "trajectory.harmonics=5")
     assert run.returncode == 2
     assert "the config is not the one that the campaign in campaign began with" in run.stderr
@@ -225,13 +225,13 @@ def test_another_config_or_robot_is_told(begun: Installed) -> None:
 def test_what_cannot_be_asked(
     folder: Path, cache: Path, arguments: tuple[str, ...], told: str
 ) -> None:
-    run = Installed(folder, cache)("campaign", "smoke.yaml", *arguments)
+    run = Program(folder, cache)("campaign", "smoke.yaml", *arguments)
     assert run.returncode == 2
     assert told in " ".join(run.stderr.split())
     assert not (folder / "campaign").exists()
 
 
-def test_a_log_of_rows_that_are_missing_is_told(begun: Installed) -> None:
+def test_a_log_of_rows_that_are_missing_is_told(begun: Program) -> None:
     """It is that of the motion, but torques are not in it."""
     play = begun.folder / "play.py"
     play.write_text(play.read_text() + "\nimport h5py\nwith h5py.File(log, 'a') as file:\n"
