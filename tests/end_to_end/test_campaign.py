@@ -131,9 +131,7 @@ def without_ways(answer: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.fixture
-def begun(
-    done: tuple[Path, dict[str, Any]], folder: Path, tmp_path: Path, cache: Path
-) -> Program:
+def begun(done: tuple[Path, dict[str, Any]], folder: Path, tmp_path: Path, cache: Path) -> Program:
     """A campaign whose first motion is measured, and its second is not yet."""
     place, _ = done
     shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
