@@ -72,7 +72,8 @@ def test_what_is_known_before_counts(weighed: bool) -> None:
     data, candidates = design(3)
     rows, target = np.diag([10.0, 100.0, 5.0**0.5, 1000.0**0.5]), np.zeros(FIXED)
     if weighed:
-        rows[1, :3], rows[3, 1:] = (20.0, 30.0, -3.0), (40.0, 1.0, 30.0)
+        rows *= 10.0  # as certain as the data
+        rows[1, :3], rows[3, 1:] = (400.0, 900.0, -30.0), (900.0, 10.0, 300.0)
         target = np.array([30.0, -4.0, 100.0, 7.0])
     both = np.column_stack([rows, target])
     data = replace(data, prior=both.T @ both)

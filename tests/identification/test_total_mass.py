@@ -7,11 +7,13 @@ import pinocchio as pin
 import pytest
 
 from excite_cli.config.data_spec import IdentificationSpec, TotalMassSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.errors import ConfigError
 from excite_cli.identification.torque_scale import knowledge_of, weighed
 from excite_cli.identification.total_mass import total_mass_row
+from excite_cli.robot.model import build_measured_robot
 from tests.base_link.stander import stander
 
 LOCKED = ("left_shoulder", "left_elbow", "right_shoulder")
@@ -48,6 +50,22 @@ def test_a_robot_that_does_not_show_its_mass_is_told_to_weigh_a_payload(
     for known in (weighed, knowledge_of):
         with pytest.raises(ConfigError, match=message):
             known(spec, (), robot, find_base_parameters(robot))
+
+
+def test_what_stands_still_below_an_arm_is_of_its_mass_and_does_not_show(tmp_path: Path) -> None:
+    """A lift shows all that it lifts, and nothing of its column."""
+    body = '<inertial><mass value="3"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    path = tmp_path / "lift.urdf"
+    path.write_text(
+        f'<robot name="lift"><link name="column">{body}</inertial></link>'
+        f'<link name="load">{body}</inertial></link><joint name="lift" type="prismatic">'
+        '<parent link="column"/><child link="load"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" velocity="1" effort="99"/></joint></robot>',
+        encoding="utf-8",
+    )
+    robot = build_measured_robot(RobotSpec(urdf=str(path)))
+    with pytest.raises(ConfigError, match=r"the whole mass of this robot does not show"):
+        total_mass_row(robot, find_base_parameters(robot))
 
 
 @pytest.mark.parametrize(("std", "believed"), [(0.5, 0.5), (0.0, 0.003)])
