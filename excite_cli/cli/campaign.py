@@ -136,8 +136,9 @@ def campaign(
     on after any interruption, and measures nothing twice.
 
     Examples:
-      excite campaign ur10.yaml --measure 'python play.py {motion} {data}' --from-speed 0.3
-      excite campaign ur10.yaml --measure 'python play.py {motion} {data}' --resume
+      excite campaign ur10.yaml --from-speed 0.3 \\
+          --measure 'python play.py {motion} {data}'
+      excite campaign ur10.yaml --resume --measure 'python play.py {motion} {data}'
       excite campaign ur10.yaml --inbox to_the_robot --log .h5
       excite campaign ur10.yaml --measure simulate --effect spring@elbow_joint=15
     """

@@ -21,6 +21,7 @@ from excite_cli.diagnosis.words import (
 from excite_cli.effects.catalogue import catalogue, straight_friction
 from excite_cli.effects.parameter import Value
 from excite_cli.identification.fit_words import relative_in_words, short_number
+from excite_cli.identification.torque_scale import KNOWN_LOAD
 
 FRICTION = "friction"
 INERTIAS = "inertias"
@@ -203,8 +204,7 @@ def _next(found: Diagnosis) -> str:
         names += f" of {place_in_words(other, len(found.joint_names))}"
     if not by_motion:
         return (
-            "Next: a run with a weighed payload (identification.known_payload), which tells "
-            f"{names}; no motion does."
+            f"Next: a run with a weighed load ({KNOWN_LOAD}), which tells {names}; no motion does."
         )
     return f"Next: a motion that tells {names} (excite optimize … --after)."
 

@@ -16,6 +16,7 @@ from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.fit_words import with_deviation
+from excite_cli.identification.torque_scale import KNOWN_LOAD, KNOWN_MASS
 from excite_cli.robot.base_joints import BASE_JOINTS
 
 # Effects that take off less than this part of the fall of the error are told with few words.
@@ -230,8 +231,8 @@ def weighed_in_words(found: Diagnosis) -> list[str]:
     """That sealed data are no test of what rests on what was weighed."""
     return [
         f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))} rests on "
-        "what was weighed (identification.total_mass, known_payload): other inertias would predict "
-        "as well without it, so that sealed data are no test of it."
+        f"what was weighed ({KNOWN_MASS}, {KNOWN_LOAD}): other inertias would predict as well "
+        "without it, so that sealed data are no test of it."
         for each in found.effects
         if each.verdict is SealedVerdict.WEIGHED
     ]

@@ -30,6 +30,8 @@ from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.link_frame import LinkFrame, link_frame, own_link
 from excite_cli.robot.model import Array, Robot
 
+# Keys of what was weighed, as messages tell them.
+KNOWN_LOAD, KNOWN_MASS = "identification.known_payload", "identification.total_mass"
 # Of gains that a known payload is to tell: more is another unit.
 _ANY_GAIN = 0.3
 # Of a body that nobody described: radius of a sphere of its mass, and how wrong that may be [m].

@@ -76,7 +76,7 @@ def test_what_it_started_is_ended_too(tmp_path: Path) -> None:
     child = int((tmp_path / "m.txt").read_text())
     time.sleep(0.3)
     alive = subprocess.run(["ps", "-o", "stat=", "-p", str(child)], capture_output=True, text=True)
-    assert alive.stdout.strip() in ("", "Z")
+    assert alive.stdout.strip()[:1] in ("", "Z")
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ for pending in json.load(sys.stdin):
                     main()
                 except SystemExit as end:
                     status = end.code
-            if status:
+            if status and "(--max-rounds) is spent" not in told.getvalue():
                 left.append((words, status, told.getvalue()))
         if len(left) == len(pending):
             break
@@ -76,12 +76,19 @@ def playable(words: list[str]) -> list[str]:
     if "--repeat" in words:
         at = words.index("--repeat") + 1
         return [*words[:at], "2", *words[at + 1 :]]
+    if words[1] == "campaign":
+        return [*words, "--max-rounds", "1", "-o", "campaign_of_examples"]
     if words[1] != "view":
         return [*words, "--overwrite"] if words[1] == "init" else words
     small = ["--size", "160x120"]
     if "--gif" in words:
         return [*words, *small, "--duration", "0.2"]
     return [*words, *small] if "--png" in words else [*words, *small, "--png", "seen.png"]
+
+
+def alone(words: list[str]) -> bool:
+    """Whether an example needs neither a program of the reader's nor a person."""
+    return "--inbox" not in words and not any("{motion}" in word for word in words)
 
 
 @pytest.mark.parametrize("command", _COMMANDS)
@@ -109,7 +116,7 @@ def test_all_examples_run(tmp_path: Path, cache: Path) -> None:
     (tmp_path / "ur10.yaml").write_text(CONFIG, encoding="utf-8")
     found = examples()
     last = found.pop("init", [])  # it writes another ur10.yaml
-    first = [playable(words) for each in found.values() for words in each]
+    first = [playable(words) for each in found.values() for words in each if alone(words)]
     lines = [first, [playable(words) for words in last]]
     run = subprocess.run(
         [sys.executable, "-c", DRIVER],
