@@ -174,7 +174,7 @@ def test_what_rests_on_a_weight_is_told_whatever_the_error_does(plain: Diagnosis
     rival = replace(gain, aliases=(offset,))
     told = answer_in_words(replace(same, effects=(rival,)))
     assert told.endswith(
-        " Next: a run with a weighed payload (identification.known_payload), which tells wrong "
+        " Next: a run with a weighed load (identification.known_payload), which tells wrong "
         "gain of the measured torque of elbow from offset of the measured torque of slide; no "
         "motion does."
     )
