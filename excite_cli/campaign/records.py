@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from excite_cli.shown.record import Shown
+
 Purpose = Literal["first", "separate", "excite", "explore"]
 # Why a campaign ended.
 End = Literal["", "complete", "budget", "stuck"]
@@ -85,8 +87,8 @@ class Round:
         return replace(self, motions=motions)
 
 
-@dataclass(frozen=True)
-class Campaign:
+@dataclass(frozen=True, repr=False)
+class Campaign(Shown):
     """All of it, as it is kept on disk after every step."""
 
     config: str

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from excite_cli.campaign.records import Campaign, Learned, Round
 from excite_cli.shown.answer import Answer
+from excite_cli.shown.record import show
 from excite_cli.shown.table import Part, Table
 
 
@@ -82,3 +83,12 @@ def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -
     table = rounds_table(campaign)
     parts: tuple[Part, ...] = (campaign.reason, table, total, *files)
     return Answer(parts, data, good=campaign.ended == "complete")
+
+
+show(
+    Campaign,
+    lambda found: (
+        f"{len(found.rounds)} rounds, {found.seconds:.0f} s of motion: {found.ended or 'goes on'}"
+    ),
+    lambda found: [found.reason, rounds_table(found)],
+)

@@ -284,7 +284,7 @@ def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -
     assert "- rests on what was weighed" not in text.split("small ones")[1]
     assert (
         "torque_gain on elbow rests on what was weighed (identification.total_mass, "
-        "known_payload): other inertias would predict as well without it"
+        "identification.known_payload): other inertias would predict as well without it"
     ) in text
     assert text.count("sealed data are no test of it") == 1
 

@@ -30,6 +30,7 @@ from excite_cli import (
 from excite_cli.api.checking import check_answer
 from excite_cli.api.comparing import comparison_answer
 from excite_cli.api.planning import plan_answer
+from excite_cli.campaign.measure import Measure
 from excite_cli.cli.console import Terminal
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Run
@@ -64,6 +65,7 @@ SCORED = ScoredRun(
 THRESHOLDS = Thresholds(("a", "b"), np.ones((2, 4)), np.array([3.0, 4.0]), 0.5, 0.02)
 # Settings, and records of a few words, which Python itself shows well.
 SHORT = {"Drawing", "Exported", "Level", "Note", "Report", "Serving", "SimulationSettings", "View"}
+SHORT |= {"Take"}
 BRIEF = ["optimizer.max_iterations=6", "sequence.motions=1"]
 
 
@@ -127,7 +129,11 @@ def test_a_run_says_where_it_was_read() -> None:
 def test_every_public_record_has_words_and_tables() -> None:
     public = {name: getattr(excite_cli, name) for name in excite_cli.__all__}
     for name, kind in public.items():
-        if not isinstance(kind, type) or issubclass(kind, Exception | Workers) or name in SHORT:
+        if (
+            not isinstance(kind, type)
+            or issubclass(kind, Exception | Workers | Measure)
+            or name in SHORT
+        ):
             continue
         assert issubclass(kind, Shown), name
         assert _found(kind) is not None, name
