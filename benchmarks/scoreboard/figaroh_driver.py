@@ -4,10 +4,10 @@
 
 Its pipeline as in its TX40 example: friction, armature and offset of every joint, its Butterworth
 filter, its decimation, base parameters by QR, weighted least squares. It takes one recording:
-several are put one after the other, and its sample mask leaves out what is sealed and the borders
-that its filters reach over. Predicted torques are its regressor times its base parameters, as in
-its own validation. Two joints that are named have coupled motors: the columns for these are those
-that the helper class of its TX40 example has.
+several are put one after the other with a smooth second between them, and its sample mask leaves
+out that, what is sealed and the borders that its filters reach over. Predicted torques are its
+regressor times its base parameters, as in its own validation. Two joints that are named have
+coupled motors: the columns for these are those that the helper class of its TX40 example has.
 """
 
 import json
@@ -17,11 +17,12 @@ from importlib import metadata
 from pathlib import Path
 
 import numpy as np
-from exchange import Given, read_given, write_answer
+from exchange import Given, Recording, read_given, write_answer
 from figaroh.data.trajectory import JOINT_FORCE, JOINT_TORQUE, TrajectoryData
 from figaroh.identification.base_identification import BaseIdentification
 from figaroh.tools.regressor import build_regressor_basic, build_regressor_reduced
 from figaroh.tools.robot import load_robot
+from scipy.interpolate import CubicHermiteSpline
 
 
 # --- what a user writes
@@ -65,7 +66,7 @@ class Identification(BaseIdentification):
         self.identif_config["act_idxv"] = [joint.idx_v for joint in joints]
 
     def load_trajectory_data(self, data_source=None):
-        recordings = self.given.recordings
+        recordings = bridged(self.given.recordings)
         step = float(np.mean(np.diff(recordings[0].t)))
         sliding = [
             self.model.joints[self.model.getJointId(name)].shortname().startswith("JointModelP")
@@ -101,6 +102,22 @@ class Identification(BaseIdentification):
 
 
 # --- what a user writes
+def bridged(recordings):
+    """The recordings with a smooth second of motion between them, which may not be used."""
+    found = [recordings[0]]
+    for one in recordings[1:]:
+        last, step = found[-1], float(np.mean(np.diff(one.t)))
+        t = np.arange(step, 1.0, step)
+        q = CubicHermiteSpline(
+            [0.0, t[-1] + step],
+            [last.q[-1], one.q[0]],
+            [(last.q[-1] - last.q[-11]) / (10 * step), (one.q[10] - one.q[0]) / (10 * step)],
+        )(t)
+        tau = last.tau[-1] + t[:, None] * (one.tau[0] - last.tau[-1])
+        found += [Recording(t, q, None, tau, np.zeros(len(t), bool)), one]
+    return found
+
+
 def inner(recording, ends: int, margin: int) -> np.ndarray:
     """Samples that lie `margin` inside of what may be used, and `ends` inside of the recording."""
     kept = np.zeros(len(recording.t), bool)

@@ -20,8 +20,8 @@ from scipy.signal import butter, sosfiltfilt
 
 # --- what a user writes
 CUT_OFF, RATE, MOST = 10.0, 25.0, 600  # Hz, Hz, samples
-# Its default is 200 iterations; the objective stands still long before.
-OPTIONS: dict = {"max_iters": 60}
+# Its default is 200 iterations without scaling, which leaves the KR300 at an error of 63 %.
+OPTIONS: dict = {"max_iters": 60, "x_scale": "jac"}
 
 
 def smooth(x, step):
@@ -58,7 +58,7 @@ def inverse(model, joints, q, v, a):
 
 
 def parameters(spec, joints, largest):
-    """What is identified; friction and offset of a joint are at most its largest torque."""
+    """What is identified; joints are bound by their largest torque, at 1 rad/s² and 0.1 rad/s."""
     model, params = spec.compile(), ParameterDict()
     for name, most in zip(joints, largest, strict=True):
         body = model.body(model.joint(name).bodyid[0])
@@ -71,7 +71,11 @@ def parameters(spec, joints, largest):
                 modifier=lambda s, p, b=body.name: put_inertia(s, b, p),
             )
         )
-        for what, top in (("armature", 10.0), ("damping", 10.0 * most), ("frictionloss", most)):
+        for what, top in (
+            ("armature", 1.0 + most),
+            ("damping", 10.0 * most),
+            ("frictionloss", most),
+        ):
             params.add(
                 Parameter(
                     f"{name}_{what}",
