@@ -1,7 +1,7 @@
 """The public score board: several ways of finding a robot's dynamics, one judge, one command.
 
-    python -m benchmarks.scoreboard [--figaroh E/bin/python] [--sysid F/bin/python]
-                                    [--only NAME …] [--simulated N] [--seed S] [--tools NAME …]
+    python -m benchmarks.scoreboard [--figaroh E/bin/python] [--sysid F/bin/python] [--tools NAME …]
+                                    [--only NAME …] [--first M] [--simulated N] [--seed S]
 
 Real logs of `data/`, then N simulated robots. Every tool is given the same training runs and asked
 for torques at the same states of the same held-out run. Results are kept in docs/scoreboard.json
@@ -39,6 +39,7 @@ def main() -> None:
     parser.add_argument("--sysid", type=Path, help="interpreter that has mujoco[sysid]")
     parser.add_argument("--only", nargs="*", help="these real logs (default: all)")
     parser.add_argument("--simulated", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0, help="number of the first simulated robot")
     parser.add_argument("--seed", type=int, default=7001)
     parser.add_argument("--tools", nargs="+", help="run these only, keep the others")
     parser.add_argument("--folder", type=Path, default=Path("results/scoreboard"))
@@ -64,7 +65,7 @@ def cases(arguments: argparse.Namespace):
     for case in REAL:
         if arguments.only is None or case.name in arguments.only:
             yield case
-    for index in range(arguments.simulated):
+    for index in range(arguments.first, arguments.simulated):
         try:
             yield simulated(arguments.seed, index, arguments.folder / "simulated")
         except RuntimeError as error:

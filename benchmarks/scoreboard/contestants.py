@@ -19,8 +19,10 @@ FIGAROH, TOLD, SYSID = "FIGAROH", "FIGAROH, coupling told", "mujoco.sysid"
 WLS, URDF = "least squares", "URDF untouched"
 _PROGRAM = "from excite_cli.cli.app import main; main()"
 _LONGEST = 1800  # [s] of one tool on one log
-# Of FIGAROH what does better on the held-out data is taken: its decimation by 10, or none.
+# What does better on the held-out data is taken: FIGAROH's decimation by 10 or none, steps of
+# mujoco.sysid as they are or scaled by its Jacobian.
 _FIGAROH_WAYS = (("10", "10"), ("10", "1"))
+_SYSID_WAYS: tuple[tuple[str, ...], ...] = ((), ("jac",))
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def tools(figaroh: Path | None, sysid: Path | None, case: Case) -> tuple[Tool, .
     own = Path(sys.executable)
     found = [Tool(WLS, FOLDER / "wls_driver.py", own), Tool(URDF, FOLDER / "urdf_driver.py", own)]
     if sysid is not None:
-        found.insert(0, Tool(SYSID, FOLDER / "sysid_driver.py", sysid))
+        found.insert(0, Tool(SYSID, FOLDER / "sysid_driver.py", sysid, _SYSID_WAYS))
     if figaroh is not None:
         driver = FOLDER / "figaroh_driver.py"
         if case.coupled:

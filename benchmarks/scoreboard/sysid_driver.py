@@ -1,11 +1,12 @@
 """mujoco.sysid, the identification toolbox of MuJoCo's wheel, on inverse dynamics.
 
-    python sysid_driver.py FOLDER ANSWER.npz
+    python sysid_driver.py FOLDER ANSWER.npz [jac]
 
 Inertias of every moved body (`InertiaType.Pseudo`, its default bounds), armature, damping, friction
 loss and an offset of every joint, by its own Gauss-Newton (`sysid.optimize`) on a custom residual:
 measured torque less `mj_inverse` at filtered states, scaled by `normalize_residual`. Its default
-residual plays commands forward and compares sensors; logs of robots hold measured torques.
+residual plays commands forward and compares sensors; logs of robots hold measured torques. `jac`
+scales its steps by the Jacobian, another of its options.
 """
 
 import sys
@@ -20,8 +21,7 @@ from scipy.signal import butter, sosfiltfilt
 
 # --- what a user writes
 CUT_OFF, RATE, MOST = 10.0, 25.0, 600  # Hz, Hz, samples
-# Its default is 200 iterations; the objective stands still long before.
-OPTIONS: dict = {"max_iters": 60}
+ITERATIONS = 60  # its default is 200
 
 
 def smooth(x, step):
@@ -103,7 +103,7 @@ def put(joint, what, value):
         setattr(joint, what, value)
 
 
-def identified(given: Given):
+def identified(given: Given, scale: str | None):
     spec = mujoco.MjSpec.from_file(str(given.urdf))
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT
@@ -112,6 +112,7 @@ def identified(given: Given):
     spec.compiler.balanceinertia = True
     q, v, a, tau = states_of(given.recordings)
     params = parameters(spec, given.joints, np.abs(tau).max(axis=0))
+    params.move_off_bounds()  # as it asks for
 
     def residual(x, params):
         found = []
@@ -122,7 +123,7 @@ def identified(given: Given):
             found.append(sysid.normalize_residual(tau - told, tau).ravel())
         return [np.array(found).T if x.ndim > 1 else found[0]], None, None
 
-    best, _ = sysid.optimize(params, residual, verbose=False, **OPTIONS)
+    best, _ = sysid.optimize(params, residual, verbose=False, max_iters=ITERATIONS, x_scale=scale)
     return sysid.apply_param_modifiers(best, spec), best["offset"].value
 
 
@@ -131,7 +132,7 @@ def identified(given: Given):
 
 def main() -> None:
     given = read_given(Path(sys.argv[1]))
-    model, offset = identified(given)
+    model, offset = identified(given, sys.argv[3] if len(sys.argv) > 3 else None)
     torques = [inverse(model, given.joints, s.q, s.v, s.a) + offset for s in given.asked]
     bodies = [model.joint(name).bodyid[0] for name in given.joints]
     phi = np.array([ten(model, b) for b in bodies])
