@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from excite_cli.diagnosis.cholesky import Cholesky
+from excite_cli.diagnosis.cholesky import RIDGE, Cholesky
 from excite_cli.diagnosis.grams import Grams
 from excite_cli.diagnosis.schur import (
     ABSORBED,
@@ -27,7 +27,6 @@ from excite_cli.diagnosis.schur import (
 )
 from excite_cli.robot.model import Array
 
-_RIDGE = 1e-11
 _UNKNOWN = 1e-4  # of what all folds know
 _RIDGE_ALONE = 1e-6  # of its own energy: half a run may not determine all that a run does
 # Where the other side of a fold has less of such a column than this share, both sides fit it.
@@ -96,7 +95,7 @@ class Evidence:
     def _normal(self, gram: Array, at: NDArray[np.intp]) -> Array:
         """With a trace of diagonal for columns that say nothing."""
         normal = gram[np.ix_(at, at)].copy()
-        normal[np.diag_indices(len(at))] += _RIDGE
+        normal[np.diag_indices(len(at))] += RIDGE
         return normal
 
     def factor(self, chosen: Sequence[int]) -> Cholesky:
@@ -121,7 +120,7 @@ class Evidence:
         at = self.columns(chosen)[held:]
         if not len(at):
             return np.zeros(0)
-        normal = self.total[np.ix_(at, at)] + _RIDGE * np.eye(len(at))
+        normal = self.total[np.ix_(at, at)] + RIDGE * np.eye(len(at))
         return Cholesky(normal).solve(self.total[at, self.torque]) / self.norms[at]
 
     def covariance(self, chosen: Sequence[int]) -> Array:
@@ -288,7 +287,7 @@ class Evidence:
                 other = parts[0] + parts[1]
             rhs = open_.T @ (other[:-1, -1] - other[:-1, :-1] @ common)
             normal = open_.T @ other[:-1, :-1] @ open_
-            normal[np.diag_indices(len(normal))] += _RIDGE_ALONE * np.diag(normal) + _RIDGE
+            normal[np.diag_indices(len(normal))] += _RIDGE_ALONE * np.diag(normal) + RIDGE
             x = common + open_ @ np.linalg.solve(normal, rhs)
             energy += _energy(judged[side], x)
         return energy
@@ -299,7 +298,7 @@ class Evidence:
             index = (at[:, None], at)
             normal = self.total[index] - self._folds[:, at[:, None], at]
             diagonal = np.arange(len(at))
-            normal[:, diagonal, diagonal] += _RIDGE
+            normal[:, diagonal, diagonal] += RIDGE
             rhs = self.total[at, self.torque] - self._folds[:, at, self.torque]
             self._without[chosen] = np.linalg.solve(normal, rhs[:, :, None])[:, :, 0]
         return self._without[chosen]

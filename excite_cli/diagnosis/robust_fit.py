@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.cholesky import Cholesky
+from excite_cli.diagnosis.cholesky import RIDGE, Cholesky
 from excite_cli.diagnosis.training import JointRows, TrainingData
 from excite_cli.out_of_core import forget
 from excite_cli.robot.model import Array
@@ -69,7 +69,7 @@ def _solve(
     scale = np.sqrt(np.diag(normal))
     scale[scale < 1e-100] = 1.0
     unit = normal / np.outer(scale, scale)
-    unit[np.diag_indices(size)] += 1e-11
+    unit[np.diag_indices(size)] += RIDGE
     return Cholesky(unit).solve(rhs / scale) / scale
 
 
