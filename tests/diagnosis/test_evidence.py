@@ -85,6 +85,34 @@ def test_what_all_folds_but_one_have_is_told_from_the_robot_on_one_side_of_that_
     assert evidence.left_out((), [0, 1])[1] > 30.0 * noise[1]
 
 
+def test_what_a_fold_hardly_has_is_judged_as_if_it_had_none() -> None:
+    """As Stribeck friction in a run that passes its speeds: a size told by the others is nothing."""
+    data, (candidate, *_) = random_data(5), random_candidates(5)
+    faint = [2e-5 if fold != 0 else 1.0 for fold in data.folds]
+    columns = tuple(c * k for c, k in zip(candidate.columns, faint, strict=True))
+    torque = tuple(
+        t + np.stack([8.0 * (c[:, 0] @ np.ones(c.shape[2])), 0.0 * t[:, 1]], axis=1)
+        for t, c in zip(data.tau, columns, strict=True)
+    )
+    there = replace(data, tau=torque).evidence([replace(candidate, columns=columns)], WHITE)
+    assert there.folds_of([0]).tolist() == [True, False, False]
+    assert there.left_out((0,), [0])[0] < 0.2 * there.left_out((), [0])[0]
+
+
+def test_columns_that_data_hardly_tell_apart_are_told_apart() -> None:
+    """Two that differ by 3e-6, as sums and differences of a heavy arm's and its flange's do."""
+    data, candidates = random_data(5), random_candidates(5)
+    declared = tuple(d.copy() for d in data.declared)
+    for d in declared:
+        d[:, :, 2] = d[:, :, 0] + 3e-6 * d[:, :, 2] / 0.1
+    size = np.array([4e6, 1.0, -4e6, 0.0])
+    torque = tuple(t + d @ size for t, d in zip(data.tau, declared, strict=True))
+    near = replace(data, declared=declared, tau=torque)
+    rows = rows_of(near, candidates, WHITE, NOTHING)
+    found = near.evidence(candidates, WHITE).solve((0,))
+    assert found == pytest.approx(rows.fitted((0,)), rel=0.02, abs=0.05)
+
+
 @pytest.mark.parametrize("chosen", [(), (0,), (1, 2)])
 def test_gains_are_what_the_residual_loses(
     both: tuple[Evidence, Rows], chosen: tuple[int, ...]
