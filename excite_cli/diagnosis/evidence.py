@@ -29,8 +29,8 @@ from excite_cli.robot.model import Array
 
 _UNKNOWN = 1e-4  # of what all folds know
 # A column of which a fold has less of the energy is not there in it: where one run passes the
-# speeds of Stribeck friction and the other hardly does (5e-10), a size fitted to the other is 30 N·m
-# instead of 0.05, and what explains 98 % of a residual had no gain on runs left out.
+# speeds of Stribeck friction and the other hardly does (5e-10), a size fitted to the other is
+# 30 N·m instead of 0.05, and what explains 98 % of a residual had no gain on runs left out.
 _THERE = 1e-5
 _RIDGE_ALONE = 1e-6  # of its own energy: half a run may not determine all that a run does
 # Where the other side of a fold has less of such a column than this share, both sides fit it.

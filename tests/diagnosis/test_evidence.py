@@ -86,7 +86,7 @@ def test_what_all_folds_but_one_have_is_told_from_the_robot_on_one_side_of_that_
 
 
 def test_what_a_fold_hardly_has_is_judged_as_if_it_had_none() -> None:
-    """As Stribeck friction in a run that passes its speeds: a size told by the others is nothing."""
+    """As Stribeck friction in a run that passes its speeds: others tell no size."""
     data, (candidate, *_) = random_data(5), random_candidates(5)
     faint = [2e-5 if fold != 0 else 1.0 for fold in data.folds]
     columns = tuple(c * k for c, k in zip(candidate.columns, faint, strict=True))
