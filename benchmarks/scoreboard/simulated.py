@@ -55,8 +55,9 @@ def _planned(robot: str, folder: Path) -> tuple[Path, Path]:
     _excite("init", *given, "-o", config, "--overwrite")
     # Simulated robots do not collide, and motions need not be the best.
     short = [word for text in _SHORT for word in ("--set", text)]
-    _excite("optimize", config, "-o", motions, "--overwrite", "--no-progress", *short)
-    return config, motions
+    begun = folder / "begun.h5"  # what is interrupted holds fewer motions
+    _excite("optimize", config, "-o", begun, "--overwrite", "--no-progress", *short)
+    return config, begun.rename(motions)
 
 
 def _as_mjcf(robot: str, folder: Path) -> Path:

@@ -102,27 +102,29 @@ def test_what_it_found_can_be_used(done: tuple[Path, dict[str, Any]]) -> None:
 def test_killed_and_resumed_it_ends_the_same(
     done: tuple[Path, dict[str, Any]], folder: Path, tmp_path: Path, cache: Path
 ) -> None:
-    """Nothing is measured twice, wherever it was killed."""
+    """Nothing is measured twice, wherever it was killed; `EXCITE_KILLS`: how often, at least."""
     place, answer = done
-    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
-    excite, rng = Installed(tmp_path, cache), random.Random(7)
-    whole = float((place / "campaign" / "campaign.json").stat().st_mtime)
-    seconds = whole - (place / "campaign" / "round_1.h5").stat().st_mtime
-    killed = 0
-    for _ in range(3):
-        resume = ("--resume",) if (tmp_path / "campaign" / "campaign.json").exists() else ()
-        process = excite.start(*ASKED, *resume)
-        try:
-            process.wait(rng.uniform(0.2, 0.6) * max(seconds, 5.0))
-        except subprocess.TimeoutExpired:
-            os.kill(process.pid, signal.SIGKILL)
-            process.wait()
-            killed += 1
-    assert killed
-    again = excite.answer(*ASKED, "--resume")
-    assert without_ways(again) == without_ways(answer)
-    played = (tmp_path / "played.txt").read_text().split()
-    assert played == (place / "played.txt").read_text().split()
+    state = Path("campaign") / "campaign.json"
+    began = (place / "campaign" / "round_1.h5").stat().st_mtime
+    seconds = max((place / state).stat().st_mtime - began, 5.0)
+    rng, killed, wanted = random.Random(7), 0, int(os.environ.get("EXCITE_KILLS", "3"))
+    while killed < wanted:
+        tries = tmp_path / f"after_{killed}_kills"
+        shutil.copytree(folder, tries)
+        excite = Installed(tries, cache)
+        for _ in range(3):
+            resume = ("--resume",) if (tries / state).exists() else ()
+            process = excite.start(*ASKED, *resume)
+            try:
+                process.wait(rng.uniform(0.2, 0.6) * seconds)
+            except subprocess.TimeoutExpired:
+                os.kill(process.pid, signal.SIGKILL)
+                process.wait()
+                killed += 1
+        again = excite.answer(*ASKED, "--resume")
+        assert without_ways(again) == without_ways(answer)
+        played = (tries / "played.txt").read_text().split()
+        assert played == (place / "played.txt").read_text().split()
 
 
 def without_ways(answer: dict[str, Any]) -> dict[str, Any]:
