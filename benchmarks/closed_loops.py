@@ -197,7 +197,7 @@ def _config(loop: Loop, folder: Folder) -> str:
 
 def _random(problem: Problem, like: Path, path: Path, count: int, seed: int) -> None:
     """Random admissible motions, the best few of many, as a result file."""
-    found = random_baseline(problem, count, seed, candidates=_DRAWN * count, seconds=0.0)
+    found = random_baseline(problem, count, seed, _DRAWN * count, 0.0, lambda drawn, best: None)
     model: Result = read_result(like)
     motions = [
         _as_motion(model, index, each.coefficients)

@@ -6,6 +6,8 @@ from math import isfinite
 from excite_cli.campaign.records import Campaign
 from excite_cli.campaign.schedule import pace_of
 from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.words import place_in_words
 
 # How much more of a joint's torque, or in N·m, may be left on the newest motion than on those that
 # the model was fitted to.
@@ -39,6 +41,13 @@ def still_open(found: Diagnosis, pairs: tuple[str, ...]) -> tuple[str, ...]:
     said = [f"{pair}: not told apart yet" for pair in pairs]
     said += [f"{joint}: more than noise is left of its torque" for joint in found.joints_left]
     said += left_on_newest(found)
+    said += [
+        f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))}: the newest "
+        "motion is predicted worse with it"
+        for each in found.effects
+        if each.verdict is SealedVerdict.HARMFUL
+        and min((r.relative_moving for r in each.removes.values()), default=0.0) < -_SMALL
+    ]
     if not found.good:
         said.append("what was found does not lower the error on the newest motion")
     return tuple(said)

@@ -8,7 +8,7 @@ out, with which it is lost): then the answer is the pass with the least error on
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -101,6 +101,7 @@ def trace(
             left_out = wanted
 
     traced: Traced | None = None
+    doubted = False
     for attempt in range(first, _PASSES):
         traced = None  # its columns are gigabytes, of large data: not beside the next ones
         traced = _one_pass(model, spec, folds, run_names, bodies, fit, attempt)
@@ -112,7 +113,10 @@ def trace(
             attempt + 1,
         )
         if attempt > first and now.places == fit.places and now.close_to(fit):
-            return traced
+            fewer = without_cut_off(now)
+            if doubted or len(fewer.effects) == len(now.effects):
+                return traced
+            now, doubted = fewer, True
         passes.append(_Pass(fit, left_out, attempt, _left_out(traced)))
         fit = now
         if attempt < _PASSES - 1:
@@ -158,6 +162,22 @@ class Fit:
         change = abs(self.energy - other.energy) / max(self.energy, 1e-300)
         alike = change < _SETTLED and bool(np.allclose(self.levels, other.levels, rtol=0.02))
         return alike and max(moved, default=0.0) < _SAME_SHAPE
+
+
+def without_cut_off(fit: Fit) -> Fit:
+    """The fit without effects of single runs where another effect cuts the torque of a joint.
+
+    What a cut takes off is reckoned with all effects in, and one that the cut hides altogether is
+    needed ever after, once found: of a UR10 whose pan saturates at 38.7 N·m, a contact of 1.17 ±
+    0.02 N in those 0.3 s of one run in which it did. A pass without them finds what is there.
+    """
+    cut = {j for effect in fit.effects if effect.cuts_torque for j in effect.joints}
+    widths = [len(effect.parameters) for effect in fit.effects]
+    declared = len(fit.values) - sum(widths)
+    kept = [not (effect.runs and cut & set(effect.joints)) for effect in fit.effects]
+    values = np.repeat([True, *kept], [declared, *widths])
+    effects = tuple(e for e, keep in zip(fit.effects, kept, strict=True) if keep)
+    return replace(fit, effects=effects, values=fit.values[values])
 
 
 def _first_fit(

@@ -84,6 +84,7 @@ class Effect(ABC):
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
     # Its columns are the whole torque of the model: other effects of its joints are in them.
     of_whole_torque: ClassVar[bool] = False
+    cuts_torque: ClassVar[bool] = False  # it hides what other effects add to its joints' torque
     # What tells its size where inertias take it up, as a person may declare it.
     settled_by: ClassVar[str] = ""
     # A body that one joint carries: part of the load of joints, and named by its link if one likes.

@@ -37,6 +37,7 @@ class TorqueSaturation(Effect):
     parameters: ClassVar = (whole_share("sharpness"),)
     shapes: ClassVar = (Parameter("level", "N·m", 0.1, 1000.0),)
     data_defect: ClassVar = True
+    cuts_torque: ClassVar = True
     tier: ClassVar = Tier.LAST
     known_by: ClassVar = "level"
     settings: ClassVar[Mapping[str, float]] = {"actuator": 0.0}

@@ -6,7 +6,8 @@ import pytest
 
 from excite_cli.campaign.ending import ended, left_on_newest, still_open
 from excite_cli.campaign.records import Asked, Campaign, Learned, PlayedMotion, Round
-from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.records import Diagnosis, Removed
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.identification.errors_of_torque import Errors
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 
@@ -59,6 +60,18 @@ def test_what_does_not_lower_the_error_is_open(found: Diagnosis) -> None:
     useless = replace(found, before=found.after)
     worse = replace(useless, after=errors(0.011, 0.1, found.joint_names))
     assert "what was found does not lower the error on the newest motion" in still_open(worse, ())
+
+
+@pytest.mark.parametrize(("worse", "open_"), [(0.01, True), (0.001, False)])
+def test_a_name_that_does_harm_is_open(found: Diagnosis, worse: float, open_: bool) -> None:
+    named = replace(
+        found.effects[0],
+        verdict=SealedVerdict.HARMFUL,
+        removes={"elbow": Removed(-worse, -worse, -0.1), "slide": Removed(0.1, 0.1, 1.0)},
+    )
+    told = still_open(replace(found, effects=(named,)), ())
+    words = "viscous_friction on elbow: the newest motion is predicted worse with it"
+    assert told == (words,) * open_
 
 
 def campaign(

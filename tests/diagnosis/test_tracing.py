@@ -3,9 +3,11 @@
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from excite_cli.diagnosis import tracing
+from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.left_out import LeftOut
 
 
@@ -17,11 +19,16 @@ class Fit(SimpleNamespace):
 
 
 def answer_of(
-    monkeypatch: pytest.MonkeyPatch, found: list[str], errors: list[float], known: str = ""
+    monkeypatch: pytest.MonkeyPatch,
+    found: list[str],
+    errors: list[float],
+    known: str = "",
+    hidden: str = "",
 ) -> tuple[str, list[str]]:
     """What the traced answer found, and what the passes began from, in order.
 
-    `known`: what was found in more of the same data, to begin from.
+    `known`: what was found in more of the same data, to begin from; `hidden`: what has more in it
+    than a cut of the torque lets through.
     """
     began: list[str] = []
     taken: list[Any] = []
@@ -57,6 +64,10 @@ def answer_of(
     monkeypatch.setattr(tracing, "fit_of", fit_of)
     monkeypatch.setattr(tracing, "_one_pass", one_pass)
     monkeypatch.setattr(tracing, "_left_out", lambda traced: errors[traced.attempt])
+    fewer = Fit(name="fewer", places={"fewer"}, effects=())
+    monkeypatch.setattr(
+        tracing, "without_cut_off", lambda fit: fewer if hidden and fit.name == hidden else fit
+    )
     model: Any = SimpleNamespace(declared=())
     nothing: Any = None
     begin: Any = (known,) if known else ()
@@ -99,3 +110,32 @@ def test_what_was_found_in_more_of_the_data_is_known_well_but_is_found_anew(
     found = ["", "", "b", "c", "d", "e"]
     answer = answer_of(monkeypatch, found, [9.0, 9.0, 4.0, 5.0, 5.0, 5.0], known="a")
     assert answer == ("b", ["a", "b", "c", "d", "a"])
+
+
+def test_what_a_cut_hides_is_left_to_be_found_anew() -> None:
+    """A contact in one run on the joint that saturates goes, one on other joints stays."""
+    kinds, window = catalogue(), {"start": 0.0, "end": 1.0}
+    effects = (
+        kinds["spring"]((0,)),
+        kinds["contact"]((0, 1), window, ("run_2",)),
+        kinds["contact"]((2, 3), window, ("run_2",)),
+        kinds["torque_saturation"]((1,), {"level": 3.0}),
+    )
+    sizes = [len(each.parameters) for each in effects]
+    values = np.concatenate([[0.5, 0.6], *(np.full(w, k) for k, w in enumerate(sizes))])
+    fit = tracing.Fit(np.zeros(10), effects, values, np.ones(4), 1.0)
+    fewer = tracing.without_cut_off(fit)
+    assert fewer.effects == (effects[0], effects[2], effects[3])
+    assert fewer.values.tolist() == [0.5, 0.6, *sizes[0] * [0], *sizes[2] * [2], *sizes[3] * [3]]
+    assert tracing.without_cut_off(fewer).effects == fewer.effects
+
+
+def test_a_pass_without_what_was_hidden_comes_before_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Once: what is found again stays."""
+    found = ["both", "both", "one", "one", "", ""]
+    answer = answer_of(monkeypatch, found, [1.0] * 6, hidden="both")
+    assert answer == ("one", ["declared", "both", "fewer", "one"])
+    answer = answer_of(monkeypatch, ["both"] * 6, [1.0] * 6, hidden="both")
+    assert answer == ("both", ["declared", "both", "fewer", "both"])
