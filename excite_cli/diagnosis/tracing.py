@@ -168,7 +168,7 @@ def without_cut_off(fit: Fit) -> Fit:
     """The fit without effects of single runs where another effect cuts the torque of a joint.
 
     What a cut takes off is reckoned with all effects in, and one that the cut hides altogether is
-    needed ever after, once found: of a UR10 whose pan saturates at 38.7 N·m, a contact of 1.17 ±
+    needed ever after, once found: of a UR10 whose pan saturates at 38.7 N·m, a push of 1.17 ±
     0.02 N in those 0.3 s of one run in which it did. A pass without them finds what is there.
     """
     cut = {j for effect in fit.effects if effect.cuts_torque for j in effect.joints}
