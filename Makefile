@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
 .PHONY: install run plan loop test suite sanitize lint lock floors dist release-check audit docs bench peers trust battery
-.PHONY: campaigns robots real scoreboard gallery clean
+.PHONY: campaigns loops robots real scoreboard gallery clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
 
@@ -65,6 +65,9 @@ SYSID ?= sysid-env/bin/python
 scoreboard: $(STAMP)     ## every tool on the same logs, one judge (docs/scoreboard.md), two hours
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.scoreboard --readme README.md \
 	  $(if $(wildcard $(FIGAROH)),--figaroh $(FIGAROH)) $(if $(wildcard $(SYSID)),--sysid $(SYSID))
+
+loops: $(STAMP)          ## campaigns on simulated robots, into docs/campaigns.md (an hour and a half)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.closed_loops --page docs/campaigns.md
 
 trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism (an hour; root)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.fuzz --count 10000

@@ -220,8 +220,8 @@ def _named(file: Path) -> list[list[Any]]:
 
 
 def _missed(scored: Record) -> float:
-    runs = scored["runs"]
-    return float(sum(run["error"]["mean_relative_moving"] for run in runs) / len(runs))
+    shares = [share for run in scored["runs"] for share in run["relative_moving"].values()]
+    return float(np.nanmean(np.array(shares, dtype=float)))
 
 
 def right(record: Record, named: list[list[Any]]) -> tuple[int, int]:
@@ -272,7 +272,7 @@ def rounds(records: list[Record]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", nargs="+", help="robots whose name has one of these words")
-    parser.add_argument("--folder", type=Path, default=Path("closed_loops"))
+    parser.add_argument("--folder", type=Path, default=Path("results/closed_loops"))
     parser.add_argument("--page", type=Path, help="write the page here")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
@@ -295,7 +295,15 @@ def main() -> None:
 _OPENING = """\
 # Campaigns on simulated robots
 
-Made by `python -m benchmarks.closed_loops --page docs/campaigns.md`.
+Made by `make loops` (an hour and a half). Five MuJoCo robots with inertias 10 to 30 % off their
+descriptions, 1 % of noise on the torques, and three effects that no config declares. One of them, a
+torque that saturates, shows only above the torques of the first round, which is played at 40 % of
+the motions' pace. `excite campaign CONFIG --measure simulate` runs without anybody's help until it
+ends by itself. Beside it stand as many seconds of motions that are planned in one go (`plain`) and
+of random admissible ones (`random`: the best of four times as many), at their own pace from the
+beginning, which nobody should try on a robot that nobody knows, diagnosed once. *Missed, unseen* is
+what each model misses of the torque of two random motions that took no part, where joints move,
+mean over the joints; noise alone is about 0.2 %.
 """
 
 if __name__ == "__main__":
