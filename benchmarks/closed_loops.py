@@ -74,6 +74,8 @@ LOOPS = (
         "TALOS' arms",
         "configs/talos_arms.yaml",
         ("coulomb_friction@arm_left_4_joint=1.5", "spring@arm_right_2_joint=4"),
+        # As the message says where a posture has no way into a motion.
+        more=("--set", "trajectory.at_rest=true"),
     ),
     Loop(
         "bench arm (MJCF)",
