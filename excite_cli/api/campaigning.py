@@ -202,19 +202,19 @@ class _Loop:
 
     def _first(self, state: Campaign) -> Round:
         count = max(self.case.spec.sequence.motions or _FEWEST, _FEWEST)
-        problem = self._problem(self.case.spec, 1, count)
+        pace = pace_of(1, state.asked.from_speed)
+        problem = self._problem(_at(pace, self.case.spec), 1, count)
         path = self.folder / "round_1.h5"
         self._say(f"round 1: {count} motions")
         result = self._planned(problem, path)
-        pace = pace_of(1, state.asked.from_speed)
         motions = self._motions(1, "first", path, result, pace)
         return Round(1, motions, efficiency=_efficiency(problem, result))
 
     def _next(self, state: Campaign, number: int) -> Round:
         """A motion for what is known, and one for what is not."""
         found = self.folder / self._diagnosis(number - 1)
-        spec = self._with_fit(state)
         pace = pace_of(number, state.asked.from_speed)
+        spec = _at(pace, self._with_fit(state))
         known, unseen = self._effects(found)
         alone = state.asked.plain or not unseen
         case = replace(self.case, spec=_of(spec, number, 2 if alone else 1))
@@ -416,6 +416,14 @@ def _of(spec: Spec, number: int, motions: int) -> Spec:
     """The config for so many motions of a round, which has starts of its own."""
     sequence = spec.sequence.model_copy(update={"motions": motions, "until": None})
     return spec.model_copy(update={"sequence": sequence, "seed": spec.seed + number - 1})
+
+
+def _at(pace: float, spec: Spec) -> Spec:
+    """The config for motions that are played at `pace`, so that none needs its own to hold."""
+    if pace >= 1.0:
+        return spec
+    constraints = spec.constraints.model_copy(update={"any_speed": True})
+    return spec.model_copy(update={"constraints": constraints})
 
 
 def _showing(spec: Spec, effects: tuple[EffectSpec, ...]) -> Spec:

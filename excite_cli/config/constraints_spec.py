@@ -181,6 +181,11 @@ class ConstraintsSpec(Section):
         description="regions of joint space to stay out of: name, then joint: [from, to] of every "
         "joint that bounds it [rad or m]",
     )
+    any_speed: bool = Field(
+        False,
+        description="torque and contact hold at any lower speed of a motion as well, down to "
+        "standing still (`excite campaign` plans so where it begins slowly)",
+    )
     own: dict[str, dict[str, Finite]] = Field(
         default_factory=dict,
         description="constraints that were added to the catalogue, by name, with their settings",

@@ -39,6 +39,8 @@ class Constraint(ABC):
     """Size (m,) by which the optimiser divides each column's margin."""
     uncertainty: InertiaUncertainty | None = None
     """Inertias for all of which the margins hold; None where those of the URDF are taken."""
+    of_forces: bool = False
+    """Whether it is about torques or forces, which change with the speed of a motion."""
 
     @property
     def title(self) -> str:

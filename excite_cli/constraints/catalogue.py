@@ -29,6 +29,7 @@ from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
 from excite_cli.constraints.motor_limits import MotorBound, MotorTorque
 from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.constraints.standing import Standing
 from excite_cli.constraints.support_polygon import support_polygon
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics
@@ -89,7 +90,10 @@ def build_constraints(
         given = getattr(spec, key)
         if given is not None:
             found += build(given, setting)
-    return (*found, *(_own(name, given, robot) for name, given in spec.own.items()))
+    found += [_own(name, given, robot) for name, given in spec.own.items()]
+    if spec.any_speed:
+        found += [Standing(each) for each in found if each.of_forces]
+    return tuple(found)
 
 
 def _own(name: str, given: dict[str, float], robot: Robot) -> Constraint:

@@ -79,6 +79,7 @@ class ZeroMomentPoint(Constraint):
 
     uncertainty: InertiaUncertainty
     name = "zmp"
+    of_forces = True
     title = "Zero-moment point to the edge of the support"
     unit = "m"
 
@@ -146,6 +147,7 @@ class Contact(Constraint):
 
     uncertainty: InertiaUncertainty
     name = "contact"
+    of_forces = True
     title = "What is left of friction, torsion and load"
     unit = "N"
 

@@ -30,6 +30,7 @@ class JointTorque(Constraint):
     """
 
     name = "joint_torque"
+    of_forces = True
     title = "Joint torque left"
     unit = "N·m"
 

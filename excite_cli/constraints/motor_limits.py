@@ -82,6 +82,7 @@ class MotorTorque(Constraint):
     """|Tᵀ τ| ≤ limit of every bounded motor, for the URDF's inertias or all that are admitted."""
 
     name = "motor_torque"
+    of_forces = True
     title = "Motor torque left"
     unit = "N·m"
 

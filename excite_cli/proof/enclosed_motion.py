@@ -12,7 +12,7 @@ Written apart from `forward_kinematics`, so that a certificate and the optimiser
 mistake. The base stands still; gravity is taken as an upward acceleration of it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -64,6 +64,15 @@ class EnclosedMotion:
         self.every = _of_all(robot, states)
         self.count = states.q.shape[0]
         self._joints = _joints_of(robot)
+
+    @cached_property
+    def at_rest(self) -> "EnclosedMotion":
+        """The robot standing still wherever it may be in an interval; it shares where that is."""
+        still = Taylor.constant(np.zeros(self.states.q.shape))
+        states = replace(self.states, v=still, a=still)
+        found = EnclosedMotion(self.robot, states)
+        found.__dict__.update(placements=self.placements, axes=self.axes)
+        return found
 
     @cached_property
     def placements(self) -> tuple[tuple[Taylor, Taylor], ...]:

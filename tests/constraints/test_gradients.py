@@ -40,6 +40,7 @@ def _all(balance: DiscSpec | PolygonSpec, collision: bool) -> ConstraintsSpec:
         torque=TorqueSpec(scale=0.7),
         balance=balance,
         self_collision=SelfCollisionSpec() if collision else None,
+        any_speed=True,
     )
 
 

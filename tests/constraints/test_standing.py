@@ -1,0 +1,84 @@
+"""What holds at a motion's own speed and standing still holds at any speed between."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.api.loading import load_problem
+from excite_cli.constraints.base import Constraint
+from excite_cli.dynamics.forward_kinematics import BatchKinematics
+from excite_cli.dynamics.states import States
+from excite_cli.excitation.admissible import verdicts
+from excite_cli.excitation.problem import Problem
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+OF_FORCES = {"joint_torque", "zmp", "contact"}
+QUICK = ["constraints.self_collision=null", "constraints.any_speed=true"]
+
+
+@pytest.fixture(scope="module", params=["uncertain", "as in the URDF"])
+def problem(request: pytest.FixtureRequest) -> Problem:
+    """A humanoid on its feet."""
+    more = [] if request.param == "uncertain" else ["uncertainty=null"]
+    return load_problem(CONFIGS / "talos_base.yaml", [*QUICK, *more])
+
+
+def both(problem: Problem) -> list[tuple[Constraint, Constraint]]:
+    """Constraints of forces, each with that of the standing robot."""
+    by_name = {each.name: each for each in problem.constraints}
+    return [(by_name[name], by_name[f"{name}_standing"]) for name in sorted(OF_FORCES)]
+
+
+def test_only_what_is_about_forces_is_asked_of_the_standing_robot(problem: Problem) -> None:
+    names = [each.name for each in problem.constraints]
+    assert {name for name in names if name.endswith("_standing")} == {
+        f"{name}_standing" for name in OF_FORCES
+    }
+    plain = load_problem(CONFIGS / "talos_base.yaml", QUICK[:1])
+    assert [name for name in names if not name.endswith("_standing")] == [
+        each.name for each in plain.constraints
+    ]
+
+
+def test_slower_motions_keep_what_the_motion_and_the_standing_robot_keep(
+    problem: Problem,
+) -> None:
+    """Joint torques are never worse than the worse of both; zero moment points keep their sign."""
+    rng = np.random.default_rng(4)
+    q, v, a = problem.robot.draw_states(200, 4)
+    q = problem.robot.posture + 0.5 * (q - problem.robot.posture)
+    v, a = 0.3 * v, 0.3 * a
+    kinematics = BatchKinematics(problem.robot)
+    for constraint, standing in both(problem):
+        own, still = (
+            constraint.margins(States(kinematics, q, *rates)) for rates in ((v, a), (0 * v, 0 * a))
+        )
+        np.testing.assert_allclose(standing.margins(States(kinematics, q, v, a)), still)
+        for s in rng.uniform(size=5):
+            slowed = constraint.margins(States(kinematics, q, s * v, s * s * a))
+            if constraint.name == "joint_torque":
+                assert np.all(slowed > np.minimum(own, still) - 1e-9)
+            kept = (own >= 0.0).all(axis=1) & (still >= 0.0).all(axis=1)
+            assert kept.any()
+            assert np.all(slowed[kept] > -1e-9)
+
+
+def test_it_is_proved_and_what_does_not_hold_up_is_found(problem: Problem) -> None:
+    """Standing still both say the same; a motion whose speed holds up an arm is broken."""
+    trajectory = problem.trajectory
+    still = {each.name: each for each in verdicts(problem, problem.still(problem.robot.posture))}
+    assert all(still[f"{name}_standing"].state == "proved" for name in OF_FORCES)
+    rng = np.random.default_rng(1)
+    moved = problem.still(problem.robot.posture)
+    moved = moved + 0.02 * rng.normal(size=moved.shape)
+    times = np.linspace(0.0, trajectory.duration, 4000)
+    q, v, a = trajectory.states(times, moved)
+    states = States(BatchKinematics(problem.robot), q, v, a)
+    found = {each.name: each for each in verdicts(problem, moved)}
+    for _, standing in both(problem):
+        lowest = float(standing.margins(states).min())
+        if found[standing.name].state == "proved":
+            assert lowest > -1e-9
+        else:
+            assert lowest < 1e-3 * float(standing.scale.max())
