@@ -133,6 +133,7 @@ def closed(loop: Loop, folder: Folder) -> Record:
     _random(problem, like, folder.place / "test.h5", _TEST_MOTIONS, _TEST_SEED)
     play = (*robot, *settings, "--overwrite")
     folder.excite("simulate", config, "test.h5", "-o", "test_log.h5", *play)
+    declared = {each.kind for each in problem.spec.effects or ()}
     ways: Record = {}
     last = whole["rounds"][-1]["number"]
     found = {"campaign": f"campaign/round_{last}_diagnosis.h5"}
@@ -150,7 +151,8 @@ def closed(loop: Loop, folder: Folder) -> Record:
     return {
         "robot": loop.name,
         "joints": problem.robot.n,
-        "planted": list(effects),
+        # TALOS' config declares dry friction: what is put in of it is no secret.
+        "planted": [text for text in effects if text.split("@")[0] not in declared],
         "rounds": whole["rounds"],
         "ended": whole["ended"],
         "reason": whole["reason"],
@@ -297,15 +299,19 @@ def main() -> None:
 _OPENING = """\
 # Campaigns on simulated robots
 
-Made by `make loops` (an hour and a half). Five MuJoCo robots with inertias 10 to 30 % off their
-descriptions, 1 % of noise on the torques, and three effects that no config declares. One of them, a
-torque that saturates, shows only above the torques of the first round, which is played at 40 % of
-the motions' pace. `excite campaign CONFIG --measure simulate` runs without anybody's help until it
-ends by itself. Beside it stand as many seconds of motions that are planned in one go (`plain`) and
-of random admissible ones (`random`: the best of four times as many), at their own pace from the
-beginning, which nobody should try on a robot that nobody knows, diagnosed once. *Missed, unseen* is
-what each model misses of the torque of two random motions that took no part, where joints move,
-mean over the joints; noise alone is about 0.2 %.
+Made by `make loops` (an hour and a half). MuJoCo robots with inertias 10 to 30 % off their
+descriptions, 1 % of noise on the torques, and two or three effects that no config declares. One of
+them, a torque that saturates, shows only above the torques of the first round, which is played at
+40 % of the motions' pace. `excite campaign CONFIG --measure simulate` runs without anybody's help
+until it ends by itself. Beside it stand as many seconds of motions that are planned in one go
+(`plain`) and of random admissible ones (`random`: the best of four times as many), at their own
+pace from the beginning, which nobody should try on a robot that nobody knows, diagnosed once.
+*Missed, unseen* is what each model misses of the torque of two random motions that took no part,
+where joints move, mean over the joints; noise alone is about 0.2 %.
+
+In as many seconds motions at full pace find the same effects, and predict as well or better: most
+of a campaign's seconds are slow ones. What a campaign adds is that nothing is played faster than
+what is known allows, that it notices what only later motions show, and that it says when to stop.
 """
 
 if __name__ == "__main__":
