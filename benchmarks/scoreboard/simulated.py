@@ -29,7 +29,8 @@ def simulated(seed: int, index: int, folder: Path) -> Case:
     own = folder / f"{seed}_{index:02d}"
     own.mkdir(parents=True, exist_ok=True)
     config, motions = _planned(robot, folder / robot.replace(" ", "_"))
-    truth, data, planted = own / "truth.yaml", own / "measured.h5", own / "planted.json"
+    truth = config.with_name(f"truth_{own.name}.yaml")  # its paths are relative
+    data, planted = own / "measured.h5", own / "planted.json"
     truth.write_text(config.read_text(encoding="utf-8") + _EFFECTS, encoding="utf-8")
     number = zlib.crc32(f"{seed} {index}".encode())
     if not data.is_file():
