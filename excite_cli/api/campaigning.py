@@ -36,6 +36,7 @@ from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
+from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.errors import ExciteError, FileError, NoAdmissibleMotionError
 from excite_cli.excitation.extension import why_not_planned
 from excite_cli.excitation.invariant import design_for, invariants
@@ -45,6 +46,7 @@ from excite_cli.excitation.stack import Stack
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.report.page import render
 from excite_cli.report.rounds_page import rounds_page
+from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.store.diagnosis_file import read_diagnosis
@@ -238,7 +240,7 @@ class _Loop:
         """What is declared or found, and what is neither, of effects that motions can show."""
         robot, read = self.case.robot, read_diagnosis(found)
         records = [*read.declared, *(each.effect for each in read.effects)]
-        known = [effect_of(each, read.joint_names) for each in records]
+        known = [effect_of(each, robot.joint_names) for each in on_robot(records, robot)]
         both = known, looked_for(robot, known)
         here, unseen = (
             tuple(
@@ -410,6 +412,16 @@ class _Loop:
         """What a step says is told where it matters beyond that step."""
         if note.level is Level.WARNING:
             self.tell(note)
+
+
+def on_robot(records: Sequence[EffectRecord], robot: Robot) -> list[EffectRecord]:
+    """What a planned motion can know of effects: their joints among those of `robot`.
+
+    Data of a robot that stands have six joints more, of its base; what is there alone is left out.
+    """
+    names = set(robot.joint_names)
+    own = [replace(r, joints=tuple(j for j in r.joints if j in names)) for r in records]
+    return [each for each in own if each.joints]
 
 
 def _of(spec: Spec, number: int, motions: int) -> Spec:
