@@ -393,7 +393,9 @@ class _Loop:
     def _with_fit(self, state: Campaign) -> Spec:
         """The config, its torques bounded for the uncertainty of the inertias that is left."""
         spec = self.case.spec
-        if spec.uncertainty is None:
+        # A fit of a robot whose base is measured has other rows than a motion: what the config
+        # says of the inertias stays, which is wider.
+        if spec.uncertainty is None or measured_case(self.case).robot.base_joints:
             return spec
         path = (self.folder / f"round_{state.rounds[-1].number}_fit.h5").resolve()
         logs = [self.folder / each.data for each in state.motions]
