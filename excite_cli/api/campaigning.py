@@ -6,18 +6,18 @@ newest motion takes no part in the diagnosis: what the model misses there is the
 from the next round on it is one of those that the model is fitted to.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.campaign_plans import MODEL, RoundPlans, diagnosis_of, warnings_only
 from excite_cli.api.checking import check
 from excite_cli.api.diagnosing import diagnose, save_config
 from excite_cli.api.exporting import export_file
-from excite_cli.api.identifying import identify
-from excite_cli.api.loading import Case, load_case, load_data, measured_case, problem_of
-from excite_cli.api.planning import Planned, PlanProgress, plan, plan_after
+from excite_cli.api.loading import Case, load_data, measured_case, problem_of
+from excite_cli.api.planning import PlanProgress, plan_after
 from excite_cli.api.simulating import simulate
 from excite_cli.atomic import write_text_atomically
 from excite_cli.campaign.command import Command as Command
@@ -28,39 +28,27 @@ from excite_cli.campaign.measure import Measure as Measure
 from excite_cli.campaign.measure import NotMeasuredError, Take
 from excite_cli.campaign.records import Asked as Asked
 from excite_cli.campaign.records import Campaign as Campaign
-from excite_cli.campaign.records import Learned, PlayedMotion, Purpose, Round
+from excite_cli.campaign.records import Learned, PlayedMotion, Round
 from excite_cli.campaign.same_motion import compared
-from excite_cli.campaign.schedule import looked_for, pace_of
 from excite_cli.claim import claim, leave
-from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
-from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.errors import ExciteError, FileError, NoAdmissibleMotionError
-from excite_cli.excitation.extension import why_not_planned
-from excite_cli.excitation.invariant import design_for, invariants
-from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.result import Result
-from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.invariant import invariants
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.report.page import render
 from excite_cli.report.rounds_page import rounds_page
-from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.settings import SimulationSettings
-from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.result_file import read_result
 from excite_cli.store.versions import versions
 from excite_cli.summary.campaign import campaign_answer as campaign_answer
 from excite_cli.summary.campaign import round_in_words
-from excite_cli.summary.motions import motion_sentence
 from excite_cli.summary.named_effects import what_and_where
 from excite_cli.workers.base import Workers
 
-PAGE, MODEL = "campaign.html", "model.yaml"
+PAGE = "campaign.html"
 _OF_DATA = ("measurement", "identification", "diagnosis")
-_FEWEST = 3  # motions of the first round: two are fitted, so that names rest on more than one
 
 
 @dataclass(frozen=True)
@@ -183,14 +171,18 @@ class _Loop:
         """The campaign after its next step: a plan, a motion measured, a diagnosis, its end."""
         last = state.rounds[-1] if state.rounds else None
         if last is None:
-            return state.with_round(self._first(state))
+            return state.with_round(self._plans.first(state))
         if last.missing is not None:
             return state.with_round(last.with_motion(self._measured(state, last, last.missing)))
         if last.learned is None:
             state = state.with_round(replace(last, learned=self._learned(state, last)))
             return ended(state, self._until)
         state = ended(state, self._until)
-        return state if state.ended else state.with_round(self._next(state, last.number + 1))
+        return (
+            state
+            if state.ended
+            else state.with_round(self._plans.following(state, last.number + 1))
+        )
 
     @property
     def _until(self) -> float | None:
@@ -201,93 +193,6 @@ class _Loop:
         """The page of all rounds, as far as they are."""
         page = rounds_page(state, self.case.robot.name)
         write_text_atomically(self.folder / PAGE, render(page))
-
-    def _first(self, state: Campaign) -> Round:
-        count = max(self.case.spec.sequence.motions or _FEWEST, _FEWEST)
-        pace = pace_of(1, state.asked.from_speed)
-        problem = self._problem(_at(pace, self.case.spec), 1, count)
-        path = self.folder / "round_1.h5"
-        self._say(f"round 1: {count} motions")
-        result = self._planned(problem, path)
-        motions = self._motions(1, "first", path, result, pace)
-        return Round(1, motions, efficiency=_efficiency(problem, result))
-
-    def _next(self, state: Campaign, number: int) -> Round:
-        """A motion for what is known, and one for what is not."""
-        found = self.folder / self._diagnosis(number - 1)
-        pace = pace_of(number, state.asked.from_speed)
-        spec = _at(pace, self._with_fit(state))
-        known, unseen = self._effects(found)
-        alone = state.asked.plain or not unseen
-        case = replace(self.case, spec=_of(spec, number, 2 if alone else 1))
-        following = plan_after(case, found, tell=lambda note: None)
-        self._say(f"round {number}: {following.messages[0]}")
-        path = self.folder / f"round_{number}.h5"
-        result = self._planned(following, path)
-        efficiency = _efficiency(following.model, result)
-        purpose: Purpose = "separate" if following.purpose == "separate" else "excite"
-        motions = self._motions(number, purpose, path, result, pace)
-        if not alone:
-            path = self.folder / f"round_{number}_explore.h5"
-            problem = self._problem(_showing(spec, (*known, *unseen)), number, 1)
-            self._say(f"round {number}: a motion that shows {len(unseen)} effects nobody has found")
-            logs = [self.folder / each.data for each in state.motions]
-            result = self._planned(problem, path, logs)
-            motions += self._motions(number, "explore", path, result, pace, len(motions))
-        return Round(number, motions, efficiency=efficiency)
-
-    def _effects(self, found: Path) -> tuple[tuple[EffectSpec, ...], tuple[EffectSpec, ...]]:
-        """What is declared or found, and what is neither, of effects that motions can show."""
-        robot, read = self.case.robot, read_diagnosis(found)
-        records = [*read.declared, *(each.effect for each in read.effects)]
-        known = [effect_of(each, robot.joint_names) for each in on_robot(records, robot)]
-        both = known, looked_for(robot, known)
-        here, unseen = (
-            tuple(
-                EffectSpec(
-                    kind=each.kind,
-                    joints=tuple(robot.joint_names[j] for j in each.joints),
-                    shape=dict(each.shape),
-                )
-                for each in effects
-                if not why_not_planned(each, robot)
-            )
-            for effects in both
-        )
-        return here, unseen
-
-    def _problem(self, spec: Spec, number: int, motions: int) -> Problem:
-        return problem_of(replace(self.case, spec=_of(spec, number, motions)), lambda note: None)
-
-    def _planned(self, problem: Planned, path: Path, logs: Sequence[Path] = ()) -> Result:
-        found = plan(
-            problem,
-            priors=logs,
-            output=path,
-            resume=path.exists(),
-            progress=self.progress,
-            workers=self.workers,
-            tell=self._warn,
-        )
-        for motion in found.motions:
-            self._say(motion_sentence(motion))
-        return found
-
-    def _motions(
-        self,
-        number: int,
-        purpose: Purpose,
-        path: Path,
-        result: Result,
-        pace: float,
-        before: int = 0,
-    ) -> tuple[PlayedMotion, ...]:
-        return tuple(
-            PlayedMotion(
-                f"round_{number}_motion_{before + k}", purpose, path.name, each.index, pace
-            )
-            for k, each in enumerate(result.motions, start=1)
-        )
 
     def _measured(self, state: Campaign, last: Round, motion: PlayedMotion) -> PlayedMotion:
         """The motion with its log, which is whole and of that motion."""
@@ -358,7 +263,7 @@ class _Loop:
         return ""
 
     def _learned(self, state: Campaign, last: Round) -> Learned:
-        path = self.folder / self._diagnosis(last.number)
+        path = self.folder / diagnosis_of(last.number)
         logs = [self.folder / each.data for each in state.motions]
         self._say(f"round {last.number}: diagnosis of {len(logs)} logs")
         found = diagnose(
@@ -367,7 +272,7 @@ class _Loop:
             output=path,
             overwrite=True,
             workers=self.workers,
-            tell=self._warn,
+            tell=warnings_only(self.tell),
         )
         save_config(self.folder / MODEL, self.case, found, unconfirmed=True)
         following = plan_after(self.case, found, tell=lambda note: None)
@@ -390,73 +295,12 @@ class _Loop:
         self._say(round_in_words(last.number, learned))
         return learned
 
-    def _with_fit(self, state: Campaign) -> Spec:
-        """The config, its torques bounded for the uncertainty of the inertias that is left."""
-        spec = self.case.spec
-        # A fit of a robot whose base is measured has other rows than a motion: what the config
-        # says of the inertias stays, which is wider.
-        if spec.uncertainty is None or measured_case(self.case).robot.base_joints:
-            return spec
-        path = (self.folder / f"round_{state.rounds[-1].number}_fit.h5").resolve()
-        logs = [self.folder / each.data for each in state.motions]
-        model = load_case(self.folder / MODEL)
-        identify(model, logs, output=path, overwrite=True, tell=lambda note: None)
-        known = spec.uncertainty.model_copy(update={"fit": str(path)})
-        return spec.model_copy(update={"uncertainty": known})
-
-    def _diagnosis(self, number: int) -> str:
-        return f"round_{number}_diagnosis.h5"
+    @property
+    def _plans(self) -> RoundPlans:
+        return RoundPlans(self.case, self.folder, self.workers, self.progress, self.tell)
 
     def _say(self, text: str) -> None:
         self.tell(Note(Level.INFO, text))
-
-    def _warn(self, note: Note) -> None:
-        """What a step says is told where it matters beyond that step."""
-        if note.level is Level.WARNING:
-            self.tell(note)
-
-
-def on_robot(records: Sequence[EffectRecord], robot: Robot) -> list[EffectRecord]:
-    """What a planned motion can know of effects: their joints among those of `robot`.
-
-    Data of a robot that stands have six joints more, of its base; what is there alone is left out.
-    """
-    names = set(robot.joint_names)
-    own = [replace(r, joints=tuple(j for j in r.joints if j in names)) for r in records]
-    return [each for each in own if each.joints]
-
-
-def _of(spec: Spec, number: int, motions: int) -> Spec:
-    """The config for so many motions of a round, which has starts of its own."""
-    sequence = spec.sequence.model_copy(update={"motions": motions, "until": None})
-    return spec.model_copy(update={"sequence": sequence, "seed": spec.seed + number - 1})
-
-
-def _at(pace: float, spec: Spec) -> Spec:
-    """The config for motions that are played at `pace`, so that none needs its own to hold."""
-    if pace >= 1.0:
-        return spec
-    constraints = spec.constraints.model_copy(update={"any_speed": True})
-    return spec.model_copy(update={"constraints": constraints})
-
-
-def _showing(spec: Spec, effects: tuple[EffectSpec, ...]) -> Spec:
-    """The config with these effects declared, to be known as well as can be beside each other.
-
-    By the determinant: of so many columns some can hardly be told from others, and a condition
-    number would see nothing but these.
-    """
-    wanted = {"kind": "log_det", "column_scaling": "unit_norm"}
-    criterion = spec.criterion.model_copy(update=wanted)
-    return spec.model_copy(update={"effects": effects, "criterion": criterion})
-
-
-def _efficiency(problem: Problem, result: Result) -> float | None:
-    """Of the motions by themselves: how much an instant tells, of what free states could."""
-    stack, objective = Stack.empty(problem.columns), problem.objective()
-    for motion in result.motions:
-        stack = stack.with_rows(objective.block(motion.coefficients))
-    return invariants(problem, stack, design_for(problem)).efficiency
 
 
 def _set_aside(log: Path) -> Path | None:

@@ -1,7 +1,8 @@
-"""What a campaign takes over from a diagnosis to plan by."""
+"""What the motions of a campaign are planned for."""
 
-from excite_cli.api.campaigning import on_robot
+from excite_cli.api.campaign_plans import at_pace, on_robot
 from excite_cli.api.loading import load_problem
+from excite_cli.config.load import load_spec
 from excite_cli.diagnosis.records import EffectRecord
 from tests.cli.program import SMOKE
 
@@ -21,3 +22,12 @@ def test_effects_of_a_measured_base_alone_are_not_planned_for() -> None:
         ("spring", (first,)),
     ]
     assert told[0].shape == {"pitch": 0.1}
+
+
+def test_what_is_played_slowly_is_planned_for_any_lower_speed() -> None:
+    spec = load_spec(SMOKE)
+    assert not spec.constraints.any_speed
+    assert at_pace(0.4, spec).constraints.any_speed
+    assert at_pace(1.0, spec) == spec
+    names = {each.name for each in load_problem(SMOKE, ["constraints.any_speed=true"]).constraints}
+    assert "joint_torque_standing" in names
