@@ -11,6 +11,8 @@ from excite_cli.dynamics.forward_kinematics import BatchKinematics
 from excite_cli.dynamics.states import States
 from excite_cli.excitation.admissible import verdicts
 from excite_cli.excitation.problem import Problem
+from excite_cli.proof.enclosed_motion import EnclosedMotion
+from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 OF_FORCES = {"joint_torque", "zmp", "contact"}
@@ -64,21 +66,30 @@ def test_slower_motions_keep_what_the_motion_and_the_standing_robot_keep(
             assert np.all(slowed[kept] > -1e-9)
 
 
-def test_it_is_proved_and_what_does_not_hold_up_is_found(problem: Problem) -> None:
-    """Standing still both say the same; a motion whose speed holds up an arm is broken."""
-    trajectory = problem.trajectory
-    still = {each.name: each for each in verdicts(problem, problem.still(problem.robot.posture))}
-    assert all(still[f"{name}_standing"].state == "proved" for name in OF_FORCES)
+def test_bounds_over_intervals_are_those_of_the_standing_robot(problem: Problem) -> None:
+    """Never above the margins within, and hardly below those of torques, over 0.2 ms of a motion."""
     rng = np.random.default_rng(1)
-    moved = problem.still(problem.robot.posture)
-    moved = moved + 0.02 * rng.normal(size=moved.shape)
-    times = np.linspace(0.0, trajectory.duration, 4000)
-    q, v, a = trajectory.states(times, moved)
-    states = States(BatchKinematics(problem.robot), q, v, a)
-    found = {each.name: each for each in verdicts(problem, moved)}
-    for _, standing in both(problem):
-        lowest = float(standing.margins(states).min())
-        if found[standing.name].state == "proved":
-            assert lowest > -1e-9
-        else:
-            assert lowest < 1e-3 * float(standing.scale.max())
+    still = problem.still(problem.robot.posture)
+    moved = still + 0.02 * rng.normal(size=still.shape)
+    intervals = intervals_of(problem.trajectory, 2e-4).only(slice(0, None, 1000))
+    states = enclosed_states(problem.trajectory, moved, intervals)
+    motion = EnclosedMotion(problem.robot, states)
+    q, v, a = problem.trajectory.states(intervals.middles, moved)
+    assert np.abs(a).max() > 1.0
+    middle = States(BatchKinematics(problem.robot), q, v, a)
+    for constraint, standing in both(problem):
+        bounds, margins = standing.least(motion), standing.margins(middle)
+        assert bounds is not None
+        assert np.all(margins[bounds >= 0.0] >= 0.0)
+        if constraint.name == "joint_torque":
+            assert np.all(bounds <= margins + 1e-9)
+            np.testing.assert_allclose(bounds, margins, atol=0.05)  # N·m
+            own = constraint.least(motion)
+            assert own is not None
+            assert np.abs(own - bounds).max() > 1.0
+
+
+def test_standing_still_is_proved(problem: Problem) -> None:
+    found = verdicts(problem, problem.still(problem.robot.posture))
+    states = {each.name: each.state for each in found}
+    assert all(states[f"{name}_standing"] == "proved" for name in OF_FORCES)
