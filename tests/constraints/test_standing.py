@@ -67,7 +67,7 @@ def test_slower_motions_keep_what_the_motion_and_the_standing_robot_keep(
 
 
 def test_bounds_over_intervals_are_those_of_the_standing_robot(problem: Problem) -> None:
-    """Never above the margins within, and hardly below those of torques, over 0.2 ms of a motion."""
+    """Never above the margins within, and hardly below those of torques, over 0.2 ms."""
     rng = np.random.default_rng(1)
     still = problem.still(problem.robot.posture)
     moved = still + 0.02 * rng.normal(size=still.shape)
