@@ -12,6 +12,7 @@ from numpy.polynomial import legendre
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
+from excite_cli.base_link.denoised import denoised
 from excite_cli.config.wrench_spec import BaseStateSpec, ImuSpec
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.measurement.base_channel import of_base_state
@@ -77,7 +78,8 @@ def _from_pose(robot: Robot, pose: Array) -> Array:
 def _from_imu(robot: Robot, run: Run, spec: ImuSpec, readings: Array) -> BaseState:
     """A base that stands: what turns and moves comes back, constants are the sensors'."""
     rotation, lever = unit_on_base(robot, spec.link)
-    rate, force = readings[:, :3] @ rotation.T, readings[:, 3:] @ rotation.T
+    rate, force = np.split(denoised(readings, run.step), 2, axis=1)
+    rate, force = rate @ rotation.T, force @ rotation.T
     turned = _integrated(rate - rate.mean(axis=0), run.step)
     angles = _without_drift(turned.as_euler("ZYX"), 1)
     spin = np.gradient(rate, run.step, axis=0)
