@@ -260,6 +260,8 @@ class _Loop:
             found = compared(planned, (run.t, run.q[:, own]), data.joint_names[own])
             if found.reason:
                 return f"{log.name} is no log of {motion.stem}: {found.reason}."
+            if found.doubt:
+                self.tell(Note(Level.WARNING, f"{log.name}: {found.doubt}."))
         return ""
 
     def _learned(self, state: Campaign, last: Round) -> Learned:

@@ -152,10 +152,10 @@ def _left(schur: Schur, white: Evidence, named: Sequence[int], others: Sequence[
     c, d = (
         np.concatenate([white.blocks[k] for k in each]) - white.fixed for each in (named, others)
     )
-    theta = _solve(schur.matrix[np.ix_(c, c)], schur.cross[c])
-    mixed = schur.matrix[np.ix_(d, c)] @ theta
-    whole = float(theta @ schur.matrix[np.ix_(c, c)] @ theta)
-    return max(0.0, whole - float(mixed @ _solve(schur.matrix[np.ix_(d, d)], mixed)))
+    theta = _solve(schur.block(c, c), schur.cross[c])
+    mixed = schur.block(d, c) @ theta
+    whole = float(theta @ schur.block(c, c) @ theta)
+    return max(0.0, whole - float(mixed @ _solve(schur.block(d, d), mixed)))
 
 
 def _solve(matrix: Array, rhs: Array) -> Array:

@@ -68,7 +68,7 @@ class Evidence:
         self.total = total / np.outer(norms, norms)
         # Searches come back to the same models: what was solved once is kept.
         self._left_out: dict[tuple, Array] = {}
-        self._without: dict[tuple[int, ...], Array] = {}
+        self._without: dict[tuple[int, ...], list[tuple[Array, Array]]] = {}
         self._solved: dict[tuple[int, ...], Array] = {}
         self._on: dict[tuple, float] = {}
         self._energies: dict[tuple[int, ...], float] = {}
@@ -99,7 +99,7 @@ class Evidence:
 
     def _normal(self, gram: Array, at: NDArray[np.intp]) -> Array:
         """With a trace of diagonal for columns that say nothing."""
-        normal = gram[np.ix_(at, at)].copy()
+        normal = np.asarray(gram[at[:, None], at])
         normal[np.diag_indices(len(at))] += RIDGE
         return normal
 
@@ -172,10 +172,9 @@ class Evidence:
         at = self.columns(chosen)
         shared = self.total[at, self.fixed : self.torque]
         solved = self.factor(chosen).solve(shared)
-        rest = slice(self.fixed, self.torque)
-        left = self.total[rest, rest] - shared.T @ solved
-        cross = self.total[rest, self.torque] - solved.T @ self.total[at, self.torque]
-        return Schur(self._candidates, left, cross, self._told_by_weight(chosen, np.diag(left)))
+        cross = self.total[self.fixed : -1, -1] - solved.T @ self.total[at, self.torque]
+        found = Schur(self._candidates, shared, solved, cross)
+        return found.heed_weight(self._told_by_weight(chosen, found.diagonal))
 
     def _told_by_weight(self, chosen: Sequence[int], left: Array) -> NDArray[np.bool_]:
         """Columns of candidates of which next to nothing is left without what was weighed.
@@ -184,7 +183,7 @@ class Evidence:
         """
         if not self._weighed:
             return np.zeros(len(left), bool)
-        by_data = np.diag(self._unweighed.schur(chosen).matrix)
+        by_data = self._unweighed.schur(chosen).diagonal
         own = np.diag(self.total)[self.fixed : self.torque]
         told = (left > SHARED * own) & (left > _BY_WEIGHT * by_data)
         return np.asarray(told & (by_data < ABSORBED * own))
@@ -193,6 +192,11 @@ class Evidence:
     def _folds(self) -> Array:
         """Normalised Gram matrices of the folds (F, K, K)."""
         return self.grams.by_fold() / np.outer(self.norms, self.norms)
+
+    @cached_property
+    def _first_sides(self) -> Array:
+        """The same of their first sides."""
+        return self.grams.by_fold(first_side=True) / np.outer(self.norms, self.norms)
 
     def _part(
         self,
@@ -204,8 +208,9 @@ class Evidence:
         """Gram matrix (k + 1, k + 1) of some folds' rows of some joints, the torque last."""
         both = np.append(at, self.torque)
         everywhere = joints is None or len(joints) == len(self.grams.joints)
-        if everywhere and len(folds) == 1 and not first_side:
-            return np.asarray(self._folds[folds[0], both[:, None], both])
+        if everywhere and len(folds) == 1:
+            of_folds = self._first_sides if first_side else self._folds
+            return np.asarray(of_folds[folds[0], both[:, None], both])
         rows = range(len(self.grams.joints)) if joints is None else joints
         norms = self.norms[both]
         return self.grams.on(folds, rows, both, first_side) / (norms[:, None] * norms)
@@ -231,22 +236,31 @@ class Evidence:
         key = (tuple(sorted(chosen)), None if joints is None else tuple(joints))
         if key not in self._left_out:
             at = self.columns(key[0])
-            fitted = self._without_folds(at, key[0])
-            seen = self._seen[:, at]
-            seen[:, : self.fixed] = True
-            alone = seen & (seen.sum(axis=0) == 1)
-            lacking = ~seen & (seen.sum(axis=0) == len(seen) - 1)
-            if self._weighed:  # a gain is told by the fold alone that has the load
-                lacking |= ~alone & (np.arange(len(at)) >= self.fixed)
             found = []
-            for fold, x in enumerate(fitted):
-                open_ = self._unknown_without(fold, at, alone[fold], lacking[fold])
+            for fold, (x, open_) in enumerate(self._fitted_without(at, key[0])):
                 if open_.shape[1]:
                     found.append(self._crosswise(fold, joints, at, (x, open_)))
                 else:
                     found.append(_energy(self._part([fold], joints, at), x))
             self._left_out[key] = np.maximum(found, 0.0)
         return self._left_out[key]
+
+    def _fitted_without(
+        self, at: NDArray[np.intp], chosen: tuple[int, ...]
+    ) -> list[tuple[Array, Array]]:
+        """Parameters (k,) fitted to all folds but one, and what these do not know, of each fold."""
+        if chosen not in self._without:
+            seen = self._seen[:, at]
+            seen[:, : self.fixed] = True
+            alone = seen & (seen.sum(axis=0) == 1)
+            lacking = ~seen & (seen.sum(axis=0) == len(seen) - 1)
+            if self._weighed:  # a gain is told by the fold alone that has the load
+                lacking |= ~alone & (np.arange(len(at)) >= self.fixed)
+            self._without[chosen] = [
+                (x, self._unknown_without(fold, at, alone[fold], lacking[fold]))
+                for fold, x in enumerate(self._without_folds(at))
+            ]
+        return self._without[chosen]
 
     def _unknown_without(
         self,
@@ -263,7 +277,9 @@ class Evidence:
         open_ = np.eye(len(at))[:, alone]
         if not lacking.any():
             return open_
-        others = self._normal(self.total - self._folds[fold], at)
+        index = (at[:, None], at)
+        others = self.total[index] - self._folds[fold][index]
+        others[np.diag_indices(len(at))] += RIDGE
         own, rest = np.flatnonzero(lacking), np.flatnonzero(~(lacking | alone))
         taken = Cholesky(others[np.ix_(rest, rest)]).solve(others[np.ix_(rest, own)])
         left = others[np.ix_(own, own)] - others[np.ix_(own, rest)] @ taken
@@ -297,16 +313,14 @@ class Evidence:
             energy += _energy(judged[side], x)
         return energy
 
-    def _without_folds(self, at: NDArray[np.intp], chosen: tuple[int, ...]) -> Array:
+    def _without_folds(self, at: NDArray[np.intp]) -> Array:
         """Parameters (F, k) fitted to all folds but one."""
-        if chosen not in self._without:
-            index = (at[:, None], at)
-            normal = self.total[index] - self._folds[:, at[:, None], at]
-            diagonal = np.arange(len(at))
-            normal[:, diagonal, diagonal] += RIDGE
-            rhs = self.total[at, self.torque] - self._folds[:, at, self.torque]
-            self._without[chosen] = np.linalg.solve(normal, rhs[:, :, None])[:, :, 0]
-        return self._without[chosen]
+        index = (at[:, None], at)
+        normal = self.total[index] - self._folds[:, at[:, None], at]
+        diagonal = np.arange(len(at))
+        normal[:, diagonal, diagonal] += RIDGE
+        rhs = self.total[at, self.torque] - self._folds[:, at, self.torque]
+        return np.asarray(np.linalg.solve(normal, rhs[:, :, None])[:, :, 0])
 
     def energy_on(
         self,

@@ -8,7 +8,7 @@ scales to tell an effect from the inertias, these predict as well without it, an
 no say.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -61,6 +61,7 @@ class Judgement:
     allowed: Callable[[Array, Sequence[int], Sequence[int]], bool]
     found: Sequence[int] = ()
     _thresholds: dict[tuple[int, int], float] = field(default_factory=dict)
+    _price: dict[tuple[int, int], float] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         """Look up who refines whom, and which kinds exclude each other."""
@@ -116,6 +117,11 @@ class Judgement:
 
     def price(self, candidate: int, dof: int) -> float:
         """χ² that `candidate` must save."""
+        if (candidate, dof) not in self._price:
+            self._price[candidate, dof] = self._price_of(candidate, dof)
+        return self._price[candidate, dof]
+
+    def _price_of(self, candidate: int, dof: int) -> float:
         c = self.candidates[candidate]
         key = (max(dof, 1), c.tests)
         if key not in self._thresholds:
@@ -131,15 +137,20 @@ class Judgement:
         most = max((len(self.candidates[i].rows) for i in told), default=0)
         return {i for i in told if len(self.candidates[i].rows) < most}
 
-    def price_beside(self, candidate: int, chosen: Sequence[int], dof: int) -> float:
+    def refined_by(self, chosen: Sequence[int]) -> set[int]:
+        """First-order friction of which something chosen is a refinement."""
+        return {parent for k in chosen for parent in self.parents[k]}
+
+    def price_beside(self, candidate: int, refined: Collection[int], dof: int) -> float:
         """As `price`; first-order friction is cheap beside what refines it."""
-        if any(candidate in self.parents[k] for k in chosen):
+        if candidate in refined:
             return self.rules.inflation * _PARENT_PRICE
         return self.price(candidate, dof)
 
     def _prices(self, chosen: Sequence[int]) -> float:
         """Price of a set."""
-        return sum(self.price_beside(i, chosen, self.candidates[i].width) for i in chosen)
+        refined = self.refined_by(chosen)
+        return sum(self.price_beside(i, refined, self.candidates[i].width) for i in chosen)
 
     def bound(self, candidate: int, chosen: Sequence[int]) -> bool:
         """Whether it must stay, since what refines it, or holds it, would take its place."""

@@ -31,6 +31,19 @@ class Gain:
     left: float
 
 
+@dataclass(frozen=True)
+class OneShape:
+    """Candidates of w columns each with d directions: `columns` (m, w), `bases` (m, w, d).
+
+    `grams` (m, w, w) of their columns.
+    """
+
+    candidates: list[int]
+    columns: NDArray[np.intp]
+    bases: Array
+    grams: Array
+
+
 class CandidateBases:
     """Columns of candidates in the normalised Gram matrix of all."""
 
@@ -46,6 +59,20 @@ class CandidateBases:
             self._bases[candidates[0]] = self._basis(self.blocks[candidates[0]])
         return self._bases[candidates[0]]
 
+    @cached_property
+    def of_one_shape(self) -> list[OneShape]:
+        """Candidates of several columns."""
+        shapes: dict[tuple[int, ...], list[int]] = {}
+        for i, block in enumerate(self.blocks):
+            if len(block) > 1:
+                shapes.setdefault(self.basis([i]).shape, []).append(i)
+        found = []
+        for several in shapes.values():
+            at = np.stack([self.blocks[i] for i in several])
+            bases = np.stack([self.basis([i]) for i in several])
+            found.append(OneShape(several, at, bases, self.total[at[:, :, None], at[:, None]]))
+        return found
+
     def _basis(self, at: NDArray[np.intp]) -> Array:
         values, vectors = np.linalg.eigh(self.total[np.ix_(at, at)])
         kept = values > _COLLINEAR * values[-1]
@@ -55,20 +82,31 @@ class CandidateBases:
 class Schur:
     """Candidates after projection off a model.
 
-    It knows the candidates and not the evidence, which keeps it: in a circle, all the matrices of a
-    pass would outlive it.
+    Of the (p, p) that is left of p columns only what is asked for is reckoned: their diagonal,
+    blocks of single candidates, pairs. It knows the candidates and not the evidence, which keeps
+    it: in a circle, all the matrices of a pass would outlive it.
     """
 
     def __init__(
-        self,
-        candidates: CandidateBases,
-        left: Array,
-        cross: Array,
-        told_by_weight: NDArray[np.bool_],
+        self, candidates: CandidateBases, shared: Array, solved: Array, cross: Array
     ) -> None:
-        """`told_by_weight` (p,): columns that scales tell from the model, and data do not."""
-        self._candidates, self.matrix, self.cross = candidates, left, cross
-        self._told = told_by_weight
+        """`shared` (k, p) is G_Sc, `solved` (k, p) N⁻¹ G_Sc, `cross` (p,) z of all columns."""
+        self._candidates, self._shared, self._solved = candidates, shared, solved
+        self.cross = cross
+        own = np.diag(candidates.total)[candidates.fixed : -1]
+        self.diagonal = own - np.einsum("kp,kp->p", shared, solved)
+        self._told = np.zeros(len(cross), bool)
+
+    def heed_weight(self, told: NDArray[np.bool_]) -> "Schur":
+        """`told` (p,): columns that scales tell from the model, and data do not."""
+        self._told = told
+        return self
+
+    def block(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
+        """What is left (r, c) of some candidates' columns, counted from the first candidate's."""
+        e = self._candidates
+        own = e.total[np.ix_(rows + e.fixed, columns + e.fixed)]
+        return np.asarray(own - self._shared[:, rows].T @ self._solved[:, columns])
 
     def told_by_weight(self, candidate: int) -> bool:
         """Whether scales alone tell a candidate of one column from the model."""
@@ -84,21 +122,47 @@ class Schur:
             absorbed = SHARED
         e = self._candidates
         at = np.concatenate([e.blocks[i] for i in candidates]) - e.fixed
-        return gain_of_columns(
-            e, self.matrix[at[:, None], at], self.cross[at], candidates, absorbed
-        )
+        return gain_of_columns(e, self.block(at, at), self.cross[at], candidates, absorbed)
 
     @cached_property
-    def singles(self) -> "Singles":
+    def singles(self) -> list[Gain]:
         """Gain of every candidate alone."""
-        return Singles(self._candidates, self.matrix, self.cross, self._told)
+        e = self._candidates
+        first = np.array([b[0] for b in e.blocks], dtype=int) - e.fixed
+        left = self.diagonal[first]
+        share = left / np.maximum(np.diag(e.total)[e.fixed : -1][first], 1e-300)
+        alive = share >= np.where(self._told[first], SHARED, ABSORBED)
+        chi2 = np.where(alive, self.cross[first] ** 2 / np.where(alive, left, 1.0), 0.0)
+        found = [
+            Gain(*each)
+            for each in zip(chi2.tolist(), alive.astype(int).tolist(), share.tolist(), strict=True)
+        ]
+        for several in e.of_one_shape:
+            for i, gain in zip(several.candidates, self._together(several), strict=True):
+                found[i] = gain
+        return found
+
+    def _together(self, several: "OneShape") -> list[Gain]:
+        """As `gain_of_columns`, of candidates of one shape at once."""
+        e = self._candidates
+        at = several.columns - e.fixed
+        shared, solved = (np.moveaxis(each[:, at], 0, 2) for each in (self._shared, self._solved))
+        left = several.grams - shared @ np.swapaxes(solved, 1, 2)
+        turned = np.swapaxes(several.bases, 1, 2)
+        shares, axes = np.linalg.eigh(turned @ left @ several.bases)
+        alive = shares > ABSORBED
+        z = (np.swapaxes(axes, 1, 2) @ (turned @ self.cross[at][:, :, None]))[:, :, 0]
+        chi2 = np.sum(np.where(alive, z**2 / np.where(alive, shares, 1.0), 0.0), axis=1)
+        each = zip(chi2.tolist(), alive.sum(axis=1).tolist(), shares[:, -1].tolist(), strict=True)
+        return [Gain(*values) for values in each]
 
     def pair_chi2(self, first: Array, second: Array) -> Array:
         """χ² of pairs of candidates of one column each, without those that are collinear."""
         e = self._candidates
         i = np.array([e.blocks[k][0] for k in first]) - e.fixed
         j = np.array([e.blocks[k][0] for k in second]) - e.fixed
-        ii, jj, ij = self.matrix[i, i], self.matrix[j, j], self.matrix[i, j]
+        shared = np.einsum("kp,kp->p", self._shared[:, i], self._solved[:, j])
+        ii, jj, ij = self.diagonal[i], self.diagonal[j], e.total[e.fixed + i, e.fixed + j] - shared
         zi, zj = self.cross[i], self.cross[j]
         determinant = ii * jj - ij**2
         found = (zi**2 * jj - 2 * zi * zj * ij + zj**2 * ii) / np.maximum(determinant, 1e-300)
@@ -123,32 +187,3 @@ def gain_of_columns(
         return Gain(0.0, 0, float(shares.max(initial=0.0)))
     z = turned[:, alive].T @ (basis.T @ cross)
     return Gain(float(np.sum(z**2 / shares[alive])), int(alive.sum()), float(shares[-1]))
-
-
-class Singles:
-    """Gains of single candidates: those with one column all at once, the others when asked for."""
-
-    def __init__(
-        self, candidates: CandidateBases, matrix: Array, cross: Array, told: NDArray[np.bool_]
-    ) -> None:
-        e = candidates
-        self._given = candidates, matrix, cross
-        self._first = np.array([b[0] for b in e.blocks], dtype=int) - e.fixed
-        self._single = np.array([len(b) == 1 for b in e.blocks])
-        own = np.diag(e.total)[e.fixed : -1][self._first]
-        left = np.diag(matrix)[self._first]
-        self._share = left / np.maximum(own, 1e-300)
-        alive = self._share > np.where(told[self._first], SHARED, ABSORBED)
-        products = cross[self._first]
-        self._chi2 = np.where(alive, products**2 / np.where(alive, left, 1.0), 0.0)
-        self._alive = alive
-        self._others: dict[int, Gain] = {}
-
-    def __getitem__(self, i: int) -> Gain:
-        if self._single[i]:
-            return Gain(float(self._chi2[i]), int(self._alive[i]), float(self._share[i]))
-        if i not in self._others:
-            e, matrix, cross = self._given
-            at = e.blocks[i] - e.fixed
-            self._others[i] = gain_of_columns(e, matrix[at[:, None], at], cross[at], (i,), ABSORBED)
-        return self._others[i]

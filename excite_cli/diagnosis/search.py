@@ -33,6 +33,9 @@ class Search:
         """`most` effects at most, and none at the `closed` places."""
         self.judge, self._most, self._closed = judge, most, closed
         self.white, self.plain, self.candidates = judge.white, judge.plain, judge.candidates
+        self._local = {  # of one column and one joint: tried in pairs
+            i for i, c in enumerate(self.candidates) if len(c.rows) == 1 and c.width == 1
+        }
 
     def run(self, start: Sequence[int] = ()) -> list[int]:
         """Search from the declared model, or from those of `start`, until no step lowers J.
@@ -114,8 +117,9 @@ class Search:
         """The candidate that saves most of those that pass."""
         schur = self.white.schur(chosen)
         free = [i for i in self._free(chosen, latest) if schur.singles[i].dof]
+        refined = self.judge.refined_by(chosen)
         saved = {
-            i: schur.singles[i].chi2 - self.judge.price_beside(i, chosen, schur.singles[i].dof)
+            i: schur.singles[i].chi2 - self.judge.price_beside(i, refined, schur.singles[i].dof)
             for i in free
         }
         best: int | None = None
@@ -148,9 +152,7 @@ class Search:
     def _pairs(self, schur: Schur, free: Sequence[int]) -> list[tuple[float, tuple[int, int]]]:
         """What promising pairs of local candidates of one joint, of different kinds, save."""
         found = []
-        local = [
-            i for i in free if len(self.candidates[i].rows) == 1 and self.candidates[i].width == 1
-        ]
+        local = [i for i in free if i in self._local]
         for rows in {self.candidates[i].rows for i in local}:
             own = [i for i in local if self.candidates[i].rows == rows and schur.singles[i].dof]
             own.sort(key=lambda i: -schur.singles[i].chi2)

@@ -15,6 +15,8 @@ from excite_cli.excitation.problem import Problem, acceleration_bounds
 from excite_cli.excitation.reference_states import reference_rows
 from excite_cli.excitation.stack import Stack
 
+_SHOWN = 1e-12  # of the energy of effects' columns
+
 
 @dataclass(frozen=True)
 class Invariants:
@@ -58,10 +60,17 @@ def design_for(problem: Problem) -> FreeDesign:
 
 
 def _information(problem: Problem, stack: Stack) -> Array:
-    """M (r, r) of the base parameters, unscaled; effects are fitted beside them."""
+    """M (r, r) of the base parameters, unscaled; effects are fitted beside them.
+
+    An effect that no motion of the stack shows, as a torque that saturates, takes nothing away.
+    """
     factor = stack.factor / problem.column_scales
     whole, rank = factor.T @ factor, problem.base.rank
     own, beside, others = whole[:rank, :rank], whole[:rank, rank:], whole[rank:, rank:]
     if not others.size:
         return np.asarray(own)
-    return np.asarray(own - beside @ np.linalg.solve(others, beside.T))
+    sizes = np.sqrt(np.diag(others))
+    sizes[sizes == 0.0] = 1.0
+    inverse = np.linalg.pinv(others / np.outer(sizes, sizes), _SHOWN, hermitian=True)
+    beside = beside / sizes
+    return np.asarray(own - beside @ inverse @ beside.T)

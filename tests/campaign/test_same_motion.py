@@ -33,7 +33,7 @@ def played(seed: int, lead: float = 0.0, lag: float = 0.0) -> tuple[np.ndarray, 
 @pytest.mark.parametrize(("lead", "lag"), [(0.0, 0.0), (0.0, 0.05), (3.0, 0.08)])
 def test_its_own_log_is_known(seed: int, lead: float, lag: float) -> None:
     found = compared(motion(seed), played(seed, lead, lag), JOINTS)
-    assert found.reason == ""
+    assert found.reason == found.doubt == ""
     assert found.lag == pytest.approx(lead + lag, abs=0.03)
     assert max(found.off.values()) < 0.05
 
@@ -70,6 +70,17 @@ def test_a_joint_that_stood_still_is_named() -> None:
     assert "1 of 3 joints" in reason
     assert "most elbow" in reason
     assert "it stood still" in reason
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_joint_that_follows_badly_makes_no_other_motion(seed: int) -> None:
+    t, q = played(seed)
+    q[:, 2] = q[0, 2] + 0.55 * (q[:, 2] - q[0, 2])  # sticks, and goes half the way
+    found = compared(motion(seed), (t, q), JOINTS)
+    assert found.reason == ""
+    assert "could not follow" in found.doubt
+    assert "wrist by 4" in found.doubt
+    assert "elbow" not in found.doubt
 
 
 def test_joints_that_are_not_planned_to_move_are_not_judged() -> None:

@@ -100,6 +100,20 @@ def _same_design(first: Problem, problem: Problem) -> FreeDesign:
     return FreeDesign(y.T @ y / 60, 0.0)
 
 
+def test_an_effect_that_no_motion_shows_takes_nothing_away() -> None:
+    """A torque that saturates has no column in motions that stay below it."""
+    problem = load_problem(SMOKE, ["effects=[{kind: viscous_friction}]"])
+    bare = load_problem(SMOKE, ["effects=null"])
+    block = problem.objective().block(_motion(problem))
+    block[:, problem.base.rank :] = 0.0
+    shown = bare.objective().block(_motion(bare))
+    found, same = (
+        invariants(each, Stack.empty(each.columns).with_rows(rows)).torque_deviation
+        for each, rows in ((problem, block), (bare, shown))
+    )
+    assert found == pytest.approx(same, rel=1e-9)
+
+
 def test_the_value_is_the_deviation_of_predicted_torques(problems: list[Problem]) -> None:
     problem = problems[0]
     block = problem.objective().block(_motion(problem))
