@@ -312,8 +312,8 @@ pace from the beginning, which nobody should try on a robot that nobody knows, d
 *Missed, unseen* is what each model misses of the torque of two random motions that took no part,
 where joints move, mean over the joints; noise alone is about 0.2 %.
 
-Of the standing robot, whose motions take minutes to plan, as many motions stand beside the campaign,
-in fewer seconds.
+Of the standing robot, whose motions take minutes to plan, as many motions stand beside the
+campaign, in fewer seconds.
 
 In as many seconds motions at full pace find the same effects, and predict as well or better: most
 of a campaign's seconds are slow ones. What a campaign adds is that nothing is played faster than
