@@ -18,8 +18,8 @@ from excite_cli.robot.model import Array
 _RATE = 100.0  # Hz
 _MOVES = 5e-3  # rad or m, RMS: less may be hidden by how well a robot holds still
 # Of a joint's deviation: arms that swing, and gears that give, are off by a tenth. Over all joints
-# more is another motion (joints that have nothing to do with each other are off by 1.4). A
-# simulated UR10 whose last joint had 1.6 N·m of Stribeck friction was 35 % off there, and nowhere else.
+# more is another motion (joints that have nothing to do with each other are off by 1.4). A MuJoCo
+# UR10 with 1.6 N·m of Stribeck friction on its last joint was 35 % off there, and on no other.
 _OFF = 0.3
 _NOT_PLAYED = 0.7  # of one joint: it stood still, or went its own way
 _WHOLE = 0.95  # of the motion's duration
