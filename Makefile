@@ -66,7 +66,7 @@ scoreboard: $(STAMP)     ## every tool on the same logs, one judge (docs/scorebo
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.scoreboard --readme README.md \
 	  $(if $(wildcard $(FIGAROH)),--figaroh $(FIGAROH)) $(if $(wildcard $(SYSID)),--sysid $(SYSID))
 
-loops: $(STAMP)          ## campaigns on simulated robots, into docs/campaigns.md (an hour and a half)
+loops: $(STAMP)          ## campaigns on simulated robots, into docs/campaigns.md (two hours)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.closed_loops --page docs/campaigns.md
 
 trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism (an hour; root)
