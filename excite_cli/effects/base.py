@@ -84,7 +84,6 @@ class Effect(ABC):
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
     # Its columns are the whole torque of the model: other effects of its joints are in them.
     of_whole_torque: ClassVar[bool] = False
-    cuts_torque: ClassVar[bool] = False  # it hides what other effects add to its joints' torque
     # What tells its size where inertias take it up, as a person may declare it.
     settled_by: ClassVar[str] = ""
     # A body that one joint carries: part of the load of joints, and named by its link if one likes.
@@ -339,6 +338,10 @@ class Effect(ABC):
 
     def forgets_over(self) -> tuple[tuple[int, float], ...]:
         """Joints and ways [rad] that they must have gone in a run before columns are right."""
+        return ()
+
+    def cuts_at(self) -> tuple[tuple[int, float], ...]:
+        """Joints and torques that no reading exceeds, whatever else adds to them there."""
         return ()
 
     def curve(self, signals: Signals, every: Sequence[Signals]) -> Array | None:

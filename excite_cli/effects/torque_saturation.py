@@ -37,7 +37,6 @@ class TorqueSaturation(Effect):
     parameters: ClassVar = (whole_share("sharpness"),)
     shapes: ClassVar = (Parameter("level", "N·m", 0.1, 1000.0),)
     data_defect: ClassVar = True
-    cuts_torque: ClassVar = True
     tier: ClassVar = Tier.LAST
     known_by: ClassVar = "level"
     settings: ClassVar[Mapping[str, float]] = {"actuator": 0.0}
@@ -70,6 +69,10 @@ class TorqueSaturation(Effect):
             return []
         levels = np.unique(np.quantile(np.concatenate(measured), _MEASURED))
         return [{"level": float(level)} for level in levels if level > 0]
+
+    def cuts_at(self) -> tuple[tuple[int, float], ...]:
+        """At the level."""
+        return ((self.joints[0], self.shape["level"]),)
 
     def leftover(self, values: Array) -> float:
         """The form of a cut-off is not known exactly."""

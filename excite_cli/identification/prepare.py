@@ -126,7 +126,7 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
         if processing.position_cutoff is not None:
             earlier = _smooth(earlier, processing.position_cutoff, fs, run.label)
         past = np.concatenate([earlier, past])
-    counted &= left_out.on_the_way(q[inside], past)
+    counted &= left_out.on_the_way(q[inside], past) & left_out.below_cuts(run.tau[inside])
     # The very same weights for the columns: left out at the working rate, other stretches of time
     # would be, and the torque would lag by milliseconds.
     to_full_rate = interpolation(len(t), stride, len(counted))

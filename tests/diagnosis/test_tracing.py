@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis import tracing
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.left_out import LeftOut
@@ -18,17 +19,21 @@ class Fit(SimpleNamespace):
         return bool(self.places == other.places)
 
 
+class Named(str):
+    """An effect by its name; some cut the torque."""
+
+    def cuts_at(self) -> tuple[tuple[int, float], ...]:
+        """`cut5` cuts joint 0 at 5."""
+        return ((0, float(self[3:])),) if self.startswith("cut") else ()
+
+
 def answer_of(
-    monkeypatch: pytest.MonkeyPatch,
-    found: list[str],
-    errors: list[float],
-    known: str = "",
-    hidden: str = "",
+    monkeypatch: pytest.MonkeyPatch, found: list[str], errors: list[float], known: str = ""
 ) -> tuple[str, list[str]]:
     """What the traced answer found, and what the passes began from, in order.
 
-    `known`: what was found in more of the same data, to begin from; `hidden`: what has more in it
-    than a cut of the torque lets through.
+    `known`: what was found in more of the same data, to begin from. A pass that begins from `rest`,
+    what is beside a cut, finds `clean`.
     """
     began: list[str] = []
     taken: list[Any] = []
@@ -36,15 +41,16 @@ def answer_of(
     def one_pass(*arguments: Any) -> Any:
         fit, attempt = arguments[-2:]
         began.append(fit.name)
+        name = "clean" if fit.name == "rest" else found[attempt]
         return SimpleNamespace(
-            name=found[attempt], chosen=(), candidates=(), attempt=attempt, taken=taken[-1:]
+            name=name, chosen=(), candidates=(), attempt=attempt, taken=taken[-1:]
         )
 
     def fit_of(_: Any, traced: Any) -> Fit:
-        return Fit(name=traced.name, places={traced.name}, effects=(traced.name,))
+        return Fit(name=traced.name, places={traced.name}, effects=(Named(traced.name),))
 
-    def by(effects: Any) -> tuple[str, ...]:
-        return tuple(effects)
+    def by(effects: Any, cutting: Any = ()) -> tuple[str, ...]:
+        return (*effects, *(f"without {each}" for each in cutting))
 
     def prepared(left_out: Any) -> list[str]:
         taken.append(left_out)
@@ -64,16 +70,14 @@ def answer_of(
     monkeypatch.setattr(tracing, "fit_of", fit_of)
     monkeypatch.setattr(tracing, "_one_pass", one_pass)
     monkeypatch.setattr(tracing, "_left_out", lambda traced: errors[traced.attempt])
-    fewer = Fit(name="fewer", places={"fewer"}, effects=())
-    monkeypatch.setattr(
-        tracing, "without_cut_off", lambda fit: fewer if hidden and fit.name == hidden else fit
-    )
+    rest = Fit(name="rest", places={"rest"}, effects=())
+    monkeypatch.setattr(tracing, "beside_cuts", lambda fit: rest)
+    monkeypatch.setattr(tracing, "_without_kinds", lambda spec, effects: spec)
     model: Any = SimpleNamespace(declared=())
     nothing: Any = None
     begin: Any = (known,) if known else ()
     traced: Any = tracing.trace(model, nothing, prepared, (), (), lambda *_: None, begin)
-    first = 2 if known else 0
-    before = found[traced.attempt - 1] if traced.attempt > first else known or "declared"
+    before = began[-1]
     # The answer's own samples: those that the pass before it left.
     assert traced.taken == [(before,) if before != "declared" else ()]
     return traced.name, began
@@ -112,30 +116,33 @@ def test_what_was_found_in_more_of_the_data_is_known_well_but_is_found_anew(
     assert answer == ("b", ["a", "b", "c", "d", "a"])
 
 
-def test_what_a_cut_hides_is_left_to_be_found_anew() -> None:
-    """A contact in one run on the joint that saturates goes, one on other joints stays."""
-    kinds, window = catalogue(), {"start": 0.0, "end": 1.0}
+def test_a_cut_leaves_what_is_beside_it() -> None:
+    kinds = catalogue()
     effects = (
         kinds["spring"]((0,)),
-        kinds["contact"]((0, 1), window, ("run_2",)),
-        kinds["contact"]((2, 3), window, ("run_2",)),
         kinds["torque_saturation"]((1,), {"level": 3.0}),
+        kinds["viscous_friction"]((1,)),
     )
     sizes = [len(each.parameters) for each in effects]
     values = np.concatenate([[0.5, 0.6], *(np.full(w, k) for k, w in enumerate(sizes))])
-    fit = tracing.Fit(np.zeros(10), effects, values, np.ones(4), 1.0)
-    fewer = tracing.without_cut_off(fit)
-    assert fewer.effects == (effects[0], effects[2], effects[3])
-    assert fewer.values.tolist() == [0.5, 0.6, *sizes[0] * [0], *sizes[2] * [2], *sizes[3] * [3]]
-    assert tracing.without_cut_off(fewer).effects == fewer.effects
+    rest = tracing.beside_cuts(tracing.Fit(np.zeros(10), effects, values, np.ones(4), 1.0))
+    assert rest.effects == (effects[0], effects[2])
+    assert rest.values.tolist() == [0.5, 0.6, *sizes[0] * [0], *sizes[2] * [2]]
 
 
-def test_a_pass_without_what_was_hidden_comes_before_the_end(
+def test_what_is_beside_a_cut_is_looked_for_without_its_samples(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Once: what is found again stays."""
-    found = ["both", "both", "one", "one", "", ""]
-    answer = answer_of(monkeypatch, found, [1.0] * 6, hidden="both")
-    assert answer == ("one", ["declared", "both", "fewer", "one"])
-    answer = answer_of(monkeypatch, ["both"] * 6, [1.0] * 6, hidden="both")
-    assert answer == ("both", ["declared", "both", "fewer", "both"])
+    """And once more where the cut turns out to lie elsewhere; then the cut is found anew."""
+    found = ["cut4", "cut5", "cut5.1", "cut5.1", "", ""]
+    name, began = answer_of(monkeypatch, found, [1.0] * 6)
+    assert name == "cut5.1"
+    assert began == ["declared", "rest", "clean", "rest", "clean", "cut5.1"]
+
+
+def test_a_search_without_cuts_knows_no_kind_of_them() -> None:
+    cut = catalogue()["torque_saturation"]((1,), {"level": 3.0})
+    blind = tracing._without_kinds(DiagnosisSpec(exclude=["backlash"]), [cut])
+    assert (blind.exclude, blind.rounds) == (["backlash", "torque_saturation"], 60)
+    alone = DiagnosisSpec(kinds=["torque_saturation"])
+    assert tracing._without_kinds(alone, [cut]).rounds == 0

@@ -35,6 +35,15 @@ def test_it_is_what_effects_ask_for() -> None:
     assert LeftOut.by(effects) == LeftOut(((0, 1, -1.0),), ((0, 0.08), (1, 0.04)))
 
 
+def test_readings_near_a_cut_are_left_out_of_its_joint() -> None:
+    cut = kind_named("torque_saturation")((1,), {"level": 10.0})
+    tau = np.array([[20.0, 9.0], [20.0, -9.9], [20.0, 10.1], [20.0, -3.0]])
+    assert LeftOut.by([cut]).below_cuts(tau).all()  # only where it is asked for
+    below = LeftOut.by([], [cut]).below_cuts(tau)
+    assert below[:, 0].all()
+    assert below[:, 1].tolist() == [True, False, False, True]
+
+
 def test_a_fit_uses_nothing_of_it() -> None:
     t = np.arange(2000) / 200.0
     q = np.stack([np.sin(t), np.cos(1.3 * t)], axis=1)
