@@ -30,5 +30,6 @@ def test_friction_of_a_joint_whose_torque_is_cut_is_named(
     ratio = found["load_dependent_friction"]["parameters"]["ratio"]["value"]
     # A third of the samples is left for it, and the others hold it to its first estimate.
     assert ratio == pytest.approx(RATIO, rel=0.1)
-    assert found["torque_saturation"]["shape"]["level"] == pytest.approx(LEVEL, rel=0.01)
+    level = found["torque_saturation"]["parameters"]["level"]["value"]
+    assert level == pytest.approx(LEVEL, rel=0.01)
     assert answer["error"]["after"]["relative_moving"]["shoulder_pitch"] < 0.006
