@@ -173,8 +173,10 @@ class Evidence:
         shared = self.total[at, self.fixed : self.torque]
         solved = self.factor(chosen).solve(shared)
         cross = self.total[self.fixed : -1, -1] - solved.T @ self.total[at, self.torque]
-        found = Schur(self._candidates, shared, solved, cross)
-        return found.heed_weight(self._told_by_weight(chosen, found.diagonal))
+        own = np.diag(self.total)[self.fixed : -1]
+        left = own - np.einsum("kp,kp->p", shared, solved)
+        told = self._told_by_weight(chosen, left)
+        return Schur(self._candidates, (shared, solved), left, cross, told)
 
     def _told_by_weight(self, chosen: Sequence[int], left: Array) -> NDArray[np.bool_]:
         """Columns of candidates of which next to nothing is left without what was weighed.

@@ -88,19 +88,20 @@ class Schur:
     """
 
     def __init__(
-        self, candidates: CandidateBases, shared: Array, solved: Array, cross: Array
+        self,
+        candidates: CandidateBases,
+        products: tuple[Array, Array],
+        diagonal: Array,
+        cross: Array,
+        told_by_weight: NDArray[np.bool_],
     ) -> None:
-        """`shared` (k, p) is G_Sc, `solved` (k, p) N⁻¹ G_Sc, `cross` (p,) z of all columns."""
-        self._candidates, self._shared, self._solved = candidates, shared, solved
-        self.cross = cross
-        own = np.diag(candidates.total)[candidates.fixed : -1]
-        self.diagonal = own - np.einsum("kp,kp->p", shared, solved)
-        self._told = np.zeros(len(cross), bool)
+        """`products` (k, p) are G_Sc and N⁻¹ G_Sc, `diagonal` and `cross` (p,) of Z and z.
 
-    def heed_weight(self, told: NDArray[np.bool_]) -> "Schur":
-        """`told` (p,): columns that scales tell from the model, and data do not."""
-        self._told = told
-        return self
+        `told_by_weight` (p,): columns that scales tell from the model, and data do not.
+        """
+        self._candidates, self.diagonal, self.cross = candidates, diagonal, cross
+        self._shared, self._solved = products
+        self._told = told_by_weight
 
     def block(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
         """What is left (r, c) of some candidates' columns, counted from the first candidate's."""
@@ -131,7 +132,7 @@ class Schur:
         first = np.array([b[0] for b in e.blocks], dtype=int) - e.fixed
         left = self.diagonal[first]
         share = left / np.maximum(np.diag(e.total)[e.fixed : -1][first], 1e-300)
-        alive = share >= np.where(self._told[first], SHARED, ABSORBED)
+        alive = share > np.where(self._told[first], SHARED, ABSORBED)
         chi2 = np.where(alive, self.cross[first] ** 2 / np.where(alive, left, 1.0), 0.0)
         found = [
             Gain(*each)
