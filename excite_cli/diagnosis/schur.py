@@ -143,7 +143,7 @@ class Schur:
                 found[i] = gain
         return found
 
-    def _together(self, several: "OneShape") -> list[Gain]:
+    def _together(self, several: OneShape) -> list[Gain]:
         """As `gain_of_columns`, of candidates of one shape at once."""
         e = self._candidates
         at = several.columns - e.fixed
@@ -154,7 +154,9 @@ class Schur:
         alive = shares > ABSORBED
         z = (np.swapaxes(axes, 1, 2) @ (turned @ self.cross[at][:, :, None]))[:, :, 0]
         chi2 = np.sum(np.where(alive, z**2 / np.where(alive, shares, 1.0), 0.0), axis=1)
-        each = zip(chi2.tolist(), alive.sum(axis=1).tolist(), shares[:, -1].tolist(), strict=True)
+        # Columns of nothing, of an effect that these data do not show, have no direction at all.
+        most = shares.max(axis=1, initial=0.0)
+        each = zip(chi2.tolist(), alive.sum(axis=1).tolist(), most.tolist(), strict=True)
         return [Gain(*values) for values in each]
 
     def pair_chi2(self, first: Array, second: Array) -> Array:
