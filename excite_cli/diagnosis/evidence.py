@@ -195,11 +195,6 @@ class Evidence:
         """Normalised Gram matrices of the folds (F, K, K)."""
         return self.grams.by_fold() / np.outer(self.norms, self.norms)
 
-    @cached_property
-    def _first_sides(self) -> Array:
-        """The same of their first sides."""
-        return self.grams.by_fold(first_side=True) / np.outer(self.norms, self.norms)
-
     def _part(
         self,
         folds: Sequence[int],
@@ -210,9 +205,8 @@ class Evidence:
         """Gram matrix (k + 1, k + 1) of some folds' rows of some joints, the torque last."""
         both = np.append(at, self.torque)
         everywhere = joints is None or len(joints) == len(self.grams.joints)
-        if everywhere and len(folds) == 1:
-            of_folds = self._first_sides if first_side else self._folds
-            return np.asarray(of_folds[folds[0], both[:, None], both])
+        if everywhere and len(folds) == 1 and not first_side:
+            return np.asarray(self._folds[folds[0], both[:, None], both])
         rows = range(len(self.grams.joints)) if joints is None else joints
         norms = self.norms[both]
         return self.grams.on(folds, rows, both, first_side) / (norms[:, None] * norms)

@@ -57,17 +57,16 @@ class Grams:
             self._add(found, fold)
         return found
 
-    def by_fold(self, first_side: bool = False) -> Array:
-        """Sums (F, K, K) over joints, of the first sides only if they are asked for."""
+    def by_fold(self) -> Array:
+        """Sums (F, K, K) over joints."""
         found = np.zeros((self.folds, self.size, self.size))
         for fold in range(self.folds):
-            self._add(found[fold], fold, first_side)
+            self._add(found[fold], fold)
         return found
 
-    def _add(self, to: Array, fold: int, first_side: bool = False) -> None:
+    def _add(self, to: Array, fold: int) -> None:
         for joint, active in zip(self.joints, self._active, strict=True):
-            grams = joint.first if first_side else joint.whole
-            to[np.ix_(active, active)] += grams[fold]
+            to[np.ix_(active, active)] += joint.whole[fold]
 
     def seen(self) -> Array:
         """Energy (F, K) of every column in every fold."""
