@@ -67,7 +67,7 @@ def _plot(done: list[Round]) -> Plot:
         logarithmic=bool((before > 0).all() and (after > 0).all()),
     )
     precision = Panel(
-        "torques known to [noise of a sample]",
+        "torques known to [1]",
         (Series("torque deviation", known, "green", "joined"),),
         height=150,
     )
@@ -78,7 +78,8 @@ def _plot(done: list[Round]) -> Plot:
         "round",
         numbers,
         (errors, precision) if np.isfinite(known).any() else (errors,),
-        caption="Errors are those on the newest motion of each round, which took no part.",
+        caption="Errors are those on the newest motion of each round, which took no part; torques at "
+        "random states are known to that share of one sample's noise.",
         wide=True,
         counted=True,
     )
