@@ -78,8 +78,8 @@ def _plot(done: list[Round]) -> Plot:
         "round",
         numbers,
         (errors, precision) if np.isfinite(known).any() else (errors,),
-        caption="Errors are those on the newest motion of each round, which took no part; torques at "
-        "random states are known to that share of one sample's noise.",
+        caption="Errors are those on the newest motion of each round, which took no part; torques "
+        "at random states are known to that share of one sample's noise.",
         wide=True,
         counted=True,
     )
