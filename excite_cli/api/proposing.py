@@ -13,10 +13,12 @@ from excite_cli.proposal.joints import choose_joints
 from excite_cli.proposal.limbs import limbs
 from excite_cli.proposal.propose import Proposal, Request
 from excite_cli.proposal.propose import propose as propose_config
+from excite_cli.robot.allowed_files import Needed as Needed
 from excite_cli.robot.description import EXAMPLE_PREFIX as EXAMPLE_PREFIX
 from excite_cli.robot.description import example_robots as example_robots
 from excite_cli.robot.description import is_named as is_named
-from excite_cli.robot.description import load_description
+from excite_cli.robot.package_search import Allow as Allow
+from excite_cli.robot.package_search import allow_nothing, load_with_folders
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note
@@ -37,6 +39,7 @@ def propose(
     xacro_args: Mapping[str, str] | None = None,
     srdf: str | Path | None = None,
     overrides: Sequence[str] = (),
+    allow: Allow = allow_nothing,
 ) -> Proposal:
     """A config for a robot of which nothing but the URDF is known: `excite init`.
 
@@ -44,13 +47,15 @@ def propose(
     or `robot_descriptions:<name>`; `joints` those to move, none for a choice of ours;
     `package_dirs` and `xacro_args` as under `robot` in a config; `srdf` a file with postures and
     pairs not to check, else one beside the URDF is taken; `overrides` (`key.path=value`) stand in
-    place of what is chosen. The `text` of what is returned is the YAML file, `notes` say what was
-    chosen and why.
+    place of what is chosen; `allow` is asked whether the robot's files may read a folder outside
+    their own (`package_dirs` answers beforehand). The `text` of what is returned is the YAML file,
+    `notes` say what was chosen and why.
 
     Raises
     ------
     RobotError, ConfigError
-        The robot lacks what a plan needs; a joint is unknown.
+        The robot lacks what a plan needs, or may not read what it asks for (`OutsideError`); a
+        joint is unknown.
     NoAdmissibleMotionError
         No posture of the robot is clear of its limits.
 
@@ -70,6 +75,7 @@ def propose(
             dict(xacro_args or {}),
             None if srdf is None else Path(srdf),
             tuple(overrides),
+            allow,
         )
     )
 
@@ -85,6 +91,7 @@ def save_proposal(
     xacro_args: Mapping[str, str] | None = None,
     srdf: str | Path | None = None,
     overrides: Sequence[str] = (),
+    allow: Allow = allow_nothing,
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Answer:
@@ -109,8 +116,9 @@ def save_proposal(
         folder = path.resolve().parent
         source = str(robot) if known else _from(Path(robot), folder)
         dirs = tuple(_from(Path(each), folder) for each in package_dirs)
-        # A wrong name is reported at once.
-        load_description(source, dirs, folder, xacro_args)
+        # A wrong name is reported at once, and what may be read is asked first.
+        _, needed = load_with_folders(source, dirs, folder, xacro_args, allow)
+        allowed = {each.folder for each in needed}
         text = f"looking at {name}: capsules and tables of its meshes take longest, once"
         tell(Note(Level.INFO, text))
         found = propose(
@@ -122,14 +130,22 @@ def save_proposal(
             xacro_args=xacro_args,
             srdf=srdf,
             overrides=overrides,
+            allow=lambda each: each.folder in allowed,
         )
         write_text_atomically(path, found.text)
         return proposal_answer(found, source, str(path))
 
 
-def limbs_of(robot: str) -> dict[str, tuple[str, ...]]:
+def limbs_of(
+    robot: str,
+    package_dirs: Sequence[str | Path] = (),
+    xacro_args: Mapping[str, str] | None = None,
+    allow: Allow = allow_nothing,
+) -> dict[str, tuple[str, ...]]:
     """The joints that would be moved, by the limb they belong to."""
-    return limbs(choose_joints(survey(load_description(robot)).joints, robot).chosen)
+    dirs = tuple(map(str, package_dirs))
+    description, _ = load_with_folders(robot, dirs, Path.cwd(), xacro_args, allow)
+    return limbs(choose_joints(survey(description).joints, robot).chosen)
 
 
 def _from(urdf: Path, folder: Path) -> str:

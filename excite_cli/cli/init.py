@@ -47,6 +47,13 @@ def init(
         Path | None,
         typer.Option("--srdf", help="Postures and pairs not to check. Default: beside the URDF."),
     ] = None,
+    allow_found: Annotated[
+        bool,
+        typer.Option(
+            "--allow-found",
+            help="Read packages and meshes found outside the robot's folder, without asking.",
+        ),
+    ] = False,
     overrides: options.Set = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
@@ -60,27 +67,35 @@ def init(
     a posture clear of limits and of itself, and a pace that suits the slowest joint. Without
     --robot and --urdf, the terminal is asked.
 
+    A robot's files read their own folder (or ROS package) and those of --package-dirs. What they
+    ask for elsewhere is looked for, and read after a yes at the terminal, or with --allow-found;
+    the config lists it under robot.package_dirs.
+
     Example:  excite init --robot ur10
 
     Example:  excite init --urdf arm.urdf.xacro --xacro-arg gripper=none
 
     Example:  excite init --robot ur10 --set sequence.motions=5
     """
-    from excite_cli.api.proposing import EXAMPLE_PREFIX, is_named, save_proposal
+    from excite_cli.api.proposing import EXAMPLE_PREFIX, is_named, limbs_of, save_proposal
     from excite_cli.api.threads import single_threaded
-    from excite_cli.cli.init_questions import Answers, ask
+    from excite_cli.cli.init_questions import Answers, ask, may_read
     from excite_cli.errors import ConfigError
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     if robot is not None and urdf is not None:
         raise ConfigError("--robot and --urdf both name a robot: give one of them.")
+    interactive = sys.stdin.isatty() and sys.stderr.isatty() and not (as_json or quiet)
+    allow = may_read(allow_found, interactive)
+    arguments = _pairs(xacro_args or ())
     chosen = tuple(filter(None, (name.strip() for name in (joints or "").split(","))))
     if robot is not None:
         answers = Answers(robot if is_named(robot) else f"{EXAMPLE_PREFIX}{robot}", output, chosen)
     elif urdf is not None:
         answers = Answers(str(urdf), output, chosen)
-    elif sys.stdin.isatty() and sys.stderr.isatty() and not (as_json or quiet):
-        answers = ask(output, chosen)
+    elif interactive:
+        own = package_dirs or ()
+        answers = ask(output, chosen, lambda each: limbs_of(each, own, arguments, allow))
     else:
         raise ConfigError(
             "init needs a robot: --robot NAME (`excite robots` lists them) or --urdf FILE. At "
@@ -93,9 +108,10 @@ def init(
             joints=answers.joints,
             base=base,
             package_dirs=package_dirs or (),
-            xacro_args=_pairs(xacro_args or ()),
+            xacro_args=arguments,
             srdf=srdf,
             overrides=overrides or (),
+            allow=allow,
             overwrite=overwrite,
             tell=terminal.tell,
         )

@@ -1,11 +1,16 @@
 """What `excite init` asks at a terminal when no robot is given."""
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from excite_cli.errors import RobotError, nearest
+
+if TYPE_CHECKING:
+    from excite_cli.api.proposing import Allow, Needed
 
 
 @dataclass(frozen=True)
@@ -17,9 +22,35 @@ class Answers:
     joints: tuple[str, ...]
 
 
-def ask(output: Path | None, joints: tuple[str, ...]) -> Answers:
-    """Ask for the robot, the limbs to move and the file, each with a default."""
-    from excite_cli.api.proposing import EXAMPLE_PREFIX, example_robots, limbs_of
+def may_read(allow_found: bool, at_terminal: bool) -> "Allow":
+    """Whether a robot's files may read a folder outside their own: asked once for each.
+
+    allow_found: yes to what was found by its package or beside the robot; at_terminal: a person is
+    there to be asked.
+    """
+    answers: dict[str, bool] = {}
+
+    def allow(needed: "Needed") -> bool:
+        if (allow_found and needed.near) or not at_terminal:
+            return allow_found and needed.near
+        if str(needed) not in answers:
+            question = f"The robot asks for {needed}, outside its own folder. Read that folder?"
+            answers[str(needed)] = typer.confirm(question, default=False, err=True)
+        return answers[str(needed)]
+
+    return allow
+
+
+def ask(
+    output: Path | None,
+    joints: tuple[str, ...],
+    limbs: Callable[[str], Mapping[str, Sequence[str]]],
+) -> Answers:
+    """Ask for the robot, the limbs to move and the file, each with a default.
+
+    limbs: the joints of a robot by the limb they belong to.
+    """
+    from excite_cli.api.proposing import EXAMPLE_PREFIX, example_robots
 
     known = example_robots()
     while True:
@@ -31,14 +62,14 @@ def ask(output: Path | None, joints: tuple[str, ...]) -> Answers:
     is_file = name not in known
     robot = str(Path(word).expanduser()) if is_file else f"{EXAMPLE_PREFIX}{name}"
     if not joints:
-        groups = limbs_of(str(Path(robot).resolve()) if is_file else robot)
+        groups = limbs(str(Path(robot).resolve()) if is_file else robot)
         if len(groups) > 1:
             joints = _of_groups(groups, sum(map(len, groups.values())))
     default = output or Path(f"{Path(robot).stem if is_file else name}.yaml")
     return Answers(robot, Path(str(_asked("Write to", str(default)))), joints)
 
 
-def _of_groups(groups: dict[str, tuple[str, ...]], count: int) -> tuple[str, ...]:
+def _of_groups(groups: Mapping[str, Sequence[str]], count: int) -> tuple[str, ...]:
     """Joints of the groups that are requested; none for all."""
     typer.echo("Joints to move:", err=True)
     typer.echo(f"  0  all {count}", err=True)

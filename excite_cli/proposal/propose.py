@@ -19,9 +19,9 @@ from excite_cli.proposal.posture import FirstPosture, first_posture
 from excite_cli.proposal.settle import Comments, Settled, Tree, settle
 from excite_cli.proposal.shapes import Shapes, choose_shapes
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
-from excite_cli.robot.description import RobotDescription, load_description
+from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.model import build_robot
-from excite_cli.robot.package_search import package_folders
+from excite_cli.robot.package_search import Allow, allow_nothing, load_with_folders
 from excite_cli.robot.reference_postures import reference_posture
 from excite_cli.robot.srdf import read_srdf, srdf_near
 from excite_cli.robot.urdf_joints import UrdfSurvey
@@ -54,7 +54,8 @@ class Request:
 
     urdf: as robot.urdf says it; folder: that of the config, from which paths start; joints: to
     move, empty for a choice of ours; package_dirs, xacro_args: as under robot; srdf: a file, else
-    those near the URDF are looked at; overrides: `key.path=value`, of what is proposed.
+    those near the URDF are looked at; overrides: `key.path=value`, of what is proposed; allow:
+    whether a folder outside the robot's own may be read.
     """
 
     urdf: str
@@ -65,6 +66,7 @@ class Request:
     xacro_args: Mapping[str, str] = field(default_factory=dict)
     srdf: Path | None = None
     overrides: tuple[str, ...] = ()
+    allow: Allow = allow_nothing
 
 
 @dataclass(frozen=True, repr=False)
@@ -88,18 +90,19 @@ def propose(request: Request) -> Proposal:
     ------
     RobotError
         The robot lacks what a plan needs; the message names it.
+    OutsideError
+        The robot asks for files that it may not read.
     ConfigError
         A joint that is requested is unknown or cannot be moved.
     NoAdmissibleMotionError
         No posture of the robot is clear of its limits.
     """
     dirs, arguments = request.package_dirs, request.xacro_args
-    description = load_description(request.urdf, dirs, request.folder, arguments)
-    packages = package_folders(description)
-    if packages:
-        more = (_written(folder, request.folder) for folder in packages.values())
-        dirs = tuple(dict.fromkeys((*dirs, *more)))
-        description = load_description(request.urdf, dirs, request.folder, arguments)
+    description, allowed = load_with_folders(
+        request.urdf, dirs, request.folder, arguments, request.allow
+    )
+    more = (_written(each.folder, request.folder) for each in allowed)
+    dirs = tuple(dict.fromkeys((*dirs, *more)))
     source = description.path.name
     shapes = choose_shapes(description)
     assumed = not shapes.facts.mass > 0
@@ -111,8 +114,7 @@ def propose(request: Request) -> Proposal:
     choice = choose_joints(facts.joints, source, request.joints)
     joints = plan_limits(choice.chosen)
     notes = [*description.notes, *choice.in_words()]
-    for name, folder in packages.items():
-        notes.append(f"meshes of {name} are taken from {folder}")
+    notes += [f"allowed to read {each}" for each in allowed]
     names = tuple(joint.name for joint in joints)
     known = [read_srdf(request.srdf)] if request.srdf else srdf_near(description.path)
     posture = first_posture(joints, reference_posture(known, description.path, names))
@@ -169,7 +171,7 @@ def _draft(
     robot: Tree = {"urdf": request.urdf}
     if dirs:
         robot["package_dirs"] = list(dirs)
-        comments["robot", "package_dirs"] = "hold the meshes that the URDF names"
+        comments["robot", "package_dirs"] = "folders beyond its own that the robot's files may read"
     if request.xacro_args:
         robot["xacro_args"] = dict(request.xacro_args)
     robot["base"] = request.base

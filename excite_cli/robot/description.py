@@ -2,8 +2,8 @@
 
 `RobotDescription` proves that the file exists, is XML without a document type (no entity tricks),
 and is one tree of links and joints of a sane size (`urdf_check`). It names the folders from which
-meshes may be read (`mesh_paths`): its own, the packages of `package_dirs`, and the
-example-robot-data package.
+files may be read (`allowed_files`): its own, those of `package_dirs`, and for a robot of
+example-robot-data that package.
 Continuous joints become revolute ones without bounds, so that one coordinate is one velocity, and
 right angles that were rounded become exact.
 """
@@ -20,6 +20,7 @@ from pathlib import Path
 
 from excite_cli.errors import RobotError, nearest
 from excite_cli.given_files import require_stored
+from excite_cli.robot.allowed_files import own_folder
 from excite_cli.robot.descriptions_package import PREFIX, Found, find_description
 from excite_cli.robot.dialects import put_into_standard
 from excite_cli.robot.formats.base import Asked
@@ -142,7 +143,7 @@ def load_description(
     tree = parsed(path, found.text)
     strange = put_into_standard(tree)
     followers, loops = mimics(path, tree), closed_loops(tree)
-    packages = (*dirs, str(_share_folder(path)), str(path.parent), *found.folders)
+    packages = (*dirs, str(own_folder(path)), str(path.parent), *found.folders)
     return RobotDescription(
         name=path.stem.removesuffix(".urdf"),
         source=urdf,
@@ -175,7 +176,7 @@ def _file(urdf: str, root: Path) -> Found:
                 f"robot.urdf: example-robot-data has no robot '{name}'."
                 f"{nearest(name, known)} `excite robots` lists all {len(known)}."
             )
-        return Found(known[name])
+        return Found(known[name], (str(example_robots_folder().parent),))
     path = (root / urdf).resolve()
     if path.exists():
         require_stored(path)
@@ -204,14 +205,6 @@ def require_limits(description: RobotDescription) -> None:
                 'no <limit>, which a URDF must give: <limit lower="…" upper="…" velocity="…" '
                 'effort="…"/>. A joint that turns without end is of type continuous.'
             )
-
-
-def _share_folder(path: Path) -> Path:
-    """Folder above the ROS package that the URDF lies in, else the URDF's own folder."""
-    for folder in path.parents:
-        if (folder / "package.xml").is_file():
-            return folder.parent
-    return path.parent
 
 
 def _read(path: Path) -> str:

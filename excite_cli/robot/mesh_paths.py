@@ -6,6 +6,9 @@ package after it, `file://…`, and plain paths, relative to the URDF or to one 
 is read must lie in one of these folders, by whatever links it is reached.
 """
 
+import contextlib
+import json
+import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -15,12 +18,13 @@ from urllib.parse import unquote
 
 from excite_cli.errors import RobotError
 from excite_cli.robot.description import EXAMPLE_PREFIX, RobotDescription
-from excite_cli.robot.mesh_trial import faults
+from excite_cli.robot.mesh_trial import MAX_BYTES, faults
 from excite_cli.robot.packages import package_in, variables_in_words
 
 Kind = Literal["collision", "visual"]
 
 _OF_PACKAGES = ("package://", "model://")
+_MATERIALS = re.compile(rb"^[ \t]*mtllib[ \t]+(.+?)[ \t\r]*$", re.MULTILINE)
 _LONGEST = 200  # characters of a name that are told
 
 
@@ -45,6 +49,7 @@ class MeshFiles:
             package, inside = package_of(spelling)
             if package:
                 yield from (folder / package / inside for folder in self.folders)
+                yield from (each / inside for each in self.folders if each.name == package)
                 yield from (folder / inside for folder in self._folders_of(package))
             else:
                 yield from (folder / inside for folder in (self._near, *self.folders))
@@ -129,13 +134,35 @@ def unusable(description: RobotDescription, kind: Kind) -> dict[str, Unusable]:
                 "meant, add its folder to robot.package_dirs"
             )
             wrong.setdefault(link, Unusable(leaves))
+        elif outer := next((each for each in _named_by(path) if not files.may_read(each)), None):
+            leaves = f"the mesh {path} names {outer}, outside the robot's own folders"
+            wrong.setdefault(link, Unusable(leaves))
         else:
             named.setdefault(path, []).append(link)
     if not description.source.startswith(EXAMPLE_PREFIX):
-        for path, fault in faults(list(named), any_format=kind != "collision").items():
+        for path, fault in faults(list(named), files.folders, kind != "collision").items():
             for link in named[path]:
                 wrong.setdefault(link, Unusable(fault))
     return wrong
+
+
+def _named_by(mesh: Path) -> Iterator[Path]:
+    """Files that a mesh names in its turn: buffers of glTF, materials of OBJ; resolved."""
+    if mesh.stat().st_size > MAX_BYTES:
+        return  # refused
+    names: list[str] = []
+    if mesh.suffix.lower() == ".gltf":
+        with contextlib.suppress(ValueError, AttributeError, TypeError):
+            tree = json.loads(mesh.read_bytes())
+            parts = (*tree.get("buffers", ()), *tree.get("images", ()))
+            names = [str(part["uri"]) for part in parts if "uri" in part]
+    elif mesh.suffix.lower() == ".obj":
+        names = [name.decode(errors="replace") for name in _MATERIALS.findall(mesh.read_bytes())]
+    for name in names:
+        if not name.startswith("data:"):
+            there = mesh_file(mesh.parent / unquote(name.strip()))
+            if there is not None:
+                yield there
 
 
 def _missing(description: RobotDescription, kind: Kind, name: str, files: MeshFiles) -> Unusable:

@@ -2,8 +2,8 @@
 
 The library that reads meshes (assimp) can be led by a damaged file to end its process, to fill
 memory or to run on; nothing in this process can hold it then. `faults` starts a process with
-limits of time and memory that reads the files as `coal` does, once for each content. The process is
-this module's `serve`, asked by lines on stdin.
+limits of time and memory, confined to the robot's folders, that reads the files as `coal` does,
+once for each content. The process is this module's `serve`, asked by lines on stdin.
 """
 
 import atexit
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from excite_cli.robot.apart import OUT_OF_TIME, command, environment, limit_memory, set_alarm
+from excite_cli.robot.confinement import confine
 
 SUFFIXES = (".stl", ".dae", ".obj", ".ply")
 MAX_BYTES = 100 * 2**20  # of a mesh
@@ -40,10 +41,13 @@ class Fault:
 _known: dict[str, Fault | None] = {}  # by content
 
 
-def faults(paths: Sequence[Path], any_format: bool = False) -> dict[Path, str]:
+def faults(
+    paths: Sequence[Path], folders: Sequence[Path], any_format: bool = False
+) -> dict[Path, str]:
     """Files that cannot be read as meshes, or not without harm; why, without a full stop.
 
-    any_format: a file may be of any format, and hold anything, as long as reading it does no harm.
+    folders: all that may be read, for what a mesh names in its turn; any_format: a file may be of
+    any format, and hold anything, as long as reading it does no harm.
     """
     found: dict[Path, str] = {}
     for path in dict.fromkeys(paths):
@@ -52,7 +56,7 @@ def faults(paths: Sequence[Path], any_format: bool = False) -> dict[Path, str]:
             continue
         content = _content(path)
         if content not in _known:
-            _known[content] = _trial.fault(path)
+            _known[content] = _trial.fault(path, [str(folder) for folder in folders])
         fault = _known[content]
         if fault is not None and (fault.harms or not any_format):
             found[path] = (
@@ -86,9 +90,13 @@ class _Trial:
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
+        self._folders: list[str] = []  # that the process was left
 
-    def fault(self, path: Path) -> Fault | None:
+    def fault(self, path: Path, folders: list[str]) -> Fault | None:
         """What is wrong with a mesh, if anything is."""
+        if folders != self._folders:
+            self.close()
+            self._folders = folders
         seconds = _SECONDS + path.stat().st_size / _BYTES_PER_SECOND
         line = json.dumps([str(path), seconds]).encode() + b"\n"
         while True:
@@ -111,6 +119,7 @@ class _Trial:
                 env=environment(),
                 process_group=0,  # Ctrl-C is for the parent
             )
+            line = json.dumps(self._folders).encode() + b"\n" + line
         process = self._process
         assert process.stdin is not None
         assert process.stdout is not None
@@ -158,10 +167,14 @@ def _peak() -> int:
 
 
 def serve() -> None:
-    """In the process: for each line [path, seconds] of stdin a line, empty for a good mesh."""
+    """In the process: for each line [path, seconds] of stdin a line, empty for a good mesh.
+
+    Before them stands a line with the folders that may be read.
+    """
     import coal
 
     limit_memory(2 * _MAX_MEMORY)
+    confine([Path(folder) for folder in json.loads(sys.stdin.buffer.readline())])
     loader = coal.MeshLoader(coal.NODE_TYPE.BV_OBBRSS)
     idle = threading.Timer(_IDLE, os._exit, (0,))
     idle.daemon = True

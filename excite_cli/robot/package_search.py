@@ -1,59 +1,96 @@
-"""Where the meshes of a URDF on disk lie: folders to give as `robot.package_dirs`.
+"""Where the meshes of a URDF on disk lie: folders to allow under `robot.package_dirs`.
 
-A package is looked for in every folder above the URDF, one folder below each of these, and in the
-folders that the variables of ROS and Gazebo name. A path that leaves the URDF's own folder
+A package is looked for as `search_package` does. A path that leaves the URDF's own folder
 (`../meshes/arm.stl`) needs the folder that holds it; one that is relative to a folder above the
 URDF (`meshes/arm.stl` beside `urdf/`) needs that folder.
 """
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from excite_cli.robot.description import RobotDescription
+from excite_cli.robot.allowed_files import Needed, OutsideError, is_trusted, outside, own_folder
+from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.mesh_paths import Kind, MeshFiles, mesh_file, mesh_names, package_of
-from excite_cli.robot.packages import folders_of_packages, package_in
+from excite_cli.robot.packages import search_package
 
 _ABOVE = 4  # folders above the URDF that relative paths may start from
 
+Allow = Callable[[Needed], bool]
 
-def package_folders(description: RobotDescription) -> dict[str, Path]:
-    """Folders beyond those of `description` that its meshes need, by what they hold.
+
+def allow_nothing(needed: Needed) -> bool:
+    """The answer of one who was not asked."""
+    return False
+
+
+def load_with_folders(
+    urdf: str,
+    package_dirs: tuple[str, ...],
+    relative_to: Path,
+    arguments: Mapping[str, object] | None = None,
+    allow: Allow = allow_nothing,
+) -> tuple[RobotDescription, tuple[Needed, ...]]:
+    """The description, as `load_description`, and what had to be allowed for it.
+
+    allow: whether a folder outside the robot's own may be read; asked once for each.
+
+    Raises
+    ------
+    OutsideError
+        One may not.
+    RobotError, MissingExtraError, FileError
+        As `load_description`.
+    """
+    allowed: dict[Path, Needed] = {}
+    while True:
+        dirs = (*package_dirs, *map(str, allowed))
+        try:
+            description = load_description(urdf, dirs, relative_to, arguments)
+            more = needed_folders(description)
+        except OutsideError as error:
+            source, own, more = error.source, error.own, [error.needed]
+        else:
+            source, own = description.path.name, own_folder(description.path)
+            if not more:
+                return description, tuple(allowed.values())
+        for needed in more:
+            if needed.folder in allowed or not allow(needed):
+                raise OutsideError(source, needed, own)
+            allowed[needed.folder] = needed
+
+
+def needed_folders(description: RobotDescription) -> list[Needed]:
+    """Folders beyond those of `description` that its meshes are in, and what they hold.
 
     What is found nowhere is left out: the check of the meshes says so.
     """
     files = MeshFiles(description)
-    found: dict[str, Path] = {}
+    found: dict[Path, Needed] = {}
     kinds: tuple[Kind, ...] = ("collision", "visual")
     for name in dict.fromkeys(name for kind in kinds for _, name in mesh_names(description, kind)):
         package, inside = package_of(name)
-        if (package or name) in found:
-            continue
         path = files.found(name)
-        if path is None:
-            folder = (
-                _of_package(package, inside, description.path)
-                if package
-                else _above(name, description.path)
-            )
-            if folder is not None:
-                found[package or str(Path(name).parent)] = folder
-        elif not package and not files.may_read(path):
-            found.setdefault(str(Path(name).parent), path.parent)
-    return found
-
-
-def _of_package(package: str, inside: str, urdf: Path) -> Path | None:
-    """The nearest folder that holds a package with the file `inside`."""
-    for folder in folders_of_packages(urdf):
-        if mesh_file(folder / package / inside):
-            return folder
-        there = package_in(folder, package)
-        if there is not None and mesh_file(there / inside):
-            return there
-    return None
+        what, near = f"meshes ({Path(name).name}, …)", True
+        if path is not None and files.may_read(path):
+            continue
+        if path is not None:
+            folder: Path | None = path.parent
+            near = outside(path, description.path).near
+        elif package:
+            folder = search_package(package, description.path, inside)
+            what = f"the package '{package}'"
+        else:
+            folder = _above(name, description.path)
+        if folder is not None:
+            found.setdefault(folder, Needed(what, folder, near))
+    return list(found.values())
 
 
 def _above(name: str, urdf: Path) -> Path | None:
     """The nearest folder above a URDF from which a relative path leads to a file."""
     inside = name.removeprefix("file://")
     above = urdf.parents[1 : 1 + _ABOVE]
-    return next((folder for folder in above if mesh_file(folder / inside)), None)
+    return next(
+        (each for each in above if mesh_file(each / inside) and is_trusted(each / inside, urdf)),
+        None,
+    )

@@ -2,10 +2,11 @@
 
 import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from excite_cli.errors import RobotError
+from excite_cli.robot.allowed_files import AllowedFiles, Needed, OutsideError, is_trusted
 
 # Folders of a package in which descriptions lie.
 _OF_DESCRIPTIONS = ("urdf", "xacro", "robots", "robot", "models", "model")
@@ -18,26 +19,68 @@ _VARIABLES = {
 }
 
 
-def find_package(name: str, near: Path, package_dirs: Iterable[str] = ()) -> Path:
-    """Folder of the package `name`, for a file `near` it.
+class MissingPackageError(RobotError):
+    """A package is not among the folders that a file may read."""
 
-    `package_dirs` (which hold packages, or are one) come before `package_folders_of(near)`.
+    def __init__(self, name: str) -> None:
+        self.name = name
+        super().__init__(f"the package '{name}' is not in the folders that may be read")
+
+
+def find_package(name: str, allowed: AllowedFiles) -> Path:
+    """Folder of the package `name`, among the folders that a file may read.
 
     Raises
     ------
-    RobotError
-        There is none.
+    MissingPackageError
+        It is in none of them.
     """
-    dirs = tuple(map(Path, package_dirs))
-    for folder in (*dirs, *folders_of_packages(near)):
+    for folder in allowed.folders:
         found = package_in(folder, name)
-        if found is not None:
+        if found is not None and allowed.has(found):
             return found
-    given = ", ".join(map(str, dirs)) or "none given"
-    raise RobotError(
-        f"the package '{name}' was not found. Looked in package_dirs ({given}), above "
-        f"{near.parent}, and by {variables_in_words()}"
+    raise MissingPackageError(name)
+
+
+def missing_package(name: str, allowed: AllowedFiles) -> RobotError:
+    """What is said of a package that a file may not read: where it is, if it is anywhere.
+
+    A package that is nowhere may be the one that the file lies in (`unnamed_package`).
+    """
+    path = allowed.path
+    there = search_package(name, path) or unnamed_package(path)
+    if there is not None:
+        return OutsideError(path.name, Needed(f"the package '{name}'", there), allowed.own)
+    return RobotError(
+        f"{path.name}: the package '{name}' was not found. Looked in "
+        f"{', '.join(map(str, allowed.folders))}; above {path.parent}; and by "
+        f"{variables_in_words()}. Name its folder under robot.package_dirs (init: --package-dirs)."
     )
+
+
+def search_package(name: str, near: Path, inside: str = "") -> Path | None:
+    """The nearest folder of the package `name` (with the file `inside`), if there is one.
+
+    It is looked for in every folder above `near`, one folder below these, and in the folders that
+    variables of ROS and Gazebo name. What belongs to another user is passed over: anybody may put
+    a folder into /tmp.
+    """
+    for folder in folders_of_packages(near):
+        named = [folder / name] if inside else []
+        for found in (*named, package_in(folder, name)):
+            if found is None or not is_trusted(found, near):
+                continue
+            if not inside or is_file(found / inside):
+                return found
+    return None
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a file; names of robots' files may be too long, or have a NUL in them."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError, RuntimeError):
+        return False
 
 
 def package_in(folder: Path, name: str) -> Path | None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from excite_cli.errors import RobotError
+from excite_cli.robot.allowed_files import allowed_files
 from excite_cli.robot.description import MAX_URDF_BYTES
 
 NEVER = "never"  # the reason of pairs that were not seen to touch, in lower case
@@ -28,12 +29,13 @@ class Srdf:
 
 
 def srdf_near(urdf: Path) -> list[Srdf]:
-    """Those beside a URDF and in folders named `srdf` or `config` of its package."""
+    """Those beside a URDF and in folders named `srdf` or `config`, within its own folder."""
+    allowed = allowed_files(urdf)
     folders = [urdf.parent, *(urdf.parent / name for name in ("srdf", "config"))]
     folders += [urdf.parent.parent / name for name in ("srdf", "config")]
     paths = dict.fromkeys(path for folder in folders for path in sorted(folder.glob("*.srdf")))
     found = []
-    for path in paths:
+    for path in filter(allowed.has, paths):
         try:
             found.append(read_srdf(path))
         except RobotError:

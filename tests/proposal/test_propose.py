@@ -11,6 +11,7 @@ from excite_cli.excitation.start import clear_posture
 from excite_cli.excitation.task import MotionTask
 from excite_cli.proposal.limbs import limbs
 from excite_cli.proposal.propose import Request, propose
+from excite_cli.robot.allowed_files import OutsideError
 from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
 from excite_cli.robot.reference_postures import reference_posture
 from excite_cli.robot.srdf import srdf_near
@@ -114,9 +115,12 @@ def test_packages_are_found_above_the_urdf(tmp_path: Path) -> None:
         joint("elbow", "upper", "lower", GOOD),
         link("lower", shape=shape),
     )
-    proposal = propose(Request("urdf/robot.urdf", tmp_path / "ws"))
-    assert "package_dirs: [src]" in proposal.text
-    assert any(note.startswith("meshes of arm_description") for note in proposal.notes)
+    with pytest.raises(OutsideError, match="the package 'arm_description' in"):
+        propose(Request("urdf/robot.urdf", tmp_path / "ws"))
+    request = Request("urdf/robot.urdf", tmp_path / "ws", allow=lambda needed: True)
+    proposal = propose(request)
+    assert "package_dirs: [src/arm_description]" in proposal.text
+    assert any("read the package 'arm_description' in" in note for note in proposal.notes)
 
 
 def test_reference_postures_are_read() -> None:

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from excite_cli.robot.allowed_files import Needed
 from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.mesh_paths import MeshFiles, unusable
-from excite_cli.robot.package_search import package_folders
+from excite_cli.robot.package_search import needed_folders
 from tests.proposal.robots import GOOD, joint, link, written
 
 
@@ -63,7 +64,8 @@ def test_a_path_relative_to_a_folder_above_is_found(tmp_path: Path) -> None:
     above = tmp_path / "arm_description"
     (above / "meshes").mkdir()
     (above / "meshes" / "l.stl").write_text("solid")
-    assert package_folders(described(tmp_path, "meshes/l.stl")) == {"meshes": above}
+    (needed,) = needed_folders(described(tmp_path, "meshes/l.stl"))
+    assert needed.folder == above
 
 
 @pytest.mark.parametrize("variable", ["ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GAZEBO_MODEL_PATH"])
@@ -76,9 +78,10 @@ def test_packages_of_the_environment_are_found(
     (share / "hand" / "meshes" / "l.stl").write_text("solid")
     name = "package://hand/meshes/l.stl"
     robot = described(tmp_path / "robots", name)
-    assert package_folders(robot) == {}
+    assert needed_folders(robot) == []
     monkeypatch.setenv(variable, str(prefix))
-    assert package_folders(robot) == {"hand": share}
+    (needed,) = needed_folders(robot)
+    assert needed == Needed("the package 'hand'", share / "hand")
 
 
 def test_a_missing_mesh_of_a_package_that_is_there_is_told_as_such(

@@ -165,7 +165,7 @@ def test_a_slow_mesh_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     path.write_bytes(binary_stl() + b" slow")
     mesh_trial._trial.close()
     monkeypatch.setattr(mesh_trial, "_SLOWEST", 1e-6)
-    assert "takes too long" in faults([path])[path]
+    assert "takes too long" in faults([path], [tmp_path])[path]
 
 
 def test_what_lies_in_the_current_folder_is_not_run(
@@ -175,7 +175,7 @@ def test_what_lies_in_the_current_folder_is_not_run(
     (tmp_path / "hand.stl").write_bytes(b"here" + binary_stl()[4:])
     mesh_trial._trial.close()
     monkeypatch.chdir(tmp_path)
-    assert not faults([tmp_path / "hand.stl"])
+    assert not faults([tmp_path / "hand.stl"], [tmp_path])
     assert not (tmp_path / "ran").exists()
 
 
@@ -185,7 +185,7 @@ def test_after_an_interruption_the_next_answer_is_its_own(
     good, bad = tmp_path / "good.stl", tmp_path / "bad.stl"
     good.write_bytes(b"good" + binary_stl()[4:])
     bad.write_bytes(binary_stl()[:100] + b"bad")
-    assert not faults([good])
+    assert not faults([good], [tmp_path])
     process = mesh_trial._trial._process
     assert process is not None
     read = process.stdout
@@ -195,9 +195,9 @@ def test_after_an_interruption_the_next_answer_is_its_own(
 
     monkeypatch.setattr(process, "stdout", SimpleNamespace(readline=interrupted, close=read.close))
     with pytest.raises(KeyboardInterrupt):
-        mesh_trial._trial.fault(bad)
+        mesh_trial._trial.fault(bad, [str(tmp_path)])
     monkeypatch.setattr(process, "stdout", read)
-    assert mesh_trial._trial.fault(good) is None
+    assert mesh_trial._trial.fault(good, [str(tmp_path)]) is None
     assert process.poll() is not None
 
 
@@ -205,7 +205,7 @@ def test_after_an_interruption_the_next_answer_is_its_own(
 def test_what_is_loaded_already_does_not_count_to_the_memory_of_meshes(tmp_path: Path) -> None:
     """Threads of linear algebra reserve tens of MiB each: as many as there are cores."""
     (tmp_path / "hand.stl").write_bytes(b"room" + binary_stl()[4:])
-    assert not faults([tmp_path / "hand.stl"])
+    assert not faults([tmp_path / "hand.stl"], [tmp_path])
     process = mesh_trial._trial._process
     assert process is not None
     limits = Path(f"/proc/{process.pid}/limits").read_text(encoding="ascii")

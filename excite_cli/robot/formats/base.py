@@ -51,10 +51,28 @@ class RobotFormat(ABC):
         ------
         RobotError
             The file is not what it seems to be, or holds what no URDF can.
+        OutsideError
+            It needs a file that it may not read.
         MissingExtraError
             The library that reads it is not installed.
         """
 
-    def sources(self, path: Path, text: str) -> tuple[Path, ...] | None:
-        """All files whose content decides what becomes of `path`; None where nobody knows."""
+    def load_library(self) -> None:
+        """Import what reads the format, before the process is confined.
+
+        Raises
+        ------
+        MissingExtraError
+            It is not installed.
+        """
+        return
+
+    def sources(self, path: Path, text: str, asked: Asked) -> tuple[Path, ...] | None:
+        """All files whose content decides what becomes of `path`; None where that is not known.
+
+        Raises
+        ------
+        OutsideError
+            The file names one that it may not read.
+        """
         return None

@@ -5,6 +5,7 @@ arguments and by the program's version, and carries a digest (`disk_cache`). Mes
 conversion wrote into the cache bear the hash of their content as a name and are compared to it.
 """
 
+import contextlib
 import hashlib
 import json
 import os
@@ -12,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -22,14 +23,17 @@ import numpy as np
 from excite_cli import __version__
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import ExciteError, MissingExtraError, RobotError
+from excite_cli.robot.allowed_files import Needed, OutsideError, allowed_files
 from excite_cli.robot.apart import OUT_OF_TIME, command, environment, limit_memory, set_alarm
+from excite_cli.robot.confinement import confine
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
-from excite_cli.robot.formats.kept_meshes import is_sound
+from excite_cli.robot.formats.kept_meshes import is_sound, kept_meshes_folder
+from excite_cli.robot.packages import MissingPackageError, missing_package
 
 _SECONDS, _BYTES_PER_SECOND = 8.0, 2**20  # processor time allowed: a base, and by size of files
 _SLOWEST = 10  # times the processor time, on a machine with much else to do
 _MAX_MEMORY = 4 * 2**30  # bytes
-_FORM = "2"  # of what is kept; another one after a change of what formats write
+_FORM = "3"  # of what is kept; another one after a change of what formats write
 _OF_ERRORS = {each.__name__: each for each in (RobotError, MissingExtraError)}
 
 
@@ -41,7 +45,7 @@ def converted(form: RobotFormat, path: Path, text: str, asked: Asked) -> Urdf:
     RobotError, MissingExtraError
         As `RobotFormat.urdf`; or reading the file ends the process, takes too long or too much.
     """
-    sources = form.sources(path, text)
+    sources = form.sources(path, text, asked)
     key = None if sources is None else _key(form, path, sources, asked)
     kept = None if key is None else _kept(key)
     if kept is not None:
@@ -111,6 +115,12 @@ def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: f
     answer = json.loads(said) if status == 0 and said else {}
     if "text" in answer:
         return _urdf(answer)
+    allowed = allowed_files(path, asked.package_dirs)
+    if "package" in answer:  # looked for here, where all may be seen
+        raise missing_package(answer["package"], allowed)
+    if "needed" in answer:
+        name, folder, near = answer["needed"]
+        raise OutsideError(path.name, Needed(name, Path(folder), near), allowed.own)
     if "error" in answer:
         raise _OF_ERRORS.get(answer["error"], RobotError)(answer["message"])
     how = "takes too long" if status in OUT_OF_TIME else "fails or takes too much memory"
@@ -118,6 +128,15 @@ def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: f
         f"{path.name}: reading it as {form.name} {how}. It is damaged, or too large: see whether "
         "the program that wrote it opens it."
     )
+
+
+def confinement_notes(what: str, folders: Sequence[Path]) -> list[str]:
+    """Confine this process to reading these folders; what the system cannot do, in words."""
+    meshes = kept_meshes_folder()
+    with contextlib.suppress(OSError):  # where it cannot be made, keeping a mesh says so
+        meshes.mkdir(parents=True, exist_ok=True)
+    lacking = confine(folders, (meshes, Path.cwd()))
+    return [f"the process that read this {what} could not be confined: {each}" for each in lacking]
 
 
 def serve() -> None:
@@ -133,7 +152,15 @@ def serve() -> None:
     limit_memory(_MAX_MEMORY)
     set_alarm(question["seconds"])
     try:
-        answer = asdict(form.urdf(path, question["text"], asked))
+        form.load_library()
+        notes = confinement_notes(form.name, allowed_files(path, asked.package_dirs).folders)
+        found = form.urdf(path, question["text"], asked)
+        answer = asdict(replace(found, notes=(*found.notes, *notes)))
+    except MissingPackageError as error:
+        answer = {"package": error.name}
+    except OutsideError as error:
+        needed = error.needed
+        answer = {"needed": [needed.name, str(needed.folder), needed.near]}
     except ExciteError as error:
         answer = {"error": type(error).__name__, "message": str(error)}
     out.write(json.dumps(answer))

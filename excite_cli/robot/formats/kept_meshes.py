@@ -22,7 +22,7 @@ def keep_mesh(points: NDArray[np.float64], faces: NDArray[Any]) -> Path:
         It cannot be written.
     """
     content = _stl(points, faces)
-    path = cache_folder() / "meshes" / f"{_name(content)}.stl"
+    path = kept_meshes_folder() / f"{_name(content)}.stl"
     try:
         if not is_sound(path):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -33,6 +33,11 @@ def keep_mesh(points: NDArray[np.float64], faces: NDArray[Any]) -> Path:
             f"{error}. Set XDG_CACHE_HOME to a folder that can."
         ) from error
     return path
+
+
+def kept_meshes_folder() -> Path:
+    """Where they lie."""
+    return cache_folder() / "meshes"
 
 
 def is_sound(path: Path) -> bool:

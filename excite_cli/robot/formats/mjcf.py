@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from excite_cli.errors import MissingExtraError, RobotError
+from excite_cli.robot.allowed_files import allowed_files
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
 from excite_cli.robot.formats.mjcf_sources import mjcf_sources
 from excite_cli.robot.formats.urdf_parts import (
@@ -52,15 +53,13 @@ class Mjcf(RobotFormat):
         except ElementTree.ParseError:
             return False
 
+    def load_library(self) -> None:
+        """MuJoCo."""
+        _library()
+
     def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
         """Bodies as links with inertias, shapes, joints, limits, efforts, friction, couplings."""
-        try:
-            import mujoco
-        except ImportError as error:
-            raise MissingExtraError(
-                "Files of MJCF need mujoco, which is not installed. Run: pip install "
-                "'excite-cli[formats]'."
-            ) from error
+        mujoco = _library()
         try:
             model = mujoco.MjModel.from_xml_path(str(path))
         except Exception as error:
@@ -68,9 +67,20 @@ class Mjcf(RobotFormat):
             raise RobotError(f"{path.name}: MuJoCo cannot compile it: {reason[:400]}") from error
         return _Writer(model, path).written()
 
-    def sources(self, path: Path, text: str) -> tuple[Path, ...] | None:
+    def sources(self, path: Path, text: str, asked: Asked) -> tuple[Path, ...] | None:
         """Includes, meshes, textures and height fields."""
-        return mjcf_sources(path, text)
+        return mjcf_sources(path, text, allowed_files(path, asked.package_dirs))
+
+
+def _library() -> Any:
+    try:
+        import mujoco
+    except ImportError as error:
+        raise MissingExtraError(
+            "Files of MJCF need mujoco, which is not installed. Run: pip install "
+            "'excite-cli[formats]'."
+        ) from error
+    return mujoco
 
 
 class _Writer:

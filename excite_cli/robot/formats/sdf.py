@@ -64,7 +64,7 @@ class Sdf(RobotFormat):
         except ValueError as error:
             raise RobotError(f"{path.name}: its SDF cannot be read: {error}.") from error
 
-    def sources(self, path: Path, text: str) -> tuple[Path, ...] | None:
+    def sources(self, path: Path, text: str, asked: Asked) -> tuple[Path, ...] | None:
         """The file alone: meshes are only named."""
         return (path,)
 

@@ -1,24 +1,30 @@
 """xacro: a URDF with macros, arguments and includes, expanded by the xacro package.
 
-Its expressions are Python. The package keeps builtins from most of them, not from `$(eval …)`, and
-lets some ways round; a robot's file is not a program that one means to run, so expressions are
-evaluated here, without builtins and without what leads to them.
+Its expressions are Python, it reads any file, and any variable of the environment. A robot's file
+is not a program that one means to run: here expressions are evaluated by `xacro_expression`, files
+are read within the robot's folders (`allowed_files`), and variables are those of a list.
 """
 
+import os
 import re
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable, Mapping
+from functools import cache, partial
 from pathlib import Path
-from types import CodeType
 from typing import Any
+from xml.dom import minidom
 
 from excite_cli.errors import MissingExtraError, RobotError
+from excite_cli.robot.allowed_files import AllowedFiles, OutsideError, allowed_files
+from excite_cli.robot.formats import xacro_expression
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
-from excite_cli.robot.packages import find_package, unnamed_package
+from excite_cli.robot.packages import MissingPackageError, find_package, unnamed_package
 
 _NAMESPACE = re.compile(r"xmlns:xacro\s*=")
-# Names that lead from a value to the interpreter's own objects.
-_HIDDEN = re.compile(r"__|^(gi|cr|ag|f|tb|co|func)_|^mro$")
+_VARIABLES = ("ROS_DISTRO", "ROS_VERSION")  # of the environment, that a file may ask for
+_MAX_BYTES = 20_000_000  # of an included file
+# What is replaced in the library: where one is missing, it is a version that nobody has tried.
+_REPLACED = ("safe_eval", "parse", "load_yaml", "_global_symbols", "process_file")
+_REPLACED_SUBSTITUTIONS = ("_eval", "_eval_env", "_eval_optenv", "_eval_find", "convert_value")
 
 
 class Xacro(RobotFormat):
@@ -37,54 +43,129 @@ class Xacro(RobotFormat):
             return False
         return bool(_NAMESPACE.search(text) and "<xacro:" in text)
 
+    def load_library(self) -> None:
+        """The xacro package."""
+        library_of_xacro()
+
     def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
-        """The expanded text; `$(find package)` as `find_package` does.
-
-        A package that is nowhere may be the one that the file lies in, whose folder was renamed
-        and lost its package.xml: it is tried, and told.
-        """
-        library = _library()
+        """The expanded text; `$(find package)` as `_Packages.find` does."""
+        library = library_of_xacro()
+        allowed = allowed_files(path, asked.package_dirs)
+        packages = _Packages(path, allowed)
+        _replace(library, allowed, packages.find)
         arguments = {name: _written(value) for name, value in asked.arguments.items()}
-
-        stand_ins: dict[str, Path] = {}
-
-        def find(name: str) -> str:
-            try:
-                return str(find_package(name, path, asked.package_dirs))
-            except RobotError:
-                own = unnamed_package(path)
-                if own is None:
-                    raise
-                stand_ins[name] = own
-                return str(own)
-
-        substitution = library.substitution_args
-        substitution._eval_find = substitution._eval_dict["find"] = find
-        substitution._eval = _substituted
-        library.safe_eval = _evaluated
-        library.parse = partial(_parsed, library.parse)
         try:
-            text = library.process_file(str(path), mappings=arguments).toxml()
+            expanded = library.process_file(str(path), mappings=arguments).toxml()
         except Exception as error:  # xacro raises whatever an expression raises
-            reason = _reason(error)
+            own = _own_error(error)
+            if isinstance(own, (OutsideError, MissingPackageError)):
+                raise own from error
+            reason = " ".join(str(own or error).split()) or type(error).__name__
             raise RobotError(
-                f"{path.name}: xacro cannot expand it: {reason[:400]}. Arguments are given under "
+                f"{path.name}: xacro cannot expand it: {reason[:600]}. Arguments are given under "
                 "robot.xacro_args (init: --xacro-arg NAME=VALUE), folders of packages under "
                 "robot.package_dirs (init: --package-dirs)."
             ) from error
-        for name, folder in stand_ins.items():
+        return packages.named_in(expanded)
+
+
+class _Packages:
+    """The packages that one file asks for.
+
+    One that is nowhere may be the one that the file lies in, whose folder was renamed and lost its
+    package.xml: where that folder is allowed, it stands in.
+    """
+
+    def __init__(self, path: Path, allowed: AllowedFiles) -> None:
+        self._path, self._allowed = path, allowed
+        self._found: dict[str, Path] = {}
+        self._stand_ins: dict[str, Path] = {}
+
+    def find(self, name: str) -> str:
+        """The folder of a package."""
+        try:
+            self._found[name] = find_package(name, self._allowed)
+        except MissingPackageError:
+            own = unnamed_package(self._path)
+            if own is None or not self._allowed.has(own):
+                raise
+            self._found[name] = self._stand_ins[name] = own
+        return str(self._found[name])
+
+    def named_in(self, text: str) -> Urdf:
+        """The URDF, with the packages that stand in, and where the others were found."""
+        for name, folder in self._stand_ins.items():
             text = text.replace(f"package://{name}/", f"file://{folder}/")
-        folders = tuple(sorted({str(folder) for folder in stand_ins.values()}))
-        notes = tuple(
+        notes = [
             f"the package '{name}' was not found: {folder}, which the file lies in, is taken for it"
-            for name, folder in stand_ins.items()
-        )
-        return Urdf(text, folders, notes)
+            for name, folder in self._stand_ins.items()
+        ]
+        notes += [
+            f"the package '{name}' is {folder}"
+            for name, folder in self._found.items()
+            if name not in self._stand_ins and folder.resolve() != self._allowed.own
+        ]
+        folders = tuple(sorted({str(folder) for folder in self._stand_ins.values()}))
+        return Urdf(text, folders, tuple(notes))
 
 
-def _parsed(parse: Callable[..., Any], given: Any, name: str | None = None) -> Any:
-    """The document, with what xacro took without its prefix until 2020: properties and includes."""
-    document = parse(given, name)
+def _replace(library: Any, allowed: AllowedFiles, find: Callable[[str], str]) -> None:
+    """Put what is safe in place of what the library does with expressions, files, variables."""
+    substitution = library.substitution_args
+    for owner, names in ((library, _REPLACED), (substitution, _REPLACED_SUBSTITUTIONS)):
+        for name in names:
+            if not hasattr(owner, name):
+                raise MissingExtraError(
+                    f"the installed version of the package xacro has no {name}, and is not one "
+                    "that excite knows. Run: pip install 'xacro==2.1.1'."
+                )
+    symbols = xacro_expression.symbols(_functions_of_xacro(library, allowed))
+    library._global_symbols = symbols
+    library.load_yaml = symbols["load_yaml"]
+    library.safe_eval = lambda text, names, local=None: xacro_expression.evaluate(
+        text, names, symbols
+    )
+    library.parse = partial(_parsed, library, allowed)
+    substitution._eval = partial(_substituted, library, symbols, find)
+    substitution._eval_find = find
+    substitution._eval_env = _variable
+    substitution._eval_optenv = lambda name, default="": _optional_variable(name, default)
+
+
+def _functions_of_xacro(library: Any, allowed: AllowedFiles) -> dict[str, Any]:
+    """The namespace `xacro` of expressions: `arg`, `load_yaml` and others that do no harm."""
+    read_table = _table_reader()
+
+    def load_yaml(name: str) -> Any:
+        path = allowed.require(Path(library.abs_filename_spec(name)))
+        _text(path)  # of a size that may be read
+        return read_table(str(path))
+
+    def argument(name: str) -> Any:
+        return library.substitution_args_context["arg"][name]
+
+    def fatal(*words: object) -> None:
+        raise ValueError(" ".join(map(str, words)))
+
+    silent = dict.fromkeys(("message", "warning", "error", "print_location"), lambda *words: "")
+    return {
+        "arg": argument,
+        "load_yaml": load_yaml,
+        "abs_filename": library.abs_filename_spec,
+        "dotify": lambda table: table,
+        "tokenize": library.tokenize,
+        "fatal": fatal,
+        **silent,
+    }
+
+
+def _parsed(library: Any, allowed: AllowedFiles, given: None, name: str) -> Any:
+    """The document of a file, with what xacro took without its prefix until 2020."""
+    path = allowed.require(Path(name))
+    if not path.is_file():  # the library passes over an include that is optional
+        library.filestack.pop()
+        raise library.XacroException(f"there is no file {path}", exc=FileNotFoundError(name))
+    document: Any = minidom.parseString(_text(path))
     for element in document.documentElement.childNodes:
         old = element.nodeName in ("property", "include") and element.hasAttribute(
             "value" if element.nodeName == "property" else "filename"
@@ -94,12 +175,24 @@ def _parsed(parse: Callable[..., Any], given: Any, name: str | None = None) -> A
     return document
 
 
-def _reason(error: BaseException) -> str:
-    """In words; of an error of ours that xacro wrapped, its own."""
-    ours: BaseException | None = error
-    while ours is not None and not isinstance(ours, RobotError):
-        ours = ours.__cause__ or ours.__context__
-    return " ".join(str(ours or error).split()) or type(error).__name__
+def _text(path: Path) -> str:
+    """The text of a file that may be read; XML of it has no document type."""
+    if not path.is_file():
+        raise RobotError(f"there is no file {path}")
+    if path.stat().st_size > _MAX_BYTES:
+        raise RobotError(f"{path} is larger than {_MAX_BYTES // 10**6} MB")
+    text = path.read_text(encoding="utf-8")
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise RobotError(f"{path} declares a document type or entities")
+    return text
+
+
+def _own_error(error: BaseException) -> RobotError | None:
+    """An error of ours that xacro wrapped."""
+    found: BaseException | None = error
+    while found is not None and not isinstance(found, RobotError):
+        found = found.__cause__ or getattr(found, "exc", None) or found.__context__
+    return found
 
 
 def _written(value: object) -> str:
@@ -107,42 +200,60 @@ def _written(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _evaluated(text: str, symbols: dict[str, Any], local: Any = None) -> Any:
-    """The value of an expression `${…}`.
+def _variable(name: str) -> str:
+    """The value of `$(env NAME)`."""
+    if name not in _VARIABLES:
+        raise RobotError(
+            f"the variable {name} of the environment is not read (only {', '.join(_VARIABLES)} "
+            "are): write its value into the file"
+        )
+    if name not in os.environ:
+        raise RobotError(f"the variable {name} of the environment is not set")
+    return os.environ[name]
+
+
+def _optional_variable(name: str, default: str) -> str:
+    """The value of `$(optenv NAME default)`; of a variable that is not read, the default."""
+    return os.environ.get(name, default) if name in _VARIABLES else default
+
+
+def _substituted(
+    library: Any,
+    symbols: Mapping[str, Any],
+    find: Callable[[str], str],
+    text: str,
+    context: Mapping[str, Any],
+) -> str:
+    """The value of `$(eval …)`, in which arguments are names as well."""
+    convert = library.substitution_args.convert_value
+    given = context.get("arg", {})
+    functions = {
+        **symbols,
+        "arg": lambda name: convert(given[name], "auto"),
+        "find": find,
+        "env": _variable,
+        "optenv": _optional_variable,
+    }
+    names = {name: convert(value, "auto") for name, value in given.items()}
+    names |= {**functions, "true": True, "false": False}
+    return str(xacro_expression.evaluate(text, names, functions))
+
+
+@cache
+def _table_reader() -> Callable[[str], Any]:
+    """The library's own reader of YAML (a safe one, with units), before it was replaced."""
+    reader: Callable[[str], Any] = library_of_xacro().load_yaml
+    return reader
+
+
+def library_of_xacro() -> Any:
+    """The package, imported.
 
     Raises
     ------
-    ValueError
-        It names what only programs need.
+    MissingExtraError
+        It is not installed.
     """
-    code = compile(text.strip(), "<expression>", "eval")
-    hidden = sorted({name for name in _names(code) if _HIDDEN.search(name)})
-    if hidden or "__" in text:
-        raise ValueError(f"the expression {text.strip()[:60]!r} is refused: it names {hidden}")
-    symbols.update(__builtins__={})
-    return eval(code, symbols, local)
-
-
-def _substituted(text: str, context: dict[str, Any]) -> str:
-    """The value of `$(eval …)`."""
-    substitution = _library().substitution_args
-    given = context.get("arg", {})
-    symbols = {name: substitution.convert_value(value, "auto") for name, value in given.items()}
-    symbols |= {k: v for k, v in substitution._eval_dict.items() if not k.startswith("_")}
-    symbols |= dict(substitution._eval_dict["__builtins__"])
-    symbols["arg"] = lambda name: substitution.convert_value(given[name], "auto")
-    return str(_evaluated(text, symbols))
-
-
-def _names(code: CodeType) -> Iterator[str]:
-    """All names in an expression and in the functions within it."""
-    yield from (*code.co_names, *code.co_varnames)
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _names(constant)
-
-
-def _library() -> Any:
     try:
         import xacro
         import xacro.substitution_args

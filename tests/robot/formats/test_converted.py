@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from excite_cli.errors import MissingExtraError, RobotError
+from excite_cli.robot.allowed_files import allowed_files
 from excite_cli.robot.description import load_description
 from excite_cli.robot.formats import converted as module
 from excite_cli.robot.formats.base import Asked, Urdf
@@ -129,9 +130,11 @@ def test_a_mesh_of_the_cache_that_is_damaged_is_made_anew(robot: Path, made: Mad
 
 
 def test_what_may_be_read_is_listed(robot: Path, tmp_path: Path) -> None:
-    found = mjcf_sources(robot, robot.read_text())
+    allowed = allowed_files(robot)
+    found = mjcf_sources(robot, robot.read_text(), allowed)
     assert found is not None
     names = {str(path.relative_to(tmp_path)) for path in found}
     assert names == {"robot.xml", "arm.xml", "shapes/m.obj"}
     attached = MODEL.replace("<asset>", '<asset><model name="o" file="other.xml"/>')
-    assert mjcf_sources(robot, attached) is None
+    (tmp_path / "other.xml").write_text("<mujoco/>")
+    assert mjcf_sources(robot, attached, allowed) is None

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from excite_cli.errors import RobotError
+from excite_cli.robot.allowed_files import OutsideError
 from excite_cli.robot.description import load_description
 
 MACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
@@ -52,7 +53,12 @@ def test_ros_package_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     with pytest.raises(RobotError, match="the package 'arm_description' was not found"):
         load_description(str(moved))
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "elsewhere" / "src"))
-    assert load_description(str(moved)).xml.count("<joint") == 2
+    there = tmp_path / "elsewhere" / "src" / "arm"
+    with pytest.raises(OutsideError, match=f"the package 'arm_description' in {there}"):
+        load_description(str(moved))
+    found = load_description(str(moved), (str(there),))
+    assert found.xml.count("<joint") == 2
+    assert f"the package 'arm_description' is {there}" in found.notes
 
 
 def test_folders_that_are_given(tmp_path: Path) -> None:
@@ -99,7 +105,9 @@ def test_a_package_that_lost_its_name_is_the_one_the_file_lies_in(tmp_path: Path
     with pytest.raises(RobotError, match="the package 'arm_support' was not found"):
         load_description(str(path))
     (path.parents[1] / "package.xml").unlink()
-    found = load_description(str(path))
+    with pytest.raises(OutsideError, match=f"the package 'arm_support' in {path.parents[1]}"):
+        load_description(str(path))
+    found = load_description(str(path), (str(path.parents[1]),))
     assert found.xml.count("<joint") == 2
     assert f"file://{path.parents[1]}/m.stl" in found.xml
     assert any("the package 'arm_support' was not found: " in note for note in found.notes)
