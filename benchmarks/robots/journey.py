@@ -102,7 +102,9 @@ def travelled(source: Source, folder: Path, seed: int) -> Record:
 
 def _travel(source: Source, steps: _Steps, seed: int) -> None:
     record = steps.record
-    proposal = steps.excite("init", *source.given, "-o", "robot.yaml", "--overwrite")
+    proposal = steps.excite(
+        "init", *source.given, "-o", "robot.yaml", "--allow-found", "--overwrite"
+    )
     record["joints"] = len(proposal["joints"])
     record["base_parameters"] = proposal["base_parameters"]
     record["ignored_pairs"] = _ignored(steps.folder / "robot.yaml")

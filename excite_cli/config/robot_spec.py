@@ -78,7 +78,9 @@ class RobotSpec(Section):
         default_factory=dict, description="arguments of a xacro file, {name: value}"
     )
     package_dirs: tuple[str, ...] = Field(
-        (), description="folders in which package:// names of the URDF are looked up"
+        (),
+        description="folders beyond its own that the robot's files may read: packages, or "
+        "folders that hold some",
     )
     density: Positive | None = Field(
         None,

@@ -1,10 +1,18 @@
 """`excite init` as a user runs it: a config that works with no edit, or one sentence."""
 
+import contextlib
+import os
+import pty
+import subprocess
+import sys
 from pathlib import Path
 
+import pytest
+
+from benchmarks.trust.fuzz_meshes import VALID
 from excite_cli.config.load import load_spec
 from tests.cli.program import BRIEF, Program
-from tests.proposal.robots import arm
+from tests.proposal.robots import GOOD, arm, joint, link, written
 from tests.proposal.test_shapes import FINGERS, shape, with_gripper
 
 
@@ -16,6 +24,56 @@ def test_a_config_that_works_unedited(excite: Program, tmp_path: Path) -> None:
     made = excite("optimize", "arm.yaml", "-o", "arm.h5", *BRIEF)
     assert made.returncode == 0, made.stderr
     assert excite("check", "arm.yaml", "arm.h5").returncode == 0
+
+
+def with_a_package(folder: Path) -> Path:
+    """A robot whose mesh lies in a package beside its folder."""
+    package = folder / "src" / "hand_description"
+    (package / "meshes").mkdir(parents=True)
+    (package / "meshes" / "l.stl").write_bytes(VALID["stl"])
+    name = "package://hand_description/meshes/l.stl"
+    mesh = f'<collision><geometry><mesh filename="{name}"/></geometry></collision>'
+    own = folder / "urdf"
+    own.mkdir()
+    written(own, link("base", shape=""), joint("j", "base", "l", GOOD), link("l", shape=mesh))
+    return package
+
+
+def test_what_lies_elsewhere_is_read_only_when_allowed(excite: Program, tmp_path: Path) -> None:
+    package = with_a_package(tmp_path)
+    run = excite("init", "--urdf", "urdf/robot.urdf", "-o", "arm.yaml")
+    assert run.returncode == 2
+    words = " ".join(run.stderr.split())
+    assert f"asks for the package 'hand_description' in {package}" in words
+    assert "--allow-found" in words
+    assert not (tmp_path / "arm.yaml").exists()
+    run = excite("init", "--urdf", "urdf/robot.urdf", "-o", "arm.yaml", "--allow-found")
+    assert run.returncode == 0, run.stderr
+    assert f"allowed to read the package 'hand_description' in {package}" in run.stdout
+    assert load_spec(tmp_path / "arm.yaml").robot.package_dirs == ("src/hand_description",)
+
+
+@pytest.mark.parametrize(("answer", "status"), [("y", 0), ("n", 2)])
+def test_a_terminal_is_asked(tmp_path: Path, answer: str, status: int) -> None:
+    with_a_package(tmp_path)
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "excite_cli", "init", "--urdf", "urdf/robot.urdf", "-o", "arm.yaml"],
+        cwd=tmp_path,
+        stdin=theirs,
+        stdout=subprocess.DEVNULL,
+        stderr=theirs,
+    )
+    os.close(theirs)
+    os.write(ours, f"{answer}\n".encode())
+    said = b""
+    with contextlib.suppress(OSError):  # the other side is closed
+        while read := os.read(ours, 65536):
+            said += read
+    os.close(ours)
+    assert process.wait() == status
+    assert b"Read that folder?" in said
+    assert (tmp_path / "arm.yaml").exists() is (status == 0)
 
 
 def test_it_says_what_it_chose(excite: Program, tmp_path: Path) -> None:

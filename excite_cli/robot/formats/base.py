@@ -9,10 +9,14 @@ from typing import ClassVar
 
 @dataclass(frozen=True)
 class Asked:
-    """What a description is read with: folders of packages, and arguments of xacro."""
+    """What a description is read with: folders of packages, and arguments of xacro.
+
+    absent: packages that are nowhere, for which the one that the file lies in stands.
+    """
 
     package_dirs: tuple[str, ...] = ()
     arguments: Mapping[str, object] = field(default_factory=dict)
+    absent: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,15 @@ from excite_cli.robot.apart import OUT_OF_TIME, command, environment, limit_memo
 from excite_cli.robot.confinement import confine
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
 from excite_cli.robot.formats.kept_meshes import is_sound, kept_meshes_folder
-from excite_cli.robot.packages import MissingPackageError, missing_package
+from excite_cli.robot.packages import (
+    MissingPackageError,
+    missing_package,
+    search_package,
+    unnamed_package,
+)
 
 _SECONDS, _BYTES_PER_SECOND = 8.0, 2**20  # processor time allowed: a base, and by size of files
+_MOST_ABSENT = 10  # packages that are nowhere; each costs a process
 _SLOWEST = 10  # times the processor time, on a machine with much else to do
 _MAX_MEMORY = 4 * 2**30  # bytes
 _FORM = "3"  # of what is kept; another one after a change of what formats write
@@ -51,11 +57,31 @@ def converted(form: RobotFormat, path: Path, text: str, asked: Asked) -> Urdf:
     if kept is not None:
         return kept
     size = sum(source.stat().st_size for source in sources or (path,))
-    found = _answered(form, path, text, asked, _SECONDS + size / _BYTES_PER_SECOND)
+    found = None
+    while found is None:
+        try:
+            found = _answered(form, path, text, asked, _SECONDS + size / _BYTES_PER_SECOND)
+        except MissingPackageError as error:  # looked for here, where all may be seen
+            asked = _without(error.name, path, asked)
     if key is not None:
         content = json.dumps(asdict(found)).encode()
         store_arrays(key, {"urdf": np.frombuffer(content, dtype=np.uint8)})
     return found
+
+
+def _without(name: str, path: Path, asked: Asked) -> Asked:
+    """The same, without a package that is nowhere; the one that the file lies in stands for it.
+
+    Raises
+    ------
+    RobotError
+        It is elsewhere, or the file lies in no package that may be read and lost its name.
+    """
+    allowed, own = allowed_files(path, asked.package_dirs), unnamed_package(path)
+    stands = own is not None and allowed.has(own) and search_package(name, path) is None
+    if not stands or name in asked.absent or len(asked.absent) >= _MOST_ABSENT:
+        raise missing_package(name, allowed)
+    return replace(asked, absent=(*asked.absent, name))
 
 
 def _key(form: RobotFormat, path: Path, sources: Sequence[Path], asked: Asked) -> str | None:
@@ -94,6 +120,7 @@ def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: f
         "text": text,
         "package_dirs": list(asked.package_dirs),
         "arguments": dict(asked.arguments),
+        "absent": list(asked.absent),
         "seconds": seconds,
     }
     # Libraries leave their logs where they run: in a folder that goes with them.
@@ -115,11 +142,11 @@ def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: f
     answer = json.loads(said) if status == 0 and said else {}
     if "text" in answer:
         return _urdf(answer)
-    allowed = allowed_files(path, asked.package_dirs)
-    if "package" in answer:  # looked for here, where all may be seen
-        raise missing_package(answer["package"], allowed)
+    if "package" in answer:
+        raise MissingPackageError(answer["package"])
     if "needed" in answer:
         name, folder, near = answer["needed"]
+        allowed = allowed_files(path, asked.package_dirs)
         raise OutsideError(path.name, Needed(name, Path(folder), near), allowed.own)
     if "error" in answer:
         raise _OF_ERRORS.get(answer["error"], RobotError)(answer["message"])
@@ -145,10 +172,9 @@ def serve() -> None:
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # whatever libraries print
     form = getattr(import_module(question["module"]), question["format"])()
-    path, asked = (
-        Path(question["path"]),
-        Asked(tuple(question["package_dirs"]), question["arguments"]),
-    )
+    path = Path(question["path"])
+    packages = tuple(question["package_dirs"])
+    asked = Asked(packages, question["arguments"], tuple(question["absent"]))
     limit_memory(_MAX_MEMORY)
     set_alarm(question["seconds"])
     try:

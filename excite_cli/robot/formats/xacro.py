@@ -7,7 +7,7 @@ are read within the robot's folders (`allowed_files`), and variables are those o
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -51,7 +51,7 @@ class Xacro(RobotFormat):
         """The expanded text; `$(find package)` as `_Packages.find` does."""
         library = library_of_xacro()
         allowed = allowed_files(path, asked.package_dirs)
-        packages = _Packages(path, allowed)
+        packages = _Packages(path, allowed, asked.absent)
         _replace(library, allowed, packages.find)
         arguments = {name: _written(value) for name, value in asked.arguments.items()}
         try:
@@ -72,12 +72,12 @@ class Xacro(RobotFormat):
 class _Packages:
     """The packages that one file asks for.
 
-    One that is nowhere may be the one that the file lies in, whose folder was renamed and lost its
-    package.xml: where that folder is allowed, it stands in.
+    For one that is nowhere (`absent`) stands the one that the file lies in: its folder was renamed
+    and lost its package.xml.
     """
 
-    def __init__(self, path: Path, allowed: AllowedFiles) -> None:
-        self._path, self._allowed = path, allowed
+    def __init__(self, path: Path, allowed: AllowedFiles, absent: Collection[str]) -> None:
+        self._path, self._allowed, self._absent = path, allowed, absent
         self._found: dict[str, Path] = {}
         self._stand_ins: dict[str, Path] = {}
 
@@ -87,7 +87,7 @@ class _Packages:
             self._found[name] = find_package(name, self._allowed)
         except MissingPackageError:
             own = unnamed_package(self._path)
-            if own is None or not self._allowed.has(own):
+            if own is None or name not in self._absent:
                 raise
             self._found[name] = self._stand_ins[name] = own
         return str(self._found[name])
@@ -164,7 +164,7 @@ def _parsed(library: Any, allowed: AllowedFiles, given: None, name: str) -> Any:
     path = allowed.require(Path(name))
     if not path.is_file():  # the library passes over an include that is optional
         library.filestack.pop()
-        raise library.XacroException(f"there is no file {path}", exc=FileNotFoundError(name))
+        raise library.XacroException(f"there is no file {path}", exc=FileNotFoundError())
     document: Any = minidom.parseString(_text(path))
     for element in document.documentElement.childNodes:
         old = element.nodeName in ("property", "include") and element.hasAttribute(
