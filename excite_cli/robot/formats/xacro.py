@@ -117,7 +117,7 @@ def _replace(library: Any, allowed: AllowedFiles, find: Callable[[str], str]) ->
             if not hasattr(owner, name):
                 raise MissingExtraError(
                     f"the installed version of the package xacro has no {name}, and is not one "
-                    "that excite knows. Run: pip install 'xacro==2.1.1'."
+                    "that excite knows. Run: pip install --force-reinstall 'excite-cli[formats]'."
                 )
     symbols = xacro_expression.symbols(_functions_of_xacro(library, allowed))
     library._global_symbols = symbols
