@@ -39,6 +39,7 @@ _SECONDS, _BYTES_PER_SECOND = 8.0, 2**20  # processor time allowed: a base, and 
 _MOST_ABSENT = 10  # packages that are nowhere; each costs a process
 _SLOWEST = 10  # times the processor time, on a machine with much else to do
 _MAX_MEMORY = 4 * 2**30  # bytes
+_MAX_TEXT = 20_000_000  # characters of the URDF, as of one that is given
 _FORM = "3"  # of what is kept; another one after a change of what formats write
 _OF_ERRORS = {each.__name__: each for each in (RobotError, MissingExtraError)}
 
@@ -129,7 +130,8 @@ def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: f
             run = subprocess.run(
                 command(__name__),
                 input=json.dumps(question).encode(),
-                capture_output=True,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,  # a file may have a library write without end
                 env=environment(),
                 cwd=folder,
                 timeout=_SLOWEST * seconds,
@@ -181,6 +183,10 @@ def serve() -> None:
         form.load_library()
         notes = confinement_notes(form.name, allowed_files(path, asked.package_dirs).folders)
         found = form.urdf(path, question["text"], asked)
+        if len(found.text) > _MAX_TEXT:
+            raise RobotError(
+                f"{path.name}: what it expands to is larger than {_MAX_TEXT // 10**6} MB: no robot."
+            )
         answer = asdict(replace(found, notes=(*found.notes, *notes)))
     except MissingPackageError as error:
         answer = {"package": error.name}
