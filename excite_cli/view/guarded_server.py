@@ -3,12 +3,16 @@
 A page of any other site may open a websocket to this machine (its `Origin` is then foreign), and a
 name that an attacker owns may be made to lead here (its `Host` is then foreign). Both are refused
 before viser sees the request. Programs send no `Origin`; they are not a web page.
+
+A request that two readers may understand in two ways (two `Host` headers, a target with a host of
+its own) is refused as well: what stands before this server may have judged by the other one.
 """
 
 import http
 import ipaddress
+import re
 import socket
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
@@ -27,6 +31,8 @@ _HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
 }
+# A name or an address, an IPv6 address in brackets, and a port.
+_HOST = re.compile(r"(?:[a-z0-9._-]+|\[[0-9a-f:.%]+\])(?::[0-9]{1,5})?", re.IGNORECASE | re.ASCII)
 
 
 def foreign(headers: Mapping[str, str], serving_host: str) -> str | None:
@@ -45,6 +51,23 @@ def foreign(headers: Mapping[str, str], serving_host: str) -> str | None:
     parts = urlsplit(origin)
     if parts.scheme not in ("http", "https") or parts.netloc.lower() != host.lower():
         return f"Origin '{origin}' is another site"
+    return None
+
+
+def ambiguous(target: str, hosts: Sequence[str], origins: Sequence[str]) -> str | None:
+    """What of a request can be read in more than one way, in words; None for a plain one.
+
+    `target` is that of the request's first line, `hosts` and `origins` are all its headers of
+    these names.
+    """
+    if not target.startswith("/") or target.startswith("//"):
+        return f"'{target}' is not a path on this server"
+    if len(hosts) != 1:
+        return f"{len(hosts)} Host headers; a request has one"
+    if not _HOST.fullmatch(hosts[0]):
+        return f"Host '{hosts[0]}' is not one name with a port"
+    if len(origins) > 1:
+        return f"{len(origins)} Origin headers; a request has one at most"
     return None
 
 
@@ -84,15 +107,16 @@ def guarded(serving_host: str) -> Iterator[None]:
 
 def _checked(inner: Any, serving_host: str) -> Any:
     """`inner`, viser's answer to a request, for requests of our own page only."""
-    from websockets.datastructures import Headers
-    from websockets.http11 import Response
 
     def process(connection: Any, request: Any) -> Any:
-        reason = foreign(_single(request.headers), serving_host)
+        hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
+        reason = ambiguous(request.path, hosts, origins)
         if reason is not None:
-            text = f"Refused: {reason}.\n".encode()
-            headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(text))})
-            return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", headers, text)
+            return _refusal(http.HTTPStatus.BAD_REQUEST, reason)
+        headers = dict(zip(("Host", "Origin"), (*hosts, *origins), strict=False))
+        reason = foreign(headers, serving_host)
+        if reason is not None:
+            return _refusal(http.HTTPStatus.FORBIDDEN, reason)
         answer = inner(connection, request) if inner is not None else None
         if answer is not None:
             answer.headers.update(_HEADERS)
@@ -101,16 +125,21 @@ def _checked(inner: Any, serving_host: str) -> Any:
     return process
 
 
-def _single(headers: Any) -> dict[str, str]:
-    """The two headers that are judged; one that is there twice is joined, and thus foreign."""
-    names = ("Host", "Origin")
-    return {name: ",".join(all_) for name in names if (all_ := headers.get_all(name))}
+def _refusal(status: http.HTTPStatus, reason: str) -> Any:
+    from websockets.datastructures import Headers
+    from websockets.http11 import Response
+
+    text = f"Refused: {reason}.\n".encode("ascii", "replace")
+    headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(text))})
+    return Response(status, status.phrase, headers, text)
 
 
-def _hostname(netloc: str) -> str | None:
+def _hostname(host: str) -> str | None:
+    """The name in a `Host` header, in small letters; None where it is none."""
+    if not _HOST.fullmatch(host):
+        return None
     try:
-        parts = urlsplit(f"//{netloc}")
-        return parts.hostname if parts.netloc == netloc and not parts.username else None
+        return urlsplit(f"//{host}").hostname
     except ValueError:
         return None
 

@@ -25,19 +25,24 @@ def port() -> Iterator[int]:
 
 def handshake(port: int, host: str, origin: str | None) -> str:
     """The status line with which a websocket is answered."""
+    return answer(port, [f"Host: {host}", *([f"Origin: {origin}"] if origin is not None else [])])
+
+
+def answer(port: int, own: list[str], target: str = "/") -> str:
+    """The status line that a websocket with these headers gets; empty where it gets none."""
     lines = [
-        "GET / HTTP/1.1",
-        f"Host: {host}",
+        f"GET {target} HTTP/1.1",
+        *own,
         "Upgrade: websocket",
         "Connection: Upgrade",
         f"Sec-WebSocket-Key: {KEY}",
         "Sec-WebSocket-Version: 13",
         f"Sec-WebSocket-Protocol: viser-v{viser.__version__}",
     ]
-    lines += [f"Origin: {origin}"] if origin is not None else []
     with socket.create_connection(("127.0.0.1", port), timeout=10) as stream:
         stream.sendall("\r\n".join([*lines, "", ""]).encode())
-        return stream.recv(4096).decode(errors="replace").splitlines()[0]
+        said = stream.recv(4096).decode(errors="replace").splitlines()
+    return said[0] if said else ""
 
 
 def test_its_own_page_and_programs_may_connect(port: int) -> None:
@@ -52,6 +57,58 @@ def test_its_own_page_and_programs_may_connect(port: int) -> None:
 )
 def test_pages_of_other_sites_may_not(port: int, origin: str) -> None:
     assert " 403 " in handshake(port, f"localhost:{port}", origin)
+
+
+HOST = "Host: localhost"
+MALFORMED = {
+    "no host": ([], "/"),
+    "host twice": ([HOST, HOST], "/"),
+    "host twice, once foreign": (["Host: localhost:1", "Host: evil.example"], "/"),
+    "host twice, foreign first": (["Host: evil.example", "host: localhost"], "/"),
+    "a list of hosts": (["Host: localhost:1, evil.example"], "/"),
+    "a port that is none": (["Host: localhost:evil.example"], "/"),
+    "a user": (["Host: @localhost"], "/"),
+    "an empty host": (["Host:"], "/"),
+    "letters of another alphabet": (["Host: löcalhost"], "/"),
+    "origin twice": ([HOST, "Origin: http://localhost", "Origin: http://localhost"], "/"),
+    "a whole address": ([HOST], "http://localhost/"),
+    "a whole address elsewhere": ([HOST], "http://evil.example/"),
+    "an address without its kind": ([HOST], "//evil.example/"),
+    "another server's name": ([HOST], "localhost:80"),
+    "the server itself": ([HOST], "*"),
+}
+
+
+@pytest.mark.parametrize("name", MALFORMED)
+def test_what_may_be_read_in_two_ways_is_refused(port: int, name: str) -> None:
+    """Two readers of one request (a proxy and this server) must not see two hosts."""
+    headers, target = MALFORMED[name]
+    assert " 400 " in answer(port, headers, target)
+
+
+@pytest.mark.parametrize("host", ["localhost.", "127.1", "0x7f.0.0.1", "2130706433", "local host"])
+def test_other_spellings_of_this_machine_are_no_names_of_it(port: int, host: str) -> None:
+    assert " 101 " not in answer(port, [f"Host: {host}"])
+
+
+def test_names_are_the_same_in_capitals(port: int) -> None:
+    assert " 101 " in handshake(port, f"LocalHost:{port}", f"http://localhost:{port}")
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        ["Transfer-Encoding: chunked"],
+        ["Transfer-Encoding: chunked", "Content-Length: 5"],
+        ["Content-Length: 5", "Content-Length: 0"],
+        ["X-Long: a", " b"],
+        ["Host : evil.example"],
+    ],
+)
+def test_requests_with_a_body_or_folded_lines_get_no_answer(port: int, more: list[str]) -> None:
+    said = answer(port, [HOST, *more])
+    assert " 101 " not in said
+    assert " 200 " not in said
 
 
 def test_names_that_lead_here_may_not(port: int) -> None:
