@@ -1,6 +1,7 @@
 """A program of the user's that plays a motion on the robot and writes its log."""
 
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -18,7 +19,7 @@ _TIMES, _MORE = 5.0, 60.0  # the limit of time: so many times the motion, and so
 
 @dataclass(frozen=True)
 class Command(Measure):
-    """Runs `words`, in which {motion} and {data} are replaced by paths ({name} by the name).
+    """Runs `words`, in which {motion} and {data} become whole paths, {name} the motion's name.
 
     No shell is between. Exit status 0 means measured. `limit` [s]; None: five times the motion and
     a minute.
@@ -61,10 +62,10 @@ class Command(Measure):
 
     def take(self, take: Take) -> None:
         """Run the program to its end, or to the limit of time: SIGTERM, and SIGKILL after 10 s."""
-        given = {"{motion}": take.motion, "{data}": take.data, "{name}": take.name}
-        words = [
-            _filled(word, {key: str(value) for key, value in given.items()}) for word in self.words
-        ]
+        # Whole paths: none begins with a minus, and each holds wherever the program goes.
+        motion, data = (str(path.absolute()) for path in (take.motion, take.data))
+        given = {"{motion}": motion, "{data}": data, "{name}": take.name}
+        words = [_filled(word, given) for word in self.words]
         limit = self._limit(take)
         with held_while_it_runs(take.diary.parent, limit) as handle, take.diary.open("ab") as diary:
             try:
@@ -106,9 +107,9 @@ class Command(Measure):
 
 
 def _filled(word: str, given: dict[str, str]) -> str:
-    for key, value in given.items():
-        word = word.replace(key, value)
-    return word
+    """The word with its places filled, in one pass: what is put in may look like a place."""
+    places = "|".join(map(re.escape, given))
+    return re.sub(places, lambda found: given[found[0]], word)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

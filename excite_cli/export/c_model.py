@@ -12,6 +12,7 @@ from excite_cli.effects.c_code import reals
 from excite_cli.effects.sign import WIDTH
 from excite_cli.export.detector_in_c import detector_in_c
 from excite_cli.export.exported import ModelText, in_words
+from excite_cli.export.gaps import filled
 from excite_cli.identification.identified_model import IdentifiedModel, Series
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, tree_of
@@ -66,8 +67,6 @@ def c_model(
         "SERIES_EFFECTS": "\n".join(f"    {code}" for code in series if code),
         **_tested(robot, kept, columns),
     }
-    for name, filling in gaps.items():
-        text = text.replace(f"@{name}@", filling)
     notes = []
     if model.of_single_runs:
         notes.append(
@@ -76,7 +75,7 @@ def c_model(
         )
     if unknown:
         notes.append(f"C has no code for: {in_words(unknown, names)}")
-    return ModelText(text, tuple(notes))
+    return ModelText(filled(text, gaps), tuple(notes))
 
 
 def _code(codes: list[tuple[Effect, str]], defects: bool) -> str:

@@ -5,6 +5,7 @@ from importlib.resources import files
 import numpy as np
 
 from excite_cli.effects.c_code import real, reals
+from excite_cli.export.gaps import filled
 from excite_cli.robot.model import Array
 from excite_cli.scoring.thresholds import REVERSAL, Residual, Thresholds
 
@@ -18,11 +19,10 @@ def detector_in_c(thresholds: Thresholds, count: int, step: float) -> str:
         "SOUND": ",\n".join(f"    {{{reals(row)}}}" for row in rows),
         "TIME_CONSTANT": real(thresholds.time_constant),
         "REVERSAL": real(REVERSAL),
+        "TEST_STEP": repr(step),
         "DETECTED": "\n    " + ",\n    ".join(map(reals, _tested(thresholds, count, step))),
     }
-    for name, filling in gaps.items():
-        text = text.replace(f"@{name}@", filling)
-    return text
+    return filled(text, gaps)
 
 
 def _tested(thresholds: Thresholds, count: int, step: float) -> Array:

@@ -1,5 +1,6 @@
 """A program that measures: its words, its end, and what is said of it."""
 
+import json
 import os
 import signal
 import subprocess
@@ -30,6 +31,25 @@ def test_it_gets_motion_log_and_name(tmp_path: Path) -> None:
     body = "open(sys.argv[2], 'w').write(open(sys.argv[1]).read() + sys.argv[3])"
     Command.of(program(tmp_path, body)).take(take_in(tmp_path))
     assert (tmp_path / "log of m.csv").read_text() == "t\n0\nm"
+
+
+ODD = ["c{data}", "{motion}{name}", "-lead", 'it\'s $HOME `id` "x"', "a {} {0} %s \\1 \\g<0>"]
+
+
+@pytest.mark.parametrize("folder", ODD)
+def test_names_of_folders_reach_the_program_as_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str
+) -> None:
+    """Nothing in a name is a place to fill, for a shell, or an option."""
+    body = "import json; json.dump(sys.argv[1:], open(sys.argv[2], 'w'))"
+    command = Command.of(f"{program(tmp_path, body)} --log={{data}},{{name}}")
+    monkeypatch.chdir(tmp_path)
+    Path(folder).mkdir()
+    command.take(take_in(Path(folder)))
+    own = tmp_path / folder
+    motion, log, name, both = json.loads((own / "log of m.csv").read_text())
+    assert (motion, log, name) == (str(own / "m 1.csv"), str(own / "log of m.csv"), "m")
+    assert both == f"--log={own / 'log of m.csv'},m"
 
 
 def test_what_it_says_is_kept(tmp_path: Path) -> None:
