@@ -21,6 +21,7 @@ from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.export.timed import timed_motion
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.shown.answer import Answer
+from excite_cli.shown.command import Command, as_word
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
@@ -131,9 +132,10 @@ def export_file(
             for each, to in zip(chains, paths, strict=True)
         )
     if slow is not None:
+        again = Command(("excite", "check", "CONFIG", as_word(paths[0]))).line
         text = (
-            "a slowed motion needs other torques: check what was written, `excite check CONFIG "
-            f"{paths[0]}`, before it is played"
+            f"a slowed motion needs other torques: check what was written, `{again}`, before it "
+            "is played"
         )
         tell(Note(Level.INFO, text))
     return Exported(format, tuple(paths), motions, rate, slow)

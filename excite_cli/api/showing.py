@@ -4,6 +4,7 @@ from excite_cli.excitation.progress import Measure as Measure
 from excite_cli.excitation.words import figure_in_words as figure_in_words
 from excite_cli.shown.answer import Answer as Answer
 from excite_cli.shown.command import Command as Command
+from excite_cli.shown.command import as_word as as_word
 from excite_cli.shown.note import Level as Level
 from excite_cli.shown.note import Note as Note
 from excite_cli.shown.note import Tell as Tell

@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from excite_cli.cli.help_page import usage_of
+from excite_cli.cli.minus_words import about_names
 from excite_cli.errors import ConfigError, nearest
 
 # Typer brings its own copy of click in some versions: take the base from one of its errors.
@@ -36,9 +37,12 @@ def in_our_words(error: Exception, words: list[str], commands: Iterable[str]) ->
     if kind == "NoSuchOption" and context is not None:
         given = str(getattr(error, "option_name", ""))
         known = [name for each in context.command.get_params(context) for name in _names(each)]
-        return ConfigError(f"{where}there is no option {given}.{nearest(given, known)}{more}")
+        taken = about_names(words, context, given)
+        told = f"{nearest(given, known)}{taken or more}"
+        return ConfigError(f"{where}there is no option {given}.{told}")
     if kind == "MissingParameter":
-        return ConfigError(f"{where}{_called(param)} is missing.{usage}")
+        taken = about_names(words, context)
+        return ConfigError(f"{where}{_called(param)} is missing.{taken}{usage}")
     if kind == "BadParameter":
         reason = reason[:1].lower() + reason[1:]
         return ConfigError(f"{where}{_called(param)}: {reason.partition(', unable')[0]}.{more}")
@@ -51,7 +55,7 @@ def in_our_words(error: Exception, words: list[str], commands: Iterable[str]) ->
         if path.endswith(" init"):  # the one command whose robot is an option
             one = shlex.quote(extra) if extra in words else "NAME"  # several are told as one text
             usage = f" Did you mean --robot {one}, or --urdf {one}?"
-        return ConfigError(f"{where}unexpected: {extra}.{usage}")
+        return ConfigError(f"{where}unexpected: {extra}.{about_names(words, context)}{usage}")
     return ConfigError(f"{where}{reason[:1].lower()}{reason[1:]}.{more}")
 
 

@@ -31,7 +31,7 @@ from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.base_joints import BASE_ROWS
 from excite_cli.robot.model import Array, Robot, build_measured_robot
-from excite_cli.shown.command import Command
+from excite_cli.shown.command import Command, as_word
 from excite_cli.shown.record import Shown
 
 
@@ -108,7 +108,7 @@ def next_experiment(
 
 def next_command(config: str, file: str) -> Command:
     """What plans the next motion of `config` after the diagnosis in `file`."""
-    return Command(("excite", "optimize", config, "--after", file))
+    return Command(("excite", "optimize", as_word(config), "--after", as_word(file)))
 
 
 def plan_after(

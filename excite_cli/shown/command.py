@@ -14,3 +14,9 @@ class Command:
     def line(self) -> str:
         """`excite optimize 'my arm.yaml'`."""
         return shlex.join(self.words)
+
+
+def as_word(name: object) -> str:
+    """The name of a file as a word of a command: one that begins with a minus is no option."""
+    text = str(name)
+    return f"./{text}" if text.startswith("-") else text

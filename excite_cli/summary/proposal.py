@@ -2,7 +2,7 @@
 
 from excite_cli.proposal.propose import Proposal
 from excite_cli.shown.answer import Answer
-from excite_cli.shown.command import Command
+from excite_cli.shown.command import Command, as_word
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts
 
@@ -20,7 +20,8 @@ def proposal_answer(found: Proposal, source: str, path: str) -> Answer:
         "notes": list(found.notes),
     }
     return Answer(
-        (*proposal_parts(found), path, "next:", Command(("excite", "optimize", path))), data
+        (*proposal_parts(found), path, "next:", Command(("excite", "optimize", as_word(path)))),
+        data,
     )
 
 
