@@ -3,7 +3,8 @@
 Names tell wheels, rotors, fingers, faces and hoses; the structure tells when a name misleads: a
 joint that carries a tenth of the robot is no finger, and a word that stands in every name says
 nothing. A robot that consists of fingers moves them. Joints that follow another one move with it.
-Joints of closed loops, which the model cuts, and those of next to no range stay where they are.
+Joints of closed loops, which the model cuts, those of next to no range and those that equal limits
+hold stay where they are.
 """
 
 import re
@@ -77,9 +78,11 @@ def choose_joints(joints: Iterable[UrdfJoint], source: str, asked: tuple[str, ..
         for joint in fingers:
             ruled[joint.name] = ""
         kept = [joint for joint in own if not ruled[joint.name]]
+    held = {joint.name for joint in own if joint.held}
     for joint in joints:  # a joint that follows does as its driver does
         if joint.mimics is not None:
-            ruled[joint.name] = ruled.get(joint.mimics.driver, _STILL)
+            driver = joint.mimics.driver
+            ruled[joint.name] = _STILL if driver in held else ruled.get(driver, _STILL)
     left_out: dict[str, tuple[str, ...]] = {}
     for joint in joints:
         if ruled[joint.name]:
@@ -110,6 +113,7 @@ def _followers(
 
 _FINGER = "fingers and grippers"
 _STILL = "joints that mimic one that is fixed or unknown"
+_NO_RANGE = "joints whose limits and those of the joints that mimic them leave no range"
 
 
 def _reason(joint: UrdfJoint, joints: tuple[UrdfJoint, ...]) -> str:
@@ -117,9 +121,13 @@ def _reason(joint: UrdfJoint, joints: tuple[UrdfJoint, ...]) -> str:
         return "joints of the base" if not joint.above else f"joints of type {joint.kind}"
     if joint.in_loop:
         return "joints of closed loops, which the model cuts"
-    least = _LEAST_SLIDE if joint.sliding else _LEAST_TURN
-    if 0.0 < joint.upper - joint.lower < least:
-        return f"joints with a range below {least:g} {'m' if joint.sliding else 'rad'}"
+    least, unit = (_LEAST_SLIDE, "m") if joint.sliding else (_LEAST_TURN, "rad")
+    if joint.held:
+        return f"held at {joint.lower:g} {unit} by equal position limits"
+    if joint.known and joint.lower >= joint.upper:
+        return _NO_RANGE
+    if joint.known and joint.upper - joint.lower < least:
+        return f"joints with a range below {least:g} {unit}"
     words = _words(joint.name)
     if words & _WHEELS or (joint.carried < _FINGER_SHARE and _words(joint.child) & _WHEELS):
         return "wheels and casters"
@@ -187,6 +195,13 @@ def _as_asked(joints: tuple[UrdfJoint, ...], asked: tuple[str, ...]) -> Choice:
             raise ConfigError(
                 f"--joints: '{name}' is of type {joint.kind}; only revolute, continuous and "
                 "prismatic joints can be moved."
+            )
+        if joint.known and joint.lower >= joint.upper:
+            why = f"is held at {joint.lower:g} by equal position limits"
+            raise ConfigError(
+                f"--joints: '{name}' {why if joint.held else 'has no range left by its followers'}."
+                " Leave it out; to move it, write the config without it, then name it under "
+                "robot.joints and give robot.limits.<joint>.position what the robot really has."
             )
     chosen = tuple(joint for joint in joints if joint.name in asked)
     followers = _followers(chosen, joints)

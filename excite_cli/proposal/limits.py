@@ -1,7 +1,8 @@
 """Limits that a plan can work with, where the URDF has none or placeholders.
 
 A figure is taken for a placeholder where no real joint has it: speeds of 0 or beyond 60 rad/s,
-torques of 0 or from 1000 N·m on, ranges that are empty or beyond two turns either way.
+torques of 0 or from 1000 N·m on, ranges beyond two turns either way. What is assumed lies within
+the range that the URDF gives, if it gives one: 0 to 0 is none.
 """
 
 import math
@@ -19,7 +20,6 @@ ASSUMED_SPEED, ASSUMED_SLIDE_SPEED = 3.1, 0.2
 # A joint reaches its top speed in this time, and accelerates no harder than this.
 _TO_TOP_SPEED = 0.2
 MOST_ACCELERATION, _MOST_SLIDE = 10.0, 2.0
-_SHORTEST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -89,19 +89,26 @@ def _plan(joint: UrdfJoint, twin: UrdfJoint | None) -> JointPlan:
 def _position(joint: UrdfJoint, unit: str, notes: dict[str, str]) -> tuple[float, float]:
     lower, upper = joint.lower, joint.upper
     longest = _LONGEST if joint.sliding else _TWO_TURNS
-    if math.isfinite(lower) and math.isfinite(upper) and _SHORTEST < upper - lower <= longest:
+    if joint.known and upper - lower <= longest:
         return lower, upper
     reach = ASSUMED_SLIDE if joint.sliding else ASSUMED_TURN
-    if not (math.isfinite(lower) or math.isfinite(upper)):
+    if not joint.known:
+        given, lower, upper = "no limits (0 to 0)", -math.inf, math.inf
+    elif not (math.isfinite(lower) or math.isfinite(upper)):
         given = "no bounds"
-    elif upper - lower <= _SHORTEST:
-        given = f"the empty range [{lower:g}, {upper:g}]"
     else:
         given = f"[{lower:g}, {upper:g}] {unit}"
-    notes["position"] = f"the URDF gives {given}; ±{reach:g} {unit} assumed"
-    low = max(lower, -reach) if lower < 0 < upper else -reach
-    high = min(upper, reach) if lower < 0 < upper else reach
+    low, high = _within(lower, upper, reach)
+    assumed = f"±{reach:g}" if low == -high else f"{low:g} to {high:g}"
+    notes["position"] = f"the URDF gives {given}; {assumed} {unit} assumed"
     return low, high
+
+
+def _within(lower: float, upper: float, reach: float) -> tuple[float, float]:
+    """What of `reach` either way lies within the range; where 0 does not, `reach` from an end."""
+    if lower < 0.0 < upper:
+        return max(lower, -reach), min(upper, reach)
+    return (lower, lower + reach) if lower >= 0.0 else (upper - reach, upper)
 
 
 def _speed_is_real(joint: UrdfJoint) -> bool:

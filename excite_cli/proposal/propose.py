@@ -185,7 +185,8 @@ def _draft(
     robot["joints"] = [joint.name for joint in joints]
     if choice.in_words():
         comments["robot", "joints"] = "; ".join(choice.in_words())
-    robot["posture"] = {**_inside(posture.others, shapes.facts), **posture.moved}
+    others = {**_inside(posture.others, shapes.facts), **_held(shapes.facts)}
+    robot["posture"] = {**others, **posture.moved}
     comments["robot", "posture"] = posture.words
     limits = _limits(joints, comments)
     if limits:
@@ -295,6 +296,13 @@ def _inside(others: dict[str, float], facts: UrdfSurvey) -> dict[str, float]:
         name: value
         for name, value in others.items()
         if name in own and own[name].lower <= value <= own[name].upper
+    }
+
+
+def _held(facts: UrdfSurvey) -> dict[str, float]:
+    """Where equal limits hold joints."""
+    return {
+        joint.name: joint.lower for joint in facts.joints if joint.held and joint.mimics is None
     }
 
 

@@ -14,7 +14,7 @@ import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 
@@ -28,10 +28,10 @@ from excite_cli.robot.formats.catalogue import as_urdf
 from excite_cli.robot.loops import Loop, closed_loops, loops_in_words
 from excite_cli.robot.mimic import Mimic, lost, mimics
 from excite_cli.robot.urdf_check import parsed
+from excite_cli.robot.written_limits import UNBOUNDED, ordered_limits
 
 EXAMPLE_PREFIX = "example-robot-data:"
 MAX_URDF_BYTES = 20_000_000
-UNBOUNDED = 1e9
 # How far [rad] an angle is off a right one that was meant, and from where on that matters.
 _ROUNDED, _EXACT = 1e-4, 1e-8
 
@@ -60,7 +60,7 @@ class RobotDescription:
     `xml` is what is used of `urdf`, the text as given or as it was made of another format, which
     may have left out what is told in `notes`. `mimicking` names the joints that follow another
     one, with what they follow; `loops` are closed ones, which are cut; `ignored` are pairs of links
-    whose contact the file itself rules out.
+    whose contact the file itself rules out. `reversed_limits` says of joints that theirs were.
     """
 
     name: str
@@ -74,6 +74,7 @@ class RobotDescription:
     notes: tuple[str, ...] = ()
     loops: tuple[Loop, ...] = ()
     ignored: tuple[tuple[str, str], ...] = ()
+    reversed_limits: Mapping[str, str] = field(default_factory=dict)
 
 
 def example_robots_folder() -> Path:
@@ -141,7 +142,7 @@ def load_description(
     path, dirs = file.path, (*extra, *file.package_dirs)
     found = as_urdf(path, _read(path), Asked(dirs, {**file.arguments, **(arguments or {})}))
     tree = parsed(path, found.text)
-    strange = put_into_standard(tree)
+    strange, swapped = put_into_standard(tree), ordered_limits(path, tree)
     followers, loops = mimics(path, tree), closed_loops(tree)
     packages = (*dirs, str(own_folder(path)), str(path.parent), *found.folders)
     return RobotDescription(
@@ -153,9 +154,16 @@ def load_description(
         sha256=hashlib.sha256(found.text.encode()).hexdigest(),
         mimicking=followers,
         urdf=found.text,
-        notes=(*found.notes, *strange, *lost(followers, tree), *loops_in_words(loops)),
+        notes=(
+            *found.notes,
+            *strange,
+            *swapped.values(),
+            *lost(followers, tree),
+            *loops_in_words(loops),
+        ),
         loops=loops,
         ignored=found.ignored,
+        reversed_limits=swapped,
     )
 
 

@@ -40,13 +40,27 @@ class Limits:
 
 @dataclass(frozen=True)
 class JointRange:
-    """Bounds of one joint; infinite where there is none."""
+    """Bounds of one joint; infinite where there is none.
+
+    Without `known` nothing gives it limits of position: a file of a robot that has none says 0, 0.
+    It is `held` where its limits, or those of a joint that follows it, are equal.
+    """
 
     lower: float
     upper: float
     velocity: float
     acceleration: float = np.inf
     effort: float = np.inf
+    known: bool = True
+    held: bool = False
+
+    @classmethod
+    def written(
+        cls, lower: float, upper: float, velocity: float, effort: float = np.inf
+    ) -> "JointRange":
+        """As the file of a robot gives it, its limits in order."""
+        known = not lower == upper == 0.0
+        return cls(lower, upper, velocity, np.inf, effort, known, known and lower == upper)
 
     def given(self, own: JointLimits | None) -> "JointRange":
         """With those that the config gives in place of the URDF's."""
@@ -59,18 +73,17 @@ class JointRange:
             own.velocity or self.velocity,
             own.acceleration or self.acceleration,
             own.effort or self.effort,
+            self.known or own.position is not None,
+            self.held and own.position is None,
         )
 
     def keeping(self, follower: "JointRange", mimic: Mimic) -> "JointRange":
-        """Narrowed so that a joint that follows keeps its limits too.
-
-        An empty range of the follower is none: URDFs leave the limits of such joints out.
-        """
+        """Narrowed so that a joint that follows keeps its limits too, as far as it has any."""
         m = mimic.multiplier
         if m == 0.0:
             return self
         lower, upper = self.lower, self.upper
-        if follower.lower < follower.upper:
+        if self.known and follower.known:
             ends = [(end - mimic.offset) / m for end in (follower.lower, follower.upper)]
             lower, upper = max(lower, min(ends)), min(upper, max(ends))
         return replace(
@@ -79,6 +92,7 @@ class JointRange:
             upper=upper,
             velocity=min(self.velocity, follower.velocity / abs(m)),
             acceleration=min(self.acceleration, follower.acceleration / abs(m)),
+            held=(self.held or follower.held) and lower == upper,
         )
 
 
@@ -95,13 +109,17 @@ def check_range(name: str, own: JointRange, kept: JointRange, followers: list[st
     Raises
     ------
     ConfigError
-        Its limits cross or are empty, or those of the joints that follow it leave it none.
+        It has no limits or equal ones, or those of the joints that follow it leave it no range.
     """
     if not own.lower < own.upper:
+        what = (
+            f"is held at {own.lower:g} by equal position limits"
+            if own.held
+            else "has no position limits (0 to 0)"
+        )
         raise ConfigError(
-            f"robot: joint '{name}' has crossed or empty position limits "
-            f"[{own.lower:g}, {own.upper:g}]. Give sensible ones under robot.limits.{name}."
-            "position, or leave the joint out of robot.joints."
+            f"robot: joint '{name}' {what} in the robot's file. To move it, give it some under "
+            f"robot.limits.{name}.position; else leave it out of robot.joints."
         )
     if not kept.lower < kept.upper:
         raise ConfigError(

@@ -21,15 +21,12 @@ from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.base_joints import BASE_JOINTS, on_base_joints
 from excite_cli.robot.carried_payload import Payload, add_payload, payload_on
 from excite_cli.robot.coupling import Coupling
-from excite_cli.robot.description import (
-    UNBOUNDED,
-    RobotDescription,
-    load_description,
-)
+from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.limits import JointRange, Limits, check_range, limits_of
 from excite_cli.robot.mimic import Mimic
 from excite_cli.robot.parsed_model import parsed_model, reduced_model
 from excite_cli.robot.posture import posture_of, require_known
+from excite_cli.robot.written_limits import UNBOUNDED
 
 Array = NDArray[np.float64]
 
@@ -49,7 +46,8 @@ class Robot:
 
     Where joints follow others (`coupling`), `model` has all of them; `joint_names`, `rows` and
     `moved` count those that move on their own, and `tree` is the robot in which all would. `motors`
-    drive several joints together; None where each joint has its own.
+    drive several joints together; None where each joint has its own. `held_joints` are those of the
+    `locked` ones that equal limits hold.
     """
 
     name: str
@@ -70,6 +68,7 @@ class Robot:
     held: "Robot | None" = None
     coupling: Coupling | None = None
     motors: Motors | None = None
+    held_joints: tuple[str, ...] = ()
 
     @cached_property
     def tree(self) -> "Robot":
@@ -301,16 +300,21 @@ def _built(description: RobotDescription, spec: RobotSpec) -> Robot:
     if spec.joints == "all":
         _check_types(full, names, description)
     mimicking = {name: own for name, own in description.mimicking.items() if name in names}
-    chosen = _chosen(spec, names, mimicking)
-    _check_types(full, chosen, description)
+    asked = _chosen(spec, names, mimicking)
+    _check_types(full, asked, description)
     # Joints of the base that slide or float stand still at neutral: they have no single value.
     others = [name for name in names if not _is_single(full, name)]
     names = [name for name in names if name not in others]
+    alone = {name: _range_of(full, name).given(spec.limits.get(name)) for name in names}
+    kept = _kept_ranges(alone, {n: own for n, own in mimicking.items() if n in names})
+    chosen = asked if spec.joints != "all" else _not_held(asked, kept, description)
     followers = {
         name: own for name, own in mimicking.items() if own.driver in chosen and name in names
     }
-    alone = {name: _range_of(full, name).given(spec.limits.get(name)) for name in names}
-    ranges = _kept_ranges(chosen, alone, followers)
+    for name in chosen:
+        theirs = [each for each, own in followers.items() if own.driver == name]
+        check_range(name, alone[name], kept[name], theirs)
+    ranges = {n: kept[n] if n in chosen or kept[n].held else alone[n] for n in names}
     posture = posture_of(spec, names, chosen, ranges, mimicking)
     reference = pin.neutral(full)
     for name in names:
@@ -353,20 +357,32 @@ def _built(description: RobotDescription, spec: RobotSpec) -> Robot:
         payload=None if spec.payload is None else payload_on(model, spec.payload),
         coupling=coupling,
         motors=motors_of(spec.transmissions, moved_names),
+        held_joints=tuple(n for n in names if n not in moving and kept[n].held),
     )
 
 
 def _kept_ranges(
-    chosen: list[str], alone: dict[str, JointRange], followers: dict[str, Mimic]
+    alone: dict[str, JointRange], followers: dict[str, Mimic]
 ) -> dict[str, JointRange]:
-    """Ranges of all joints, those of the chosen ones narrowed for the joints that follow them."""
+    """Ranges of all joints, narrowed for the joints that follow them."""
     kept = dict(alone)
     for name, own in followers.items():
-        kept[own.driver] = kept[own.driver].keeping(alone[name], own)
-    for name in chosen:
-        theirs = [each for each, own in followers.items() if own.driver == name]
-        check_range(name, alone[name], kept[name], theirs)
+        if own.driver in kept:
+            kept[own.driver] = kept[own.driver].keeping(alone[name], own)
     return kept
+
+
+def _not_held(
+    names: list[str], ranges: dict[str, JointRange], description: RobotDescription
+) -> list[str]:
+    """Those of the joints that equal limits do not hold where they are."""
+    free = [name for name in names if not ranges[name].held]
+    if names and not free:
+        raise RobotError(
+            f"{description.path.name}: equal position limits hold every joint where it is, so "
+            "there is nothing to move. Give others under robot.limits.<joint>.position."
+        )
+    return free
 
 
 def _coupling(
@@ -434,10 +450,9 @@ def _range_of(model: pin.Model, name: str) -> JointRange:
     joint = model.joints[model.getJointId(name)]
     lower = float(model.lowerPositionLimit[joint.idx_q])
     upper = float(model.upperPositionLimit[joint.idx_q])
-    return JointRange(
+    return JointRange.written(
         lower if lower > -UNBOUNDED else -np.inf,
         upper if upper < UNBOUNDED else np.inf,
         float(model.velocityLimit[joint.idx_v]) or np.inf,
-        np.inf,
         float(model.effortLimit[joint.idx_v]) or np.inf,
     )

@@ -32,10 +32,13 @@ def posture_of(
     for name in names:
         if name in mimicking:
             continue
-        lower, upper = ranges[name].lower, ranges[name].upper
+        own_range = ranges[name]
+        lower, upper = own_range.lower, own_range.upper
         if name in spec.posture:
             value = float(spec.posture[name])
-            if not lower <= value <= upper and (lower < upper or name in chosen):
+            if own_range.held:
+                value = _held(name, value, lower)
+            elif not lower <= value <= upper and (lower < upper or name in chosen):
                 raise ConfigError(
                     f"robot.posture.{name}: {value:g} is outside its limits "
                     f"[{lower:g}, {upper:g}]. Give a value between them{_in_degrees(value)}."
@@ -55,6 +58,16 @@ def posture_of(
                     f"{own.driver}."
                 )
     return posture
+
+
+def _held(name: str, given: float, held: float) -> float:
+    """Where equal limits hold a joint, once the config says nothing else."""
+    if abs(given - held) > _AS_TOLD:
+        raise ConfigError(
+            f"robot.posture.{name}: {given:g} is not where it stands, {held:g}: its position "
+            f"limits are equal. Leave it out, or give robot.limits.{name}.position."
+        )
+    return held
 
 
 def _inside(lower: float, upper: float) -> float:

@@ -8,9 +8,10 @@ import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 
-from excite_cli.robot.description import UNBOUNDED, RobotDescription
+from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.limits import JointRange
 from excite_cli.robot.mimic import Mimic
+from excite_cli.robot.written_limits import UNBOUNDED
 
 
 @dataclass(frozen=True)
@@ -19,10 +20,12 @@ class UrdfJoint:
 
     kind: `revolute`, `prismatic`, or another type of URDF; `continuous` is a revolute one with
     infinite `lower` and `upper`. lower, upper [rad or m], velocity [rad/s or m/s], effort [N·m or
-    N]: as written, nan where the URDF gives none. carried: share of the robot's mass beyond the
-    joint. above: movable joints between it and the base, nearest to the base first. beyond: those
-    that it carries. mimics: what it follows; lower, upper and velocity of a joint that others
-    follow are those that these leave it. in_loop: whether it lies on a closed loop, which is cut.
+    N]: as written, nan where the URDF gives none; without `known` it gives no limits of position,
+    and both are 0; `held`: equal ones, its own or those of a follower, hold it. carried: share of
+    the robot's mass beyond the joint. above: movable joints between it and the base, nearest to the
+    base first. beyond: those that it carries. mimics: what it follows; lower, upper and velocity of
+    a joint that others follow are those that these leave it. in_loop: whether it lies on a closed
+    loop, which is cut.
     """
 
     name: str
@@ -38,11 +41,20 @@ class UrdfJoint:
     above: tuple[str, ...]
     beyond: tuple[str, ...]
     in_loop: bool = False
+    known: bool = True
+    held: bool = False
 
     @property
     def sliding(self) -> bool:
         """Whether it is prismatic."""
         return self.kind == "prismatic"
+
+    @property
+    def range(self) -> JointRange:
+        """Its limits of position and speed; what is no speed bounds nothing."""
+        speed = self.velocity if self.velocity > 0 else math.inf
+        bounds = JointRange.written(self.lower, self.upper, speed)
+        return replace(bounds, known=self.known, held=self.held)
 
 
 @dataclass(frozen=True)
@@ -160,6 +172,7 @@ def survey(description: RobotDescription) -> UrdfSurvey:
                 in_loop=element.get("name", "") in looped,
             )
         )
+    joints = [_as_written(joint) for joint in joints]
     _narrow(joints)
     return UrdfSurvey(
         joints=tuple(joints),
@@ -170,6 +183,13 @@ def survey(description: RobotDescription) -> UrdfSurvey:
     )
 
 
+def _as_written(joint: UrdfJoint) -> UrdfJoint:
+    """The joint, with what its limits of position mean; only turning and sliding ones have any."""
+    bounds = JointRange.written(joint.lower, joint.upper, math.inf)
+    held = bounds.held and joint.kind in ("revolute", "prismatic")
+    return replace(joint, known=bounds.known, held=held)
+
+
 def _narrow(joints: list[UrdfJoint]) -> None:
     """Limits of joints that others follow become those that these leave them."""
     place = {joint.name: k for k, joint in enumerate(joints)}
@@ -177,13 +197,12 @@ def _narrow(joints: list[UrdfJoint]) -> None:
         if follower.mimics is None or follower.mimics.driver not in place:
             continue
         k = place[follower.mimics.driver]
-        own, theirs = (
-            JointRange(one.lower, one.upper, one.velocity if one.velocity > 0 else math.inf)
-            for one in (joints[k], follower)
-        )
-        kept = own.keeping(theirs, follower.mimics)
+        own = joints[k].range
+        kept = own.keeping(follower.range, follower.mimics)
         speed = kept.velocity if kept.velocity < own.velocity else joints[k].velocity
-        joints[k] = replace(joints[k], lower=kept.lower, upper=kept.upper, velocity=speed)
+        joints[k] = replace(
+            joints[k], lower=kept.lower, upper=kept.upper, velocity=speed, held=kept.held
+        )
 
 
 def _link(element: ElementTree.Element, end: str) -> str:

@@ -10,6 +10,7 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.words import dropped_in_words
 from excite_cli.robot.loops import loops_in_words
+from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
@@ -30,6 +31,7 @@ def problem_notes(problem: Problem) -> Iterator[Note]:
     moved = set(robot.joint_names)
     cut = [loop for loop in robot.description.loops if moved & set(loop.joints)]
     yield from (_warning(f"{told}.") for told in loops_in_words(cut))
+    yield from _limits(robot, problem.spec.robot.joints == "all")
     names = ", ".join(_counted_name(constraint) for constraint in problem.constraints) or "none"
     yield _said(f"constraints: {names}")
     yield _detail(
@@ -93,6 +95,16 @@ def _counted_name(constraint: Constraint) -> str:
     if constraint.left_out is None:
         return constraint.name
     return f"{constraint.name} ({len(constraint.labels)} pairs)"
+
+
+def _limits(robot: Robot, every: bool) -> Iterator[Note]:
+    """What is odd about limits of joints that move, or would; `every`: all were requested."""
+    for name, told in robot.description.reversed_limits.items():
+        if name in robot.tree.joint_names:
+            yield _warning(f"{told}.")
+    held = [f"{name} at {robot.locked[name]:g}" for name in robot.held_joints] if every else []
+    if held:
+        yield _said(f"not moved, held by equal position limits: {', '.join(held)}")
 
 
 def _uncertainty(problem: Problem) -> Iterator[Note]:

@@ -35,12 +35,29 @@ def test_a_torque_that_no_joint_has_bounds_nothing(tmp_path: Path, effort: str) 
 
 @pytest.mark.parametrize(
     "bounds",
-    ['lower="0" upper="0"', 'lower="1" upper="-1"', 'lower="-1e9" upper="1e9"', ""],
+    ['lower="0" upper="0"', 'lower="-1e9" upper="1e9"', ""],
 )
 def test_a_range_that_is_none_is_replaced(tmp_path: Path, bounds: str) -> None:
     plan = planned(tmp_path, f'{bounds} velocity="3" effort="50"')
     assert (plan.lower, plan.upper) == (-3.1, 3.1)
     assert "±3.1 rad assumed" in plan.notes["position"]
+
+
+@pytest.mark.parametrize(
+    ("bounds", "wanted"),
+    [
+        ('lower="1" upper="-1"', (-1, 1)),
+        ('lower="0" upper="100"', (0, 3.1)),
+        ('lower="1" upper="1e9"', (1, 4.1)),
+        ('lower="-100" upper="-2"', (-5.1, -2)),
+        ('lower="-1" upper="100"', (-1, 3.1)),
+    ],
+)
+def test_a_plan_stays_within_what_is_given(
+    tmp_path: Path, bounds: str, wanted: tuple[float, float]
+) -> None:
+    plan = planned(tmp_path, f'{bounds} velocity="3" effort="50"')
+    assert (plan.lower, plan.upper) == pytest.approx(wanted)
 
 
 def test_a_missing_limit_element_is_no_error(tmp_path: Path) -> None:

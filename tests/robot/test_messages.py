@@ -239,13 +239,15 @@ def test_posture_outside_limits(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("posture", [{}, {"elbow": 0.0}])
-def test_crossed_limits(tmp_path: Path, posture: dict[str, float]) -> None:
-    text = urdf(inside='<limit lower="1" upper="-1" velocity="2" effort="10"/>')
-    with pytest.raises(ConfigError, match=r"elbow' has crossed .*robot.limits.elbow.position"):
+def test_empty_limits(tmp_path: Path, posture: dict[str, float]) -> None:
+    text = urdf(inside='<limit lower="0" upper="0" velocity="2" effort="10"/>')
+    with pytest.raises(ConfigError, match=r"elbow' has no position .*robot.limits.elbow.position"):
         built(tmp_path, text, posture=posture)
     assert built(tmp_path, text, joints=("wrist",)).joint_names == ("wrist",)
     mended = {"elbow": JointLimits(position=(-1.0, 1.0))}
     assert built(tmp_path, text, limits=mended).limits.lower[0] == -1.0
+    crossed = urdf(inside='<limit lower="1" upper="-1" velocity="2" effort="10"/>')
+    assert built(tmp_path, crossed, posture=posture).limits.lower[0] == -1.0
 
 
 @pytest.mark.parametrize("inside", ["", '<limit velocity="3" effort="7"/>', LIMIT])

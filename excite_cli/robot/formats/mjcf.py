@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.robot.allowed_files import allowed_files
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.mjcf_ranges import Ranges, compiled
 from excite_cli.robot.formats.mjcf_sources import mjcf_sources
 from excite_cli.robot.formats.urdf_parts import (
     add_inertial,
@@ -61,11 +62,11 @@ class Mjcf(RobotFormat):
         """Bodies as links with inertias, shapes, joints, limits, efforts, friction, couplings."""
         mujoco = _library()
         try:
-            model = mujoco.MjModel.from_xml_path(str(path))
+            model, ranges = compiled(mujoco.MjSpec.from_file(str(path)))
         except Exception as error:
             reason = " ".join(str(error).split())
             raise RobotError(f"{path.name}: MuJoCo cannot compile it: {reason[:400]}") from error
-        return _Writer(model, path).written()
+        return _Writer(model, path, ranges).written()
 
     def sources(self, path: Path, text: str, asked: Asked) -> tuple[Path, ...] | None:
         """Includes, meshes, textures and height fields."""
@@ -86,8 +87,8 @@ def _library() -> Any:
 class _Writer:
     """One compiled model as XML."""
 
-    def __init__(self, model: Any, path: Path) -> None:
-        self.m, self.path = model, path
+    def __init__(self, model: Any, path: Path, ranges: Ranges) -> None:
+        self.m, self.path, self.ranges = model, path, ranges
         self.root = 0
         self.robot = ElementTree.Element("robot", name=path.stem)
         self.notes: list[str] = []
@@ -208,7 +209,7 @@ class _Writer:
                 kind = "prismatic"
                 place = place - ref * (turn @ axis)
             else:
-                kind = "revolute" if m.jnt_limited[j] else "continuous"
+                kind = "revolute" if j in self.ranges else "continuous"
                 turn = turn @ pin.exp3(-ref * axis)
             joint = self._joint(self._name(j), kind, above, below, place, turn)
             ElementTree.SubElement(joint, "axis", xyz=words(axis))
@@ -228,8 +229,8 @@ class _Writer:
     def _limit(self, joint: Element, j: int) -> None:
         effort = self.efforts.get(j, 0.0)  # 0: not known, as for the velocity, which MJCF lacks
         limit = {"effort": repr(effort), "velocity": "0"}
-        if self.m.jnt_limited[j]:
-            lower, upper = map(float, self.m.jnt_range[j])
+        if j in self.ranges:
+            lower, upper = self.ranges[j]
             limit |= {"lower": repr(lower), "upper": repr(upper)}
         elif self.m.jnt_type[j] == _SLIDE:
             limit |= {"lower": "-1e9", "upper": "1e9"}
