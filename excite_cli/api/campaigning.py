@@ -44,6 +44,7 @@ from excite_cli.store.result_file import read_result
 from excite_cli.store.versions import versions
 from excite_cli.summary.campaign import campaign_answer as campaign_answer
 from excite_cli.summary.campaign import round_in_words
+from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.summary.named_effects import what_and_where
 from excite_cli.workers.base import Workers
 
@@ -97,7 +98,8 @@ def run_campaign(
     NotMeasuredError
         A motion was not measured; everything before it is kept.
     FileError
-        The folder holds another campaign, or none to resume; another run is writing it.
+        The folder holds another campaign, or none to resume; another run is writing it; a motion
+        is not the one that was proved.
     NoAdmissibleMotionError
         No motion within all constraints was found.
     """
@@ -197,6 +199,7 @@ class _Loop:
     def _measured(self, state: Campaign, last: Round, motion: PlayedMotion) -> PlayedMotion:
         """The motion with its log, which is whole and of that motion."""
         path = self.folder / f"{motion.name}.csv"
+        self._require_proved(motion)
         exported = export_file(
             self.folder / motion.plan,
             "csv",
@@ -230,6 +233,17 @@ class _Loop:
             f"{motion.name} was not measured in {self.retries + 1} tries: {why} Everything before "
             "it is kept: see to the cause, then go on with --resume."
         )
+
+    def _require_proved(self, motion: PlayedMotion) -> None:
+        """What is played is the motion that was planned and proved, as it was then."""
+        plan = self.folder / motion.plan
+        read = read_result(plan)
+        words = doubts_in_words([each for each in read.doubted() if each.index == motion.index])
+        if words:
+            raise FileError(
+                f"{plan}: {words[0]}. A campaign plays no such motion: put the file back as it "
+                "was and go on with --resume, or begin in another folder with -o."
+            )
 
     def _require_admissible(self, motion: PlayedMotion, path: Path) -> None:
         """What is played keeps every constraint, slowed and with its ways, by an own check.

@@ -26,6 +26,8 @@ from excite_cli.store.result_file import is_result, read_result, read_samples
 from excite_cli.summary.inspections import check_answer as check_answer
 from excite_cli.trajectory.chain import Segment
 
+_JUDGED = ("robot", "constraints", "uncertainty")  # sections that verdicts speak of
+
 
 @checked("motions")
 def check(
@@ -65,7 +67,9 @@ def check(
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise FileError(f"Two motions are called {twice}. Give each a name of its own.")
-    _require_same_trajectory(problem, motions)
+    result = _result_of(motions)
+    if result is not None:
+        _compare_configs(problem, result, _name_of(motions), tell)
     checker = mesh_check_of(problem) if meshes else None
     look = Look(rate, random, problem.spec.seed)
     stored = _samples(motions) if slow is None else {}
@@ -77,20 +81,44 @@ def check(
         found[segment.name] = inspect(problem, path, checker, look)
         if index in stored:
             differences[segment.name] = _difference(path, stored[index])
-    return Inspections(found, look, differences, slow)
+    doubted = () if result is None else result.doubted()
+    doubts = {f"motion_{each.index}": each.doubt for each in doubted}
+    return Inspections(found, look, differences, slow, doubts)
 
 
-def _require_same_trajectory(problem: Problem, motions: Motions) -> None:
-    """A result must have been made with the trajectory section of the config."""
-    if isinstance(motions, Result):
-        name, result = "the result", motions
-    elif isinstance(motions, str | Path) and is_result(Path(motions)):
-        name, result = str(motions), read_result(Path(motions))
-    else:
-        return
-    stored = parse_spec(result.config, f"the config stored in {name}").trajectory
-    if stored != problem.spec.trajectory:
+def _result_of(motions: Motions) -> Result | None:
+    """The result that the motions are of, if they are of one."""
+    if isinstance(motions, str | Path):
+        return read_result(Path(motions)) if is_result(Path(motions)) else None
+    return motions if isinstance(motions, Result) else None
+
+
+def _compare_configs(problem: Problem, result: Result, name: str, tell: Tell) -> None:
+    """A result must have been made with the trajectory section of the config.
+
+    What else differs of what verdicts speak of is reported: they are those of the config.
+
+    Raises
+    ------
+    FileError
+        It has another trajectory section.
+    """
+    stored = parse_spec(result.config, f"the config stored in {name}")
+    if stored.trajectory != problem.spec.trajectory:
         raise FileError(f"{name} has motions of another trajectory section than the config.")
+    differing = [key for key in _JUDGED if getattr(stored, key) != getattr(problem.spec, key)]
+    if result.fingerprint != problem.robot.fingerprint():
+        differing.append("the robot's file or posture")
+    if differing:
+        text = (
+            f"{name} was planned with another config (different: {', '.join(differing)}); it is "
+            "judged by the one given here"
+        )
+        tell(Note(Level.INFO, text))
+
+
+def _name_of(motions: Motions) -> str:
+    return str(motions) if isinstance(motions, str | Path) else "the result"
 
 
 def _slowed(problem: Problem, segment: Segment, share: float | None, tell: Tell) -> Segment:

@@ -11,11 +11,13 @@ from excite_cli.api.planning import plan
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.comparison import Comparison
+from excite_cli.excitation.doubt import Doubt
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.result import Result, matches
 from excite_cli.store.result_file import read_result, write_result
 from excite_cli.summary.comparison import comparison_answer as comparison_answer
+from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.workers.base import Workers
 
 
@@ -25,13 +27,19 @@ def optimized_for(problem: Problem, optimized: Result | str | Path) -> Result:
     Raises
     ------
     FileError
-        It cannot be read, or is of another robot, trajectory or weighting.
+        It cannot be read, was changed, or is of another robot, trajectory or weighting.
     """
     name = "the result" if isinstance(optimized, Result) else str(optimized)
     result = optimized if isinstance(optimized, Result) else read_result(Path(optimized))
     reason = matches(problem, result)
     if reason:
         raise FileError(f"--optimized {name} does not belong to the config: {reason}.")
+    changed = [each for each in result.doubted() if each.doubt is Doubt.CHANGED]
+    if changed:
+        raise FileError(
+            f"--optimized {name}: {doubts_in_words(changed)[0]}, so its condition numbers are not "
+            "its own. Put the file back as it was, or plan anew with `excite optimize`."
+        )
     stored = parse_spec(result.config, f"the config stored in {name}")
     asked = problem.spec
     if (stored.trajectory, stored.sampling) != (asked.trajectory, asked.sampling):

@@ -11,6 +11,7 @@ from excite_cli.config.load import parse_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.errors import ExciteError, FileError
+from excite_cli.excitation.doubt import Doubt
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.time_scaling import PaceLimits, slowed_chain
@@ -18,31 +19,41 @@ from excite_cli.export.own_samples import require_own_samples
 from excite_cli.export.timed import repeated
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.robot.model import build_robot
-from excite_cli.shown.note import Tell
+from excite_cli.shown.command import Command, as_word
+from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.fit_knowledge import fit_knowledge
 from excite_cli.store.result_file import read_result, read_samples
+from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.trajectory.chain import Chain, Segment
 from excite_cli.trajectory.sampled import through_samples
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which motions of a result (none: all), how often, how slow, and from which posture."""
+    """Which motions of a result (none: all), how often, how slow, and from which posture.
+
+    `unproved`: also those that do not count as proved.
+    """
 
     chosen: Sequence[int] = ()
     periods: int = 1
     slow: float | None = None
     start: Start | None = None
+    unproved: bool = False
 
 
 @dataclass(frozen=True)
 class ExportedChain:
-    """What is written: `pace` is the share of its own pace at which the motion goes."""
+    """What is written: `pace` is the share of its own pace at which the motion goes.
+
+    `doubt`: why it does not count as proved, although its file says so.
+    """
 
     name: str
     joint_names: tuple[str, ...]
     chain: Chain
     pace: float
+    doubt: Doubt = Doubt.NONE
 
 
 def chains_of(file: Path, wanted: Wanted, tell: Tell) -> list[ExportedChain]:
@@ -51,8 +62,8 @@ def chains_of(file: Path, wanted: Wanted, tell: Tell) -> list[ExportedChain]:
     Raises
     ------
     FileError, ConfigError, NoAdmissibleMotionError
-        The file cannot be read, does not hold or know what is requested, or no admissible entry
-        was found.
+        The file cannot be read, does not hold or know what is requested, a motion is not the one
+        that was proved, or no admissible entry was found.
     """
     if is_motion(file):
         joints, segment = _own_motion(file, wanted)
@@ -60,7 +71,7 @@ def chains_of(file: Path, wanted: Wanted, tell: Tell) -> list[ExportedChain]:
     result = read_result(file)
     motions, joints = motions_of(result, wanted.chosen, str(file)), result.joint_names
     require_own_samples(file, result, motions, read_samples(file))
-    _require_own_joints(file, result)
+    doubts = _doubts(file, result, motions, wanted, tell)
     if wanted.start is not None:
         chains, constraints = _entered(file, result, motions, wanted, tell)
     else:
@@ -72,8 +83,8 @@ def chains_of(file: Path, wanted: Wanted, tell: Tell) -> list[ExportedChain]:
         slowed = [slowed_chain(limits, chain, wanted.slow) for chain in chains]
         chains, paces = [chain for chain, _ in slowed], [pace for _, pace in slowed]
     return [
-        ExportedChain(segment.name, joints, chain, pace)
-        for segment, chain, pace in zip(motions, chains, paces, strict=True)
+        ExportedChain(segment.name, joints, chain, pace, doubt)
+        for segment, chain, pace, doubt in zip(motions, chains, paces, doubts, strict=True)
     ]
 
 
@@ -93,21 +104,54 @@ def _own_motion(file: Path, wanted: Wanted) -> tuple[tuple[str, ...], Segment]:
     return found.joint_names, segment
 
 
-def _require_own_joints(file: Path, result: Result) -> None:
-    """Names in another order would send every joint the motion of another one.
+def _doubts(
+    file: Path, result: Result, motions: Sequence[Segment], wanted: Wanted, tell: Tell
+) -> list[Doubt]:
+    """Why motions do not count as proved; such are written only where that was requested.
 
-    A robot that is not found here, or is another one by now, tells nothing.
+    Raises
+    ------
+    FileError
+        One is not the motion that was proved, and `unproved` ones were not requested.
+    """
+    names = [segment.name for segment in motions]
+    chosen = [each for each in result.motions if f"motion_{each.index}" in names]
+    if _is_another_robot(file, result):
+        chosen = [each if each.doubt else each.doubted(Doubt.OTHER_ROBOT) for each in chosen]
+    words = "; ".join(doubts_in_words(chosen))
+    if words and not wanted.unproved:
+        look = Command(("excite", "check", "CONFIG", as_word(file))).line
+        raise FileError(
+            f"{file}: {words}. Look at it with `{look}`, which judges it as it is now; to write it "
+            "all the same, give --allow-unproved. `excite optimize CONFIG --start FILE` makes "
+            "proved motions of those in a file."
+        )
+    if words:
+        tell(Note(Level.WARNING, f"{file}: {words}; written all the same (--allow-unproved)."))
+    by_name = {f"motion_{each.index}": each.doubt for each in chosen}
+    return [by_name[name] for name in names]
+
+
+def _is_another_robot(file: Path, result: Result) -> bool:
+    """Whether the robot has changed since; one that is not found here tells nothing.
+
+    Raises
+    ------
+    FileError
+        Names in another order would send every joint the motion of another one.
     """
     spec = parse_spec(result.config, f"the config stored in {file}")
     try:
         robot = build_robot(spec.robot, Path(result.config_folder))
     except ExciteError:
-        return
-    if robot.fingerprint() == result.fingerprint and robot.joint_names != result.joint_names:
+        return False
+    same = robot.fingerprint() == result.fingerprint
+    if same and robot.joint_names != result.joint_names:
         raise FileError(
             f"{file} names other joints than the robot it was made for, or in another order: it "
             "was edited. Plan its motions again."
         )
+    return not same
 
 
 def _joint_bounds(file: Path, result: Result) -> tuple[Constraint, ...]:

@@ -36,7 +36,8 @@ MODELS = {"urdf": ".urdf", "mjcf": ".xml", "yaml": ".yaml", "c": ".c"}
 class ExportedMotion:
     """A motion as it was written: `duration` [s] in all, `durations` of its parts.
 
-    `pace` is the share of its own pace at which it goes.
+    `pace` is the share of its own pace at which it goes. `doubt`: why it does not count as proved,
+    although its file says so; empty where it may.
     """
 
     name: str
@@ -45,6 +46,7 @@ class ExportedMotion:
     duration: float
     durations: dict[str, float]
     pace: float
+    doubt: str = ""
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,7 @@ def export_file(
     slow: float | None = None,
     start: Start | None = None,
     thresholds: str | Path | None = None,
+    allow_unproved: bool = False,
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Exported:
@@ -90,12 +93,16 @@ def export_file(
     accelerations keep the share `slow` of their limits, and with `start` (position by joint [rad,
     m], the others at robot.posture) entered from rest there and left for it again.
 
+    Motions of a result that changed since they were proved, or of an earlier version, are written
+    only with `allow_unproved`.
+
     `thresholds` (JSON of `excite score --thresholds`) make a model in C a collision detector, too.
 
     Raises
     ------
     FileError
-        The file is missing, or holds what the format cannot; an output exists.
+        The file is missing, or holds what the format cannot; a motion is not the one that was
+        proved; an output exists.
     ConfigError, RobotError, MissingExtraError
         The format is unknown; the motion cannot be repeated; the library of a format is missing.
     NoAdmissibleMotionError
@@ -123,7 +130,7 @@ def export_file(
         limits = None if thresholds is None else existing(thresholds)
         return _export_model(path, format, target, limits, overwrite, tell)
     exporter = MOTION_EXPORTERS[format]
-    chains = chains_of(path, Wanted(chosen, periods, slow, start), tell)
+    chains = chains_of(path, Wanted(chosen, periods, slow, start, allow_unproved), tell)
     paths = _paths(path, target, exporter, [each.name for each in chains])
     refuse_inputs_as_outputs({f"--output ({to})": to for to in paths}, (path,))
     with _held(paths, exporter, overwrite):
@@ -149,6 +156,7 @@ def export_answer(found: Exported) -> Answer:
     lines = tuple(
         f"{each.path}: {each.name}, {each.instants} instants, {each.duration:.6g} s"
         + (f", at {100 * each.pace:.4g} % of its pace" if found.slow is not None else "")
+        + (f"; not proved: {each.doubt}" if each.doubt else "")
         for each in found.motions
     )
     motions = [
@@ -159,6 +167,7 @@ def export_answer(found: Exported) -> Answer:
             "duration": each.duration,
             "durations": each.durations,
             "pace": each.pace,
+            "doubt": each.doubt or None,
         }
         for each in found.motions
     ]
@@ -173,7 +182,13 @@ def _written(
     )
     exporter.write(path, timed)
     return ExportedMotion(
-        each.name, path, len(timed.t), timed.duration, durations_of(each.chain), each.pace
+        each.name,
+        path,
+        len(timed.t),
+        timed.duration,
+        durations_of(each.chain),
+        each.pace,
+        str(each.doubt),
     )
 
 

@@ -24,6 +24,7 @@ from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit
 from excite_cli.store.result_file import is_result, read_result
 from excite_cli.summary import motions as motions  # how they are shown
+from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.trajectory.catalogue import build_trajectory
 from excite_cli.trajectory.chain import Segment
 from excite_cli.trajectory.sampled import through_samples
@@ -55,7 +56,7 @@ def load_motions(
     """
     robot = problem.robot
     if isinstance(motions, Result):
-        return _of_result(robot, motions, "the result", chosen)
+        return _of_result(robot, motions, "the result", chosen, tell)
     if isinstance(motions, Segment):
         return [_fitting(robot, motions)]
     if isinstance(motions, Dataset):
@@ -64,7 +65,7 @@ def load_motions(
         return [_fitting(robot, each) for each in _listed(motions)]
     path = Path(motions)
     if is_result(path):
-        return _of_result(robot, read_result(path), str(path), chosen)
+        return _of_result(robot, read_result(path), str(path), chosen, tell)
     if path.is_file() and (is_fit(path) or is_diagnosis(path)):
         read_result(path)  # tells that these are no motions
     if chosen and list(chosen) != [1]:
@@ -127,12 +128,21 @@ def is_motion(path: Path, spec: Spec | None = None) -> bool:
     return motion_reader_for(path, tuple(measured)) is not None
 
 
-def _of_result(robot: Robot, result: Result, name: str, chosen: Sequence[int]) -> list[Segment]:
+def tell_doubts(result: Result, name: str, tell: Tell) -> None:
+    """Say which motions of a result, called `name`, do not count as proved."""
+    for each in doubts_in_words(result.doubted()):
+        tell(Note(Level.WARNING, f"{name}: {each}."))
+
+
+def _of_result(
+    robot: Robot, result: Result, name: str, chosen: Sequence[int], tell: Tell
+) -> list[Segment]:
     if result.joint_names != robot.joint_names:
         raise FileError(
             f"{name} moves other joints than the config: {', '.join(result.joint_names)}. Take "
             "the config that the motions were made with."
         )
+    tell_doubts(result, name, tell)
     return motions_of(result, chosen, name)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.loading import Case, inputs_of
-from excite_cli.api.motions import Motions, load_motions
+from excite_cli.api.motions import Motions, load_motions, tell_doubts
 from excite_cli.api.outputs import held_result
 from excite_cli.api.priors import Prior, load_prior, name_of
 from excite_cli.api.working import tell_idle
@@ -119,6 +119,7 @@ def _begun(
         count, held = len(found.motions), len(read.motions)
         anew = f"; motion {held}, which was interrupted, is made anew" if held > count else ""
         tell(Note(Level.INFO, f"resuming after motion {count} of {stored}{anew}"))
+        tell_doubts(found, str(stored), tell)
         return found
     stacks: list[tuple[str, Result | Stack]] = []
     if following is not None:

@@ -6,6 +6,7 @@ from excite_cli.api.loading import load_data
 from excite_cli.api.motions import is_motion, load_motions
 from excite_cli.diagnosis.measured_prior import measured_stack
 from excite_cli.errors import FileError
+from excite_cli.excitation.doubt import Doubt
 from excite_cli.excitation.planned_prior import planned_stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
@@ -14,6 +15,7 @@ from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.result_file import is_result, read_result
+from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.trajectory.chain import Segment
 
 Prior = str | Path | Result | Dataset | Segment | Stack
@@ -37,12 +39,15 @@ def load_prior(problem: Problem, prior: Prior, name: str, tell: Tell) -> Result 
         if is_diagnosis(path):
             raise FileError(f"--prior {path} is a diagnosis. Plan on top of it with --after.")
         if not path.exists() or is_result(path):
-            return read_result(path)
+            prior = read_result(path)
+            _tell_changed(prior, name, tell)
+            return prior
         if is_motion(path, problem.spec):
             prior = load_motions(problem, path, tell=tell)[0]
         else:
             prior = load_data(problem, path, tell)
     if isinstance(prior, Result):
+        _tell_changed(prior, name, tell)
         return prior
     if isinstance(prior, Stack):
         return _fitting(problem, prior, name)
@@ -52,6 +57,14 @@ def load_prior(problem: Problem, prior: Prior, name: str, tell: Tell) -> Result 
         stack, words = measured_stack(problem, prior)
     tell(Note(Level.INFO, f"--prior {name}: {words}"))
     return stack
+
+
+def _tell_changed(prior: Result, name: str, tell: Tell) -> None:
+    """Say that motions are not those that the data which are stacked came of."""
+    changed = [each for each in prior.doubted() if each.doubt is Doubt.CHANGED]
+    for words in doubts_in_words(changed):
+        text = f"--prior {name}: {words}; what is stacked is what the file holds of it from before"
+        tell(Note(Level.WARNING, text))
 
 
 def _fitting(problem: Problem, stack: Stack, name: str) -> Stack:

@@ -1,13 +1,27 @@
 """The problem of a result, from the config that the result holds."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.config.load import load_spec, parse_spec
 from excite_cli.errors import FileError
+from excite_cli.excitation.admissible import worst_margins
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.result import Result, matches
 from excite_cli.robot.description import is_named
 from excite_cli.store.fit_knowledge import fit_knowledge
+
+
+def with_own_margins(result: Result, problem: Problem) -> Result:
+    """The result, with margins taken anew of motions that its own may not be of."""
+    doubted = {motion.index: motion for motion in result.doubted()}
+    motions = (
+        replace(doubted[m.index], margins=worst_margins(problem, m.coefficients))
+        if m.index in doubted
+        else m
+        for m in result.motions
+    )
+    return replace(result, motions=tuple(motions))
 
 
 def rebuilt_problem(

@@ -1,13 +1,13 @@
 """One page about motions, fits and diagnoses, and figures: `excite report`."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import page_path, paths_in
-from excite_cli.api.rebuilt import rebuilt_problem
+from excite_cli.api.rebuilt import rebuilt_problem, with_own_margins
 from excite_cli.api.report_figures import write_figures
 from excite_cli.api.report_files import Told, read_files
 from excite_cli.atomic import write_text_atomically
@@ -18,6 +18,7 @@ from excite_cli.report.assembly import Source, page_of
 from excite_cli.report.page import render
 from excite_cli.report.style import matplotlib_part
 from excite_cli.shown.answer import Answer
+from excite_cli.summary.doubts import doubts_in_words
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
 Progress = Callable[[str, int, int], None]
@@ -25,10 +26,14 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Report:
-    """The files that were written: the page, if one was requested, and figures."""
+    """The files that were written: the page, if one was requested, and figures.
+
+    `doubts`: which motions of which file do not count as proved, and why.
+    """
 
     page: Path | None
     figures: tuple[Path, ...] = ()
+    doubts: tuple[str, ...] = ()
 
 
 @checked()
@@ -80,26 +85,40 @@ def write_report(
     if page is not None:
         page = page_path(page, " Figures and PDF are written by --figures.")
     with held({"output": page}, overwrite, paths_in(paths, config)):
-        told = read_files(paths)
+        told: Sequence[Told] = read_files(paths)
         problems = {
             each.path: rebuilt_problem(each.content, config, str(each.path))
             for each in told
             if isinstance(each.content, Result)
         }
+        told = [
+            replace(each, content=with_own_margins(each.content, problems[each.path]))
+            if isinstance(each.content, Result)
+            else each
+            for each in told
+        ]
         drawn: tuple[Path, ...] = ()
         if figures is not None:
             drawn = write_figures(told, problems, (Path(figures), format, overwrite), progress)
         if page is not None:
             write_text_atomically(page, _page_text(told, problems, picture, progress))
-    return Report(page, drawn)
+    doubts = (
+        f"{each.path}: {words}"
+        for each in told
+        if isinstance(each.content, Result)
+        for words in doubts_in_words(each.content.motions)
+    )
+    return Report(page, drawn, tuple(doubts))
 
 
 def report_answer(found: Report) -> Answer:
-    """What `excite report` answers: the files."""
+    """What `excite report` answers: what is in doubt, and the files."""
     figures = tuple(map(str, found.figures))
     page = None if found.page is None else str(found.page)
-    parts = figures if page is None else (page, *figures)
-    return Answer(parts, {"output": page, "figures": list(figures)})
+    doubts = tuple(f"{words}." for words in found.doubts)
+    parts = (*doubts, *figures) if page is None else (*doubts, page, *figures)
+    data = {"output": page, "figures": list(figures), "doubts": list(found.doubts)}
+    return Answer(parts, data)
 
 
 def _page_text(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.loading import load_problem
-from excite_cli.api.motions import Motions, load_motions, motions_of
+from excite_cli.api.motions import Motions, load_motions, motions_of, tell_doubts
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import existing, paths_in
 from excite_cli.api.rebuilt import rebuilt_problem
@@ -223,6 +223,7 @@ def _on_their_robot(
     if result is not None and not isinstance(config, Problem):
         if overrides:
             raise ConfigError("--set: a result file has its own config; leave it out.")
+        tell_doubts(result, name, tell)
         return rebuilt_problem(result, config, name), motions_of(result, chosen, name)
     if config is None:
         raise FileError(_unknown_robot(motions))

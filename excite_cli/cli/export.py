@@ -76,6 +76,13 @@ def export(
             help="Those of score --thresholds: c has a collision detector with them.",
         ),
     ] = None,
+    allow_unproved: Annotated[
+        bool,
+        typer.Option(
+            "--allow-unproved",
+            help="Write motions that changed since they were proved, too.",
+        ),
+    ] = False,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -88,6 +95,9 @@ def export(
     any rate. The last instant is the motion's end; where the duration is no whole number of steps,
     the last step is between half and one and a half of the others. Several motions go to files with
     their numbers in the name. With --entry the robot starts and ends at rest. Units: s, rad (m).
+
+    A motion of a result that is not the one that was proved (its coefficients, verdict, config or
+    robot changed since), or was written by an earlier version, is refused.
 
     A model is a fit, a diagnosis or a config of `diagnose --apply`. As C it is one file without
     dependencies or allocation, with every effect that C can hold and a test of itself.
@@ -115,6 +125,7 @@ def export(
             slow=slow,
             start=start_from(posture, entry),
             thresholds=thresholds,
+            allow_unproved=allow_unproved,
             overwrite=overwrite,
             tell=terminal.tell,
         )

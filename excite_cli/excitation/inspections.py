@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from excite_cli.excitation.doubt import Doubt
 from excite_cli.excitation.inspection import Inspection, Look
 from excite_cli.shown.record import Shown
 
@@ -30,7 +31,8 @@ class Difference:
 class Inspections(Shown, Mapping[str, Inspection]):
     """Inspections by the motion's name.
 
-    `differences`: of the samples of motions from a result file. `slow`: the share of the limits of
+    `differences`: of the samples of motions from a result file. `doubts`: why motions of a result
+    do not count as proved, whatever the result says of them. `slow`: the share of the limits of
     speed and acceleration that the motions were slowed to, if they were.
     """
 
@@ -38,6 +40,7 @@ class Inspections(Shown, Mapping[str, Inspection]):
     look: Look
     differences: dict[str, Difference] = field(default_factory=dict)
     slow: float | None = None
+    doubts: dict[str, Doubt] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Inspection:
         return self.motions[name]
@@ -51,6 +54,10 @@ class Inspections(Shown, Mapping[str, Inspection]):
     def difference(self, name: str) -> Difference:
         """That of one motion; none where no samples are known."""
         return self.differences.get(name, Difference())
+
+    def doubt(self, name: str) -> Doubt:
+        """That of one motion; none where it is not of a result."""
+        return self.doubts.get(name, Doubt.NONE)
 
     def violations_of(self, name: str) -> int:
         """Those of one motion, samples that differ included."""

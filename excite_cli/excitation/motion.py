@@ -1,8 +1,9 @@
 """Records that travel from the optimiser to the file and the terminal."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from excite_cli.constraints.base import Array
+from excite_cli.excitation.doubt import Doubt
 from excite_cli.excitation.progress import Status
 from excite_cli.proof.worst_margin import Worst
 from excite_cli.shown.record import Shown
@@ -33,7 +34,8 @@ class Motion(Shown):
     with all earlier data, both on the samples of the cost, and `dense_condition_number` the latter
     on eight times as many (None in files of before). `improved` tells whether the stack became
     better by it; `note` says what else one should know; `certified` which constraints are proved
-    at every instant.
+    at every instant. With a `doubt`, none counts as proved: the motion is another one than that
+    which was. `digest` is that of all this (`motion_digest`), from when the motion was finished.
     """
 
     index: int
@@ -49,3 +51,9 @@ class Motion(Shown):
     note: str = ""
     certified: dict[str, bool] = field(default_factory=dict)
     dense_condition_number: float | None = None
+    digest: str = ""
+    doubt: Doubt = Doubt.NONE
+
+    def doubted(self, doubt: Doubt) -> "Motion":
+        """The motion of which nothing counts as proved, and why."""
+        return replace(self, doubt=doubt, certified=dict.fromkeys(self.certified, False))

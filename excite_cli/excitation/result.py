@@ -5,7 +5,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.excitation.doubt import Doubt
 from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.motion_digest import digest_of
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.sequence import Step
@@ -48,8 +50,35 @@ class Result(Shown):
         return self.base_words[len(self.base_selection) :]
 
     def with_step(self, step: Step) -> "Result":
-        """The result with one more motion."""
-        return replace(self, motions=(*self.motions, step.motion), stack=step.stack)
+        """The result with one more motion, and the digest of what is said of it here."""
+        motion = replace(step.motion, digest=self.digest_of(step.motion))
+        return replace(self, motions=(*self.motions, motion), stack=step.stack)
+
+    def digest_of(self, motion: Motion) -> str:
+        """The digest of a motion of this result, of what is said of it and of what it was for."""
+        return digest_of(motion, self.config, self.fingerprint, self.joint_names)
+
+    def doubted(self) -> tuple[Motion, ...]:
+        """Those of the motions that do not count as proved, also for a change since they were read.
+
+        One that was made elsewhere and has no digest says nothing against itself.
+        """
+        found = []
+        for motion in self.motions:
+            if motion.doubt:
+                found.append(motion)
+            elif motion.digest and motion.digest != self.digest_of(motion):
+                found.append(motion.doubted(Doubt.CHANGED))
+        return tuple(found)
+
+    def with_config(self, config: str) -> "Result":
+        """The result for another config that asks for the same; digests of before go on to hold."""
+        new = replace(self, config=config)
+        motions = (
+            replace(m, digest=new.digest_of(m)) if m.digest == self.digest_of(m) else m
+            for m in self.motions
+        )
+        return replace(new, motions=tuple(motions))
 
 
 def matches(problem: Problem, result: Result) -> str | None:

@@ -8,6 +8,7 @@ from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.dense_grid import dense_condition_number
+from excite_cli.excitation.doubt import Doubt
 from excite_cli.excitation.ending import Ending
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressCallback, Status
@@ -81,7 +82,7 @@ def resumed_result(
     ------
     FileError
         The stored config differs in more than the number of motions and the optimizer, or
-        `priors` are not those that the file was made with.
+        `priors` are not those that the file was made with; a motion was changed since.
     """
     if priors and tuple(str(prior) for prior in priors) != result.priors:
         made = ", ".join(result.priors) or "none"
@@ -96,7 +97,14 @@ def resumed_result(
             f"--resume: {path} was made with another config (different: {', '.join(keys)}). "
             "Resume with the config it was made with, or give another -o."
         )
-    return replace(_finished(problem, result), config=spec_as_yaml(problem.spec))
+    changed = [str(each.index) for each in result.doubted() if each.doubt is Doubt.CHANGED]
+    if changed:
+        raise FileError(
+            f"--resume: motion {', '.join(changed)} of {path} is not proved: {Doubt.CHANGED}. More "
+            "motions would be planned on top of what nobody checked. Put the file back as it was, "
+            "or give another -o; `--start` makes proved motions of those in a file."
+        )
+    return _finished(problem, result).with_config(spec_as_yaml(problem.spec))
 
 
 def _finished(problem: Problem, result: Result) -> Result:

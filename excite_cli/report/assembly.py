@@ -18,6 +18,7 @@ from excite_cli.report.fit_sections import fit_figures, fit_sections
 from excite_cli.report.page import KeyFigure, Page, Section, Text
 from excite_cli.report.score_sections import score_figures, score_sections
 from excite_cli.scoring.records import Score
+from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.summary.score import sentences
 
 
@@ -83,7 +84,12 @@ def _part(source: Source, campaign: Campaign | None) -> _Part:
     content = source.content
     if campaign is not None:
         sections = campaign_sections(campaign, source.picture)
-        return _Part(source, campaign_figures(campaign), sections)
+        doubts = tuple(
+            Text(f"{source.file}: {words}. Its margins here are taken anew, its condition numbers "
+                 "are those that the file states. `excite check CONFIG FILE.h5` judges it.", "bad")
+            for words in doubts_in_words(campaign.result.motions)
+        )  # fmt: skip
+        return _Part(source, campaign_figures(campaign), sections, doubts)
     if isinstance(content, StoredFit):
         return _Part(source, fit_figures(content), fit_sections(content))
     if isinstance(content, Score):

@@ -16,6 +16,7 @@ from excite_cli.report.motion_section import drawn_motions, not_drawn
 from excite_cli.report.page import Block, Charts, Choice, KeyFigure, Section, Table, Text
 from excite_cli.report.plot import Panel, Plot, Series
 from excite_cli.robot.model import Array
+from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.summary.pairs import counted, unguarded_in_words, unjudged
 
 _POINTS = 400
@@ -74,8 +75,10 @@ def margin_figures(campaign: Campaign) -> tuple[KeyFigure, ...]:
     broken = sum(w.violations > 0 for m in campaign.result.motions for w in m.margins.values())
     if broken:
         return (KeyFigure(f"constraints{of}", f"{broken} BROKEN", "at controller rate"),)
-    if not found:
-        return (KeyFigure(f"constraints{of}", "kept at 1 kHz", "not proved between instants"),)
+    doubted = any(motion.doubt for motion in campaign.result.motions)
+    if doubted or not found:
+        why = "not as they were proved" if doubted else "not proved between instants"
+        return (KeyFigure(f"constraints{of}", "kept at 1 kHz", why),)
     all_of = f"{sum(found)} of {len(found)}"
     if all(found):
         return (KeyFigure(f"constraints{of}", "all proved", "at every instant of every motion"),)
@@ -83,6 +86,7 @@ def margin_figures(campaign: Campaign) -> tuple[KeyFigure, ...]:
 
 
 def _verdict(result: Result) -> Text:
+    doubts = doubts_in_words(result.motions)
     loose = [
         f"{name} (motion {motion.index})"
         for motion in result.motions
@@ -97,6 +101,9 @@ def _verdict(result: Result) -> Text:
     ]
     if broken:
         return Text(f"Broken at controller rate: {', '.join(broken)}.", "bad")
+    if doubts:
+        words = "; ".join(doubts)
+        return Text(f"Kept at every millisecond, but {words}. `excite check` judges it.", "bad")
     if not any(motion.certified for motion in result.motions):
         return Text(
             "Kept at every millisecond. Between these instants nothing was proved when the motions "

@@ -5,7 +5,7 @@ time. Reading trusts nothing: a foreign or damaged file gives one message.
 """
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from excite_cli.measurement.hdf5_file import new_hdf5
 from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.proof.worst_margin import Worst
 from excite_cli.store import checked
+from excite_cli.store.motion_state import as_found, digest_with_samples
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 from excite_cli.trajectory.catalogue import build_trajectory
 
@@ -92,7 +93,8 @@ def _table(motions: tuple[Motion, ...] | tuple[RandomMotion, ...]) -> Any:
     return np.array(rows, dtype=_TABLE)
 
 
-def _write_states(group: Any, coefficients: Any, problem: Problem) -> None:
+def _write_states(group: Any, coefficients: Any, problem: Problem) -> list[Matrix]:
+    """Write the motion and its samples t (T,), q, v, a (T, n), which are returned."""
     times = problem.constraint_basis.times
     if times[-1] < problem.trajectory.duration:
         times = np.append(times, problem.trajectory.duration)
@@ -100,10 +102,11 @@ def _write_states(group: Any, coefficients: Any, problem: Problem) -> None:
     arrays = {"t": times, "q": q, "v": v, "a": a}
     for name, array in {**arrays, "coefficients": coefficients}.items():
         group[name] = array
+    return list(arrays.values())
 
 
 def _write_motion(group: Any, motion: Motion, problem: Problem) -> None:
-    _write_states(group, motion.coefficients, problem)
+    samples = _write_states(group, motion.coefficients, problem)
     group.attrs.update(
         {
             "condition_number": motion.condition_number,
@@ -124,10 +127,12 @@ def _write_motion(group: Any, motion: Motion, problem: Problem) -> None:
     )  # fmt: skip
     if motion.dense_condition_number is not None:
         group.attrs["dense_condition_number"] = motion.dense_condition_number
+    if motion.digest:
+        group.attrs["digest"] = digest_with_samples(motion.digest, samples)
 
 
 def read_result(path: Path) -> Result:
-    """Read a result file.
+    """Read a result file; of motions that changed since they were proved, nothing counts as proved.
 
     Raises
     ------
@@ -187,7 +192,7 @@ def _read(file: Any, path: Path) -> Result:
     if columns < len(selection):
         raise ValueError("its base parameters do not fit together")
     drawn = checked.record(json.dumps(attributes["random_candidates"].tolist()), tuple[int, int])
-    return Result(
+    found = Result(
         config=config,
         config_folder=checked.text(attributes, "config_folder"),
         fingerprint=checked.text(attributes, "robot_hash"),
@@ -218,6 +223,14 @@ def _read(file: Any, path: Path) -> Result:
         checked_pairs=checked.texts(file["collision_pairs/checked"][()], "collision_pairs/checked"),
         dropped_pairs=checked.texts(file["collision_pairs/dropped"][()], "collision_pairs/dropped"),
     )
+    motions = (_as_found(file[f"motions/{each.index}"], each, found) for each in found.motions)
+    return replace(found, motions=tuple(motions))
+
+
+def _as_found(group: Any, motion: Motion, result: Result) -> Motion:
+    samples = _samples(group, len(result.joint_names))
+    stored = checked.text(group.attrs, "digest", "")
+    return as_found(motion, result.digest_of(motion), samples, stored)
 
 
 def _read_stack(dataset: Any, counted: Any, columns: int) -> Stack:

@@ -98,6 +98,12 @@ def _notes(found: Inspections, name: str) -> list[str]:
             f"{off.share:.2g} of the largest value at {off.time:.4f} s; someone changed one of "
             "them."
         )
+    if found.doubt(name):
+        notes.append(
+            f"{name}: {found.doubt(name)}: what its file says of it does not count, and is not "
+            "renewed by this check, which holds for the motion as it is now. `excite optimize "
+            "CONFIG --start FILE -o NEW.h5` makes a proved motion of it."
+        )
     return notes
 
 
@@ -116,6 +122,7 @@ def _data(found: Inspections, index: int, name: str) -> dict[str, Any]:
             for key, (state, reason) in inspection.states.items()
         },
         "samples_differ": {"share": off.share, "time": off.time},
+        "doubt": found.doubt(name) or None,
     }
     data["second_path"] = {
         each.name: {

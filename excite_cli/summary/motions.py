@@ -17,6 +17,7 @@ from excite_cli.excitation.result import Result
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.record import show
 from excite_cli.shown.table import Parts, Table
+from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.summary.margins import worst_data
 from excite_cli.summary.pairs import pairs_data, pairs_in_words
 from excite_cli.summary.problem import problem_parts
@@ -93,8 +94,9 @@ def ending_in_words(
 
 
 def result_parts(result: Result) -> Parts:
-    """Condition numbers, and margins where something was asked to be kept."""
-    return _tables(result.motions)
+    """Condition numbers, margins where something was asked to be kept, and what is in doubt."""
+    words = doubts_in_words(result.motions)
+    return [*_tables(result.motions), *(f"{each[:1].upper()}{each[1:]}." for each in words)]
 
 
 def invariants_in_words(found: Invariants) -> str:
@@ -177,7 +179,9 @@ def motion_sentence(motion: Motion) -> str:
     note += f"; {motion.note}" if motion.note else ""
     if flattered(motion.stacked_condition_number, motion.dense_condition_number):
         note += f"; {_dense(motion)} between its samples: take more of sampling.cost"
-    if motion.certified:
+    if motion.doubt:
+        note += f"; not proved: {motion.doubt}"
+    elif motion.certified:
         loose = [name for name, proved in motion.certified.items() if not proved]
         told = "all constraints proved at every instant"
         note += f"; not proved: {', '.join(loose)}" if loose else f"; {told}"
@@ -202,6 +206,7 @@ def motion_data(motion: Motion) -> dict[str, Any]:
         "iterations": motion.iterations,
         "evaluations": motion.evaluations,
         "certified": motion.certified,
+        "doubt": motion.doubt or None,
         "margins": {name: worst_data(worst) for name, worst in motion.margins.items()},
     }
 

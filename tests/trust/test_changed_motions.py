@@ -1,0 +1,311 @@
+"""A result that was edited, or is of an earlier version: nothing of it counts as proved."""
+
+import json
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from excite_cli import check, load_case, load_problem, plan, read_result, write_result
+from excite_cli.api.campaigning import Asked, Measure, run_campaign
+from excite_cli.api.comparing import optimized_for
+from excite_cli.campaign.measure import NotMeasuredError, Take
+from excite_cli.errors import FileError
+from excite_cli.excitation.doubt import Doubt
+from excite_cli.shown.note import Note
+from tests.trust.conftest import SMOKE, Loop
+from tests.trust.in_process import excite, refused
+
+CHANGED = "not proved: changed since it was proved"
+EARLIER = "not proved: written by an earlier version"
+BRIEF = ("--motions", "1", "--set", "optimizer.max_iterations=1", "-q")
+FIRST = "motions/1"
+
+
+def _scaled(file: Any, factor: float = 1.6) -> None:
+    """The motion and its samples, which go on to agree."""
+    for name in ("coefficients", "q", "v", "a"):
+        file[f"{FIRST}/{name}"][...] = factor * file[f"{FIRST}/{name}"][()]
+
+
+def _record(name: str, change: Callable[[Any], Any]) -> Callable[[Any], None]:
+    def edit(file: Any) -> None:
+        attributes = file[FIRST].attrs
+        attributes[name] = json.dumps(change(json.loads(attributes[name])))
+
+    return edit
+
+
+def _attribute(name: str, value: Any) -> Callable[[Any], None]:
+    def edit(file: Any) -> None:
+        assert name in file[FIRST].attrs
+        file[FIRST].attrs[name] = value
+
+    return edit
+
+
+def _config(old: str, new: str) -> Callable[[Any], None]:
+    def edit(file: Any) -> None:
+        text = file.attrs["config"]
+        assert old in text
+        file.attrs["config"] = text.replace(old, new)
+
+    return edit
+
+
+def _wider(margins: dict[str, Any]) -> dict[str, Any]:
+    return {name: {**worst, "margin": worst["margin"] + 1.0} for name, worst in margins.items()}
+
+
+def _swapped(file: Any) -> None:
+    file.move("motions/1", "motions/x")
+    file.move("motions/2", "motions/1")
+    file.move("motions/x", "motions/2")
+
+
+def _one_sample(file: Any) -> None:
+    file[f"{FIRST}/q"][3, 2] += 1e-9
+
+
+def _without(file: Any) -> None:
+    del file[FIRST].attrs["digest"]
+
+
+EDITS: dict[str, Callable[[Any], None]] = {
+    "the motion, a little": lambda file: _scaled(file, 1.0 + 1e-9),
+    "one sample, below what export compares": _one_sample,
+    "the verdicts": _record("certified", lambda all_: dict.fromkeys(all_, True) | {"more": True}),
+    "a verdict left out": _record("certified", lambda all_: dict(list(all_.items())[1:])),
+    "the margins": _record("margins", _wider),
+    "the condition number": _attribute("stacked_condition_number", 2.0),
+    "the dense condition number": _attribute("dense_condition_number", 2.0),
+    "how the search ended": _attribute("status", "converged"),
+    "the note": _attribute("note", "all is well"),
+    "the limits of the config": _config("acceleration: 10.0", "acceleration: 40.0"),
+    "the posture of the config": _config("elbow: 0.8", "elbow: 0.9"),
+    "another motion in its place": _swapped,
+    "the digest": _attribute("digest", "0" * 64),
+    "an empty digest": _attribute("digest", ""),
+    "no digest": _without,
+}
+OF_EARLIER = ("an empty digest", "no digest")
+
+
+def edited(source: Path, target: Path, edit: Callable[[Any], None]) -> Path:
+    shutil.copy(source, target)
+    with h5py.File(target, "r+") as file:
+        edit(file)
+    return target
+
+
+def test_a_motion_as_it_was_proved_is_not_doubted(loop: Loop, tmp_path: Path) -> None:
+    result = read_result(loop.result)
+    assert not result.doubted()
+    assert all(all(motion.certified.values()) for motion in result.motions)
+    file = edited(loop.result, tmp_path / "r.h5", lambda file: None)
+    exported = json.loads(
+        excite("export", file, "-f", "csv", "-o", tmp_path / "m.csv", "--json").stdout
+    )
+    assert [each["doubt"] for each in exported["motions"]] == [None, None]
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_an_edited_motion_is_not_proved(loop: Loop, tmp_path: Path, name: str) -> None:
+    file = edited(loop.result, tmp_path / "r.h5", EDITS[name])
+    words = EARLIER if name in OF_EARLIER else CHANGED
+    motion = read_result(file).motions[0]
+    assert motion.doubt is (Doubt.EARLIER if name in OF_EARLIER else Doubt.CHANGED)
+    assert not any(motion.certified.values())
+    assert words in repr(motion)
+    told = refused("export", file, "-f", "csv", "-o", tmp_path / "m.csv")
+    assert re.search(r"motions? 1\b.* not proved: ", told)
+    assert motion.doubt in told
+    assert "excite check CONFIG" in told
+    assert "--allow-unproved" in told
+    assert not list(tmp_path.glob("*.csv"))
+
+
+@pytest.mark.parametrize("name", ["the motion, a little", "the verdicts", "no digest"])
+def test_it_is_written_where_that_is_asked_for(loop: Loop, tmp_path: Path, name: str) -> None:
+    file = edited(loop.result, tmp_path / "r.h5", EDITS[name])
+    to = tmp_path / "m.csv"
+    words = ("export", file, "-f", "csv", "-o", to, "--motion", "1", "--allow-unproved")
+    run = excite(*words, "--json")
+    assert run.returncode == 0, run.stderr
+    assert "not proved" in run.stderr
+    doubt = Doubt.EARLIER if name == "no digest" else Doubt.CHANGED
+    assert json.loads(run.stdout)["motions"][0]["doubt"] == doubt
+    other = excite("export", file, "-f", "csv", "-o", to, "--motion", "2", "--overwrite")
+    assert other.returncode == (0 if name != "the limits of the config" else 2), other.stderr
+
+
+@pytest.mark.parametrize("factor", [1.6, 0.9])
+def test_a_report_says_what_became_of_it(loop: Loop, tmp_path: Path, factor: float) -> None:
+    file = edited(loop.result, tmp_path / "r.h5", lambda file: _scaled(file, factor))
+    page = tmp_path / "page.html"
+    run = excite("report", file, "--no-picture", "-o", page, "--json")
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout)["doubts"] == [f"{file}: motion 1 is {CHANGED}"]
+    text = page.read_text(encoding="utf-8")
+    assert f"motion 1 is {CHANGED}" in text
+    assert "all proved" not in text
+    assert "is proved to hold at every instant" not in text
+    assert ("BROKEN" in text) == (factor > 1.0)
+
+
+def test_check_says_that_the_verdict_of_the_file_does_not_count(loop: Loop, tmp_path: Path) -> None:
+    file = edited(loop.result, tmp_path / "r.h5", lambda file: _scaled(file, 0.9))
+    run = excite("check", SMOKE, file, "--no-meshes", "--json")
+    assert run.returncode == 0, run.stderr
+    first, second = json.loads(run.stdout)["motions"]
+    assert (first["doubt"], second["doubt"]) == (Doubt.CHANGED, None)
+    said = excite("check", SMOKE, file, "--no-meshes").stdout
+    assert "motion_1: changed since it was proved: what its file says of it does not" in said
+    assert "--start" in said
+    with h5py.File(file) as read:
+        digest = read[FIRST].attrs["digest"]
+    with h5py.File(loop.result) as before:
+        assert digest == before[FIRST].attrs["digest"]  # it was not renewed
+
+
+def test_check_says_that_its_config_is_another(loop: Loop, tmp_path: Path) -> None:
+    run = excite("check", SMOKE, loop.result, "--no-meshes", "--set", "constraints.torque.scale=1")
+    assert "planned with another config (different: constraints)" in run.stderr
+    assert "another config" not in excite("check", SMOKE, loop.result, "--no-meshes").stderr
+
+
+def test_what_is_shown_and_played_in_simulation_says_so(loop: Loop, tmp_path: Path) -> None:
+    file = edited(loop.result, tmp_path / "r.h5", EDITS["the motion, a little"])
+    data, told = tmp_path / "d.h5", f"motion 1 is {CHANGED}"
+    run = excite("simulate", SMOKE, file, "-o", data, "--rate", "50")
+    assert run.returncode == 0, run.stderr
+    assert told in run.stderr
+    run = excite("view", file, "--png", tmp_path / "v.png", "--size", "64x64", "--time", "0")
+    assert run.returncode == 0, run.stderr
+    assert told in run.stderr
+
+
+def test_no_plan_goes_on_from_it(loop: Loop, tmp_path: Path) -> None:
+    file = edited(loop.result, tmp_path / "r.h5", EDITS["the motion, a little"])
+    before = file.read_bytes()
+    config = ("--set", "optimizer.max_iterations=4", "--set", "diagnosis.rounds=2", "-q")
+    words = ("optimize", SMOKE, "-o", file, "--resume", "--motions", "3", *config)
+    assert f"motion 1 of {file} is {CHANGED}" in refused(*words)
+    assert file.read_bytes() == before
+    run = excite("optimize", SMOKE, "--prior", file, "-o", tmp_path / "new.h5", *BRIEF[:-1])
+    assert run.returncode == 0, run.stderr
+    assert f"motion 1 is {CHANGED}" in run.stderr
+    with pytest.raises(FileError, match="its condition numbers are not its own"):
+        optimized_for(load_problem(SMOKE), file)
+
+
+def test_what_an_earlier_version_wrote_is_gone_on_with(loop: Loop, tmp_path: Path) -> None:
+    """Its motions stay without proof; the new ones have theirs."""
+    file = edited(loop.result, tmp_path / "r.h5", _without)
+    config = ("--set", "optimizer.max_iterations=4", "--set", "diagnosis.rounds=2")
+    run = excite("optimize", SMOKE, "-o", file, "--resume", "--motions", "3", *config, "--json")
+    assert run.returncode == 0, run.stderr
+    assert f"motion 1 is {EARLIER}" in run.stderr
+    doubts = [each["doubt"] for each in json.loads(run.stdout)["motions"]]
+    assert doubts == [Doubt.EARLIER, None, None]
+    assert [each.doubt for each in read_result(file).motions] == [Doubt.EARLIER, "", ""]
+
+
+def test_a_start_makes_a_proved_motion_of_it(loop: Loop, tmp_path: Path) -> None:
+    file = edited(loop.result, tmp_path / "r.h5", lambda file: _scaled(file, 0.9))
+    to = tmp_path / "new.h5"
+    run = excite("optimize", SMOKE, "--start", file, "-o", to, *BRIEF)
+    assert run.returncode == 0, run.stderr
+    assert not read_result(to).doubted()
+    assert excite("export", to, "-f", "csv", "-o", tmp_path / "m.csv").returncode == 0
+
+
+def test_resumed_with_another_optimizer_it_is_still_proved(loop: Loop, tmp_path: Path) -> None:
+    """The stored config changes then, in what no verdict speaks of."""
+    file = edited(loop.result, tmp_path / "r.h5", lambda file: None)
+    words = ("--set", "optimizer.max_iterations=5", "--set", "diagnosis.rounds=2", "-q")
+    run = excite("optimize", SMOKE, "-o", file, "--resume", "--motions", "3", *words)
+    assert run.returncode == 0, run.stderr
+    found = read_result(file)
+    assert len(found.motions) == 3
+    assert not found.doubted()
+
+
+def test_a_result_that_a_script_changed_is_not_proved(loop: Loop, tmp_path: Path) -> None:
+    problem = load_problem(SMOKE, ["optimizer.max_iterations=4", "diagnosis.rounds=2"])
+    result = read_result(loop.result)
+    first, second = result.motions
+    faster = replace(first, coefficients=1.6 * first.coefficients)
+    changed = replace(result, motions=(faster, second))
+    assert [each.doubt for each in changed.doubted()] == [Doubt.CHANGED]
+    found = check(problem, changed, meshes=False)
+    assert found.doubt("motion_1") is Doubt.CHANGED
+    assert not found.doubt("motion_2")
+    write_result(tmp_path / "changed.h5", changed, problem)
+    read = read_result(tmp_path / "changed.h5")
+    assert [each.doubt for each in read.motions] == [Doubt.CHANGED, ""]
+
+
+def test_a_robot_that_is_another_by_now(tmp_path: Path) -> None:
+    urdf = (SMOKE.parents[1] / "data" / "smoke_arm.urdf").read_text()
+    (tmp_path / "smoke_arm.urdf").write_text(urdf)
+    config = tmp_path / "arm.yaml"
+    config.write_text(re.sub("urdf: .*", "urdf: smoke_arm.urdf", SMOKE.read_text()))
+    file, csv = tmp_path / "arm.h5", tmp_path / "m.csv"
+    plan(load_problem(config, ["optimizer.max_iterations=2", "sequence.motions=1"]), output=file)
+    (tmp_path / "smoke_arm.urdf").write_text(urdf.replace('upper="', 'upper="0', 1))
+    assert Doubt.OTHER_ROBOT in refused("export", file, "-f", "csv", "-o", csv)
+    assert excite("export", file, "-f", "csv", "-o", csv, "--allow-unproved").returncode == 0
+    (tmp_path / "smoke_arm.urdf").unlink()  # nothing is known of it then, as on another machine
+    assert excite("export", file, "-f", "csv", "-o", csv, "--overwrite").returncode == 0
+
+
+class _Absent(Measure):
+    """Nobody is there at first; later, what is played is noted."""
+
+    suffix = ".csv"
+
+    def __init__(self) -> None:
+        self.played: list[str] = []
+
+    def take(self, take: Take) -> None:
+        self.played.append(take.name)
+        raise NotMeasuredError("nobody is there.")
+
+
+@pytest.mark.parametrize("name", ["the motion, a little", "the margins", "no digest"])
+def test_a_campaign_plays_nothing_that_was_changed(tmp_path: Path, name: str) -> None:
+    changes = ["optimizer.max_iterations=2", "optimizer.restarts=1"]
+    case, measure, asked = load_case(SMOKE, changes), _Absent(), Asked(entry=False)
+    heard: list[Note] = []
+    folder = tmp_path / "campaign"
+    with pytest.raises(NotMeasuredError):
+        run_campaign(case, measure, folder, asked, retries=0, tell=heard.append)
+    assert measure.played == ["round_1_motion_1"]
+    plan_ = folder / "round_1.h5"
+    edited(plan_, tmp_path / "edited.h5", EDITS[name])
+    shutil.copy(tmp_path / "edited.h5", plan_)
+    with pytest.raises(FileError, match=r"motion 1 is not proved: .*A campaign plays no such"):
+        run_campaign(case, measure, folder, asked, retries=0, resume=True, tell=heard.append)
+    assert measure.played == ["round_1_motion_1"]
+
+
+def test_the_digest_is_the_same_wherever_it_is_taken(loop: Loop) -> None:
+    """Seconds differ from run to run, and whole numbers become others in a file."""
+    result = read_result(loop.result)
+    motion = result.motions[0]
+    again = replace(
+        motion,
+        seconds=motion.seconds + 1.0,
+        iterations=motion.iterations + 1,
+        coefficients=np.asfortranarray(motion.coefficients),
+        margins={n: replace(w, violations=int(w.violations)) for n, w in motion.margins.items()},
+    )
+    assert result.digest_of(again) == motion.digest
+    assert result.digest_of(replace(motion, index=2)) != motion.digest
