@@ -43,7 +43,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_writes_a_page(stored: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "page.html"
     assert _run("report", stored, "-o", path, "--config", CONFIG, "--json") == 0
-    assert json.loads(capsys.readouterr().out) == {"output": str(path), "figures": []}
+    assert json.loads(capsys.readouterr().out) == {"output": str(path), "figures": [], "doubts": []}
     assert list(tmp_path.iterdir()) == [path]
     text = path.read_text()
     assert text.startswith("<!doctype html>")
@@ -69,7 +69,7 @@ def test_writes_a_folder_of_figures(
     assert _run("report", stored, "--figures", folder, "--config", CONFIG, "--json") == 0
     expected = [folder / f"{name}.png" for name in NAMES]
     written = [str(path) for path in expected]
-    assert json.loads(capsys.readouterr().out) == {"output": None, "figures": written}
+    assert json.loads(capsys.readouterr().out) == {"output": None, "figures": written, "doubts": []}
     assert sorted(folder.iterdir()) == sorted(expected)
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in expected)
 
