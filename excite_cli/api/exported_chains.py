@@ -133,7 +133,7 @@ def _doubts(
 
 
 def _is_another_robot(file: Path, result: Result) -> bool:
-    """Whether the robot has changed since; one that is not found here tells nothing.
+    """Whether the robot has changed since; one that is not found here says nothing.
 
     Raises
     ------

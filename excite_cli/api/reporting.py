@@ -85,18 +85,13 @@ def write_report(
     if page is not None:
         page = page_path(page, " Figures and PDF are written by --figures.")
     with held({"output": page}, overwrite, paths_in(paths, config)):
-        told: Sequence[Told] = read_files(paths)
+        told = read_files(paths)
         problems = {
             each.path: rebuilt_problem(each.content, config, str(each.path))
             for each in told
             if isinstance(each.content, Result)
         }
-        told = [
-            replace(each, content=with_own_margins(each.content, problems[each.path]))
-            if isinstance(each.content, Result)
-            else each
-            for each in told
-        ]
+        told = tuple(_with_own_margins(each, problems) for each in told)
         drawn: tuple[Path, ...] = ()
         if figures is not None:
             drawn = write_figures(told, problems, (Path(figures), format, overwrite), progress)
@@ -109,6 +104,13 @@ def write_report(
         for words in doubts_in_words(each.content.motions)
     )
     return Report(page, drawn, tuple(doubts))
+
+
+def _with_own_margins(file: Told, problems: Mapping[Path, Problem]) -> Told:
+    """The file, with margins taken anew of motions that its own may not be of."""
+    if not isinstance(file.content, Result):
+        return file
+    return replace(file, content=with_own_margins(file.content, problems[file.path]))
 
 
 def report_answer(found: Report) -> Answer:

@@ -38,8 +38,8 @@ def in_our_words(error: Exception, words: list[str], commands: Iterable[str]) ->
         given = str(getattr(error, "option_name", ""))
         known = [name for each in context.command.get_params(context) for name in _names(each)]
         taken = about_names(words, context, given)
-        told = f"{nearest(given, known)}{taken or more}"
-        return ConfigError(f"{where}there is no option {given}.{told}")
+        advice = f"{nearest(given, known)}{taken or more}"
+        return ConfigError(f"{where}there is no option {given}.{advice}")
     if kind == "MissingParameter":
         taken = about_names(words, context)
         return ConfigError(f"{where}{_called(param)} is missing.{taken}{usage}")

@@ -101,7 +101,7 @@ def resumed_result(
     if changed:
         raise FileError(
             f"--resume: motion {', '.join(changed)} of {path} is not proved: {Doubt.CHANGED}. More "
-            "motions would be planned on top of what nobody checked. Put the file back as it was, "
+            "motions would be planned on top of an unchecked one. Put the file back as it was, "
             "or give another -o; `--start` makes proved motions of those in a file."
         )
     return _finished(problem, result).with_config(spec_as_yaml(problem.spec))

@@ -335,19 +335,13 @@ def _built(description: RobotDescription, spec: RobotSpec) -> Robot:
         ([np.arange(6)] if "base" in spec.rows else []) + ([moved] if "joints" in spec.rows else [])
     )
     start = np.array([posture[name] for name in every])
-    reduced = np.array(pin.neutral(model))
-    if floating:
-        reduced[3:7] = reference[3:7]
-        reduced[7:] = start
-    else:
-        reduced = start
     return Robot(
         name=description.name,
         description=description,
         model=model,
         joint_names=moved_names,
         posture=np.array([posture[name] for name in moved_names]),
-        reference=reduced,
+        reference=_reduced_reference(model, start, reference[3:7]) if floating else start,
         rows=rows,
         moved=moved,
         floating=floating,
@@ -359,6 +353,14 @@ def _built(description: RobotDescription, spec: RobotSpec) -> Robot:
         motors=motors_of(spec.transmissions, moved_names),
         held_joints=tuple(n for n in names if n not in moving and kept[n].held),
     )
+
+
+def _reduced_reference(model: pin.Model, start: Array, orientation: Array) -> Array:
+    """Configuration (nq,) of a floating robot at the joint positions `start`."""
+    reduced = np.array(pin.neutral(model))
+    reduced[3:7] = orientation
+    reduced[7:] = start
+    return reduced
 
 
 def _kept_ranges(

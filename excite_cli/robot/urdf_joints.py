@@ -50,11 +50,11 @@ class UrdfJoint:
         return self.kind == "prismatic"
 
     @property
-    def range(self) -> JointRange:
+    def bounds(self) -> JointRange:
         """Its limits of position and speed; what is no speed bounds nothing."""
         speed = self.velocity if self.velocity > 0 else math.inf
-        bounds = JointRange.written(self.lower, self.upper, speed)
-        return replace(bounds, known=self.known, held=self.held)
+        written = JointRange.written(self.lower, self.upper, speed)
+        return replace(written, known=self.known, held=self.held)
 
 
 @dataclass(frozen=True)
@@ -197,8 +197,8 @@ def _narrow(joints: list[UrdfJoint]) -> None:
         if follower.mimics is None or follower.mimics.driver not in place:
             continue
         k = place[follower.mimics.driver]
-        own = joints[k].range
-        kept = own.keeping(follower.range, follower.mimics)
+        own = joints[k].bounds
+        kept = own.keeping(follower.bounds, follower.mimics)
         speed = kept.velocity if kept.velocity < own.velocity else joints[k].velocity
         joints[k] = replace(
             joints[k], lower=kept.lower, upper=kept.upper, velocity=speed, held=kept.held

@@ -21,7 +21,7 @@ def ordered_limits(path: Path, root: ElementTree.Element) -> dict[str, str]:
     RobotError
         The limits of a joint are both beyond all that a robot can reach.
     """
-    told = {}
+    said = {}
     for joint in root.findall("joint"):
         limit = joint.find("limit")
         if joint.get("type") not in _KINDS or limit is None:
@@ -32,7 +32,7 @@ def ordered_limits(path: Path, root: ElementTree.Element) -> dict[str, str]:
         if lower > upper:
             limit.set("lower", texts[1])
             limit.set("upper", texts[0])
-            told[name] = (
+            said[name] = (
                 f"the position limits of {name} are reversed in {path.name}, {lower:g} to "
                 f"{upper:g}: they are taken as {upper:g} to {lower:g}"
             )
@@ -41,4 +41,4 @@ def ordered_limits(path: Path, root: ElementTree.Element) -> dict[str, str]:
                 f"{path}: joint '{name}' has the position limits {lower:g} and {upper:g}, which no "
                 "robot can reach. Positions are in rad (m for prismatic joints)."
             )
-    return told
+    return said

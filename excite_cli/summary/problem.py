@@ -99,9 +99,9 @@ def _counted_name(constraint: Constraint) -> str:
 
 def _limits(robot: Robot, every: bool) -> Iterator[Note]:
     """What is odd about limits of joints that move, or would; `every`: all were requested."""
-    for name, told in robot.description.reversed_limits.items():
+    for name, words in robot.description.reversed_limits.items():
         if name in robot.tree.joint_names:
-            yield _warning(f"{told}.")
+            yield _warning(f"{words}.")
     held = [f"{name} at {robot.locked[name]:g}" for name in robot.held_joints] if every else []
     if held:
         yield _said(f"not moved, held by equal position limits: {', '.join(held)}")

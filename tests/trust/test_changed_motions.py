@@ -267,7 +267,7 @@ def test_a_robot_that_is_another_by_now(tmp_path: Path) -> None:
 
 
 class _Absent(Measure):
-    """Nobody is there at first; later, what is played is noted."""
+    """Notes what it is to play, and measures nothing."""
 
     suffix = ".csv"
 
@@ -276,7 +276,7 @@ class _Absent(Measure):
 
     def take(self, take: Take) -> None:
         self.played.append(take.name)
-        raise NotMeasuredError("nobody is there.")
+        raise NotMeasuredError("the robot is off.")
 
 
 @pytest.mark.parametrize("name", ["the motion, a little", "the margins", "no digest"])
