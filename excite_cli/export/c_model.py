@@ -10,6 +10,7 @@ import numpy as np
 from excite_cli.effects.base import Effect
 from excite_cli.effects.c_code import reals
 from excite_cli.effects.sign import WIDTH
+from excite_cli.export.c_comment import in_comment
 from excite_cli.export.detector_in_c import detector_in_c
 from excite_cli.export.exported import ModelText, in_words
 from excite_cli.export.gaps import filled
@@ -46,8 +47,8 @@ def c_model(
     text = (files("excite_cli.export") / "model_template.c").read_text(encoding="utf-8")
     tree = tree_of(robot)
     gaps = {
-        "ROBOT": _comment(robot.name),
-        "MADE": _comment(made),
+        "ROBOT": in_comment(robot.name),
+        "MADE": in_comment(made),
         "JOINTS": _lines(f"{j} {name}" for j, name in enumerate(names)),
         "COLUMNS": _lines(f"{k} {name}" for k, name in enumerate(columns)),
         "EFFECTS": _lines(in_words(kept.effects, names).split("; ") if kept.effects else ()),
@@ -126,10 +127,5 @@ def _wrapped(x: Array) -> str:
 
 
 def _lines(words: object) -> str:
-    found = [f" *   {_comment(word)}" for word in words]  # type: ignore[attr-defined]
+    found = [f" *   {in_comment(word)}" for word in words]  # type: ignore[attr-defined]
     return "\n".join(found) or " *   none"
-
-
-def _comment(words: str) -> str:
-    """Names may hold anything: nothing of them ends a comment."""
-    return words.replace("*/", "* /").replace("\n", " ").replace("@", "(at)")

@@ -21,9 +21,23 @@
 @LEFT@
  * Rates of torques (elastic gears, delays) are central differences in excite_series and backward
  * ones in excite_torque, which cannot look ahead and knows no backlash; all else is the same in both.
+ *
+ * What is not finite: NaN, +-Inf, and numbers whose square overflows (beyond 6e153, with EXCITE_FLOAT
+ * 9e18), in what a function is given or in what comes out of it. Such an instant
+ *   - is a contact: excite_detect answers 1 for it;
+ *   - has the torque NaN on all joints, and excite_torque and excite_load return 1 (else 0),
+ *     excite_series the number of such instants;
+ *   - never enters a memory or a filter: these keep their last finite values, its time passes, and
+ *     the next finite instant is answered as usual.
+ * A step that is not finite or not above 0 (or a start that is not finite) makes every instant such
+ * a one until the next begin with a good step; what begins a series returns 1 for a bad step.
+ * Numbers are judged by their bits, which holds with -ffast-math and -Ofast, too. A controller must
+ * not apply a torque of an instant for which 1 was returned.
  */
+#include <float.h>
 #include <math.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <string.h>
 #include <tgmath.h>
 
@@ -33,6 +47,17 @@ typedef float real;
 typedef double real;
 #endif
 #define R(x) ((real)(x))
+
+/* Exponent bits: all of them are set in what is no finite number; from SQUARES on its square is none. */
+#if defined(EXCITE_FLOAT) || DBL_MANT_DIG == FLT_MANT_DIG
+typedef uint32_t bits;
+#define EXPONENT ((bits)0xff << 23)
+#define SQUARES ((bits)(127 + 63) << 23)
+#else
+typedef uint64_t bits;
+#define EXPONENT ((bits)0x7ff << 52)
+#define SQUARES ((bits)(1023 + 511) << 52)
+#endif
 
 #define EXCITE_JOINTS @N@
 #define EXCITE_COLUMNS @NCOLUMNS@
@@ -44,7 +69,10 @@ typedef double real;
 /* What a model remembers of a series; excite_begin empties it. */
 typedef struct {
     real step, start, t;     /* between instants [s]; time on the campaign's clock, and since */
-    size_t count;            /* instants so far */
+    int usable;              /* whether step and start are */
+    size_t count, last;      /* instants so far; the last finite one */
+    size_t known, rated;     /* finite ones so far; those that differences may look back on */
+    real since, before;      /* from the last finite one to this one [s], and to it from its last */
     real q[N], v[N];         /* of the last one, then of this one */
     real last_q[N], last_v[N];
     real bristle[N];         /* of friction with memory */
@@ -71,6 +99,27 @@ static const real LOADED[M][10] = {
 };
 static const real GRAVITY[3] = {@GRAVITY@};
 static const real STILL[M] = {0};
+
+/* Whether all `count` numbers are finite, and their squares. The compiler may not guess what comes
+ * out of something volatile, so that no option takes this test away. */
+static int all_finite(size_t count, const real *x)
+{
+    volatile union { real number; bits all; } each;
+    for (size_t i = 0; i < count; ++i) {
+        each.number = x[i];
+        if ((each.all & EXPONENT) >= SQUARES)
+            return 0;
+    }
+    return 1;
+}
+
+/* NaN, or with `endless` infinity, whatever the compiler thinks of them. */
+static void spoil(size_t count, real *x, int endless)
+{
+    const bits all = EXPONENT | (endless ? 0 : EXPONENT >> 1);
+    for (size_t i = 0; i < count; ++i)
+        memcpy(x + i, &all, sizeof(all));
+}
 
 static void cross(const real *x, const real *y, real *out)
 {
@@ -319,8 +368,8 @@ static inline real dahl(
     excite_memory *memory, int j, real distance, real sliding, real standing)
 {
     const real q0 = memory->last_q[j], q1 = memory->q[j];
-    const real v0 = memory->last_v[j], v1 = memory->v[j], step = memory->step;
-    if (memory->count == 0)
+    const real v0 = memory->last_v[j], v1 = memory->v[j], step = memory->since;
+    if (memory->known == 0)
         return memory->bristle[j] = tanh(v1 / sliding);
     const real between = v0 * v1 < 0 ? q0 + R(0.5) * step * v0 * v0 / (v0 - v1) : R(0.5) * (q0 + q1);
     const real way[2] = {between - q0, q1 - between};
@@ -423,6 +472,7 @@ static void robot_torque(
         s[j] = SIGN(v[j]);
     memcpy(tau, load, N * sizeof(real));
     (void)t, (void)start, (void)s, (void)a, (void)q, (void)column, (void)load_rate, (void)load_bend;
+    (void)slopes, (void)tilted, (void)pushed, (void)dahl, (void)backlash;
 @ROBOT_EFFECTS@
 }
 
@@ -435,17 +485,26 @@ static void measured_torque(
 @DEFECTS@
 }
 
-void excite_load(const real q[N], const real v[N], const real a[N], real tau[N])
+int excite_load(const real q[N], const real v[N], const real a[N], real tau[N])
 {
-    rigid(LOADED, GRAVITY, q, v, a, tau);
+    int sound = all_finite(N, q) && all_finite(N, v) && all_finite(N, a);
+    if (sound) {
+        rigid(LOADED, GRAVITY, q, v, a, tau);
+        sound = all_finite(N, tau);
+    }
+    if (!sound)
+        spoil(N, tau, 0);
+    return !sound;
 }
 
 /* `step` between the instants [s]; `start` on the campaign's clock [s]. */
-void excite_begin(excite_memory *memory, real step, real start)
+int excite_begin(excite_memory *memory, real step, real start)
 {
     memset(memory, 0, sizeof(*memory));
-    memory->step = step;
-    memory->start = start;
+    memory->usable = all_finite(1, &step) && all_finite(1, &start) && step > 0;
+    memory->step = memory->usable ? step : 1;
+    memory->start = memory->usable ? start : 0;
+    return !memory->usable;
 }
 
 static void next(excite_memory *memory, const real *q, const real *v)
@@ -455,36 +514,71 @@ static void next(excite_memory *memory, const real *q, const real *v)
     memcpy(memory->q, q, sizeof(memory->q));
     memcpy(memory->v, v, sizeof(memory->v));
     memory->t = (real)memory->count * memory->step;
+    memory->before = memory->since;
+    memory->since = (real)(memory->count - memory->last) * memory->step;
+}
+
+/* After an instant: what was computed `ahead` becomes the memory if it is finite. Else the memory
+ * stays as it was, only that differences begin anew: one of its own numbers may be too large. */
+static int kept(excite_memory *memory, excite_memory *ahead, int sound)
+{
+    if (sound && all_finite(N, ahead->bristle)) {
+        ahead->last = ahead->count;
+        ahead->known += 1;
+        ahead->rated += 1;
+        *memory = *ahead;
+    } else {
+        sound = 0;
+        memory->rated = 0;
+    }
+    memory->count += 1;
+    return sound;
 }
 
 /* First and second backward difference; `last` are the one and the two before. */
 static inline void backward(
-    const real *now, real last[2][N], size_t count, real step, real *rate, real *bend)
+    const excite_memory *memory, const real *now, real last[2][N], real *rate, real *bend)
 {
+    const real since = memory->since, before = memory->before;
     for (int j = 0; j < N; ++j) {
-        rate[j] = count > 0 ? (now[j] - last[0][j]) / step : 0;
-        bend[j] = count > 1 ? (now[j] - 2 * last[0][j] + last[1][j]) / (step * step) : 0;
-        if (count > 1)
-            rate[j] += R(0.5) * step * bend[j];
+        rate[j] = memory->rated > 0 ? (now[j] - last[0][j]) / since : 0;
+        bend[j] = memory->rated > 1
+            ? 2 * (rate[j] - (last[0][j] - last[1][j]) / before) / (since + before) : 0;
+        rate[j] += R(0.5) * since * bend[j];
         last[1][j] = last[0][j];
         last[0][j] = now[j];
     }
 }
 
-void excite_torque(
+static int given(const real *q, const real *v, const real *a, const real *column)
+{
+    return all_finite(N, q) && all_finite(N, v) && all_finite(N, a)
+        && (!column || all_finite(EXCITE_COLUMNS, column));
+}
+
+int excite_torque(
     excite_memory *memory, const real q[N], const real v[N], const real a[N],
     const real column[], real tau[N])
 {
     real load[N], torque[N], rate[N] = {0}, bend[N] = {0};
-    next(memory, q, v);
+    excite_memory ahead = *memory;
+    if (!memory->usable || !given(q, v, a, column)) {
+        memory->count += 1;
+        spoil(N, tau, 0);
+        return 1;
+    }
+    next(&ahead, q, v);
     rigid(LOADED, GRAVITY, q, v, a, load);
     if (RATES)
-        backward(load, memory->load, memory->count, memory->step, rate, bend);
-    robot_torque(memory, q, v, a, column, load, rate, bend, torque);
+        backward(&ahead, load, ahead.load, rate, bend);
+    robot_torque(&ahead, q, v, a, column, load, rate, bend, torque);
     if (RATES)
-        backward(torque, memory->torque, memory->count, memory->step, rate, bend);
+        backward(&ahead, torque, ahead.torque, rate, bend);
     measured_torque(q, v, column, load, torque, rate, tau);
-    memory->count += 1;
+    if (kept(memory, &ahead, all_finite(N, load) && all_finite(N, torque) && all_finite(N, tau)))
+        return 0;
+    spoil(N, tau, 0);
+    return 1;
 }
 
 /* Central differences of rows; one-sided at the ends. */
@@ -504,26 +598,23 @@ size_t excite_work(size_t count)
     return (4 * N + 3) * count;
 }
 
-void excite_series(
-    size_t count, real step, real start, const real *q, const real *v, const real *a,
-    const real *column, real *tau, real *work)
+/* A part of a recording in which all is finite; `load` is known. */
+static void part(
+    excite_memory *memory, size_t count, const real *q, const real *v, const real *a,
+    const real *column, real *tau, const real *load, real *rate, real *bend, real *torque, real *spare)
 {
-    real *load = work, *rate = work + N * count, *bend = work + 2 * N * count;
-    real *torque = work + 3 * N * count, *spare = work + 4 * N * count;
-    excite_memory memory;
-    excite_begin(&memory, step, start);
-    for (size_t k = 0; k < count; ++k)
-        rigid(LOADED, GRAVITY, q + k * N, v + k * N, a + k * N, load + k * N);
+    const real step = memory->step;
     if (RATES) {
         rates(count, step, load, rate);
         rates(count, step, rate, bend);
     }
     for (size_t k = 0; k < count; ++k) {
-        next(&memory, q + k * N, v + k * N);
+        excite_memory ahead = *memory;
+        next(&ahead, q + k * N, v + k * N);
         robot_torque(
-            &memory, q + k * N, v + k * N, a + k * N, column ? column + k * EXCITE_COLUMNS : 0,
+            &ahead, q + k * N, v + k * N, a + k * N, column ? column + k * EXCITE_COLUMNS : 0,
             load + k * N, RATES ? rate + k * N : STILL, RATES ? bend + k * N : STILL, torque + k * N);
-        memory.count += 1;
+        kept(memory, &ahead, all_finite(N, torque + k * N));
     }
     (void)spare;
 @SERIES_EFFECTS@
@@ -535,6 +626,43 @@ void excite_series(
             torque + k * N, RATES ? rate + k * N : STILL, tau + k * N);
 }
 
+size_t excite_series(
+    size_t count, real step, real start, const real *q, const real *v, const real *a,
+    const real *column, real *tau, real *work)
+{
+    real *load = work, *rate = work + N * count, *bend = work + 2 * N * count;
+    real *torque = work + 3 * N * count, *spare = work + 4 * N * count;
+    size_t bad = 0;
+    excite_memory memory;
+    excite_begin(&memory, step, start);
+    for (size_t k = 0; k < count;) {
+        size_t end = k;
+        for (; memory.usable && end < count; ++end) {
+            const real *columns = column ? column + end * EXCITE_COLUMNS : 0;
+            if (!given(q + end * N, v + end * N, a + end * N, columns)
+                || excite_load(q + end * N, v + end * N, a + end * N, load + end * N))
+                break;
+        }
+        if (end > k)
+            part(
+                &memory, end - k, q + k * N, v + k * N, a + k * N,
+                column ? column + k * EXCITE_COLUMNS : 0, tau + k * N, load + k * N, rate + k * N,
+                bend + k * N, torque + k * N, spare);
+        if (end < count) {
+            spoil(N, tau + end * N, 0);
+            memory.count += 1;
+            end += 1;
+        }
+        k = end;
+    }
+    for (size_t k = 0; k < count; ++k)
+        if (!all_finite(N, tau + k * N)) {
+            spoil(N, tau + k * N, 0);
+            bad += 1;
+        }
+    return bad;
+}
+
 #define TESTED @TESTED@
 static const real TEST_Q[TESTED * N] = {@TEST_Q@};
 static const real TEST_V[TESTED * N] = {@TEST_V@};
@@ -542,15 +670,47 @@ static const real TEST_A[TESTED * N] = {@TEST_A@};
 static const real TEST_TAU[TESTED * N] = {@TEST_TAU@};
 static const real TEST_COLUMN[TESTED * EXCITE_COLUMNS + 1] = {@TEST_COLUMN@};
 
+/* Whether every number of an instant may be NaN or infinite without anything left of it. */
+static int recovers(void)
+{
+    enum { GIVEN = 3 * N + EXCITE_COLUMNS };
+    for (int k = 0; k < 2 * GIVEN; ++k) {
+        real x[GIVEN + 1], tau[N];
+        excite_memory memory;
+        excite_begin(&memory, R(@TEST_STEP@), 0);
+        for (size_t at = 0; at < TESTED; ++at) {
+            memcpy(x, TEST_Q + at * N, N * sizeof(real));
+            memcpy(x + N, TEST_V + at * N, N * sizeof(real));
+            memcpy(x + 2 * N, TEST_A + at * N, N * sizeof(real));
+            memcpy(x + 3 * N, TEST_COLUMN + at * EXCITE_COLUMNS, EXCITE_COLUMNS * sizeof(real));
+            if (at == TESTED / 2)
+                spoil(1, x + k / 2, k % 2);
+            const int bad = excite_torque(&memory, x, x + N, x + 2 * N, x + 3 * N, tau);
+            if (bad != (at == TESTED / 2) || bad == all_finite(N, tau))
+                return 0;
+        }
+    }
+    return 1;
+}
+
+/* Relative to the largest of `count` recorded numbers; 1 if one of `found` is not finite. */
+static real deviation(size_t count, const real *found, const real *recorded)
+{
+    real worst = 0, largest = 0;
+    if (!all_finite(count, found))
+        return 1;
+    for (size_t i = 0; i < count; ++i) {
+        worst = fmax(worst, fabs(found[i] - recorded[i]));
+        largest = fmax(largest, fabs(recorded[i]));
+    }
+    return largest > 0 ? worst / largest : worst;
+}
+
 real excite_self_test(void)
 {
-    real tau[TESTED * N], work[(4 * N + 3) * TESTED], worst = 0, largest = 0;
+    real tau[TESTED * N], work[(4 * N + 3) * TESTED];
     excite_series(TESTED, R(@TEST_STEP@), 0, TEST_Q, TEST_V, TEST_A, TEST_COLUMN, tau, work);
-    for (size_t i = 0; i < TESTED * N; ++i) {
-        worst = fmax(worst, fabs(tau[i] - TEST_TAU[i]));
-        largest = fmax(largest, fabs(TEST_TAU[i]));
-    }
-    return worst / largest;
+    return recovers() ? deviation(TESTED * N, tau, TEST_TAU) : 1;
 }
 
 @DETECTOR@

@@ -25,7 +25,7 @@ from tests.robot.random_robots import random_robot
 
 PLANTED = (*ON_JOINTS, ("wrench_gain", tuple(range(6)), {}, [0.02]))
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)] or ["cc"]
-STRICT = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
+STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wcomment", "-Werror"]
 UR10 = RobotSpec(urdf=str(Path(__file__).parents[2] / "data" / "ur10_cb" / "ur10.urdf"))
 
 

@@ -36,7 +36,7 @@ def test_it_says_what_the_thresholds_say(compiler: str, robot: Robot, tmp_path: 
     residual = 0.5 * np.cumsum(rng.normal(0.0, 0.4, (300, robot.n)), axis=0)
     speed, load = rng.normal(0.0, 0.1, (2, 300, robot.n))
     expected = given.beyond(Residual(residual, speed, load, step))
-    state = (ctypes.c_double * (robot.n + 2))()
+    state = (ctypes.c_double * (2 * robot.n + 2))()
     library.excite_detector_begin(state, ctypes.c_double(step))
     beyond = np.zeros(robot.n)
     for k in range(300):
