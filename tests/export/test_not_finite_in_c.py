@@ -1,8 +1,7 @@
-"""What is not finite is a contact in the C file, and leaves nothing in any memory: also -ffast-math."""
+"""What is not finite is a contact in the C file and enters no memory, also with -ffast-math."""
 
 import ctypes
 import subprocess
-from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 
@@ -33,13 +32,13 @@ def robot() -> Robot:
 @pytest.fixture(scope="module", params=BUILDS, ids=NAMED)
 def whole(
     request: pytest.FixtureRequest, robot: Robot, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[ctypes.CDLL]:
+) -> ctypes.CDLL:
     """Every effect at once, and a detector."""
     compiler, level = request.param
     effects, values = planted()
     model = IdentifiedModel(standard_parameters(robot), effects, values)
     text = c_model(robot, model, thresholds=_thresholds(robot)).text
-    yield compiled(text, tmp_path_factory.mktemp("c"), compiler, *level[1:], level=level[0])
+    return compiled(text, tmp_path_factory.mktemp("c"), compiler, *level[1:], level=level[0])
 
 
 def _thresholds(robot: Robot) -> Thresholds:
@@ -203,9 +202,7 @@ def test_series_with_bad_instants(whole: ctypes.CDLL, robot: Robot, value: float
         rows = [row.copy() for row in _rows(series)]
         for k in bad:
             rows[which][k, 0] = value
-        spoilt = Series(
-            series.t, *rows[:3], series.run, series.start, {"temp": rows[3][:, 0]}
-        )
+        spoilt = Series(series.t, *rows[:3], series.run, series.start, {"temp": rows[3][:, 0]})
         found = by_c(whole, spoilt)
         assert [k for k in range(200) if not np.isfinite(found[k]).all()] == bad
         assert [k for k in range(200) if np.isnan(found[k]).any()] == bad
