@@ -48,6 +48,7 @@ from excite_cli.dynamics.regressor import standard_parameter_names, standard_par
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
+from excite_cli.identification.filter_bias import filter_findings, fitted_behind
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
@@ -61,7 +62,7 @@ from excite_cli.identification.prior import prior_rows
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split, with_ends_sealed
-from excite_cli.identification.torque_scale import assumed_scale, weighed
+from excite_cli.identification.torque_scale import Knowledge, assumed_scale, weighed
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.recorded import recorded
@@ -197,6 +198,7 @@ def _diagnosed(
             *assumed_scale(spec.measurement, spec.identification),
             *suspicious,
             *standing,
+            *_filter_bias(model, models[1], spec, parts.training, processing),
             *_noticed(assumed, floor, robot, parts.training),
         ),
         processing=_choices(processing, traced, parts, training),
@@ -300,6 +302,18 @@ def _noticed(
             "is a part of the same motion. Record a second motion, and names that do not hold go.",
             training[0].name,
         )
+
+
+def _filter_bias(
+    model: Model, after: IdentifiedModel, spec: Spec, runs: Sequence[Run], processing: Processing
+) -> tuple[Finding, ...]:
+    """Whether the filter that was set biases the model that was found."""
+    rows = model.weighed if model.weighed is not None else np.zeros((0, 1))
+    wide = np.zeros((len(rows), model.base.rank + sum(len(e.parameters) for e in after.effects)))
+    wide[:, : rows.shape[1] - 1] = rows[:, :-1]
+    known = Knowledge(after.effects, wide, rows[:, -1])
+    behind = fitted_behind(model.robot, model.base, known, spec.identification, runs)
+    return filter_findings(runs, processing, spec.measurement.filter, behind)
 
 
 def _unexplained(traced: Traced, robot: Robot) -> tuple[list[Unexplained], Dependence]:

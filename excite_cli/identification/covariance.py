@@ -44,7 +44,13 @@ class Rows:
 
 @dataclass(frozen=True)
 class Covariance:
-    """`matrix` (p, p); `noises` per run; `samples` the effective number of independent samples."""
+    """`matrix` (p, p); `noises` per run; `samples` the effective number of independent samples.
+
+    That is never more than there are samples. Where noise lies at high frequencies (positions that
+    were differentiated), it changes its sign from sample to sample and hardly shows in slow columns:
+    these are known better than behind white noise of that size, which `matrix` holds, but no sample
+    is two.
+    """
 
     matrix: Array
     noises: tuple[Noise, ...]
@@ -87,7 +93,7 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = white / np.diag(matrix)
     shares = shares[np.isfinite(shares)]
-    samples = float(plain * np.median(shares)) if len(shares) else float("nan")
+    samples = plain * min(float(np.median(shares)), 1.0) if len(shares) else float("nan")
     return Covariance((matrix + matrix.T) / 2, tuple(noises), samples)
 
 

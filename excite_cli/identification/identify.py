@@ -12,6 +12,7 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ExciteError
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.filter_bias import filter_findings, fitted_behind
 from excite_cli.identification.fit import (
     Fit,
     all_rows,
@@ -114,6 +115,10 @@ def identify(
     if follows_model(training):
         values = found.values[found.rank :]
         training, held_out = (rebuilt(r, found.phi, values) for r in (training, held_out))
+    tell("the filter")
+    behind = fitted_behind(robot, base, known, spec.identification, parts.training)
+    wanted = spec.measurement.filter
+    biased = filter_findings(parts.training, processing, wanted, behind, found)
     tell("closed-loop bias")
     cut = (sealed, spec.diagnosis.block, spec.identification.needed_runs)
     hausman = _hausman(training, dataset, parts, processing, found, cut)
@@ -133,6 +138,7 @@ def identify(
             *standing_still([run.prepared for run in training.runs], robot.joint_names),
             *_hardly_moved(found),
             *_noticed(found, hausman),
+            *biased,
             *_much_left(error),
             *implausible(found.links, found.inertias, found.joint_names),
             *(floor.noticed(robot.joint_names) if floor else ()),

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from excite_cli.config.data_spec import IdentificationSpec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.nearest_inertias import half_of
@@ -24,12 +25,18 @@ from excite_cli.effects.parameter import Value, deviation
 from excite_cli.effects.signals import Signals
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.filter_bias import filter_findings
 from excite_cli.identification.fit import Fit, fit, rebuilt
 from excite_cli.identification.identify import judged
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.prepare import prepare_all, require_motion
-from excite_cli.identification.processing import choose_processing
-from excite_cli.identification.regression import build_regression, effect_columns, with_effects
+from excite_cli.identification.processing import Processing, choose_processing
+from excite_cli.identification.regression import (
+    Regression,
+    build_regression,
+    effect_columns,
+    with_effects,
+)
 from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.run_identity import RunId
@@ -101,24 +108,20 @@ def identify_load(
     processing = choose_processing(
         dataset.runs, spec.measurement.filter, spec.diagnosis.moving_speed
     )
-    prepared = prepare_all(dataset.runs, processing, LeftOut.by(effects))
-    require_motion(
-        prepared,
-        processing,
-        robot.joint_names,
-        (*spec.measurement.without_torque, *robot.unmeasured),
-    )
-    regression = build_regression(robot, base, effects, prepared)
-    # What the URDF says of the robot is in its fit, and nobody asks here for a consistent one.
+    # What the URDF says of the robot is in its fit, and no consistent bodies are wanted here.
     plain = spec.identification.model_copy(update={"inertias": "free", "consistent": False})
     known = _known(alone.values, covariance)
-    found = fit(regression, plain, known)
-    for _ in range(_REBUILDS):  # gains act upon the load, too
-        regression = rebuilt(regression, found.phi, found.values[base.rank :])
-        last, found = found, fit(regression, plain, known)
-        change = np.linalg.norm(found.values - last.values)
-        if change <= _SETTLED * np.linalg.norm(found.values):
-            break
+
+    def behind(other: Processing) -> tuple[Regression, Fit]:
+        prepared = prepare_all(dataset.runs, other, LeftOut.by(effects))
+        unmeasured = (*spec.measurement.without_torque, *robot.unmeasured)
+        require_motion(prepared, other, robot.joint_names, unmeasured)
+        return _fitted(build_regression(robot, base, effects, prepared), plain, known)
+
+    regression, found = behind(processing)
+    biased = filter_findings(
+        dataset.runs, processing, spec.measurement.filter, lambda other: behind(other)[1], found
+    )
     with_load, _ = judged(found, regression, sealed=False)
     without, _ = judged(alone, replace(regression, effects=tuple(before)), sealed=False)
     at = slice(len(found.values) - _WIDTH, None)
@@ -145,8 +148,23 @@ def identify_load(
         with_load=with_load,
         fit_error=fit_error,
         seconds=float(sum(run.duration for run in dataset.runs)),
-        findings=(*dataset.findings, *_noticed(with_load, fit_error, possible)),
+        findings=(*dataset.findings, *biased, *_noticed(with_load, fit_error, possible)),
     )
+
+
+def _fitted(
+    regression: Regression, plain: IdentificationSpec, known: tuple[Array, Array]
+) -> tuple[Regression, Fit]:
+    """The fit, with columns that follow what was found: gains act upon the load, too."""
+    rank = regression.base.rank
+    found = fit(regression, plain, known)
+    for _ in range(_REBUILDS):
+        regression = rebuilt(regression, found.phi, found.values[rank:])
+        last, found = found, fit(regression, plain, known)
+        change = np.linalg.norm(found.values - last.values)
+        if change <= _SETTLED * np.linalg.norm(found.values):
+            break
+    return regression, found
 
 
 @dataclass(frozen=True)

@@ -46,10 +46,21 @@ def torque_trace(
     before: Array | None = None,
     sealed: bool = False,
 ) -> TorqueTrace:
+    """As `whole_trace`, with at most `MOST_SAMPLES` samples, in single precision."""
+    return thinned(whole_trace(run, load, predicted, before, sealed))
+
+
+def whole_trace(
+    run: PreparedRun,
+    load: Array,
+    predicted: Array,
+    before: Array | None = None,
+    sealed: bool = False,
+) -> TorqueTrace:
     """The trace of a prepared run; `load`, `predicted`, `before` (T, n) at the working rate."""
     stacked = run.averaged(np.concatenate([run.t[:, None], run.q, run.v, run.a], axis=1))
     motion = np.split(stacked[:, 1:], 3, axis=1)
-    whole = TorqueTrace(
+    return TorqueTrace(
         run=run.run.key,
         sealed=sealed,
         t=stacked[:, 0],
@@ -62,7 +73,6 @@ def torque_trace(
         predicted=run.averaged_torque(predicted),
         before=None if before is None else run.averaged_torque(before),
     )
-    return thinned(whole)
 
 
 def thinned(trace: TorqueTrace) -> TorqueTrace:

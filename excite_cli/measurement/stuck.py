@@ -9,11 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+from excite_cli.measurement.moving import moves
 from excite_cli.measurement.stretches import stretches
 
 _SHORTEST = 0.1  # s, of a single channel
 _FEWEST = 20  # samples, of a single channel
 _FROZEN_END = 10  # samples
+_HARDER = 3.0  # times the change of a step before a robot stopped
 _SHORT = 5  # samples of stale messages that need no jump to be known
 # Torques that repeat in less than this share of samples do not all repeat at once by chance.
 _HARDLY, _ENOUGH = 1e-3, 200
@@ -57,12 +59,15 @@ def _stale(run: Run) -> Mask:
 
     At rest, a noiseless robot repeats its rows too, and in slow motion a coarse encoder; there is
     no jump of more than a step of the encoder when it goes on. A few equal rows are stale without
-    a jump where no torque ever repeats by itself.
+    a jump where no torque of a moving robot ever repeats by itself, and equal rows up to the end
+    where the robot would have stopped much harder than it slowed down. Nothing is stale where
+    nothing moves.
     """
     moved = np.abs(np.diff(run.q, axis=0)).max(axis=1)
     same = np.diff(run.tau, axis=0) == 0
     repeated = same.all(axis=1) & (moved == 0)
-    noisy = len(run.t) > _ENOUGH and same[~repeated].mean() < _HARDLY
+    own = same[moved > 0]
+    noisy = len(own) > _ENOUGH and own.mean() < _HARDLY
     # Repeats of a time stamp are duplicates, and told as such.
     repeated = np.concatenate([[False], repeated & (np.diff(run.t) > 0)])
     stale = np.zeros(len(run.t), bool)
@@ -73,9 +78,19 @@ def _stale(run: Run) -> Mask:
             late = moved[end - 1] > max((1 + 0.5 * length) * moved[end], 2.5 * encoder)
             late |= noisy and length <= _SHORT
         else:
-            late = length >= _FROZEN_END
-        stale[start:end] = late
+            late = length >= _FROZEN_END and _stops_at_once(run.q[:start])
+        stale[start:end] = late and moves(run.q, start, end).any()
     return stale
+
+
+def _stops_at_once(q: Array) -> bool:
+    """Whether the last step of positions (T, n) is no end of a motion that slows down."""
+    steps = np.abs(np.diff(q, axis=0))
+    if len(steps) < 2:
+        return False
+    count = np.min(steps, axis=0, initial=np.inf, where=steps > 0)
+    harder = steps[-1] > _HARDER * np.abs(steps[-2] - steps[-1]) + 2.5 * count
+    return bool(harder.any())
 
 
 def _filled(run: Run, stale: Mask) -> Run:
@@ -101,4 +116,8 @@ def _standing(run: Run, repeats: Mask, j: int) -> list[tuple[int, int]]:
     resumed = np.append(steps, np.inf)
     first, lengths = stretches(repeats)
     found = [(int(a), int(a + n)) for a, n in zip(first, lengths, strict=True) if n >= fewest]
-    return [(a, b) for a, b in found if np.ptp(run.q[a:b, j]) > 0 and resumed[b - 1] > leap]
+    return [
+        (a, b)
+        for a, b in found
+        if np.ptp(run.q[a:b, j]) > 0 and resumed[b - 1] > leap and moves(run.q, a, b)[j]
+    ]

@@ -7,6 +7,7 @@ and so does the noise of many sensors,
     allowed = r₀ max(1, τ/τ₀).
 
 With the noise taken to stay as it is, 2 of 120 sound simulated runs raised an alarm (ratio 1.7).
+Of joints that stand or reverse only what friction cannot explain is in both (`beyond_friction`).
 Residuals are serially correlated, so that samples say little of how far a mean of squares may go:
 that is told by means over blocks of a second of the model's own data, whose deviation is κ of their
 mean.
@@ -18,7 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.identification.stored_model import StoredModel
+from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.robot.model import Array
+from excite_cli.scoring.beyond_friction import beyond_friction
 
 SECONDS = 1.0  # of a block
 # More than the model's own residual: models are worse in motions that they do not know. With 1.35,
@@ -67,15 +70,39 @@ def allowance_of(stored: StoredModel) -> Allowance | None:
         torque = np.where(relative > 0, residual / relative, np.nan)
     if not np.isfinite(torque).any():
         return None
-    own = [blocks_of(each.measured - each.predicted, each.t) for each in stored.traces]
-    torques = [blocks_of(each.measured, each.t) for each in stored.traces]
-    blocks = np.concatenate([np.zeros((0, stored.robot.n)), *own])
-    if len(blocks):
-        trained = np.sqrt(np.nanmean(blocks, axis=0))
-        larger = trained > residual
-        residual = np.where(larger, trained, residual)
-        torque = np.where(larger, np.sqrt(np.nanmean(np.concatenate(torques), axis=0)), torque)
+    blocks, torques = _own_blocks(stored, stored.traces)
+    sealed = _own_blocks(stored, [each for each in stored.traces if each.sealed])
+    residual, torque = _known(*sealed, residual, torque)
+    trained, beside = _known(blocks, torques, np.zeros(len(names)), torque)
+    larger = trained > residual
+    residual, torque = np.where(larger, trained, residual), np.where(larger, beside, torque)
     return Allowance(residual, torque, *_of_blocks(blocks, residual))
+
+
+def _own_blocks(stored: StoredModel, traces: Sequence[TorqueTrace]) -> tuple[Array, Array]:
+    """Mean squares (B, n) of what is judged of the model's own residual, and of the torque."""
+    none = [np.zeros((0, stored.robot.n))]
+    own = (stored.robot, stored.model)
+    left = [blocks_of(beyond_friction(*own, each, stored.processing), each.t) for each in traces]
+    torques = [blocks_of(each.measured, each.t) for each in traces]
+    return np.concatenate(none + left), np.concatenate(none + torques)
+
+
+def _known(blocks: Array, torques: Array, residual: Array, torque: Array) -> tuple[Array, Array]:
+    """RMS (n,) over blocks (B, n), of residual and torque; as given where too few say anything."""
+    enough = np.isfinite(blocks).sum(axis=0) >= _FEWEST
+    return (
+        np.where(enough, rms_of(np.sqrt(blocks)), residual),
+        np.where(enough, rms_of(np.sqrt(torques)), torque),
+    )
+
+
+def rms_of(x: Array) -> Array:
+    """RMS (n,) of what is finite in (m, n), by joint; NaN where nothing is."""
+    good = np.isfinite(x)
+    count = good.sum(axis=0)
+    total = np.where(good, np.square(x), 0.0).sum(axis=0)
+    return np.where(count > 0, np.sqrt(total / np.maximum(count, 1)), np.nan)
 
 
 def _of_blocks(blocks: Array, residual: Array) -> tuple[Array, Array]:

@@ -26,8 +26,9 @@ class ScoredRun(Shown):
     """A run, or a part of it, beside the torque that the model predicts; nothing was fitted.
 
     `allowed` RMS of the residual by joint [N·m] (N) that the model's own residual allows in this
-    motion, `ratio` of the RMS to it; `peak` the same of the worst block of a second; empty where
-    the model does not tell. `alarm` where joints (`left`) are beyond that; `reasons` are what
+    motion, `ratio` to it of the RMS of what friction cannot explain (`beyond_friction`; NaN where
+    the joint stands all the time); `peak` the same of the worst block of a second; empty where
+    the model does not say. `alarm` where joints (`left`) are beyond that; `reasons` are what
     explains it best. `sums` (6, n): ‖e‖², ‖τ‖², the same where joints move, and both counts of
     samples. `covariates`: means of the log's declared columns. `epoch` of the recording's
     start [s], if known.

@@ -12,9 +12,11 @@ from excite_cli.identification.identified_model import IdentifiedModel, Predicti
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.stored_model import StoredModel
+from excite_cli.identification.torque_trace import whole_trace
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Array
-from excite_cli.scoring.allowance import Allowance, allowance_of, blocks_of
+from excite_cli.scoring.allowance import Allowance, allowance_of, blocks_of, rms_of
+from excite_cli.scoring.beyond_friction import beyond_friction
 from excite_cli.scoring.reason import reasons_of
 from excite_cli.scoring.records import Reason, ScoredRun
 from excite_cli.scoring.shift import Shift
@@ -124,20 +126,19 @@ class Scorer:
         worse: Shift | None,
     ) -> ScoredRun:
         robot, names = self.stored.robot, self.stored.robot.joint_names
-        rms = _by_name(found.error.rms, names)
         with np.errstate(divide="ignore", invalid="ignore"):
-            torque = rms / _by_name(found.error.relative, names)
+            torque = _by_name(found.error.rms, names) / _by_name(found.error.relative, names)
         allowed = allowance.rms(torque)
+        traces = [
+            whole_trace(run, told.load, told.torque)
+            for run, told in zip(prepared, predictions, strict=True)
+        ]
+        filters = self.stored.processing
+        judged = [beyond_friction(robot, model, each, filters) for each in traces]
         blocks = np.concatenate(
-            [
-                blocks_of(
-                    np.where(run.valid, run.tau - run.averaged_torque(told.torque), np.nan),
-                    np.asarray(run.averages @ run.t),
-                )
-                for run, told in zip(prepared, predictions, strict=True)
-            ]
+            [blocks_of(each, trace.t) for each, trace in zip(judged, traces, strict=True)]
         )
-        ratio = rms / allowed
+        ratio = rms_of(np.concatenate(judged)) / allowed
         peak = np.sqrt(np.nanmax(np.vstack([blocks, np.zeros(robot.n)]), axis=0)) / allowed
         with np.errstate(invalid="ignore"):
             beyond = (ratio > allowance.most(len(blocks))) | (peak > allowance.most_of_a_block)

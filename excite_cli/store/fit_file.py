@@ -214,7 +214,8 @@ def _read_fit(file: Any, joints: tuple[str, ...]) -> Fit:
         noise=checked.array(file["noise"], (len(joints),), finite=False),
         phi=phi,
         count=checked.count(settings, "count"),
-        samples=checked.number(settings, "samples"),
+        # Of earlier versions some say more than there are.
+        samples=min(checked.number(settings, "samples"), checked.count(settings, "count")),
         consistent=_consistent(consistent, len(phi), size - rank),
         links=_links(consistent, len(phi) // 10),
         # Files of earlier versions fitted all of them.

@@ -185,12 +185,13 @@ def _run_in_words(run: ScoredRun) -> str:
 
 
 def _run_parts(run: ScoredRun) -> Parts:
-    names = ("joint", "where moving", "RMS", "allowed", "ratio")
+    names = ("joint", "where moving", "RMS", "beyond friction", "allowed", "ratio")
     rows = tuple(
         (
             joint,
             percent(run.error.relative_moving[joint]),
             figure(rms),
+            figure(run.ratio[joint] * run.allowed[joint]) if joint in run.ratio else "",
             figure(run.allowed[joint]) if joint in run.allowed else "",
             figure(run.ratio[joint]) if joint in run.ratio else "",
         )

@@ -84,3 +84,12 @@ def test_a_random_walk_has_a_finite_variance() -> None:
     fit = fit_rows([rows])
     assert np.isfinite(fit.covariance).all()
     assert fit.samples < 40
+
+
+def test_no_sample_counts_twice() -> None:
+    """Noise that changes its sign from sample to sample hardly shows in slow columns."""
+    rng = np.random.default_rng(5)
+    fit = fit_rows([slow_rows(rng, np.ones(COLUMNS), -0.9) for _ in range(3)])
+    white = fit_rows([slow_rows(rng, np.ones(COLUMNS), 0.0) for _ in range(3)])
+    assert fit.samples == fit.count.sum()
+    assert np.diag(fit.covariance).max() < np.diag(white.covariance).min()

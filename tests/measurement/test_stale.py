@@ -1,0 +1,90 @@
+"""What repeats is called stale, or stuck, only where the robot really moves."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from excite_cli.measurement.dataset import Run
+from excite_cli.measurement.stuck import mask_stuck
+from tests.measurement.recordings import JOINTS, recorded, without_speed
+
+COUNT = 5e-5  # rad
+
+
+def _still(seed: int = 0) -> Run:
+    """Nothing moves; positions and torques are constant to the last digit."""
+    run = without_speed(recorded(seed=seed))
+    return replace(run, q=np.tile(run.q[0], (len(run.t), 1)), tau=np.tile(run.tau[0], (len(run.t), 1)))
+
+
+def _flickering(seed: int = 0) -> Run:
+    """Encoders change by a count now and then, torques are coarse."""
+    run, rng = _still(seed), np.random.default_rng(seed)
+    counts = rng.uniform(size=run.q.shape) < 0.02
+    steps = 0.3 * np.round(rng.normal(0.0, 0.3, run.tau.shape))
+    return replace(run, q=run.q + COUNT * counts, tau=run.tau + steps)
+
+
+def _noisy(seed: int = 0) -> Run:
+    """Noise of encoders and torques; a message comes twice now and then."""
+    run, rng = _still(seed), np.random.default_rng(seed)
+    q = run.q + rng.normal(0.0, COUNT, run.q.shape)
+    tau = run.tau + rng.normal(0.0, 0.1, run.tau.shape)
+    for at in rng.choice(len(run.t) - 10, 30, replace=False):
+        q[at + 1 : at + 3], tau[at + 1 : at + 3] = q[at], tau[at]
+    return replace(run, q=q, tau=tau)
+
+
+def _creeping_sensor(seed: int = 0) -> Run:
+    """Encoders flicker; a torque that is read rarely stands for a second, and goes on."""
+    run, rng = _flickering(seed), np.random.default_rng(seed)
+    tau = run.tau + rng.normal(0.0, 0.1, run.tau.shape)
+    tau[400:600, 1] = tau[400, 1]
+    return replace(run, tau=tau)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("made", [_still, _flickering, _noisy, _creeping_sensor])
+def test_nothing_is_stale_where_nothing_moves(made: Callable[[int], Run], seed: int) -> None:
+    run = made(seed)
+    for columns in (slice(None), slice(0, 1), slice(1, 2)):  # also of a single joint
+        part = replace(run, q=run.q[:, columns], tau=run.tau[:, columns])
+        back, findings = mask_stuck(part, JOINTS[columns])
+        assert findings == []
+        assert back.valid is None
+
+
+def _freezing(at: int) -> Run:
+    """Row `at` is repeated up to the end."""
+    run = without_speed(recorded())
+    held = np.minimum(np.arange(len(run.t)), at)
+    return replace(run, q=run.q[held], tau=run.tau[held])
+
+
+def _stopping() -> Run:
+    """A motion that slows down to rest; then nothing changes any more."""
+    run = without_speed(recorded())
+    pace = np.clip((1200 - np.arange(len(run.t))) / 600, 0.0, 1.0)
+    clock = np.cumsum(pace) / 200.0
+    q = np.column_stack([np.interp(clock, run.t, column) for column in run.q.T])
+    held = np.minimum(np.arange(len(run.t)), 1200)
+    return replace(run, q=q[held], tau=run.tau[held])
+
+
+def test_a_robot_that_comes_to_rest_is_not_stale() -> None:
+    assert mask_stuck(_stopping(), JOINTS)[1] == []
+
+
+@pytest.mark.parametrize("at", [899, 1000, 1580])
+@pytest.mark.parametrize("count", [0.0, COUNT, 1e-3])
+def test_a_record_that_freezes_in_motion_is(at: int, count: float) -> None:
+    run = _freezing(at)
+    if count:
+        run = replace(run, q=count * np.round(run.q / count))
+    back, findings = mask_stuck(run, JOINTS)
+    (found,) = findings
+    assert (found.kind, found.severity) == ("stale", "warning")
+    assert back.usable()[: at + 1].all()
+    assert not back.usable()[at + 1 :].any()
