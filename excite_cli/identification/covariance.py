@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
 from scipy.sparse import csr_matrix
 
 from excite_cli.identification.factors import Mask
@@ -22,6 +21,7 @@ from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 
 MOST_ENLARGED = 4.0
+_UNSTABLE = 1.0 - 1e-9
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,10 @@ class Rows:
 class Covariance:
     """`matrix` (p, p); `noises` per run; `samples` the effective number of independent samples.
 
-    That is never more than there are samples. Where noise lies at high frequencies (positions that
-    were differentiated), it changes its sign from sample to sample and hardly shows in slow columns:
-    these are known better than behind white noise of that size, which `matrix` holds, but no sample
-    is two.
+    That is never more than there are samples. Noise of high frequencies (of positions that were
+    differentiated) changes its sign from sample to sample and hardly shows in slow columns: these
+    are known better than behind white noise of that size, which `matrix` holds, but no sample is
+    two.
     """
 
     matrix: Array
@@ -140,12 +140,13 @@ def _part(shared: tuple[Array, Array, Array], run: Rows, tell: Tell) -> _Part:
 
 
 def _gain(polynomial: Array) -> float:
-    """Variance of an autoregressive series per variance of its innovations."""
-    if len(polynomial) == 1:
-        return 1.0
-    order = len(polynomial) - 1
-    companion = np.eye(order, k=-1)
-    companion[0] = -polynomial[1:]
-    state = np.zeros((order, order))
-    state[0, 0] = 1.0
-    return float(solve_discrete_lyapunov(companion, state)[0, 0])
+    """Variance of an autoregressive series per variance of its innovations: Π 1/(1 − k²).
+
+    k are the reflection coefficients, from the highest order down (Levinson, backwards).
+    """
+    gain, own = 1.0, np.asarray(polynomial[1:], dtype=float)
+    while len(own):
+        k = float(np.clip(own[-1], -_UNSTABLE, _UNSTABLE))  # rounding may reach 1
+        gain /= 1.0 - k * k
+        own = (own[:-1] - k * own[-2::-1]) / (1.0 - k * k)
+    return gain

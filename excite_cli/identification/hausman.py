@@ -197,8 +197,12 @@ def _norms(x: Array) -> Array:
 def _bias(
     runs: Sequence[Rows], instruments: Sequence[Array], first_stage: Array, noise: Array
 ) -> tuple[Array, Array]:
-    """Least squares less instrumental variables (p,), and the latter's standard deviation."""
+    """Least squares less instrumental variables (p,), and the latter's standard deviation.
+
+    NaN where rounding leaves no variance: the instruments do not show that parameter.
+    """
     projected = _with(_projected, first_stage, runs, instruments)
     plain, second = (solve(stacked(factors_of(group), noise)) for group in (runs, projected))
     covariance = estimate_covariance(projected, second.x, second.inverse, noise)
-    return plain.x - second.x, np.sqrt(np.diag(covariance.matrix))
+    variance = np.diag(covariance.matrix)
+    return plain.x - second.x, np.sqrt(np.where(variance > 0.0, variance, np.nan))

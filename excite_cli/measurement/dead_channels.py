@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run, Severity
+from excite_cli.measurement.moving import moves
 
 _MOSTLY, _FEWEST = 0.6, 50  # share of samples in motion with one torque; and how many there must be
 
@@ -53,9 +54,10 @@ def _of_run(
     findings = []
     silent = _constant(run.tau)
     masked = np.zeros(len(joints), bool)
+    held = stands | ~moves(run.q, 0, len(run.t))  # an encoder that flickers is no motion
     for j in np.flatnonzero(silent & (run.usable().any(axis=0))):
         joint, level = joints[j], run.tau[0, j]
-        if stands[j] and not still[j]:
+        if held[j] and not still[j]:
             masked[j] = True
             text = f"{joint} is held in this run and its torque constant at {level:.6g}; masked"
             findings.append(Finding("held", "warning", text, run.name, (joint,)))

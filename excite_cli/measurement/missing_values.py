@@ -1,8 +1,9 @@
 """NaN and infinite values: taken out, filled and masked, and always reported.
 
 What is larger than anything measured (`BEYOND`) counts as infinite: recorders write such numbers
-where they have none, and arithmetic with them overflows. Stamps may be larger, so that a clock in
-another unit than declared is recognised by its steps and not lost here.
+where they have none, and arithmetic with them overflows. What is smaller than anything measured
+(`NOTHING`) is zero: its square vanishes. Stamps may be larger, so that a clock in another unit than
+declared is recognised by its steps and not lost here.
 """
 
 from dataclasses import replace
@@ -14,6 +15,7 @@ from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 
 BEYOND = 1e12  # s, rad, m, N·m, N
+NOTHING = 1e-30  # the same
 _LATEST = 1e30  # of a stamp, in whatever unit: beyond any clock's count since the epoch
 
 
@@ -40,6 +42,12 @@ def without_missing(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Findin
         Nothing is left.
     """
     findings = []
+    run = replace(
+        run,
+        q=_or_zero(run.q),
+        tau=_or_zero(run.tau),
+        dq=None if run.dq is None else _or_zero(run.dq),
+    )
     stamped = known_stamps(run.t)
     if not stamped.all():
         text = f"{np.count_nonzero(~stamped)} rows without a time stamp are left out"
@@ -65,6 +73,12 @@ def without_missing(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Findin
         dq, more = _fill_speed(kept, joints)
         kept, findings = replace(kept, dq=dq), findings + more
     return kept, findings
+
+
+def _or_zero(values: Array) -> Array:
+    """`values` with zeros where they are too small for a square."""
+    dust = (np.abs(values) < NOTHING) & (values != 0.0)
+    return np.where(dust, 0.0, values) if dust.any() else values
 
 
 def _share(count: int, total: int) -> str:

@@ -21,7 +21,7 @@ import numpy as np
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.robot.model import Array
-from excite_cli.scoring.beyond_friction import beyond_friction
+from excite_cli.scoring.beyond_friction import beyond_friction, slowest_known
 
 SECONDS = 1.0  # of a block
 # More than the model's own residual: models are worse in motions that they do not know. With 1.35,
@@ -36,13 +36,15 @@ _LEAST_SPREAD, _FEWEST = 0.5, 4  # of blocks, relative; blocks
 class Allowance:
     """Of every joint (n,): `residual` r₀ and `torque` τ₀ when the model was made.
 
-    `spread` κ of blocks, and the largest block's RMS over its mean (`largest`).
+    `spread` κ of blocks, and the largest block's RMS over its mean (`largest`); `slowest`: the
+    speed [rad/s] (m/s) below which friction is not known (`slowest_known`).
     """
 
     residual: Array
     torque: Array
     spread: Array
     largest: Array
+    slowest: Array
 
     def rms(self, torque: Array) -> Array:
         """RMS (n,) of the residual that is allowed beside torque of RMS (n,)."""
@@ -70,20 +72,27 @@ def allowance_of(stored: StoredModel) -> Allowance | None:
         torque = np.where(relative > 0, residual / relative, np.nan)
     if not np.isfinite(torque).any():
         return None
-    blocks, torques = _own_blocks(stored, stored.traces)
-    sealed = _own_blocks(stored, [each for each in stored.traces if each.sealed])
+    slowest = slowest_known(stored.traces, stored.processing, len(names))
+    blocks, torques = _own_blocks(stored, stored.traces, slowest)
+    held_out = [each for each in stored.traces if each.sealed]
+    sealed = _own_blocks(stored, held_out, slowest)
     residual, torque = _known(*sealed, residual, torque)
     trained, beside = _known(blocks, torques, np.zeros(len(names)), torque)
     larger = trained > residual
     residual, torque = np.where(larger, trained, residual), np.where(larger, beside, torque)
-    return Allowance(residual, torque, *_of_blocks(blocks, residual))
+    return Allowance(residual, torque, *_of_blocks(blocks, residual), slowest)
 
 
-def _own_blocks(stored: StoredModel, traces: Sequence[TorqueTrace]) -> tuple[Array, Array]:
+def _own_blocks(
+    stored: StoredModel, traces: Sequence[TorqueTrace], slowest: Array
+) -> tuple[Array, Array]:
     """Mean squares (B, n) of what is judged of the model's own residual, and of the torque."""
     none = [np.zeros((0, stored.robot.n))]
-    own = (stored.robot, stored.model)
-    left = [blocks_of(beyond_friction(*own, each, stored.processing), each.t) for each in traces]
+
+    def judged(trace: TorqueTrace) -> Array:
+        return beyond_friction(stored.robot, stored.model, trace, stored.processing, slowest)
+
+    left = [blocks_of(judged(each), each.t) for each in traces]
     torques = [blocks_of(each.measured, each.t) for each in traces]
     return np.concatenate(none + left), np.concatenate(none + torques)
 
@@ -110,9 +119,11 @@ def _of_blocks(blocks: Array, residual: Array) -> tuple[Array, Array]:
     n = len(residual)
     if len(blocks) < _FEWEST:
         return np.full(n, 1.0), np.full(n, 2.0)
+    mean = np.square(rms_of(np.sqrt(blocks)))
+    worst = np.where(np.isfinite(blocks), blocks, 0.0).max(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        spread = np.nanstd(blocks, axis=0) / np.nanmean(blocks, axis=0)
-        largest = np.sqrt(np.nanmax(blocks, axis=0)) / residual
+        spread = rms_of(blocks - mean) / mean
+        largest = np.where(worst > 0.0, np.sqrt(worst) / residual, np.nan)
     return np.fmax(spread, _LEAST_SPREAD), np.fmax(np.nan_to_num(largest, nan=2.0), 1.0)
 
 

@@ -1,6 +1,7 @@
 """What a score holds, as frozen records."""
 
 from dataclasses import dataclass, field
+from math import isfinite
 
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.effects.base import Value
@@ -51,6 +52,11 @@ class ScoredRun(Shown):
     def alarm(self) -> bool:
         """Whether it leaves what the model's own residual allows."""
         return bool(self.left)
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """Joints of which something is left that friction cannot explain, so that it is judged."""
+        return tuple(joint for joint, ratio in self.ratio.items() if isfinite(ratio))
 
 
 @dataclass(frozen=True, repr=False)

@@ -133,8 +133,8 @@ class Scorer:
             whole_trace(run, told.load, told.torque)
             for run, told in zip(prepared, predictions, strict=True)
         ]
-        filters = self.stored.processing
-        judged = [beyond_friction(robot, model, each, filters) for each in traces]
+        filters, slowest = self.stored.processing, allowance.slowest
+        judged = [beyond_friction(robot, model, each, filters, slowest) for each in traces]
         blocks = np.concatenate(
             [blocks_of(each, trace.t) for each, trace in zip(judged, traces, strict=True)]
         )
@@ -148,7 +148,8 @@ class Scorer:
         reasons: tuple[Reason, ...] = ()
         if left:
             longest = max(prepared, key=lambda run: len(run.t))
-            known = np.where(np.isfinite(allowed), allowed, np.nanmedian(allowed))
+            finite = np.isfinite(allowed)
+            known = np.where(finite, allowed, np.median(allowed[finite]))
             if worse is not None:
                 usual = _by_name(worse.usual, names)
                 known = known * np.where(usual > 0.0, usual, 1.0)

@@ -74,7 +74,9 @@ def drift(xml: str, runs: Sequence[Played], inertia: Array) -> Drift:
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     data = mujoco.MjData(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    usual = np.sqrt(np.nanmean(np.square(np.concatenate([run.torque for run in runs])), axis=0))
+    torque = np.concatenate([run.torque for run in runs])
+    known = np.isfinite(torque)  # never, of a joint whose torque was not measured
+    usual = np.sqrt(np.square(np.where(known, torque, 0.0)).sum(axis=0) / known.sum(axis=0).clip(1))
     stiffness = np.maximum(inertia * BANDWIDTH**2, usual / _SLACK)
     damping = 2.0 * np.sqrt(stiffness * np.maximum(inertia, _LIGHTEST))
     model.dof_damping[:] += damping  # implicit, so that light joints stay calm

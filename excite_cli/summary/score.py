@@ -36,13 +36,26 @@ def sentences(found: Score) -> list[str]:
     if found.made is None:
         return [first]
     if not found.alarms:
-        return [f"{first} No run leaves what its own residual allows."]
+        return [f"{first} No run leaves what its own residual allows.", *_not_judged(found)]
     told = [f"{run.name}: {in_words(run, found)}" for run in found.alarms[:_TOLD]]
     more = len(found.alarms) - _TOLD
     if more > 0:
         told.append(f"and {more} more: see the table")
     count = f"{len(found.alarms)} of {len(found.runs)}"
-    return [f"{count} runs leave what its own residual allows. {'. '.join(told)}.", first]
+    alarm = f"{count} runs leave what its own residual allows. {'. '.join(told)}."
+    return [alarm, first, *_not_judged(found)]
+
+
+def _not_judged(found: Score) -> list[str]:
+    """A sentence on runs in which friction may explain everything."""
+    names = [run.name for run in found.runs if not run.judged]
+    if not names:
+        return []
+    more = f" and {len(names) - _TOLD} more" if len(names) > _TOLD else ""
+    return [
+        f"Not judged: {', '.join(names[:_TOLD])}{more}. Joints stand there, or move more slowly "
+        "than in the model's own data, and friction may explain all that is left."
+    ]
 
 
 def in_words(run: ScoredRun, found: Score) -> str:
@@ -77,7 +90,7 @@ def runs_table(found: Score) -> Table:
             percent(run.error.mean_relative_moving),
             percent(run.error.mean_relative),
             _worst(run),
-            "ALARM" if run.alarm else "",
+            "ALARM" if run.alarm else "" if run.judged or found.made is None else "not judged",
             in_words(run, found) if run.alarm else "",
         )
         for run in found.runs
@@ -157,6 +170,7 @@ def _run_data(run: ScoredRun, found: Score) -> dict[str, Any]:
         "ratio": run.ratio,
         "peak": run.peak,
         "alarm": run.alarm,
+        "judged": list(run.judged),
         "joints": list(run.left),
         "reasons": [
             {
@@ -180,7 +194,7 @@ def _run_data(run: ScoredRun, found: Score) -> dict[str, Any]:
 
 def _run_in_words(run: ScoredRun) -> str:
     """`monday: 1.2% of the torque; as the model allows`, as far as the run itself knows."""
-    state = _beyond(run) if run.left else "as the model allows" if run.allowed else "not judged"
+    state = _beyond(run) if run.left else "as the model allows" if run.judged else "not judged"
     return f"{run.name}: {percent(run.error.mean_relative_moving)} of the torque; {state}"
 
 

@@ -303,3 +303,10 @@ def test_stale_messages_are_filled_and_masked_be_they_slow_or_close(rate: float)
     assert np.array_equal(runs[0].usable(), np.tile(~stale[:, None], run.tau.shape[1]))
     step = np.abs(np.diff(run.q, axis=0)).max()
     assert np.abs(runs[0].q - run.q).max() < 0.5 * step
+
+
+def test_torques_too_small_for_a_square_are_none() -> None:
+    run = recorded()
+    found = check(replace(run, tau=run.tau * 1e-200))[1]
+    assert {(each.kind, each.severity) for each in found} == {("dead_torque", "error")}
+    assert all("is constant at 0 while it moves" in each.text for each in found)

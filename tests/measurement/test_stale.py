@@ -8,7 +8,7 @@ import pytest
 
 from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.stuck import mask_stuck
-from tests.measurement.recordings import JOINTS, recorded, without_speed
+from tests.measurement.recordings import JOINTS, check, recorded, without_speed
 
 COUNT = 5e-5  # rad
 
@@ -16,7 +16,9 @@ COUNT = 5e-5  # rad
 def _still(seed: int = 0) -> Run:
     """Nothing moves; positions and torques are constant to the last digit."""
     run = without_speed(recorded(seed=seed))
-    return replace(run, q=np.tile(run.q[0], (len(run.t), 1)), tau=np.tile(run.tau[0], (len(run.t), 1)))
+    return replace(
+        run, q=np.tile(run.q[0], (len(run.t), 1)), tau=np.tile(run.tau[0], (len(run.t), 1))
+    )
 
 
 def _flickering(seed: int = 0) -> Run:
@@ -88,3 +90,15 @@ def test_a_record_that_freezes_in_motion_is(at: int, count: float) -> None:
     assert (found.kind, found.severity) == ("stale", "warning")
     assert back.usable()[: at + 1].all()
     assert not back.usable()[at + 1 :].any()
+
+
+def test_a_torque_that_is_constant_where_an_encoder_flickers_is_no_dead_channel() -> None:
+    """The elbow is held in one of two runs; its brake says nothing of its torque."""
+    moving, rng = without_speed(recorded()), np.random.default_rng(1)
+    q, tau = moving.q.copy(), moving.tau.copy()
+    q[:, 1] = 0.3 + COUNT * (rng.uniform(size=len(q)) < 0.1)
+    tau[:, 1] = 0.0
+    runs, findings = check(moving, replace(moving, name="held", q=q, tau=tau))
+    assert [(found.kind, found.severity) for found in findings] == [("held", "warning")]
+    assert not runs[1].usable()[:, 1].any()
+    assert runs[1].usable()[:, [0, 2]].all()

@@ -16,6 +16,7 @@ from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
+from excite_cli.summary.score import runs_table, score_data, sentences
 from excite_cli.trajectory.fourier import FourierTrajectory
 
 pytest.importorskip("mujoco")
@@ -90,6 +91,13 @@ def test_what_changed_does(scored: Scored) -> None:
     assert sorted(scored.alarms(faults)) == sorted(faults)
 
 
-def test_a_joint_that_always_stands_is_not_judged(scored: Scored) -> None:
+def test_a_run_in_which_friction_may_explain_everything_is_not_judged(scored: Scored) -> None:
     (run,) = (run for run in scored.found.runs if run.name == STANDS)
-    assert not any(np.isfinite(x) and x > 1.5 for x in run.ratio.values())
+    assert not run.judged
+    assert "Not judged: " in " ".join(sentences(scored.found))
+    (data,) = (each for each in score_data(scored.found)["runs"] if each["name"] == STANDS)
+    assert data["judged"] == []
+    states = {row[0]: row[5] for row in runs_table(scored.found).rows}
+    assert (states[STANDS], states["pace_1"]) == ("not judged", "")
+    quick = next(each for each in scored.found.runs if each.name == "pace_1")
+    assert quick.judged == scored.found.joint_names
