@@ -1,7 +1,7 @@
 """Measuring programs that do not end when they are asked to, in three kinds.
 
-Each notes every process of its own, as `pid start`, in a file of the folder that it runs in; all
-would run for ten minutes.
+Each notes every process of its own, as `pid start`, in a file beside itself; all would run for ten
+minutes.
 """
 
 import sys
@@ -17,7 +17,7 @@ def deaf(*numbers):
 
 def note():
     start = open("/proc/self/stat").read().rsplit(")", 1)[1].split()[19]
-    with open({PIDS!r}, "a") as file:
+    with open(os.path.join(os.path.dirname(__file__), {PIDS!r}), "a") as file:
         file.write(f"{{os.getpid()}} {{start}}\\n")
 
 """
@@ -76,14 +76,13 @@ def noted(folder: Path) -> list[tuple[int, str]]:
 
 def alive(folder: Path) -> list[int]:
     """Those of the noted processes that still run."""
-    return [pid for pid, start in noted(folder) if _state(pid) not in ((), ("Z", start))
-            and _state(pid)[1:] == (start,)]  # fmt: skip
+    return [pid for pid, start in noted(folder) if _runs(pid, start)]
 
 
-def _state(pid: int) -> tuple[str, ...]:
-    """State and start of a process; nothing of one that is not there."""
+def _runs(pid: int, start: str) -> bool:
+    """Whether that process, and no later one of its id, runs."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     except OSError:
-        return ()
-    return fields[0], fields[19]
+        return False
+    return fields[0] not in "ZX" and fields[19] == start

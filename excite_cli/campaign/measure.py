@@ -1,6 +1,7 @@
 """Who has a motion measured: a program, people who carry files, or a simulated robot."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,12 +14,22 @@ class NotMeasuredError(ExciteError):
     exit_status = 1
 
 
+class StillRunningError(NotMeasuredError):
+    """Something that may move the robot could not be ended; nothing else is played."""
+
+
+def _nothing_refused(log: Path, since: float | None) -> str:
+    return ""
+
+
 @dataclass(frozen=True)
 class Take:
     """One motion to be measured.
 
     `motion`: CSV of t, q, v, a, from rest to rest; `data`: where its log is to be written;
-    `seconds`: how long the motion is; `diary`: where what a program says is kept.
+    `seconds`: how long the motion is; `diary`: where what a program says is kept. `refused(log,
+    since)`: why a file is no log of the motion, empty where it is one; with `since` [s from 1970],
+    also where its own time stamps say that it ended before.
     """
 
     name: str
@@ -26,6 +37,7 @@ class Take:
     data: Path
     seconds: float
     diary: Path
+    refused: Callable[[Path, float | None], str] = _nothing_refused
 
 
 class Measure(ABC):
@@ -33,12 +45,12 @@ class Measure(ABC):
 
     suffix: str  # of the logs
 
-    def settle(self, take: Take) -> None:  # noqa: B027
+    def wait_for_earlier(self, take: Take) -> None:  # noqa: B027
         """Wait for what a campaign that was killed has left at work on this take."""
 
     @abstractmethod
     def take(self, take: Take) -> None:
-        """Have `take.motion` played, and its log written to `take.data`.
+        """Have `take.motion` played, and its log written to `take.data`: whole, on return.
 
         Raises
         ------

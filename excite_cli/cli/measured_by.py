@@ -24,4 +24,4 @@ def measured_by(
     if measure == "simulate":
         settings = SimulationSettings(seed=case.spec.seed, inertia_error=inertia_error)
         return Simulated(case, effects, settings)
-    return Command.of(measure, suffix, limit)
+    return Command.of(measure, suffix, limit, tell)

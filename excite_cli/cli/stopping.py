@@ -10,6 +10,7 @@ from types import FrameType
 
 _RESUMED = {
     "optimize": "interrupted; what was found so far is in the file: see --resume.",
+    "campaign": "interrupted; all that was measured is in the folder: see --resume.",
     "study": "interrupted; every finished case is in the folder: see --resume.",
 }
 _last = signal.SIGINT

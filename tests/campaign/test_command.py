@@ -140,10 +140,10 @@ def test_a_program_of_a_killed_campaign_is_waited_for(tmp_path: Path) -> None:
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     assert not take.data.exists()
-    Command.of(line).settle(take)
+    Command.of(line).wait_for_earlier(take)
     assert take.data.read_text() == "whole"
     running = subprocess.Popen([sys.executable, "-c", campaign])
     time.sleep(1.0)
     with pytest.raises(NotMeasuredError, match="still running"):
-        Command.of(line, limit=0.2).settle(take)
+        Command.of(line, limit=0.2).wait_for_earlier(take)
     running.wait()

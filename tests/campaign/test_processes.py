@@ -1,0 +1,134 @@
+"""What runs of a program: found by parent, mark or session, and never taken for a later one."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from excite_cli.campaign.processes import (
+    MARK,
+    Process,
+    descendants,
+    in_group,
+    in_words,
+    marked,
+    of_session,
+    running,
+    send,
+    start_of,
+)
+from tests.campaign.campaign_process import PATIENCE, until
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+SLEEP = [sys.executable, "-c", "import time; time.sleep(600)"]
+
+
+@pytest.fixture
+def sleeper(tmp_path: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """A process of its own session that bears the mark of `tmp_path`."""
+    environment = {**os.environ, MARK: str(tmp_path / "log.csv")}
+    process = subprocess.Popen(SLEEP, start_new_session=True, env=environment)
+    yield process
+    process.kill()
+    process.wait()
+
+
+def ids(found: list[Process]) -> list[int]:
+    return [each.pid for each in found]
+
+
+def test_descendants_are_found_whatever_their_session(sleeper: subprocess.Popen[bytes]) -> None:
+    assert sleeper.pid in ids(descendants(os.getpid()))
+    assert descendants(sleeper.pid) == []
+    assert os.getpid() in ids(descendants(os.getppid()))
+
+
+def test_what_has_ended_does_not_run(sleeper: subprocess.Popen[bytes]) -> None:
+    sleeper.kill()
+    # Nobody has waited for it: it is still in /proc.
+    until(lambda: sleeper.pid not in running(), "it is dead")
+    assert Path(f"/proc/{sleeper.pid}/stat").exists()
+    assert sleeper.pid not in ids(descendants(os.getpid()))
+
+
+def test_a_process_whose_first_thread_has_ended_runs() -> None:
+    script = """
+import ctypes, threading, time
+threading.Thread(target=time.sleep, args=(600,)).start()
+print("here", flush=True)
+ctypes.CDLL(None).pthread_exit(None)
+"""
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE)
+    try:
+        assert process.stdout is not None
+        process.stdout.readline()
+        stat = Path(f"/proc/{process.pid}/stat")
+        until(lambda: stat.read_text().rsplit(")", 1)[1].split()[0] == "Z", "its thread has ended")
+        assert process.pid in running()
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_the_mark_is_that_of_the_folder(sleeper: subprocess.Popen[bytes], tmp_path: Path) -> None:
+    until(lambda: ids(marked(tmp_path)) == [sleeper.pid], "it has begun")
+    assert marked(tmp_path / "other") == []
+    (longer := tmp_path.with_name(tmp_path.name[:-1])).mkdir(exist_ok=True)
+    assert marked(longer) == []
+
+
+def test_a_session_is_known_by_its_beginning(sleeper: subprocess.Popen[bytes]) -> None:
+    start = start_of(sleeper.pid)
+    until(lambda: ids(of_session(sleeper.pid, start)) == [sleeper.pid], "it has begun")
+    assert of_session(sleeper.pid, start - 1) == []  # the id was another process's then
+
+
+def test_a_signal_is_for_that_process_alone(sleeper: subprocess.Popen[bytes]) -> None:
+    process = running()[sleeper.pid]
+    send(replace(process, start=process.start - 1), signal.SIGKILL)
+    with pytest.raises(subprocess.TimeoutExpired):
+        sleeper.wait(0.2)
+    send(process, signal.SIGKILL)
+    assert sleeper.wait(PATIENCE) == -signal.SIGKILL
+    send(process, signal.SIGKILL)  # it is gone
+
+
+def test_where_pidfd_is_not_known_a_signal_is_sent_all_the_same(
+    sleeper: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unknown(pid: int) -> int:
+        raise OSError(38, "Function not implemented")
+
+    process = running()[sleeper.pid]
+    monkeypatch.setattr(os, "pidfd_open", unknown)
+    send(replace(process, start=process.start - 1), signal.SIGKILL)
+    with pytest.raises(subprocess.TimeoutExpired):
+        sleeper.wait(0.2)
+    send(process, signal.SIGKILL)
+    assert sleeper.wait(PATIENCE) == -signal.SIGKILL
+
+
+def test_a_group_stands_for_its_processes(sleeper: subprocess.Popen[bytes]) -> None:
+    """As where there is no /proc."""
+    assert in_words(in_group(sleeper.pid)) == f"process group {sleeper.pid}"
+    sleeper.kill()
+    sleeper.wait()
+    assert in_group(sleeper.pid) == []
+
+
+def test_names_of_processes_may_hold_anything(tmp_path: Path) -> None:
+    odd = tmp_path / "a) R 1 (b"
+    odd.symlink_to("/bin/sleep")
+    process = subprocess.Popen([odd, "600"])
+    try:
+        until(lambda: running()[process.pid].name == "a) R 1 (b", "it has begun")
+        assert running()[process.pid].parent == os.getpid()
+        assert in_words([running()[process.pid]]) == f"process {process.pid} (a) R 1 (b)"
+    finally:
+        process.kill()
+        process.wait()
