@@ -13,10 +13,9 @@ from pathlib import Path
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.campaign_plans import MODEL, RoundPlans, diagnosis_of, warnings_only
-from excite_cli.api.checking import check
+from excite_cli.api.campaign_takes import Takes
 from excite_cli.api.diagnosing import diagnose, save_config
-from excite_cli.api.exporting import export_file
-from excite_cli.api.loading import Case, load_data, measured_case, problem_of
+from excite_cli.api.loading import Case
 from excite_cli.api.planning import PlanProgress, plan_after
 from excite_cli.api.simulating import simulate
 from excite_cli.atomic import write_text_atomically
@@ -25,26 +24,22 @@ from excite_cli.campaign.ending import ended, still_open
 from excite_cli.campaign.folder import STATE, read_campaign, write_campaign
 from excite_cli.campaign.inbox import Inbox as Inbox
 from excite_cli.campaign.measure import Measure as Measure
-from excite_cli.campaign.measure import NotMeasuredError, Take
+from excite_cli.campaign.measure import Take
 from excite_cli.campaign.records import Asked as Asked
 from excite_cli.campaign.records import Campaign as Campaign
-from excite_cli.campaign.records import Learned, PlayedMotion, Round
-from excite_cli.campaign.same_motion import compared
+from excite_cli.campaign.records import Learned, Round
 from excite_cli.claim import claim, leave
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
-from excite_cli.errors import ExciteError, FileError, NoAdmissibleMotionError
+from excite_cli.errors import FileError
 from excite_cli.excitation.invariant import invariants
-from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.report.page import render
 from excite_cli.report.rounds_page import rounds_page
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.settings import SimulationSettings
-from excite_cli.store.result_file import read_result
 from excite_cli.store.versions import versions
 from excite_cli.summary.campaign import campaign_answer as campaign_answer
 from excite_cli.summary.campaign import round_in_words
-from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.summary.named_effects import what_and_where
 from excite_cli.workers.base import Workers
 
@@ -175,7 +170,7 @@ class _Loop:
         if last is None:
             return state.with_round(self._plans.first(state))
         if last.missing is not None:
-            return state.with_round(last.with_motion(self._measured(state, last, last.missing)))
+            return state.with_round(last.with_motion(self._takes.measured(state, last.missing)))
         if last.learned is None:
             state = state.with_round(replace(last, learned=self._learned(state, last)))
             return ended(state, self._until)
@@ -195,88 +190,6 @@ class _Loop:
         """The page of all rounds, as far as they are."""
         page = rounds_page(state, self.case.robot.name)
         write_text_atomically(self.folder / PAGE, render(page))
-
-    def _measured(self, state: Campaign, last: Round, motion: PlayedMotion) -> PlayedMotion:
-        """The motion with its log, which is whole and of that motion."""
-        path = self.folder / f"{motion.name}.csv"
-        self._require_proved(motion)
-        exported = export_file(
-            self.folder / motion.plan,
-            "csv",
-            path,
-            chosen=(motion.index,),
-            slow=motion.pace if motion.pace < 1.0 else None,
-            start={} if state.asked.entry else None,
-            overwrite=True,
-            tell=lambda note: None,
-        ).motions[0]
-        motion = replace(motion, pace=min(motion.pace, exported.pace), seconds=exported.duration)
-        self._require_admissible(motion, path)
-        log = self.folder / f"{motion.name}_log{self.measure.suffix}"
-        take = Take(motion.name, path, log, motion.seconds, log.with_suffix(".txt"))
-        self.measure.settle(take)
-        self._say(f"{motion.name}: {motion.seconds:.1f} s at {motion.pace:.0%} of its pace")
-        why = ""
-        for _ in range(self.retries + 1):
-            try:
-                if not log.exists():  # it is there if the campaign was killed just then
-                    self.measure.take(take)
-                why = self._no_log_of(path, log)
-            except NotMeasuredError as error:
-                why = str(error)
-            if not why:
-                return replace(motion, data=log.name)
-            motion = replace(motion, rejected=(*motion.rejected, why))
-            where = _set_aside(log)
-            self.tell(Note(Level.WARNING, why + (f" Set aside: {where}." if where else "")))
-        raise NotMeasuredError(
-            f"{motion.name} was not measured in {self.retries + 1} tries: {why} Everything before "
-            "it is kept: see to the cause, then go on with --resume."
-        )
-
-    def _require_proved(self, motion: PlayedMotion) -> None:
-        """What is played is the motion that was planned and proved, as it was then."""
-        plan = self.folder / motion.plan
-        read = read_result(plan)
-        words = doubts_in_words([each for each in read.doubted() if each.index == motion.index])
-        if words:
-            raise FileError(
-                f"{plan}: {words[0]}. A campaign plays no such motion: put the file back as it "
-                "was and go on with --resume, or begin in another folder with -o."
-            )
-
-    def _require_admissible(self, motion: PlayedMotion, path: Path) -> None:
-        """What is played keeps every constraint, slowed and with its ways, by an own check.
-
-        For the inertias that were possible when it was planned.
-        """
-        plan_of = read_result(self.folder / motion.plan).config
-        planned = parse_spec(plan_of, f"the config stored in {motion.plan}")
-        spec = self.case.spec.model_copy(update={"uncertainty": planned.uncertainty})
-        problem = problem_of(replace(self.case, spec=spec), lambda note: None)
-        found = check(problem, path, meshes=False, tell=lambda note: None)
-        if found.violations:
-            raise NoAdmissibleMotionError(
-                f"{path} would break {found.violations} constraints, and is not played: "
-                f"`excite check` says which. Slowed motions need other torques: raise --from-speed."
-            )
-
-    def _no_log_of(self, motion: Path, log: Path) -> str:
-        """Why a file is no log of a motion of this robot; empty if it is one."""
-        try:
-            data = load_data(self.case, log, lambda note: None)
-        except ExciteError as error:
-            return f"{log.name} is no log of this robot: {error}"
-        read = read_own_motion(motion)
-        planned = read.t, read.q
-        own = slice(measured_case(self.case).robot.base_joints, None)
-        for run in data.runs:
-            found = compared(planned, (run.t, run.q[:, own]), data.joint_names[own])
-            if found.reason:
-                return f"{log.name} is no log of {motion.stem}: {found.reason}."
-            if found.doubt:
-                self.tell(Note(Level.WARNING, f"{log.name}: {found.doubt}."))
-        return ""
 
     def _learned(self, state: Campaign, last: Round) -> Learned:
         path = self.folder / diagnosis_of(last.number)
@@ -315,15 +228,9 @@ class _Loop:
     def _plans(self) -> RoundPlans:
         return RoundPlans(self.case, self.folder, self.workers, self.progress, self.tell)
 
+    @property
+    def _takes(self) -> Takes:
+        return Takes(self.case, self.measure, self.folder, self.retries, self.tell)
+
     def _say(self, text: str) -> None:
         self.tell(Note(Level.INFO, text))
-
-
-def _set_aside(log: Path) -> Path | None:
-    """Give a file that is no log another name, for who wants to see it."""
-    if not log.exists():
-        return None
-    number = 1
-    while (to := log.with_name(f"{log.stem}_rejected_{number}{log.suffix}")).exists():
-        number += 1
-    return log.rename(to)

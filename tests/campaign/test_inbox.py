@@ -1,36 +1,219 @@
-"""Files that people carry: a motion is laid out, a log that is whole is taken."""
+"""Files that people carry: a motion is laid out, a log of it that is whole is taken."""
 
+import os
+import shutil
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from threading import Thread
 
+import pytest
+
+from excite_cli.campaign import inbox
 from excite_cli.campaign.inbox import Inbox
 from excite_cli.campaign.measure import Take
+from excite_cli.claim import claim, leave
+from excite_cli.errors import FileError
+from tests.campaign.campaign_process import PATIENCE, until
+
+STILL = 0.3  # s
 
 
-def test_a_log_is_taken_once_it_grows_no_more(tmp_path: Path) -> None:
-    motion = tmp_path / "motion.csv"
-    motion.write_text("t\n0\n")
-    box, said = tmp_path / "inbox", []
-    take = Take("round_1_motion_1", motion, tmp_path / "log.h5", 12.0, tmp_path / "x.txt")
+class Desk:
+    """A campaign that waits for one log, in a thread of its own, and the person who brings it."""
 
-    def person() -> None:
-        while not (box / "round_1_motion_1.csv").exists():
-            time.sleep(0.05)
-        for part in range(3):
-            with (box / "round_1_motion_1_log.h5").open("a") as file:
-                file.write(f"part {part}\n")
-            time.sleep(1.0)
+    def __init__(self, folder: Path) -> None:
+        self.box, self.said = folder / "inbox", []
+        self.motion, self.log = self.box / "m.csv", self.box / "m_log.csv"
+        source = folder / "motion.csv"
+        source.write_text("t\n0\n")
+        self.take = Take("m", source, folder / "log.csv", 12.0, folder / "x.txt")
+        self._waiting: Thread | None = None
 
-    carrier = Thread(target=person)
-    carrier.start()
-    Inbox(box, said.append, ".h5").take(take)
-    carrier.join()
-    assert take.data.read_text() == "part 0\npart 1\npart 2\n"
-    assert (box / "round_1_motion_1.csv").read_text() == "t\n0\n"
-    assert said == [
-        f"play {box / 'round_1_motion_1.csv'} (12 s) and put its log there as "
-        "round_1_motion_1_log.h5"
-    ]
-    assert not (box / "round_1_motion_1_log.h5").exists()  # the next one is another take
-    assert (box / "round_1_motion_1_log.read.h5").exists()
+    def wait(self) -> None:
+        measure = Inbox(self.box, self.said.append)
+        # Daemon: a test that fails leaves it waiting.
+        self._waiting = Thread(target=measure.take, args=(self.take,), daemon=True)
+        self._waiting.start()
+        until(lambda: self.said, "the motion is laid out")
+
+    def taken(self) -> str:
+        """What was taken."""
+        assert self._waiting is not None
+        self._waiting.join(PATIENCE)
+        assert not self._waiting.is_alive()
+        return self.take.data.read_text()
+
+    def says(self, *words: str) -> str:
+        """What it says of a file that it does not take."""
+        until(lambda: len(self.said) > 1, f"it says {words}")
+        assert all(word in self.said[-1] for word in words), self.said[-1]
+        return self.said[-1]
+
+
+@pytest.fixture
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Desk:
+    monkeypatch.setattr(inbox, "_STILL", STILL)
+    monkeypatch.setattr(inbox, "_POLL", 0.02)
+    return Desk(tmp_path)
+
+
+def put(path: Path, text: str, age: float = 0.0) -> None:
+    """A file whose date is `age` seconds ago."""
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text)
+    then = time.time() - age
+    os.utime(path, (then, then))
+
+
+def test_a_log_is_taken_once_it_grows_no_more(desk: Desk) -> None:
+    desk.wait()
+    for part in range(3):
+        with desk.log.open("a") as file:
+            file.write(f"part {part}\n")
+        time.sleep(STILL / 2)
+    assert desk.taken() == "part 0\npart 1\npart 2\n"
+    assert desk.motion.read_text() == "t\n0\n"
+    assert desk.said == [f"play {desk.motion} (12 s) and put its log there as m_log.csv"]
+    assert not desk.log.exists()  # the next one is another take
+    assert (desk.box / "m_log.read.csv").exists()
+
+
+def test_a_copy_that_pauses_is_not_cut_in_two(desk: Desk) -> None:
+    """As long as somebody has it open for writing it is not whole, however long nothing comes."""
+    desk.wait()
+    with desk.log.open("w") as file:
+        file.write("first half, ")
+        file.flush()
+        time.sleep(5 * STILL)
+        file.write("second half")
+    assert desk.taken() == "first half, second half"
+
+
+def whole(log: Path, since: float | None) -> str:
+    return "" if log.read_text().endswith("end") else f"{log.name} is not whole."
+
+
+def test_a_log_that_is_not_whole_is_waited_for(desk: Desk) -> None:
+    """A copy from another machine pauses: nothing says that it is still being written."""
+    desk.take = replace(desk.take, refused=whole)
+    desk.wait()
+    put(desk.log, "first half, ")
+    words = desk.says("m_log.csv is not taken: log.csv is not whole.", "looked at again once it")
+    assert ".ok" not in words
+    assert not desk.take.data.exists()
+    assert desk.log.exists()
+    put(desk.log, "first half, second half, end")
+    assert desk.taken() == "first half, second half, end"
+    assert len(desk.said) == 2
+
+
+def test_a_log_that_is_older_than_its_motion_is_not_taken(desk: Desk) -> None:
+    """Last month's log lies there, under the same name."""
+    put(desk.log, "last month's", age=30 * 86400.0)
+    desk.wait()
+    words = desk.says("m_log.csv is of ", "its motion was laid out at", "touch ", "m_log.csv.ok")
+    assert time.strftime("%Y-%m", time.localtime(time.time() - 30 * 86400.0)) in words
+    assert desk.log.read_text() == "last month's"
+    put(desk.log, "today's")
+    assert desk.taken() == "today's"
+
+
+def test_a_person_can_say_that_a_clock_was_wrong(desk: Desk) -> None:
+    desk.wait()
+    put(desk.log, "today's", age=86400.0)  # as the robot's clock has it
+    put(desk.box / "m_log.csv.ok", "", age=86400.0)  # of yesterday, too: it is about another log
+    desk.says("m_log.csv is of ")
+    (desk.box / "m_log.csv.ok").touch()
+    assert desk.taken() == "today's"
+    assert {each.name for each in desk.box.iterdir()} == {"m.csv", "m_log.read.csv"}
+
+
+def test_stamps_that_are_older_than_the_motion_are_said_with_what_to_do(desk: Desk) -> None:
+    asked: list[float | None] = []
+
+    def refused(log: Path, since: float | None) -> str:
+        asked.append(since)
+        return "" if since is None else "its time stamps end 86400 s before the motion was there."
+
+    desk.take = replace(desk.take, refused=refused)
+    desk.wait()
+    put(desk.log, "of the robot's clock")
+    desk.says("its time stamps end 86400 s before", "touch ", "m_log.csv.ok")
+    assert asked[0] == pytest.approx(desk.motion.stat().st_mtime)
+    (desk.box / "m_log.csv.ok").touch()
+    assert desk.taken() == "of the robot's clock"
+
+
+@pytest.mark.parametrize("before", [("m_log.read.csv",), ("m_log.read.csv", "m_log.read_2.csv")])
+def test_nothing_that_was_read_is_replaced(desk: Desk, before: tuple[str, ...]) -> None:
+    desk.box.mkdir()
+    for name in before:
+        (desk.box / name).write_text(f"this is {name}")
+    desk.wait()
+    put(desk.log, "another take")
+    assert desk.taken() == "another take"
+    assert [(desk.box / name).read_text() for name in before] == [f"this is {n}" for n in before]
+    assert (desk.box / f"m_log.read_{len(before) + 1}.csv").read_text() == "another take"
+
+
+def interrupted(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The campaign lays its motion out and is interrupted."""
+
+    def stop(seconds: float) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(inbox.time, "sleep", stop)
+        with pytest.raises(KeyboardInterrupt):
+            Inbox(desk.box, lambda text: None).take(desk.take)
+
+
+def test_a_log_that_came_while_the_campaign_was_off_is_taken(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    interrupted(desk, monkeypatch)
+    shutil.move(desk.motion, desk.box / "on its way to the robot")
+    put(desk.log, "recorded meanwhile")
+    hour = time.time() + 3600.0  # the campaign is resumed an hour later
+    monkeypatch.setattr(inbox, "_copy", dated(inbox._copy, hour))
+    desk.wait()
+    assert desk.taken() == "recorded meanwhile"
+
+
+def test_a_log_of_what_was_laid_out_before_another_motion_is_old(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same name, another motion: what was recorded before is not of it."""
+    interrupted(desk, monkeypatch)
+    put(desk.log, "of the first motion", age=1.0)
+    desk.take.motion.write_text("t\n1\n")
+    desk.wait()
+    desk.says("m_log.csv is of ")
+    put(desk.log, "of the second")
+    assert desk.taken() == "of the second"
+
+
+def dated(copy: Callable[[Path, Path], None], then: float) -> Callable[[Path, Path], None]:
+    def later(source: Path, target: Path) -> None:
+        copy(source, target)
+        os.utime(target, (then, then))
+
+    return later
+
+
+def test_two_campaigns_do_not_wait_for_the_same_name(desk: Desk) -> None:
+    desk.box.mkdir()
+    claim(desk.motion)
+    try:
+        code = os.fork()
+        if code == 0:  # another process: what is claimed here is claimed for it
+            try:
+                Inbox(desk.box, desk.said.append).take(desk.take)
+            except FileError as error:
+                os._exit(7 if "is being written by another run" in str(error) else 8)
+            os._exit(9)
+        assert os.waitstatus_to_exitcode(os.waitpid(code, 0)[1]) == 7
+    finally:
+        leave(desk.motion)
