@@ -13,7 +13,7 @@ _KILLED = 2.0  # s after SIGKILL: what still runs then waits for hardware, or is
 class Escalation:
     """Ends all that `find` gives, `group` among them, in two stages.
 
-    Each `request` begins the next stage; `grace` [s] is between the two where nobody asks again.
+    Each `request` begins the next stage; without a second one it begins after `grace` [s].
     Nothing happens but in `request` and `step`, which is to be called every now and then.
     """
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_ASK_TO_END = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_ASK_TO_END = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 class Held:
@@ -36,7 +36,7 @@ class Held:
 
 @contextmanager
 def held_signals() -> Iterator[Held]:
-    """Count SIGINT, SIGTERM and SIGHUP, but for those that are ignored.
+    """Count SIGINT, SIGTERM, SIGHUP and SIGQUIT, but for those that are ignored.
 
     Only the main thread hears signals: in another one nothing is held, and nothing needs to be.
     """

@@ -17,6 +17,7 @@ from excite_cli.campaign.being_written import is_being_written
 from excite_cli.campaign.measure import Measure, Take
 from excite_cli.campaign.measured_log import digest_of, record_measured
 from excite_cli.claim import claim, leave
+from excite_cli.errors import refusal
 
 _POLL = 0.5  # s
 _STILL = 5.0  # s that a file's size and time have not changed: a copy pauses for less
@@ -66,10 +67,11 @@ class Inbox(Measure):
 
 @dataclass(frozen=True)
 class _State:
-    """Of a log: size, date [ns], and when somebody said that the date is none, if it was said."""
+    """Of a log: size, date, last change of any kind, and when its date was confirmed [ns]."""
 
     size: int
     date: int
+    changed: int
     confirmed: int
 
     @classmethod
@@ -81,7 +83,8 @@ class _State:
             return None
         with suppress(OSError):
             confirmed = _confirmation(log).stat().st_mtime_ns
-        return cls(status.st_size, status.st_mtime_ns, confirmed) if log.is_file() else None
+        found = cls(status.st_size, status.st_mtime_ns, status.st_ctime_ns, confirmed)
+        return found if log.is_file() else None
 
 
 def _confirmation(log: Path) -> Path:
@@ -128,6 +131,10 @@ def _refused(take: Take, log: Path, state: _State, since: int) -> str:
             f"{log} is of {_date(state.date)}, and its motion was laid out at {_date(since)}: an "
             f"older log is none of this motion, and is not taken. {confirm}."
         )
+    try:
+        log.open("rb").close()
+    except OSError as error:
+        return f"{log} cannot be read: {refusal(error)}"
     _copy(log, take.data)
     if _State.of(log) != state:
         return f"{log} has changed while it was read."

@@ -123,9 +123,11 @@ def campaign(
 
     The program of --measure gets a motion (CSV: t, q, v, a, from rest to rest), plays it, and
     writes a log that the config reads; exit status 0 means measured. Its log must be whole and of
-    that motion; else it is told, set aside, and the motion tried again. In every round one motion
-    tells apart or excites what is known, and one shows what nobody has found yet; that one takes no
-    part in the diagnosis and judges it.
+    that motion; else it is set aside, and the motion tried again. At the limit of time, and at
+    Ctrl-C, all that the program started gets SIGTERM, and SIGKILL 10 s later or at the next Ctrl-C.
+    What people put into the inbox is taken once it is a whole log of the motion, and newer. In
+    every round one motion separates or excites what is known, and one shows what is not known yet;
+    that one takes no part in the diagnosis and judges it.
 
     It ends when the newest motion is predicted as well as those that the model was fitted to, and
     no effect found could be another; or when the budget is spent. Exit status 1: something is open,

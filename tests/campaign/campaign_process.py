@@ -11,7 +11,7 @@ from excite_cli.campaign.measure import Take
 
 PATIENCE = 60.0  # s, for a busy machine
 _SCRIPT = """
-import signal, sys
+import resource, signal, sys
 from pathlib import Path
 from excite_cli.campaign.command import Command
 from excite_cli.campaign.measure import NotMeasuredError
@@ -24,8 +24,9 @@ def say(note):
 line, limit, grace, folder = sys.argv[1:]
 # Whatever runs the tests may have let them be ignored (nohup, a shell's background).
 signal.signal(signal.SIGINT, signal.default_int_handler)
-for each in (signal.SIGTERM, signal.SIGHUP):
+for each in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
     signal.signal(each, signal.SIG_DFL)
+resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 heed_signals()
 try:
     command = Command.of(line, limit=float(limit), tell=say, grace=float(grace))

@@ -1,4 +1,4 @@
-"""SIGTERM once, SIGKILL after the grace or at the second request, and what is said of the rest."""
+"""SIGTERM once, SIGKILL after the grace or at the second request, and how long that is tried."""
 
 import signal
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 import pytest
 
@@ -144,6 +145,27 @@ def test_stamps_that_are_older_than_the_motion_are_said_with_what_to_do(desk: De
     assert asked[0] == pytest.approx(desk.motion.stat().st_mtime)
     (desk.box / "m_log.csv.ok").touch()
     assert desk.taken() == "of the robot's clock"
+
+
+def test_a_log_that_cannot_be_read_is_waited_for(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of another user, say; that it may be read later changes neither its size nor its date."""
+    desk.wait()
+    allowed, opened = False, Path.open
+
+    def guarded(path: Path, *given: Any, **more: Any) -> Any:
+        if path == desk.log and not allowed:
+            raise PermissionError(13, "Permission denied")
+        return opened(path, *given, **more)
+
+    monkeypatch.setattr(Path, "open", guarded)
+    desk.log.touch(0o600)
+    os.truncate(desk.log, 10)
+    desk.says("m_log.csv cannot be read: no permission", "looked at again once it changes")
+    allowed = True
+    desk.log.chmod(0o644)
+    assert desk.taken() == "\0" * 10
 
 
 @pytest.mark.parametrize("before", [("m_log.read.csv",), ("m_log.read.csv", "m_log.read_2.csv")])

@@ -50,7 +50,7 @@ def test_descendants_are_found_whatever_their_session(sleeper: subprocess.Popen[
 
 def test_what_has_ended_does_not_run(sleeper: subprocess.Popen[bytes]) -> None:
     sleeper.kill()
-    # Nobody has waited for it: it is still in /proc.
+    # It was not waited for: it is still in /proc.
     until(lambda: sleeper.pid not in running(), "it is dead")
     assert Path(f"/proc/{sleeper.pid}/stat").exists()
     assert sleeper.pid not in ids(descendants(os.getpid()))

@@ -23,11 +23,12 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="ne
         ((signal.SIGINT,), LONG, 0.3, 130),
         ((signal.SIGTERM,), LONG, 0.3, 143),
         ((signal.SIGHUP,), LONG, 0.3, 129),
+        ((signal.SIGQUIT,), LONG, 0.3, -signal.SIGQUIT),
         ((signal.SIGINT, signal.SIGINT), LONG, LONG, 130),
         ((signal.SIGINT, signal.SIGTERM), LONG, LONG, 130),
         ((signal.SIGTERM, signal.SIGHUP), LONG, LONG, 143),
     ],
-    ids=["limit", "INT", "TERM", "HUP", "INT-INT", "INT-TERM", "TERM-HUP"],
+    ids=["limit", "INT", "TERM", "HUP", "QUIT", "INT-INT", "INT-TERM", "TERM-HUP"],
 )
 def test_nothing_of_a_stubborn_program_runs_on(
     kind: str,
