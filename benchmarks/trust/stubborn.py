@@ -55,6 +55,7 @@ def main() -> None:
     parser.add_argument("--times", type=int, default=20)
     parser.add_argument("--at-once", type=int, default=6, help="trials that run beside each other")
     asked = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
     root = Path(tempfile.mkdtemp(prefix="excite-stubborn-"))
     begun = time.monotonic()
     try:
