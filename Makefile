@@ -69,7 +69,7 @@ scoreboard: $(STAMP)     ## every tool on the same logs, one judge (docs/scorebo
 loops: $(STAMP)          ## campaigns on simulated robots, into docs/campaigns.md (two hours)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.closed_loops --page docs/campaigns.md
 
-trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism, programs that do not end (80 minutes; root)
+trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism, stubborn programs (90 minutes; root)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.fuzz --count 10000
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.kill --kills 500
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.disk

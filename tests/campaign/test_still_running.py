@@ -11,6 +11,7 @@ import pytest
 from excite_cli.campaign import command, supervised
 from excite_cli.campaign.command import Command
 from excite_cli.campaign.measure import NotMeasuredError, StillRunningError
+from excite_cli.campaign.measured_log import is_measured
 from excite_cli.campaign.one_at_a_time import left_in
 from excite_cli.campaign.processes import running
 from excite_cli.campaign.supervisor import Ended
@@ -100,6 +101,16 @@ def test_an_interruption_comes_once_the_program_has_ended(
             Command.of("x {motion} {data}").take(take_in(tmp_path))
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def test_a_program_is_run_from_any_thread(tmp_path: Path) -> None:
+    """Only the main thread hears signals; the others need not hold them."""
+    take = take_in(tmp_path)
+    line = program(tmp_path, "open(sys.argv[2], 'w').write('whole')")
+    thread = Thread(target=Command.of(line).take, args=(take,))
+    thread.start()
+    thread.join()
+    assert is_measured(take.data)
 
 
 def test_what_goes_wrong_in_the_campaign_ends_the_program(tmp_path: Path) -> None:
