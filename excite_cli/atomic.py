@@ -9,6 +9,7 @@ import ctypes
 import errno
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -39,7 +40,9 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
         temporary = Path(name)
         try:
             write(temporary)
-            temporary.chmod(0o666 & ~_umask())
+            wanted = 0o666 & ~_umask()
+            if stat.S_IMODE(temporary.stat().st_mode) != wanted:  # a confined process may not
+                temporary.chmod(wanted)
             _to_disk(temporary)
             os.replace(temporary, target)
             _to_disk(target.parent)

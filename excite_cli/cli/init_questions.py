@@ -34,7 +34,7 @@ def may_read(allow_found: bool, at_terminal: bool) -> "Allow":
         if (allow_found and needed.near) or not at_terminal:
             return allow_found and needed.near
         if str(needed) not in answers:
-            question = f"The robot asks for {needed}, outside its own folder. Read that folder?"
+            question = f"Read {needed.folder}? The robot asks for {needed}, outside its own folder."
             answers[str(needed)] = typer.confirm(question, default=False, err=True)
         return answers[str(needed)]
 

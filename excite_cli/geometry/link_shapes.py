@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from excite_cli.errors import RobotError
-from excite_cli.geometry import gltf_scenes
 from excite_cli.geometry.capsule_fit import sphere_points
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.mesh_paths import Kind, check_mesh_paths, located
@@ -128,7 +127,7 @@ def collision_model(robot: Robot) -> pin.GeometryModel:
 
 def visual_model(robot: Robot, advice: str = "") -> pin.GeometryModel:
     """Visual geometry of the URDF; otherwise as `collision_model`. `advice` ends its errors."""
-    return gltf_scenes.whole_scenes(_geometry(robot, "visual", pin.GeometryType.VISUAL, advice))
+    return _geometry(robot, "visual", pin.GeometryType.VISUAL, advice)
 
 
 def _geometry(

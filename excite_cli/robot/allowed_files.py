@@ -7,6 +7,7 @@ elsewhere is named in an `OutsideError`, which says what would have to be allowe
 """
 
 import os
+import stat
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,22 +16,25 @@ from excite_cli.errors import RobotError
 
 # Folders above a description in which its own things are usually kept (`robots/arm/urdf`).
 _ABOVE = 3
+_SHOWN = 80  # characters of a name that messages repeat
+_MARKS = ("package.xml", "model.config")  # of ROS and of Gazebo
 
 
 @dataclass(frozen=True)
 class Needed:
     """What a description asks for, and the folder that would have to be allowed for it.
 
-    near: it was found by the name of its package, or lies beside the description; a path that
+    near: the folder is a package that says so itself, or lies beside the description; a path that
     leads elsewhere may lead anywhere.
     """
 
     name: str
     folder: Path
-    near: bool = True
+    near: bool
 
     def __str__(self) -> str:
-        return f"{self.name} in {self.folder}"
+        """The folder in full; the name, which the file chose, short and without what steers."""
+        return f"{_printable(self.name)[:_SHOWN]} in {_printable(str(self.folder))}"
 
 
 class OutsideError(RobotError):
@@ -97,36 +101,64 @@ def allowed_files(path: Path, package_dirs: Iterable[str | Path] = ()) -> Allowe
 
 def outside(file: Path, path: Path) -> Needed:
     """What would have to be allowed for a `file`, which the description at `path` names."""
-    above = [each for each in path.resolve().parents[:_ABOVE] if not _holds_everything(each)]
-    near = any(file.is_relative_to(each) for each in above) and is_trusted(file, path)
-    return Needed(file.name, file.parent, near)
+    return needed(file.name, file.parent, path)
 
 
-def _holds_everything(folder: Path) -> bool:
-    """Whether it is the root, lies in it (`/tmp`), or is the home folder."""
-    return folder == Path.home() or len(folder.parts) <= 2
+def needed(name: str, folder: Path, path: Path) -> Needed:
+    """A folder that the description at `path` asks for, by the name of what is in it."""
+    real = folder.resolve()
+    above = [each for each in path.resolve().parents[:_ABOVE] if not holds_everything(each)]
+    beside = any(real.is_relative_to(each) for each in above)
+    marked = any(is_trusted(real / mark, path) for mark in _MARKS)
+    hidden = any(part.startswith(".") for part in real.parts[1:] if part not in path.parts)
+    near = (beside or marked) and not hidden and not holds_everything(real)
+    return Needed(name, folder, near and is_trusted(real, path))
+
+
+def holds_everything(folder: Path) -> bool:
+    """Whether it is the root, lies in it (`/tmp`), or is the home folder or above it."""
+    return len(folder.parts) <= 2 or any(each.is_relative_to(folder) for each in _home())
+
+
+def _home() -> tuple[Path, ...]:
+    """The home folder as it is named and where it is; none for a user without any."""
+    try:
+        return Path.home(), Path.home().resolve()
+    except RuntimeError:
+        return ()
+
+
+def _printable(text: str) -> str:
+    return "".join(each if each.isprintable() else "?" for each in text)
 
 
 def own_folder(path: Path) -> Path:
     """The ROS package that a file lies in, else the folder that it lies in.
 
-    A package.xml of somebody else above the file makes no package of it, nor one in a home folder.
+    A package.xml of another user above the file makes no package of it, nor one in a home folder
+    or in a folder that everybody may write to.
     """
     path = path.resolve()
     for folder in path.parents:
-        if _holds_everything(folder):
+        if holds_everything(folder):
             break
         mark = folder / "package.xml"
-        if mark.is_file() and is_trusted(folder, path) and is_trusted(mark, path):
+        if is_trusted(mark, path) and is_trusted(folder, path) and not _is_open(folder):
             return folder
     return path.parent
 
 
+def _is_open(folder: Path) -> bool:
+    """Whether everybody may put files into a folder: nobody's package."""
+    return bool(folder.stat().st_mode & stat.S_IWOTH)
+
+
 def is_trusted(found: Path, path: Path) -> bool:
-    """Whether what was found belongs to the user, to the system or to the owner of `path`."""
-    if not hasattr(os, "geteuid"):
-        return True
+    """Whether there is something, of the user, the system or the owner of `path`; links as well."""
     try:
-        return found.stat().st_uid in (os.geteuid(), 0, path.stat().st_uid)
-    except OSError:
+        owners = {found.lstat().st_uid, found.stat().st_uid}
+        if not hasattr(os, "geteuid"):
+            return True
+        return owners <= {os.geteuid(), 0, path.stat().st_uid}
+    except (OSError, ValueError):
         return False

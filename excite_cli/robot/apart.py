@@ -15,6 +15,11 @@ from excite_cli.measurement.memory_limit import address_space
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
 
 
+# Beginnings of names of variables.
+_NEEDED = ("PATH", "HOME", "LANG", "LC_", "TMP", "TEMP", "XDG_CACHE_HOME", "PYTHON", "VIRTUAL_ENV",
+           "LD_LIBRARY_PATH", "DYLD_", "SYSTEMROOT", "ROS_DISTRO", "ROS_VERSION")  # fmt: skip
+
+
 def command(module: str) -> list[str]:
     """Words that start Python on `module`'s function `serve`.
 
@@ -25,9 +30,13 @@ def command(module: str) -> list[str]:
     return [sys.executable, "-P", "-c", boot, *sys.path]
 
 
-def environment() -> dict[str, str]:
-    """That of this process, with one thread for linear algebra."""
-    return {**os.environ, **ONE_THREAD}
+def environment(few: bool = False) -> dict[str, str]:
+    """That of this process, with one thread for linear algebra.
+
+    few: of it only what Python needs, and what a robot's file may ask for.
+    """
+    known = {k: v for k, v in os.environ.items() if not few or k.startswith(_NEEDED)}
+    return {**known, **ONE_THREAD}
 
 
 def limit_memory(most: int) -> None:

@@ -1,9 +1,9 @@
 """A process that reads an untrusted file gives up what it does not need, for good.
 
 On Linux, by Landlock (files: kernel 5.13; TCP: 6.7) and by seccomp (sockets, starting programs,
-looking into other processes). Neither needs privileges, and neither can be taken back by whoever
-gains control of the process. Elsewhere, or where the kernel lacks one of them, what could not be
-given up is returned, so that it can be said.
+looking into other processes, changing modes and owners). Neither needs privileges, and neither can
+be taken back by whoever gains control of the process. Elsewhere, or where the kernel lacks one of
+them, what could not be given up is returned, so that it can be said.
 """
 
 import ctypes
@@ -26,10 +26,20 @@ _OF_FILES = 1 << 1 | _READ_FILE | 1 << 14  # write, read, truncate: what a file 
 _DEVICES = 1 << 15  # ioctl
 _TCP, _SCOPED = 0b11, 0b11  # bind and connect; abstract sockets and signals
 # Calls that are refused: socket, connect, execve, execveat, ptrace, process_vm_readv and _writev,
-# io_uring_setup (which opens sockets by itself).
+# io_uring_setup (which opens sockets by itself); and, since Landlock leaves them alone, chmod,
+# chown, setxattr, utime and their kin, and unshare.
 _REFUSED = {
-    "x86_64": (0xC000003E, (41, 42, 59, 322, 101, 310, 311, 425)),
-    "aarch64": (0xC00000B7, (198, 203, 221, 281, 117, 270, 271, 425)),
+    "x86_64": (
+        0xC000003E,
+        (
+            *(41, 42, 59, 322, 101, 310, 311, 425),
+            *(90, 91, 268, 452, 92, 93, 94, 260, 188, 189, 190, 132, 235, 261, 280, 272),
+        ),
+    ),
+    "aarch64": (
+        0xC00000B7,
+        (198, 203, 221, 281, 117, 270, 271, 425, 52, 53, 452, 54, 55, 5, 6, 7, 88, 97),
+    ),
 }
 _X32 = 0x40000000  # bit of calls of the 32-bit convention on x86_64
 _ALLOW, _KILL, _ERROR_EPERM = 0x7FFF0000, 0x80000000, 0x00050001
@@ -44,6 +54,7 @@ def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> tuple[st
     """
     if sys.platform != "linux":
         return ("files and network (only Linux can confine a process here)",)
+    os.umask(0o077)  # as files are made, for none can be changed to it later
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.prctl(_NO_NEW_PRIVS, 1, 0, 0, 0) != 0:
         return ("files and network (the kernel refuses no_new_privs)",)

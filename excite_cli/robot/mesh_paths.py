@@ -7,7 +7,6 @@ is read must lie in one of these folders, by whatever links it is reached.
 """
 
 import contextlib
-import json
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -18,13 +17,17 @@ from urllib.parse import unquote
 
 from excite_cli.errors import RobotError
 from excite_cli.robot.description import EXAMPLE_PREFIX, RobotDescription
-from excite_cli.robot.mesh_trial import MAX_BYTES, faults
+from excite_cli.robot.mesh_trial import MAX_BYTES, copy_of, faults
 from excite_cli.robot.packages import package_in, variables_in_words
 
 Kind = Literal["collision", "visual"]
 
 _OF_PACKAGES = ("package://", "model://")
-_MATERIALS = re.compile(rb"^[ \t]*mtllib[ \t]+(.+?)[ \t\r]*$", re.MULTILINE)
+# What other files a mesh names, by its suffix.
+_NAMED = {
+    ".obj": re.compile(rb"^\s*mtllib[ \t]+([^\r\n]+)", re.MULTILINE),
+    ".gltf": re.compile(rb'"uri"\s*:\s*"([^"]*)"'),
+}
 _LONGEST = 200  # characters of a name that are told
 
 
@@ -91,8 +94,6 @@ def mesh_names(description: RobotDescription, kind: Kind) -> Iterator[tuple[str,
 def check_mesh_paths(description: RobotDescription, kind: Kind = "collision") -> None:
     """Raise unless every mesh of the kind is in a folder that the URDF may read, and can be read.
 
-    Of visual meshes only those are refused that would end the process.
-
     Raises
     ------
     RobotError
@@ -118,8 +119,7 @@ class Unusable:
 def unusable(description: RobotDescription, kind: Kind) -> dict[str, Unusable]:
     """Links with a mesh that is missing, or must not or cannot be read, in the URDF's order.
 
-    Of visual meshes only those count as damaged that do harm. Those of example-robot-data are known
-    to be sound.
+    Those of example-robot-data are known to be sound.
     """
     files = MeshFiles(description)
     wrong: dict[str, Unusable] = {}
@@ -147,22 +147,19 @@ def unusable(description: RobotDescription, kind: Kind) -> dict[str, Unusable]:
 
 
 def _named_by(mesh: Path) -> Iterator[Path]:
-    """Files that a mesh names in its turn: buffers of glTF, materials of OBJ; resolved."""
+    """Files that a mesh names in its turn: buffers of glTF, materials of OBJ; resolved.
+
+    For a message: what keeps them from being read is the confinement of the process that reads.
+    """
     if mesh.stat().st_size > MAX_BYTES:
         return  # refused
-    names: list[str] = []
-    if mesh.suffix.lower() == ".gltf":
-        with contextlib.suppress(ValueError, AttributeError, TypeError):
-            tree = json.loads(mesh.read_bytes())
-            parts = (*tree.get("buffers", ()), *tree.get("images", ()))
-            names = [str(part["uri"]) for part in parts if "uri" in part]
-    elif mesh.suffix.lower() == ".obj":
-        names = [name.decode(errors="replace") for name in _MATERIALS.findall(mesh.read_bytes())]
-    for name in names:
-        if not name.startswith("data:"):
-            there = mesh_file(mesh.parent / unquote(name.strip()))
-            if there is not None:
-                yield there
+    pattern = _NAMED.get(mesh.suffix.lower())
+    for found in () if pattern is None else pattern.findall(mesh.read_bytes()):
+        name = found.decode(errors="replace").strip()
+        for meant in () if name.startswith("data:") else (name, unquote(name)):
+            with contextlib.suppress(OSError, ValueError, RuntimeError):
+                if (mesh.parent / meant).exists():
+                    yield (mesh.parent / meant).resolve()
 
 
 def _missing(description: RobotDescription, kind: Kind, name: str, files: MeshFiles) -> Unusable:
@@ -209,11 +206,15 @@ def without_unusable(description: RobotDescription, links: tuple[str, ...]) -> R
 
 
 def located(description: RobotDescription, kind: Kind) -> str:
-    """The URDF's XML with every mesh of the kind by its whole path."""
+    """The URDF's XML with every mesh of the kind by the path of its copy, once it was checked.
+
+    Those of example-robot-data by their own.
+    """
+    known = description.source.startswith(EXAMPLE_PREFIX)
     root = ElementTree.fromstring(description.xml)
     files = MeshFiles(description)
     for mesh in root.findall(f"link/{kind}/geometry/mesh"):
         path = files.found(mesh.get("filename", ""))
         if path is not None:
-            mesh.set("filename", str(path))
+            mesh.set("filename", str(path if known else copy_of(path)))
     return ElementTree.tostring(root, encoding="unicode")

@@ -1,9 +1,10 @@
-"""Meshes read for a try in a process of their own, before this one reads them.
+"""Meshes are read in a process of their own; this one reads copies that it made.
 
 The library that reads meshes (assimp) can be led by a damaged file to end its process, to fill
-memory or to run on; nothing in this process can hold it then. `faults` starts a process with
-limits of time and memory, confined to the robot's folders, that reads the files as `coal` does,
-once for each content. The process is this module's `serve`, asked by lines on stdin.
+memory, to run on, or to read other files; nothing in this process can hold it then. `faults` starts
+a process with limits of time and memory, confined to the robot's folders, that reads the files as
+`coal` does and leaves their triangles as plain STL in the cache (`copy_of`), which is all that this
+process reads of them. The process is this module's `serve`, asked by lines on stdin.
 """
 
 import atexit
@@ -11,17 +12,24 @@ import contextlib
 import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import Any
 
+from excite_cli.errors import RobotError
 from excite_cli.robot.apart import OUT_OF_TIME, command, environment, limit_memory, set_alarm
 from excite_cli.robot.confinement import confine
+from excite_cli.robot.formats.kept_meshes import is_sound, keep_mesh, kept_meshes_folder
 
 SUFFIXES = (".stl", ".dae", ".obj", ".ply")
+VISUAL_SUFFIXES = (*SUFFIXES, ".glb", ".gltf", ".3ds", ".fbx")
 MAX_BYTES = 100 * 2**20  # of a mesh
 MAX_TRIANGLES = 1_000_000
 _MAX_MEMORY = 2**30  # bytes that the reading of one robot's meshes may take
@@ -31,14 +39,15 @@ _IDLE = 10.0  # s without a question after which the process ends
 
 
 @dataclass(frozen=True)
-class Fault:
-    """What is wrong with a mesh; `harms`: reading it ends the process or takes forever."""
+class Reading:
+    """What came of a mesh: a copy of its triangles as STL, or what is wrong with it."""
 
-    words: str
-    harms: bool = False
+    copy: Path | None
+    fault: str = ""
 
 
-_known: dict[str, Fault | None] = {}  # by content
+# By place, which says what else it may name, and content.
+_known: dict[tuple[Path, str], Reading] = {}
 
 
 def faults(
@@ -46,30 +55,57 @@ def faults(
 ) -> dict[Path, str]:
     """Files that cannot be read as meshes, or not without harm; why, without a full stop.
 
-    folders: all that may be read, for what a mesh names in its turn; any_format: a file may be of
-    any format, and hold anything, as long as reading it does no harm.
+    folders: all that may be read, for what a mesh names in its turn; any_format: more formats than
+    those of collision meshes, and any number of triangles.
     """
     found: dict[Path, str] = {}
     for path in dict.fromkeys(paths):
         if refused := _refused(path, any_format):
             found[path] = f"the mesh {path} {refused}"
             continue
-        content = _content(path)
-        if content not in _known:
-            _known[content] = _trial.fault(path, [str(folder) for folder in folders])
-        fault = _known[content]
-        if fault is not None and (fault.harms or not any_format):
+        key = path, _content(path)
+        if key not in _known:
+            _known[key] = _trial.reading(path, [str(folder) for folder in folders], any_format)
+        if _known[key].fault:
             found[path] = (
-                f"the mesh {path} cannot be loaded: {fault.words}. Repair it, or convert it to "
-                "STL with another program"
+                f"the mesh {path} cannot be loaded: {_known[key].fault}. Repair it, or convert it "
+                "to STL with another program"
             )
     return found
 
 
+@cache
+def _copies() -> Path:
+    """Where copies are kept: the cache, or where that cannot be, a folder that goes at the end."""
+    folder = kept_meshes_folder()
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+    if os.access(folder, os.W_OK):
+        return folder
+    passing = Path(tempfile.mkdtemp(prefix="excite-"))
+    atexit.register(shutil.rmtree, passing, ignore_errors=True)
+    return passing
+
+
+def copy_of(path: Path) -> Path:
+    """The copy of a mesh in which `faults` found nothing wrong.
+
+    Raises
+    ------
+    RobotError
+        It has changed since.
+    """
+    reading = _known.get((path, _content(path)))
+    if reading is None or reading.copy is None or not is_sound(reading.copy):
+        raise RobotError(f"the mesh {path} was changed while it was read. Try again.")
+    return reading.copy
+
+
 def _refused(path: Path, any_format: bool) -> str:
     """Why a file is not even tried; empty where it is."""
-    if not any_format and path.suffix.lower() not in SUFFIXES:
-        return f"is of no known format; read are {', '.join(SUFFIXES)}"
+    known = VISUAL_SUFFIXES if any_format else SUFFIXES
+    if path.suffix.lower() not in known:
+        return f"is of no known format; read are {', '.join(known)}"
     size = path.stat().st_size
     if size <= MAX_BYTES:
         return ""
@@ -92,21 +128,21 @@ class _Trial:
         self._process: subprocess.Popen[bytes] | None = None
         self._folders: list[str] = []  # that the process was left
 
-    def fault(self, path: Path, folders: list[str]) -> Fault | None:
-        """What is wrong with a mesh, if anything is."""
+    def reading(self, path: Path, folders: list[str], large: bool = False) -> Reading:
+        """What comes of a mesh; `large`: it may have any number of triangles."""
         if folders != self._folders:
             self.close()
             self._folders = folders
         seconds = _SECONDS + path.stat().st_size / _BYTES_PER_SECOND
-        line = json.dumps([str(path), seconds]).encode() + b"\n"
+        line = json.dumps([str(path), seconds, large]).encode() + b"\n"
         while True:
             answer, status = self._asked(line, _SLOWEST * seconds)
             if answer:
-                said = str(json.loads(answer))
-                return Fault(said) if said else None
+                fault, name = map(str, json.loads(answer))
+                return Reading(None, fault) if fault else _believed(name)
             if status != 0:  # else it was idle and has just ended
                 how = "takes too long" if status in OUT_OF_TIME else "fails"
-                return Fault(f"reading it {how}", harms=True)
+                return Reading(None, f"reading it {how}")
 
     def _asked(self, line: bytes, longest: float) -> tuple[bytes, int]:
         """The answer, or how the process ended; it is ended if it takes longer [s]."""
@@ -116,10 +152,11 @@ class _Trial:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                env=environment(),
+                env=environment(few=True),
                 process_group=0,  # Ctrl-C is for the parent
             )
-            line = json.dumps(self._folders).encode() + b"\n" + line
+            start = [str(_copies()), *self._folders]
+            line = json.dumps(start).encode() + b"\n" + line
         process = self._process
         assert process.stdin is not None
         assert process.stdout is not None
@@ -167,25 +204,25 @@ def _peak() -> int:
 
 
 def serve() -> None:
-    """In the process: for each line [path, seconds] of stdin a line, empty for a good mesh.
+    """In the process: for each line [path, seconds, large] of stdin a line [fault, copy].
 
-    Before them stands a line with the folders that may be read.
+    Before them stands a line with the folder for copies, and those that may be read.
     """
-    import coal
+    from excite_cli.robot.gltf_scenes import load_whole
 
     limit_memory(2 * _MAX_MEMORY)
-    confine([Path(folder) for folder in json.loads(sys.stdin.buffer.readline())])
-    loader = coal.MeshLoader(coal.NODE_TYPE.BV_OBBRSS)
+    copies, *folders = map(Path, json.loads(sys.stdin.buffer.readline()))
+    confine(folders, [copies])
     idle = threading.Timer(_IDLE, os._exit, (0,))
     idle.daemon = True
     idle.start()
     for line in sys.stdin.buffer:
         idle.cancel()
-        path, seconds = json.loads(line)
+        path, seconds, large = json.loads(line)
         set_alarm(seconds)
-        said = _said(loader, path)
+        answer = _read(load_whole, Path(path), copies, large)
         set_alarm(0)
-        print(json.dumps(said), flush=True)
+        print(json.dumps(answer), flush=True)
         if _peak() > _MAX_MEMORY:
             return  # the next begins with a peak of its own
         idle = threading.Timer(_IDLE, os._exit, (0,))
@@ -193,18 +230,35 @@ def serve() -> None:
         idle.start()
 
 
-def _said(loader: object, path: str) -> str:
+def _read(
+    load: Callable[[Path, Path], Any], path: Path, copies: Path, large: bool
+) -> tuple[str, str]:
+    """What is wrong with a mesh, or nothing and its copy."""
     import numpy as np
 
     try:
-        mesh = loader.load(path, np.ones(3))  # type: ignore[attr-defined]
+        mesh = load(path, copies)
     except Exception as error:
         said = str(error).partition("message: ")[2] or str(error)  # coal begins with its own files
-        return (said.strip().splitlines() or ["no reason given"])[0].rstrip(".")[:200]
+        return (said.strip().splitlines() or ["no reason given"])[0].rstrip(".")[:200], ""
     if not mesh.num_vertices or not mesh.num_tris:
-        return "it has no triangles"
-    if mesh.num_tris > MAX_TRIANGLES or _peak() > _MAX_MEMORY:
-        return f"it is too large ({mesh.num_tris:,} triangles)"
-    if not np.isfinite(np.asarray(mesh.vertices())).all():
-        return "it has corners that are not finite"
-    return ""
+        return "it has no triangles", ""
+    if (mesh.num_tris > MAX_TRIANGLES and not large) or _peak() > _MAX_MEMORY:
+        return f"it is too large ({mesh.num_tris:,} triangles)", ""
+    points = np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3)
+    if not np.isfinite(points).all():
+        return "it has corners that are not finite", ""
+    triangles = (mesh.tri_indices(k) for k in range(mesh.num_tris))
+    faces = np.array([(t[0], t[1], t[2]) for t in triangles], dtype=np.intp)
+    try:
+        return "", str(keep_mesh(points, faces, copies))
+    except RobotError as error:
+        return str(error).rstrip("."), ""
+
+
+def _believed(name: str) -> Reading:
+    """A copy, which lies where copies are kept: the process may have been led astray."""
+    copy = Path(name)
+    if copy.parent != _copies() or not is_sound(copy):
+        return Reading(None, "reading it fails")
+    return Reading(copy)

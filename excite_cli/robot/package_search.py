@@ -8,7 +8,14 @@ URDF (`meshes/arm.stl` beside `urdf/`) needs that folder.
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from excite_cli.robot.allowed_files import Needed, OutsideError, is_trusted, outside, own_folder
+from excite_cli.robot.allowed_files import (
+    Needed,
+    OutsideError,
+    holds_everything,
+    is_trusted,
+    needed,
+    own_folder,
+)
 from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.mesh_paths import Kind, MeshFiles, mesh_file, mesh_names, package_of
 from excite_cli.robot.packages import search_package
@@ -53,10 +60,10 @@ def load_with_folders(
             source, own = description.path.name, own_folder(description.path)
             if not more:
                 return description, tuple(allowed.values())
-        for needed in more:
-            if needed.folder in allowed or not allow(needed):
-                raise OutsideError(source, needed, own)
-            allowed[needed.folder] = needed
+        for each in more:
+            if each.folder in allowed or not allow(each):
+                raise OutsideError(source, each, own)
+            allowed[each.folder] = each
 
 
 def needed_folders(description: RobotDescription) -> list[Needed]:
@@ -70,19 +77,18 @@ def needed_folders(description: RobotDescription) -> list[Needed]:
     for name in dict.fromkeys(name for kind in kinds for _, name in mesh_names(description, kind)):
         package, inside = package_of(name)
         path = files.found(name)
-        what, near = f"meshes ({Path(name).name}, …)", True
+        what = f"meshes ({Path(name).name}, …)"
         if path is not None and files.may_read(path):
             continue
         if path is not None:
             folder: Path | None = path.parent
-            near = outside(path, description.path).near
         elif package:
             folder = search_package(package, description.path, inside)
             what = f"the package '{package}'"
         else:
             folder = _above(name, description.path)
         if folder is not None:
-            found.setdefault(folder, Needed(what, folder, near))
+            found.setdefault(folder, needed(what, folder, description.path))
     return list(found.values())
 
 
@@ -91,6 +97,12 @@ def _above(name: str, urdf: Path) -> Path | None:
     inside = name.removeprefix("file://")
     above = urdf.parents[1 : 1 + _ABOVE]
     return next(
-        (each for each in above if mesh_file(each / inside) and is_trusted(each / inside, urdf)),
+        (
+            each
+            for each in above
+            if not holds_everything(each)
+            and mesh_file(each / inside)
+            and is_trusted(each / inside, urdf)
+        ),
         None,
     )

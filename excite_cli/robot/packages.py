@@ -1,15 +1,24 @@
 """Where packages of ROS lie, without ROS: by folder names, by package.xml, by its variables."""
 
 import os
+import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
 
 from excite_cli.errors import RobotError
-from excite_cli.robot.allowed_files import AllowedFiles, Needed, OutsideError, is_trusted
+from excite_cli.robot.allowed_files import (
+    AllowedFiles,
+    OutsideError,
+    holds_everything,
+    is_trusted,
+    needed,
+)
 
 # Folders of a package in which descriptions lie.
 _OF_DESCRIPTIONS = ("urdf", "xacro", "robots", "robot", "models", "model")
+_NAME = re.compile(r"[A-Za-z0-9][\w.-]*\Z")  # of a package: one folder, and none that is hidden
+_SHOWN = 80  # characters of a name that messages repeat
 # By variable: what lies between a folder that it names and the packages.
 _VARIABLES = {
     "ROS_PACKAGE_PATH": "",
@@ -35,7 +44,7 @@ def find_package(name: str, allowed: AllowedFiles) -> Path:
     MissingPackageError
         It is in none of them.
     """
-    for folder in allowed.folders:
+    for folder in allowed.folders if _NAME.match(name) else ():
         found = package_in(folder, name)
         if found is not None and allowed.has(found):
             return found
@@ -49,8 +58,10 @@ def missing_package(name: str, allowed: AllowedFiles) -> RobotError:
     """
     path = allowed.path
     there = search_package(name, path) or unnamed_package(path)
+    name = name[:_SHOWN]
     if there is not None:
-        return OutsideError(path.name, Needed(f"the package '{name}'", there), allowed.own)
+        what = needed(f"the package '{name}'", there, path)
+        return OutsideError(path.name, what, allowed.own)
     return RobotError(
         f"{path.name}: the package '{name}' was not found. Looked in "
         f"{', '.join(map(str, allowed.folders))}; above {path.parent}; and by "
@@ -65,10 +76,10 @@ def search_package(name: str, near: Path, inside: str = "") -> Path | None:
     variables of ROS and Gazebo name. What belongs to another user is passed over: anybody may put
     a folder into /tmp.
     """
-    for folder in folders_of_packages(near):
+    for folder in folders_of_packages(near) if _NAME.match(name) else ():
         named = [folder / name] if inside else []
         for found in (*named, package_in(folder, name)):
-            if found is None or not is_trusted(found, near):
+            if found is None or holds_everything(found) or not is_trusted(found, near):
                 continue
             if not inside or is_file(found / inside):
                 return found
@@ -96,7 +107,7 @@ def unnamed_package(path: Path) -> Path | None:
     if path.parent.name not in _OF_DESCRIPTIONS:
         return None
     folder = path.parent.parent
-    return None if (folder / "package.xml").exists() else folder
+    return None if holds_everything(folder) or (folder / "package.xml").exists() else folder
 
 
 def folders_of_packages(path: Path) -> Iterator[Path]:

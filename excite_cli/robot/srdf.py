@@ -12,6 +12,7 @@ from excite_cli.errors import RobotError
 from excite_cli.robot.allowed_files import allowed_files
 from excite_cli.robot.description import MAX_URDF_BYTES
 
+_MOST = 10  # files that are looked at
 NEVER = "never"  # the reason of pairs that were not seen to touch, in lower case
 
 
@@ -35,7 +36,7 @@ def srdf_near(urdf: Path) -> list[Srdf]:
     folders += [urdf.parent.parent / name for name in ("srdf", "config")]
     paths = dict.fromkeys(path for folder in folders for path in sorted(folder.glob("*.srdf")))
     found = []
-    for path in filter(allowed.has, paths):
+    for path in [each for each in paths if each.is_file() and allowed.has(each)][:_MOST]:
         try:
             found.append(read_srdf(path))
         except RobotError:

@@ -50,7 +50,7 @@ def parsed(path: Path, text: str) -> ElementTree.Element:
     RobotError
         It is not XML, not a URDF, too large or too deep, no tree, or has numbers of no robot.
     """
-    root = _tree(path, text)
+    root = tree_of(path, text)
     if root.tag != "robot":
         raise RobotError(
             f"{path} is not a URDF: its root is <{_short(root.tag)}>, not <robot>. URDF, xacro, "
@@ -63,8 +63,27 @@ def parsed(path: Path, text: str) -> ElementTree.Element:
     return root
 
 
-def _tree(path: Path, text: str) -> ElementTree.Element:
-    """Parsed piece by piece, so that depth and number of elements are known before it is large."""
+def root_tag(text: str) -> str:
+    """The name of the first element; empty of what is not XML."""
+    parser: Any = ElementTree.XMLPullParser(("start",))
+    try:
+        for start in range(0, len(text), _CHUNK):
+            parser.feed(text[start : start + _CHUNK])
+            for _, element in parser.read_events():
+                return str(element.tag)
+    except (ElementTree.ParseError, ValueError, LookupError):
+        pass
+    return ""
+
+
+def tree_of(path: Path, text: str) -> ElementTree.Element:
+    """Parsed piece by piece, so that depth and number of elements are known before it is large.
+
+    Raises
+    ------
+    RobotError
+        It is not XML, too large or too deep.
+    """
     parser: Any = ElementTree.XMLPullParser(("start", "end"))
     root: ElementTree.Element | None = None
     depth = count = 0
@@ -78,7 +97,7 @@ def _tree(path: Path, text: str) -> ElementTree.Element:
                 if depth > MAX_DEPTH or count > MAX_ELEMENTS:
                     what = f"deeper than {MAX_DEPTH} levels" if depth > MAX_DEPTH else "too large"
                     raise RobotError(
-                        f"{path} is {what}: not a URDF (up to {MAX_ELEMENTS:,} elements are read)."
+                        f"{path} is {what}: no robot (up to {MAX_ELEMENTS:,} elements are read)."
                     )
         parser.close()
     except (ElementTree.ParseError, ValueError, LookupError) as error:

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.robot.allowed_files import Needed
 from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.mesh_paths import MeshFiles, unusable
 from excite_cli.robot.package_search import needed_folders
@@ -81,7 +80,7 @@ def test_packages_of_the_environment_are_found(
     assert needed_folders(robot) == []
     monkeypatch.setenv(variable, str(prefix))
     (needed,) = needed_folders(robot)
-    assert needed == Needed("the package 'hand'", share / "hand")
+    assert (needed.name, needed.folder) == ("the package 'hand'", share / "hand")
 
 
 def test_a_missing_mesh_of_a_package_that_is_there_is_told_as_such(

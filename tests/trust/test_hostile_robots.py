@@ -195,9 +195,9 @@ def test_after_an_interruption_the_next_answer_is_its_own(
 
     monkeypatch.setattr(process, "stdout", SimpleNamespace(readline=interrupted, close=read.close))
     with pytest.raises(KeyboardInterrupt):
-        mesh_trial._trial.fault(bad, [str(tmp_path)])
+        mesh_trial._trial.reading(bad, [str(tmp_path)])
     monkeypatch.setattr(process, "stdout", read)
-    assert mesh_trial._trial.fault(good, [str(tmp_path)]) is None
+    assert mesh_trial._trial.reading(good, [str(tmp_path)]).fault == ""
     assert process.poll() is not None
 
 

@@ -108,8 +108,8 @@ def test_visual_shapes_that_keep_links_apart_stand_there_too(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("content", [b"glTF", b"{}", b"glTF\2\0\0\0\xff\0\0\0", b"\0" * 40])
-def test_what_is_no_gltf_is_refused_as_before(tmp_path: Path, content: bytes) -> None:
+def test_what_is_no_gltf_is_refused(tmp_path: Path, content: bytes) -> None:
     mesh = tmp_path / "m.glb"
     mesh.write_bytes(content)
     _, note = robot_bodies(robot_with(mesh))
-    assert "the visual geometry cannot be loaded" in note
+    assert "m.glb cannot be loaded" in note

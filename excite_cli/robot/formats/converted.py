@@ -28,6 +28,7 @@ from excite_cli.robot.apart import OUT_OF_TIME, command, environment, limit_memo
 from excite_cli.robot.confinement import confine
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
 from excite_cli.robot.formats.kept_meshes import is_sound, kept_meshes_folder
+from excite_cli.robot.mesh_trial import MAX_BYTES
 from excite_cli.robot.packages import (
     MissingPackageError,
     missing_package,
@@ -57,7 +58,7 @@ def converted(form: RobotFormat, path: Path, text: str, asked: Asked) -> Urdf:
     kept = None if key is None else _kept(key)
     if kept is not None:
         return kept
-    size = sum(source.stat().st_size for source in sources or (path,))
+    size = sum(min(source.stat().st_size, MAX_BYTES) for source in sources or (path,))
     found = None
     while found is None:
         try:
@@ -112,6 +113,13 @@ def _urdf(content: dict[str, Any]) -> Urdf:
     return Urdf(content["text"], **lists, ignored=pairs)
 
 
+def _believed(found: Urdf, path: Path) -> Urdf:
+    """Without folders that no conversion has a need of: what it says is read unconfined."""
+    own = unnamed_package(path)
+    known = {str(kept_meshes_folder()), *([] if own is None else [str(own)])}
+    return replace(found, folders=tuple(each for each in found.folders if each in known))
+
+
 def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: float) -> Urdf:
     """The answer of a process of its own, which may compute for so long [s]."""
     question = {
@@ -132,7 +140,7 @@ def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: f
                 input=json.dumps(question).encode(),
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,  # a file may have a library write without end
-                env=environment(),
+                env=environment(few=True),
                 cwd=folder,
                 timeout=_SLOWEST * seconds,
                 process_group=0,  # Ctrl-C is for this process, which then ends the other
@@ -143,7 +151,7 @@ def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: f
             status, said = OUT_OF_TIME[-1], b""
     answer = json.loads(said) if status == 0 and said else {}
     if "text" in answer:
-        return _urdf(answer)
+        return _believed(_urdf(answer), path)
     if "package" in answer:
         raise MissingPackageError(answer["package"])
     if "needed" in answer:

@@ -13,8 +13,10 @@ from excite_cli.cache_folder import cache_folder
 from excite_cli.errors import FileError, RobotError
 
 
-def keep_mesh(points: NDArray[np.float64], faces: NDArray[Any]) -> Path:
-    """The binary STL in the cache with triangles `faces` (F, 3) of `points` (N, 3) [m].
+def keep_mesh(points: NDArray[np.float64], faces: NDArray[Any], folder: Path | None = None) -> Path:
+    """The binary STL with triangles `faces` (F, 3) of `points` (N, 3) [m], in the cache.
+
+    Or in another folder.
 
     Raises
     ------
@@ -22,7 +24,7 @@ def keep_mesh(points: NDArray[np.float64], faces: NDArray[Any]) -> Path:
         It cannot be written.
     """
     content = _stl(points, faces)
-    path = kept_meshes_folder() / f"{_name(content)}.stl"
+    path = (folder or kept_meshes_folder()) / f"{_name(content)}.stl"
     try:
         if not is_sound(path):
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -30,6 +30,7 @@ from excite_cli.robot.formats.urdf_parts import (
     words,
 )
 from excite_cli.robot.loops import TAG
+from excite_cli.robot.urdf_check import root_tag
 
 Array = NDArray[np.float64]
 Element = ElementTree.Element
@@ -49,10 +50,7 @@ class Mjcf(RobotFormat):
         """Whether the root element is `mujoco` (a URDF may have such an element within)."""
         if "<mujoco" not in text:
             return False
-        try:
-            return ElementTree.fromstring(text).tag == "mujoco"
-        except ElementTree.ParseError:
-            return False
+        return root_tag(text) == "mujoco"
 
     def load_library(self) -> None:
         """MuJoCo."""

@@ -1,22 +1,26 @@
 """The files that an MJCF reads, all within the folders that it may read.
 
 Includes, models that it attaches, meshes, textures, height fields: MuJoCo looks for them beside the
-main file or in a folder that <compiler> names. Here all that a name may mean are taken, before
-MuJoCo sees any of them.
+main file or in a folder that <compiler> names, takes `\\` for `/`, and resolves `..` by the names
+alone. Here all that a name may mean are taken, so and as the file system has it, before MuJoCo sees
+any of them.
 """
 
+import os
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from excite_cli.errors import RobotError
 from excite_cli.robot.allowed_files import AllowedFiles
-from excite_cli.robot.packages import is_file
+from excite_cli.robot.mesh_trial import MAX_BYTES
+from excite_cli.robot.urdf_check import tree_of
 
 _FOLDERS = ("meshdir", "texturedir", "assetdir")
 _MODELS = ("include", "model")
-_MOST = 2000  # files; beyond, no one could vouch for what is kept
-_MAX_BYTES = 20_000_000  # of an included file
+_MOST, _MOST_INCLUDED = 2000, 100  # names of files; files that are read here
+_MAX_TOTAL = 2**30  # bytes of all files, whose content is what a kept conversion is found by
+_MAX_INCLUDED = 20_000_000  # bytes of an included file
 
 
 def mjcf_sources(path: Path, text: str, allowed: AllowedFiles) -> tuple[Path, ...] | None:
@@ -29,51 +33,91 @@ def mjcf_sources(path: Path, text: str, allowed: AllowedFiles) -> tuple[Path, ..
     OutsideError
         One of them lies outside the folders that may be read.
     RobotError
-        An included file is not XML or too large, or there are too many.
+        An included file is no XML, a file is none that can be read, or they are too many or large.
     """
-    roots = {path: _root(path, text)}
+    own = path.resolve()
+    roots = {own: tree_of(path, text)}
     while True:
         elements = [element for root in roots.values() for element in root.iter()]
         folders = {element.get(key, ".") for element in elements for key in _FOLDERS}
-        places = {file.parent / folder for file in roots for folder in folders}
-        models = {
-            name for element in elements if element.tag in _MODELS for name in _names(element)
-        }
-        more = [each for each in _there(places, models, allowed) if each not in roots]
+        places = {os.path.join(file.parent, _plain(each)) for file in roots for each in folders}
+        included = [each for each in elements if _tag(each) in _MODELS]
+        more = {*_there(places, _names(included), allowed)} - {*roots}
         if not more:
             break
-        roots |= {each: _root(each, _text(each)) for each in more}
-        if len(roots) > _MOST:
-            raise RobotError(f"{path.name}: it includes more than {_MOST} files.")
-    names = {name for element in elements for name in _names(element)}
+        if len(roots) + len(more) > _MOST_INCLUDED:
+            raise RobotError(f"{path.name}: it includes more than {_MOST_INCLUDED} files.")
+        roots |= {each: tree_of(each, _text(each)) for each in sorted(more)}
+    names = _names(elements)
     if len(names) > _MOST:
         raise RobotError(f"{path.name}: it names more than {_MOST} files.")
     found = {*roots, *_there(places, names, allowed)}
-    attaches = any(element.tag in ("model", "attach") for element in elements)
+    _check_sizes(path, found)
+    attaches = any(_tag(element) in ("model", "attach") for element in elements)
     return None if attaches else tuple(sorted(found))
 
 
-def _names(element: ElementTree.Element) -> Iterator[str]:
-    """The files that an element names: `file`, and `fileright` and its like of a sky."""
-    return (value for key, value in element.attrib.items() if key.startswith("file"))
+def _tag(element: ElementTree.Element) -> str:
+    """The name of an element, in whatever namespace: MuJoCo knows none."""
+    return str(element.tag).rpartition("}")[2]
 
 
-def _there(places: set[Path], names: set[str], allowed: AllowedFiles) -> Iterator[Path]:
-    """The files that names mean in places; an absolute one stands alone, whatever it is joined to.
+def _names(elements: Iterable[ElementTree.Element]) -> set[str]:
+    """The files that elements name: `file`, and `fileright` and its like of a sky."""
+    return {
+        value
+        for element in elements
+        for key, value in element.attrib.items()
+        if key.startswith("file")
+    }
 
-    MuJoCo also takes the last part of a name alone (strippath).
+
+def _there(places: set[str], names: set[str], allowed: AllowedFiles) -> Iterator[Path]:
+    """The files that names mean in places, resolved.
+
+    An absolute name stands alone, whatever it is joined to. MuJoCo also takes the last part of a
+    name alone (strippath).
     """
     for place in sorted(places):
-        for name in sorted(names):
-            for inside in dict.fromkeys((name, Path(name.replace("\\", "/")).name)):
-                if inside and is_file(place / inside):
-                    allowed.require(place / inside)
-                    yield place / inside
+        for name in map(_plain, sorted(names)):
+            for inside in dict.fromkeys((name, os.path.basename(name))):
+                joined = os.path.join(place, inside)
+                for meant in dict.fromkeys((joined, os.path.normpath(joined))):
+                    if inside and _exists(meant):
+                        real = allowed.require(Path(meant))
+                        if real.is_dir():
+                            continue
+                        if not real.is_file():
+                            raise RobotError(f"{allowed.source}: {real} is no regular file.")
+                        yield real
+
+
+def _plain(name: str) -> str:
+    return name.replace("\\", "/")
+
+
+def _exists(path: str) -> bool:
+    """Whether there is something; names of robots' files may be too long, or have a NUL in them."""
+    try:
+        return os.path.exists(path)
+    except ValueError:
+        return False
+
+
+def _check_sizes(path: Path, files: set[Path]) -> None:
+    sizes = {file: file.stat().st_size for file in files}
+    largest = max(sizes, key=lambda file: sizes[file])
+    if sizes[largest] > MAX_BYTES or sum(sizes.values()) > _MAX_TOTAL:
+        raise RobotError(
+            f"{path.name}: its files are too large ({largest.name}: "
+            f"{sizes[largest] / 2**20:.0f} MiB); {MAX_BYTES // 2**20} MiB each and "
+            f"{_MAX_TOTAL // 2**20} MiB together are read."
+        )
 
 
 def _text(path: Path) -> str:
-    if path.stat().st_size > _MAX_BYTES:
-        raise RobotError(f"{path} is larger than {_MAX_BYTES // 10**6} MB.")
+    if path.stat().st_size > _MAX_INCLUDED:
+        raise RobotError(f"{path} is larger than {_MAX_INCLUDED // 10**6} MB.")
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -81,10 +125,3 @@ def _text(path: Path) -> str:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise RobotError(f"{path} declares a document type or entities; an MJCF needs neither.")
     return text
-
-
-def _root(path: Path, text: str) -> ElementTree.Element:
-    try:
-        return ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise RobotError(f"{path} is not well-formed XML: {error}") from error

@@ -28,6 +28,7 @@ from excite_cli.robot.formats.urdf_parts import (
     words,
 )
 from excite_cli.robot.loops import TAG
+from excite_cli.robot.urdf_check import root_tag
 
 Array = NDArray[np.float64]
 Element = ElementTree.Element
@@ -48,10 +49,7 @@ class Sdf(RobotFormat):
         """Whether the first element is `sdf`."""
         if not _ROOT.search(text):
             return False
-        try:
-            return ElementTree.fromstring(text).tag == "sdf"
-        except ElementTree.ParseError:
-            return False
+        return root_tag(text) == "sdf"
 
     def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
         """Links with inertias and shapes, joints with limits, friction and couplings."""

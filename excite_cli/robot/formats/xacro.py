@@ -5,9 +5,11 @@ is not a program that one means to run: here expressions are evaluated by `xacro
 are read within the robot's folders (`allowed_files`), and variables are those of a list.
 """
 
+import glob
 import os
 import re
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -21,9 +23,10 @@ from excite_cli.robot.packages import MissingPackageError, find_package, unnamed
 
 _NAMESPACE = re.compile(r"xmlns:xacro\s*=")
 _VARIABLES = ("ROS_DISTRO", "ROS_VERSION")  # of the environment, that a file may ask for
+_OF_ARGUMENTS = " Arguments are given under robot.xacro_args (init: --xacro-arg NAME=VALUE)."
 _MAX_BYTES = 20_000_000  # of an included file
 # What is replaced in the library: where one is missing, it is a version that nobody has tried.
-_REPLACED = ("safe_eval", "parse", "load_yaml", "_global_symbols", "process_file")
+_REPLACED = ("safe_eval", "parse", "load_yaml", "glob", "_global_symbols", "process_file")
 _REPLACED_SUBSTITUTIONS = ("_eval", "_eval_env", "_eval_optenv", "_eval_find", "convert_value")
 
 
@@ -61,10 +64,9 @@ class Xacro(RobotFormat):
             if isinstance(own, (OutsideError, MissingPackageError)):
                 raise own from error
             reason = " ".join(str(own or error).split()) or type(error).__name__
+            advice = _OF_ARGUMENTS if "rgument" in reason else ""
             raise RobotError(
-                f"{path.name}: xacro cannot expand it: {reason[:600]}. Arguments are given under "
-                "robot.xacro_args (init: --xacro-arg NAME=VALUE), folders of packages under "
-                "robot.package_dirs (init: --package-dirs)."
+                f"{path.name}: xacro cannot expand it: {reason[:600]}.{advice}"
             ) from error
         return packages.named_in(expanded)
 
@@ -126,6 +128,7 @@ def _replace(library: Any, allowed: AllowedFiles, find: Callable[[str], str]) ->
         text, names, symbols
     )
     library.parse = partial(_parsed, library, allowed)
+    library.glob = _Patterns(allowed)
     substitution._eval = partial(_substituted, library, symbols, find)
     substitution._eval_find = find
     substitution._eval_env = _variable
@@ -147,12 +150,14 @@ def _functions_of_xacro(library: Any, allowed: AllowedFiles) -> dict[str, Any]:
     def fatal(*words: object) -> None:
         raise ValueError(" ".join(map(str, words)))
 
-    silent = dict.fromkeys(("message", "warning", "error", "print_location"), lambda *words: "")
+    silent = dict.fromkeys(
+        ("message", "warning", "error", "print_location"), lambda *words, **how: ""
+    )
     return {
         "arg": argument,
         "load_yaml": load_yaml,
         "abs_filename": library.abs_filename_spec,
-        "dotify": lambda table: table,
+        "dotify": lambda *table, **more: dict(*table, **more),
         "tokenize": library.tokenize,
         "fatal": fatal,
         **silent,
@@ -175,13 +180,28 @@ def _parsed(library: Any, allowed: AllowedFiles, given: None, name: str) -> Any:
     return document
 
 
+@dataclass(frozen=True)
+class _Patterns:
+    """Python's module glob, for patterns that begin in a folder that may be read."""
+
+    allowed: AllowedFiles
+
+    def glob(self, pattern: str) -> list[str]:
+        """The files that a pattern means."""
+        self.allowed.require(Path(re.split(r"[*?\[]", pattern)[0] + "_").parent)
+        return glob.glob(pattern)
+
+
 def _text(path: Path) -> str:
     """The text of a file that may be read; XML of it has no document type."""
     if not path.is_file():
         raise RobotError(f"there is no file {path}")
     if path.stat().st_size > _MAX_BYTES:
         raise RobotError(f"{path} is larger than {_MAX_BYTES // 10**6} MB")
-    text = path.read_text(encoding="utf-8")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise RobotError(f"{path} is not UTF-8: {error.reason}") from error
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise RobotError(f"{path} declares a document type or entities")
     return text
@@ -228,14 +248,16 @@ def _substituted(
     convert = library.substitution_args.convert_value
     given = context.get("arg", {})
     functions = {
-        **symbols,
+        **{name: symbols[name] for name in xacro_expression.OF_EVAL},
         "arg": lambda name: convert(given[name], "auto"),
         "find": find,
         "env": _variable,
         "optenv": _optional_variable,
     }
-    names = {name: convert(value, "auto") for name, value in given.items()}
+    names = {name: symbols[name] for name in xacro_expression.BELOW_ARGUMENTS}
+    names |= {name: convert(value, "auto") for name, value in given.items()}
     names |= {**functions, "true": True, "false": False}
+    functions |= {name: symbols[name] for name in xacro_expression.BELOW_ARGUMENTS}
     return str(xacro_expression.evaluate(text, names, functions))
 
 

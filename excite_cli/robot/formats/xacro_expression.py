@@ -9,6 +9,7 @@ the listed functions, which have no attributes here. Sizes of numbers and texts 
 
 import ast
 import builtins
+import datetime
 import math
 import operator
 import re
@@ -39,6 +40,8 @@ _OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
     ast.Pow: operator.pow,
+    ast.BitAnd: operator.and_,
+    ast.BitOr: operator.or_,
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
     ast.Lt: operator.lt,
@@ -58,13 +61,14 @@ _SIGNS: dict[type, Callable[[Any], Any]] = {
 _METHODS: dict[type, tuple[str, ...]] = {
     str: (
         *("capitalize", "count", "endswith", "find", "isdigit", "join", "lower", "lstrip"),
-        *("replace", "rsplit", "rstrip", "split", "startswith", "strip", "title", "upper"),
+        *("isnumeric", "partition", "replace", "rsplit", "rstrip", "split", "splitlines"),
+        *("startswith", "strip", "title", "upper", "zfill"),
     ),
     list: ("count", "index"),
     tuple: ("count", "index"),
     dict: ("get", "items", "keys", "values"),
 }
-_PLAIN = (str, int, float, bool, list, tuple, dict, set, type(None))
+_PLAIN = (str, int, float, bool, list, tuple, dict, set, type(None), datetime.date)
 # A width of several digits in `'%5d' % x` could ask for any amount of memory.
 _WIDE = re.compile(r"%[^a-zA-Z%]*(\d{3}|\*)")
 
@@ -94,11 +98,29 @@ _MATH: dict[str, Any] = {
     name: getattr(math, name)
     for name in (
         *("acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos"),
-        *("cosh", "degrees", "dist", "e", "exp", "fabs", "floor", "fmod", "hypot", "inf"),
+        *(
+            "cosh",
+            "degrees",
+            "dist",
+            "e",
+            "exp",
+            "fabs",
+            "floor",
+            "fmod",
+            "fsum",
+            "gcd",
+            "hypot",
+            "inf",
+        ),
         *("isclose", "isfinite", "isinf", "isnan", "log", "log10", "log2", "modf", "nan", "pi"),
         *("pow", "radians", "remainder", "sin", "sinh", "sqrt", "tan", "tanh", "tau", "trunc"),
     )
 }
+
+
+# Of `$(eval …)`: names that arguments cannot have, and those that they can.
+OF_EVAL = tuple(_MATH)
+BELOW_ARGUMENTS = ("list", "dict", "map", "str", "float", "int")
 
 
 def symbols(of_xacro: Mapping[str, Any]) -> dict[str, Any]:

@@ -17,9 +17,6 @@ from typing import Any
 
 import coal
 import numpy as np
-import pinocchio as pin
-
-from excite_cli.errors import RobotError
 
 _BINARY, _TEXT = ".glb", ".gltf"
 _MAGIC, _JSON = b"glTF", b"JSON"
@@ -27,33 +24,24 @@ _HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
 _PLACES = ("matrix", "translation", "rotation", "scale")
 
 
-def whole_scenes(geometry: pin.GeometryModel) -> pin.GeometryModel:
-    """The same geometry, where meshes of glTF stand as their scene says.
+def load_whole(path: Path, folder: Path) -> Any:
+    """The geometry of a mesh (coal's), where one of glTF stands as its scene says.
+
+    folder: for a file that is gone afterwards.
 
     Raises
     ------
-    RobotError
-        Such a mesh cannot be read a second time.
+    RuntimeError, ValueError
+        It cannot be read.
     """
-    read: dict[tuple[str, bytes], pin.CollisionGeometry] = {}
-    for item in geometry.geometryObjects:
-        scale = np.asarray(item.meshScale, dtype=float).ravel()
-        key = str(item.meshPath), scale.tobytes()
-        if key not in read:
-            below = _below_a_root(Path(item.meshPath))
-            read[key] = item.geometry if below is None else _read(Path(item.meshPath), below, scale)
-        item.geometry = read[key]
-    return geometry
-
-
-def _read(path: Path, content: bytes, scale: np.ndarray) -> pin.CollisionGeometry:
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / path.name
-        copy.write_bytes(content)
-        try:
-            return coal.MeshLoader().load(str(copy), scale)
-        except (RuntimeError, ValueError) as error:
-            raise RobotError(f"the mesh {path} cannot be loaded: {error}.") from error
+    loader, one = coal.MeshLoader(coal.NODE_TYPE.BV_OBBRSS), np.ones(3)
+    below = _below_a_root(path)
+    if below is None:
+        return loader.load(str(path), one)
+    with tempfile.TemporaryDirectory(dir=folder) as inner:
+        copy = Path(inner) / path.name
+        copy.write_bytes(below)
+        return loader.load(str(copy), one)
 
 
 def _below_a_root(path: Path) -> bytes | None:
@@ -73,7 +61,15 @@ def _below_a_root(path: Path) -> bytes | None:
         scene["nodes"] = [len(tree["nodes"])]
         tree["nodes"].append({"children": [root]})
         _embed(tree, path.parent)
-    except (KeyError, IndexError, TypeError, ValueError, OSError, struct.error):
+    except (
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        OSError,
+        RecursionError,
+        struct.error,
+    ):
         return None  # several roots, or no glTF that could be read so
     return _joined(json.dumps(tree).encode(), chunks)
 
@@ -104,5 +100,7 @@ def _embed(tree: dict[str, Any], folder: Path) -> None:
     for buffer in tree.get("buffers", ()):
         uri = buffer.get("uri", "data:")
         if not uri.startswith("data:"):
+            if not (folder / uri).is_file():
+                raise ValueError(f"{uri} is no file")
             data = base64.b64encode((folder / uri).read_bytes()).decode()
             buffer["uri"] = f"data:application/octet-stream;base64,{data}"
