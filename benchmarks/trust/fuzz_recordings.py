@@ -69,7 +69,8 @@ def odd_samples(rng: Rng, data: dict[str, Array]) -> dict[str, Array]:
         elif way == 1:
             column[:] = column[::-1].copy()
         elif way == 2:
-            column *= value
+            with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+                column *= value
         elif way == 3:
             column[:] = rng.permutation(column)
         elif way == 4:

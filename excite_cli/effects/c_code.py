@@ -4,7 +4,9 @@ In the code of an effect `q`, `v`, `a` are the state, `s` the smoothed signs of 
 the torque that the gears carry, `torque` all of the robot's, `tau` what the code adds to, each with
 an entry per joint; `t` and `start` are times in the recording and on the campaign's clock,
 `column` further columns of the log, `load_rate`, `load_bend` and `torque_rate` the first and second
-rates of those torques, `memory` what effects remember. `slopes(q, v, a, j, x, y, z, out)` gives
+rates of those torques, `memory` what effects remember (`memory->since` is the time from the last
+instant to this one); it is kept only where all of an instant is finite. `slopes(q, v, a, j, x, y,
+z, out)` gives
 x ∂τ/∂q_j + y ∂τ/∂v_j + z ∂τ/∂a_j of the rigid bodies, `tilted(roll, pitch, q, out)` what a turned
 base adds, `pushed(f, q, out)` what a force at the tip does; the template says how.
 """

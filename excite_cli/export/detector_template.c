@@ -25,7 +25,7 @@ int excite_detector_begin(excite_detector *detector, real step)
 
 /* Whether the next `residual` (measured torque less excite_torque) says collision on some joint.
  * `load` is that of excite_load; `beyond` gets every filtered residual over its threshold, whose
- * sign tells from which side, and EXCITE_NOT_FINITE where residual, speed or load are not finite. */
+ * sign shows from which side, and EXCITE_NOT_FINITE where residual, speed or load are not finite. */
 int excite_detect(
     excite_detector *detector, const real residual[N], const real v[N], const real load[N],
     real beyond[N])
