@@ -27,7 +27,7 @@ from excite_cli.geometry.link_meshes import link_meshes
 from excite_cli.robot.description import example_robots, load_description
 from excite_cli.robot.mesh_paths import check_mesh_paths
 from excite_cli.robot.model import build_robot, links_by_joint
-from excite_cli.robot.package_search import package_folders
+from excite_cli.robot.package_search import needed_folders
 from excite_cli.robot.urdf_joints import survey
 
 _ARM = Path(__file__).resolve().parents[2] / "data" / "smoke_arm.urdf"
@@ -139,7 +139,7 @@ class UrdfFuzzer(Fuzzer):
         """As the commands: description, joints, packages, model, base parameters, geometry."""
         description = load_description(str(path), relative_to=path.parent)
         survey(description)
-        package_folders(description)
+        needed_folders(description)
         robot = build_robot(RobotSpec(urdf=str(path)), path.parent)
         links_by_joint(robot)
         if robot.n <= 12:
