@@ -13,6 +13,7 @@ import numpy as np
 from excite_cli.errors import FileError, nearest
 from excite_cli.measurement.dataset import Array
 
+_LARGEST = 1e12  # of any number, as of measured data: squares of larger ones overflow
 _CHANNELS = {"q": "position", "v": "speed", "a": "acceleration"}
 _LISTED = 12
 # Share by which changes and rates may differ; the change below which nothing is compared, and the
@@ -58,8 +59,8 @@ def checked(path: Path, motion: TimedMotion) -> TimedMotion:
             f"{path} has {len(t)} instants of {len(names)} joints; a motion needs at least two "
             "instants of one joint."
         )
-    if not np.isfinite(t).all():
-        row = int(np.argmin(np.isfinite(t)))
+    if not (good := np.abs(t) <= _LARGEST).all():
+        row = int(np.argmin(good))
         raise FileError(f"{path}: instant {row + 1} of {len(t)} is not a number.")
     if not (np.diff(t) > 0).all():
         row = int(np.argmax(np.diff(t) <= 0))
@@ -69,11 +70,11 @@ def checked(path: Path, motion: TimedMotion) -> TimedMotion:
         )
     for channel, words in _CHANNELS.items():
         values = getattr(motion, channel)
-        if values is not None and not np.isfinite(values).all():
-            row, joint = np.argwhere(~np.isfinite(values))[0].tolist()
+        if values is not None and not (good := np.abs(values) <= _LARGEST).all():
+            row, joint = np.argwhere(~good)[0].tolist()
             raise FileError(
                 f"{path}: the {words} of '{names[joint]}' at {t[row]:.6g} s (instant {row + 1}) "
-                "is missing or not a number."
+                "is missing, or no number of a robot."
             )
     _check_agreement(path, motion, "position", motion.q, motion.v)
     if motion.v is not None:

@@ -134,9 +134,11 @@ def unusable(description: RobotDescription, kind: Kind) -> dict[str, Unusable]:
                 "meant, add its folder to robot.package_dirs"
             )
             wrong.setdefault(link, Unusable(leaves))
-        elif outer := next((each for each in _named_by(path) if not files.may_read(each)), None):
-            leaves = f"the mesh {path} names {outer}, outside the robot's own folders"
-            wrong.setdefault(link, Unusable(leaves))
+        elif outer := next((each for each in _named_by(path) if not _is_own(files, each)), None):
+            where = (
+                "no regular file" if files.may_read(outer) else "outside the robot's own folders"
+            )
+            wrong.setdefault(link, Unusable(f"the mesh {path} names {outer}, {where}"))
         else:
             named.setdefault(path, []).append(link)
     if not description.source.startswith(EXAMPLE_PREFIX):
@@ -144,6 +146,10 @@ def unusable(description: RobotDescription, kind: Kind) -> dict[str, Unusable]:
             for link in named[path]:
                 wrong.setdefault(link, Unusable(fault))
     return wrong
+
+
+def _is_own(files: MeshFiles, path: Path) -> bool:
+    return files.may_read(path) and not (path.exists() and not path.is_file())
 
 
 def _named_by(mesh: Path) -> Iterator[Path]:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,10 +11,11 @@ import pytest
 from benchmarks.trust.fuzz_meshes import VALID
 from excite_cli.errors import RobotError
 from excite_cli.proposal.propose import Request, propose
-from excite_cli.robot.allowed_files import OutsideError, own_folder
+from excite_cli.robot.allowed_files import OutsideError, needed, own_folder
 from excite_cli.robot.description import load_description
-from excite_cli.robot.mesh_paths import Kind, check_mesh_paths
+from excite_cli.robot.mesh_paths import Kind, check_mesh_paths, located
 from excite_cli.robot.package_search import load_with_folders
+from excite_cli.robot.srdf import srdf_near
 
 STL = VALID["stl"]
 XACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm">{0}<link name="base"/>
@@ -48,6 +50,7 @@ OF_XACRO = {
     "include above": '<xacro:include filename="../../outside/s.xacro"/>',
     "include by an absolute path": '<xacro:include filename="{outside}/s.xacro"/>',
     "include by a link": '<xacro:include filename="linked/s.xacro"/>',
+    "include by a pattern": '<xacro:include filename="../../outside/*.xacro"/>',
     "include by a property": (
         '<xacro:property name="p" value="{outside}"/><xacro:include filename="${{p}}/s.xacro"/>'
     ),
@@ -78,16 +81,6 @@ def test_a_xacro_reads_its_own_folder_only(text: str, robot: Path) -> None:
     assert "secret" not in words
 
 
-def test_a_pattern_finds_nothing_outside(robot: Path) -> None:
-    path = robot / "arm.xacro"
-    path.write_text(XACRO.format('<xacro:include filename="../../outside/*.xacro"/>'))
-    try:
-        text = load_description(str(path)).xml
-    except OutsideError:  # of a system without Landlock
-        text = ""
-    assert "secret" not in text
-
-
 def test_a_variable_that_is_not_read_has_its_default(
     robot: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -107,6 +100,10 @@ OF_MJCF = {
     "mesh by an absolute path": MESH.format("{outside}/s.stl"),
     "mesh above": MESH.format("../../outside/s.stl"),
     "mesh by a link": MESH.format("linked.stl"),
+    "mesh above what is not there": MESH.format("none/../../../outside/s.stl"),
+    "mesh with backslashes": MESH.format("..\\..\\outside\\s.stl"),
+    "include with backslashes": '<include file="..\\..\\outside\\s.xml"/>',
+    "include in a namespace": '<include xmlns="u" file="own.xml"/>',
     "folder of meshes": '<compiler meshdir="../../outside"/>' + MESH.format("s.stl"),
     "absolute folder of meshes": '<compiler meshdir="{outside}"/>' + MESH.format("s.stl"),
     "folder of assets": '<compiler assetdir="{outside}"/>' + MESH.format("meshes/s.stl"),
@@ -205,6 +202,80 @@ def test_what_a_mesh_names_is_not_read_outside(robot: Path) -> None:
         description = load_description(str(urdf(robot, kind, name)))
         with pytest.raises(RobotError, match=r"names .*, outside the robot's own folders"):
             check_mesh_paths(description, kind)
+
+
+@pytest.mark.parametrize(
+    "name", [".hidden", "..", ".", "etc", "tmp", "a/b", "*", "", "-x", "a\x1b]0;b"]
+)
+def test_no_odd_name_of_a_package_is_allowed_with_all_that_was_found(
+    name: str, robot: Path
+) -> None:
+    for parent in robot.parents[:2]:
+        (parent / ".hidden").mkdir(exist_ok=True)
+    path = robot / "arm.xacro"
+    path.write_text(
+        XACRO.format(f'<xacro:include filename="$(find {name.replace(chr(27), "")})/x"/>')
+    )
+    with pytest.raises(RobotError) as caught:
+        load_description(str(path))
+    assert not isinstance(caught.value, OutsideError) or not caught.value.needed.near
+
+
+def test_what_holds_everything_is_never_proposed_as_near(robot: Path) -> None:
+    for folder in (Path("/"), Path("/etc"), Path.home(), Path.home().parent):
+        assert not needed("a mesh", folder, robot / "arm.urdf").near
+    assert needed("a mesh", robot.parent / "hand", robot / "arm.urdf").near is False  # not there
+    (robot.parent / "hand").mkdir()
+    assert needed("a mesh", robot.parent / "hand", robot / "arm.urdf").near
+
+
+def test_what_a_terminal_is_asked_cannot_be_forged(robot: Path) -> None:
+    said = str(needed("x\x1b]0;\n" + 200 * "y", robot, robot / "arm.urdf"))
+    assert "\x1b" not in said
+    assert "\n" not in said
+    assert said.endswith(f"yyy in {robot}")
+    assert len(said) < 100 + len(str(robot))
+
+
+def test_mjcf_files_above_each_other_in_one_package_are_read(tmp_path: Path) -> None:
+    """As scenes that include robots that include defaults."""
+    texts = {
+        "scenes/scene.xml": '<mujoco><include file="../robots/arm.xml"/></mujoco>',
+        "robots/arm.xml": (
+            '<mujocoinclude><include file="../common/defaults.xml"/><worldbody><body><joint/>'
+            '<geom size="0.1" mass="1"/></body></worldbody></mujocoinclude>'
+        ),
+        "common/defaults.xml": "<mujocoinclude><option timestep='0.01'/></mujocoinclude>",
+    }
+    (tmp_path / "package.xml").write_text("<package><name>scenes</name></package>")
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_text(text)
+    assert "<joint" in load_description(str(tmp_path / "scenes" / "scene.xml")).xml
+
+
+@pytest.mark.parametrize("line", ["mtllib s.mtl", "mtllib \\\ns.mtl", "\x0cmtllib s.mtl"])
+def test_this_process_reads_copies_of_meshes_only(line: str, robot: Path) -> None:
+    (robot / "s.mtl").symlink_to(robot.parents[1] / "outside" / "s.yaml")
+    (robot / "s.obj").write_bytes(line.encode() + b"\n" + VALID["obj"])
+    description = load_description(str(urdf(robot, "collision", "s.obj")))
+    try:
+        check_mesh_paths(description)
+    except RobotError:
+        return
+    (mesh,) = ElementTree.fromstring(located(description, "collision")).iter("mesh")
+    copy = Path(mesh.get("filename", ""))
+    assert copy.suffix == ".stl"
+    assert not copy.is_relative_to(robot)
+
+
+def test_nothing_waits_for_a_pipe(robot: Path) -> None:
+    os.mkfifo(robot / "arm.srdf")
+    os.mkfifo(robot / "pipe.mtl")
+    (robot / "m.obj").write_bytes(b"mtllib pipe.mtl\n" + VALID["obj"])
+    assert srdf_near(robot / "arm.urdf") == []
+    with pytest.raises(RobotError, match="no regular file"):
+        check_mesh_paths(load_description(str(urdf(robot, "collision", "m.obj"))))
 
 
 def test_init_says_what_it_would_allow_and_writes_what_was_allowed(robot: Path) -> None:
