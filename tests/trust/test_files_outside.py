@@ -222,6 +222,7 @@ def test_no_odd_name_of_a_package_is_allowed_with_all_that_was_found(
 
 
 def test_what_holds_everything_is_never_proposed_as_near(robot: Path) -> None:
+    (robot / "arm.urdf").touch()
     for folder in (Path("/"), Path("/etc"), Path.home(), Path.home().parent):
         assert not needed("a mesh", folder, robot / "arm.urdf").near
     assert needed("a mesh", robot.parent / "hand", robot / "arm.urdf").near is False  # not there
