@@ -36,6 +36,11 @@ class MissingPackageError(RobotError):
         super().__init__(f"the package '{name}' is not in the folders that may be read")
 
 
+def is_name(name: str) -> bool:
+    """Whether a package may be called so: by one folder's name, which is not hidden."""
+    return bool(_NAME.match(name))
+
+
 def find_package(name: str, allowed: AllowedFiles) -> Path:
     """Folder of the package `name`, among the folders that a file may read.
 
@@ -44,7 +49,7 @@ def find_package(name: str, allowed: AllowedFiles) -> Path:
     MissingPackageError
         It is in none of them.
     """
-    for folder in allowed.folders if _NAME.match(name) else ():
+    for folder in allowed.folders if is_name(name) else ():
         found = package_in(folder, name)
         if found is not None and allowed.has(found):
             return found
@@ -57,7 +62,7 @@ def missing_package(name: str, allowed: AllowedFiles) -> RobotError:
     A package that is nowhere may be the one that the file lies in (`unnamed_package`).
     """
     path = allowed.path
-    there = search_package(name, path) or unnamed_package(path)
+    there = search_package(name, path) or (unnamed_package(path) if is_name(name) else None)
     name = name[:_SHOWN]
     if there is not None:
         what = needed(f"the package '{name}'", there, path)
@@ -76,7 +81,7 @@ def search_package(name: str, near: Path, inside: str = "") -> Path | None:
     variables of ROS and Gazebo name. What belongs to another user is passed over: anybody may put
     a folder into /tmp.
     """
-    for folder in folders_of_packages(near) if _NAME.match(name) else ():
+    for folder in folders_of_packages(near) if is_name(name) else ():
         named = [folder / name] if inside else []
         for found in (*named, package_in(folder, name)):
             if found is None or holds_everything(found) or not is_trusted(found, near):

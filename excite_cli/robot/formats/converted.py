@@ -31,6 +31,7 @@ from excite_cli.robot.formats.kept_meshes import is_sound, kept_meshes_folder
 from excite_cli.robot.mesh_trial import MAX_BYTES
 from excite_cli.robot.packages import (
     MissingPackageError,
+    is_name,
     missing_package,
     search_package,
     unnamed_package,
@@ -81,7 +82,7 @@ def _without(name: str, path: Path, asked: Asked) -> Asked:
     """
     allowed, own = allowed_files(path, asked.package_dirs), unnamed_package(path)
     stands = own is not None and allowed.has(own) and search_package(name, path) is None
-    if not stands or name in asked.absent or len(asked.absent) >= _MOST_ABSENT:
+    if not stands or not is_name(name) or name in asked.absent or len(asked.absent) >= _MOST_ABSENT:
         raise missing_package(name, allowed)
     return replace(asked, absent=(*asked.absent, name))
 
