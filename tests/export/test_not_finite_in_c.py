@@ -51,35 +51,35 @@ class Detector:
     """The C file's, one instant after the other."""
 
     def __init__(self, library: ctypes.CDLL, n: int, step: float) -> None:
-        self.library, self.beyond = library, np.zeros(n)
+        self.code, self.beyond = library, np.zeros(n)
         self.state = ctypes.create_string_buffer(16 * n + 256)
         self.begin(step)
 
     def begin(self, step: float) -> None:
-        self.library.excite_detector_begin(self.state, ctypes.c_double(step))
+        self.code.excite_detector_begin(self.state, ctypes.c_double(step))
 
     def __call__(self, *rows: Array) -> int:
         given = [np.ascontiguousarray(row) for row in (*rows, self.beyond)]
         pointers = [row.ctypes.data_as(ctypes.c_void_p) for row in given]
-        return int(self.library.excite_detect(self.state, *pointers))
+        return int(self.code.excite_detect(self.state, *pointers))
 
 
 class Stepper:
     """`excite_torque`, one instant after the other."""
 
     def __init__(self, library: ctypes.CDLL, n: int, step: float = STEP, start: float = 0.0):
-        self.library, self.tau = library, np.zeros(n)
+        self.code, self.tau = library, np.zeros(n)
         self.memory = ctypes.create_string_buffer(8 * 24 * n + 256)
         library.excite_begin.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double]
         self.begin(step, start)
 
     def begin(self, step: float, start: float = 0.0) -> None:
-        self.library.excite_begin(self.memory, step, start)
+        self.code.excite_begin(self.memory, step, start)
 
     def __call__(self, *rows: Array) -> tuple[int, Array]:
         given = [np.ascontiguousarray(row) for row in (*rows, self.tau)]
         pointers = [row.ctypes.data_as(ctypes.c_void_p) for row in given]
-        said = self.library.excite_torque(self.memory, *pointers)
+        said = self.code.excite_torque(self.memory, *pointers)
         return int(said), self.tau.copy()
 
 
