@@ -90,6 +90,15 @@ def test_an_expression_runs_nothing(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("text", ["b'a'", "1j", "...", "module", "[module][0]", "stranger('x')"])
+def test_no_value_of_another_kind_comes_in(text: str) -> None:
+    """Whatever the library may put among its symbols, only plain data and listed functions pass."""
+    table = symbols({"load_yaml": dict, "abs_filename": str, "dotify": dict})
+    names = {**table, "module": sys, "stranger": print}
+    with pytest.raises(ValueError, match="a value of type"):
+        evaluate(text, names, table)
+
+
 # Ways to an expression: attributes, text, arguments of macros, `eval`, included files, tables.
 WAYS = {
     "property": '<xacro:property name="p" value="${{{0}}}"/><a b="${{p}}"/>',
