@@ -39,7 +39,7 @@ def kill_caches(folder: Path, kills: int, seed: int) -> Tally:
         os.kill(process, signal.SIGKILL)
         os.waitpid(process, 0)
         tally.kills += 1
-        found, read = stored_capsules(_OTHER), stored_arrays(_KEY)
+        found, read = stored_capsules(_OTHER, 0), stored_arrays(_KEY)
         paths = (inner / f"meshes-{_OTHER}.npz", inner / f"meshes-{_KEY}.npz")
         for path, content in zip(paths, (found, read), strict=True):
             if path.exists() and content is None:
@@ -64,7 +64,7 @@ def kill_caches(folder: Path, kills: int, seed: int) -> Tally:
     store_capsules(_OTHER, capsules)
     store_arrays(_KEY, arrays)
     over = [each.name for each in inner.iterdir() if each.name.startswith(".")]
-    if over or stored_capsules(_OTHER) is None or stored_arrays(_KEY) is None:
+    if over or stored_capsules(_OTHER, 0) is None or stored_arrays(_KEY) is None:
         tally.broken.append(f"left after the last run: {', '.join(over)}")
     tally.swept, tally.finished = left, 1
     return tally

@@ -13,6 +13,7 @@ import numpy as np
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.dataset import Array, Finding
+from excite_cli.measurement.hdf5_attributes import attribute
 from excite_cli.measurement.memory_limit import is_shortage, limited_memory
 from excite_cli.measurement.reader import (
     RawRun,
@@ -79,7 +80,7 @@ def _runs(path: Path, file: Any, wanted: ReadOptions) -> list[RawRun]:
         if not found:
             raise FileError(f"{path}: /runs has no group with {_needed(wanted)}.")
         return _all(path, file, found, wanted)
-    kind = str(file.attrs.get("kind", file.attrs.get("content", "")))
+    kind = str(attribute(file, "kind", attribute(file, "content", "")))
     if kind in ("fit", "diagnosis"):
         raise FileError(
             f"{path} holds a {kind}, not measured data. Give the recordings that it was made from."
@@ -189,7 +190,7 @@ def _run(path: Path, file: Any, group: Any, name: str, wanted: ReadOptions) -> R
     columns, others = _by_channel(where, arrays, names, wanted)
     text = f"not numbers per sample, left out: {', '.join(skipped)}"
     findings = (Finding("left_out", "note", text),) if skipped else ()
-    epoch = group.attrs.get("epoch")  # as written beside simulated data
+    epoch = attribute(group, "epoch")  # as written beside simulated data
     known = isinstance(epoch, float) and np.isfinite(epoch)
     return RawRun(
         name, t, columns, others, False, not stamped, findings, group.name,
@@ -245,8 +246,9 @@ def _values(path: Path, group: Any, name: str) -> Array:
 def _joint_names(where: str, file: Any, group: Any) -> tuple[str, ...]:
     """Names of the columns, from the run, from /runs or from the root."""
     for holder in (group, file.get("runs", file), file):
-        if "joint_names" in holder.attrs:
-            value = np.atleast_1d(np.asarray(holder.attrs["joint_names"], dtype=object))
+        found = attribute(holder, "joint_names")
+        if found is not None:
+            value = np.atleast_1d(np.asarray(found, dtype=object))
             names = [_text(item) for item in value.ravel()]
             if not names or not all(names) or len(set(names)) != len(names):
                 raise FileError(

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.given_files import require_stored
+from excite_cli.measurement.hdf5_attributes import attribute, require_plain
 from excite_cli.measurement.memory_limit import limited_memory
 
 PROGRAM = "excite"
@@ -36,7 +37,7 @@ def is_marked(path: Path, own: OwnFile) -> bool:
     name, value = own.marker
     try:
         with limited_memory(path), h5py.File(path, "r") as file:
-            return str(file.attrs.get(name, "")) == value
+            return str(attribute(file, name, "")) == value
     except Exception:  # damaged, in whatever way: whoever reads it says so
         return False
 
@@ -60,6 +61,7 @@ def opened(path: Path, own: OwnFile) -> Iterator[Any]:
         raise FileError(f"There is no file {path}.")
     try:
         with limited_memory(path), h5py.File(path, "r") as file:
+            require_plain(file)
             _check(file.attrs, path, own)
             _check_contents(file, path)
             yield file
@@ -94,6 +96,7 @@ def _check_contents(file: Any, path: Path) -> None:
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 raise ValueError(f"'{name}' is a link; only data in the file itself is read")
             member = group[name]
+            require_plain(member)
             if isinstance(member, h5py.Dataset):
                 if member.is_virtual or member.external:
                     raise ValueError(f"'{name}' keeps its data in other files")
