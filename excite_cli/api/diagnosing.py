@@ -58,7 +58,8 @@ def diagnose(
 
     `data` are measured data or their files. Written to `output` (HDF5) if that is given, and the
     config with what was found to `apply` (YAML); where the error on sealed data did not fall
-    (`good` is false), that is written with `apply_unconfirmed` only. `smallest`: with the fewest
+    (`good` is false), that is written with `apply_unconfirmed` only, and where the textbook's model
+    is better (`worse_than_textbook`), that one is. `smallest`: with the fewest
     effects that are within one standard error of the best on runs left out. `workers`
     (`open_workers`) share the runs; every number is the same without.
 
@@ -97,6 +98,11 @@ def diagnose(
             write_diagnosis(Path(output), found)
         if apply is not None and (found.good or apply_unconfirmed):
             save_config(apply, problem, found, unconfirmed=True, smallest=smallest)
+        elif apply is not None and found.worse_than_textbook:
+            path = Path(apply)
+            text = found_config(problem.spec, problem.folder, found, path, textbook=True)
+            write_text_atomically(path, text)
+            tell(Note(Level.WARNING, f"{apply} has the textbook's effects. {_HAVE_IT}"))
         elif apply is not None:
             tell(Note(Level.WARNING, f"{apply} is not written. {_HAVE_IT}"))
         return found

@@ -195,8 +195,10 @@ class IdentificationSpec(Section):
     method: Literal["ols", "wls", "irls"] = Field(
         "wls", description="ordinary, weighted by joint, or robust least squares"
     )
-    inertias: Literal["free", "cad"] = Field(
-        "free", description="cad: kept at the URDF's values within `uncertainty`"
+    inertias: Literal["auto", "free", "cad"] = Field(
+        "auto",
+        description="cad: kept at the URDF's values within `uncertainty`; auto: free in identify, "
+        "and in diagnose kept as near the URDF's as predicts data left out best",
     )
     uncertainty: Positive = Field(
         0.1, description="one standard deviation of the URDF's inertial parameters, as a share"

@@ -25,6 +25,7 @@ class KeptInertias:
 class Model:
     """What is known before: robot, declared effects, a prior on the inertias, states of runs.
 
+    `by_data`: how wide the prior is the data choose (`inertia_prior`).
     `weighed` (m, r + k + 1): rows [W target] in standard deviations, over the base parameters and
     the parameters of the declared effects.
     """
@@ -35,6 +36,7 @@ class Model:
     prior: KeptInertias | None
     states: States = field(default_factory=dict)
     weighed: Array | None = None
+    by_data: bool = False
 
     @property
     def declared_width(self) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import joint_aliases, other_name
-from excite_cli.diagnosis.before_after import Played, both_models, on_sealed
+from excite_cli.diagnosis.before_after import Played, both_models, on_sealed, refitted
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
@@ -32,12 +32,15 @@ from excite_cli.diagnosis.records import (
     EffectRecord,
     ErrorPath,
     JointAlias,
+    Textbook,
     Unexplained,
 )
 from excite_cli.diagnosis.rounds import order_of, rounds_of
 from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors, sealed_errors
 from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
 from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
+from excite_cli.diagnosis.sufficient import sufficient
+from excite_cli.diagnosis.textbook import textbook
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.unexplained import unexplained_structure
@@ -82,8 +85,9 @@ def diagnose(
 ) -> Diagnosis:
     """Find what the declared model of `spec` lacks, and measure the error before and after.
 
-    Where the fit of free inertias is worse than what it was fitted to by far, or than the untouched
-    URDF, the same is done with the URDF's inertias kept, and the error of that is told (`overfit`).
+    Inertias are kept as near the URDF's as predicts best (`inertia_prior`), unless the config says
+    how. Where a fit of free ones is worse than what it was fitted to by far, or than the untouched
+    URDF, the same is done with the URDF's kept, and the error of that is told (`overfit`).
 
     Nothing of the sealed part is used but for `before` and `after`. Texts of the configuration and
     versions are left to the caller (`dataclasses.replace`).
@@ -99,7 +103,7 @@ def diagnose(
     if not is_overfit(found, spec.identification.inertias):
         return found
     kept: Diagnosis | None = None
-    if found.untouched is not None:  # the URDF has inertias that may be kept
+    if found.untouched is not None and spec.identification.inertias == "free":
         progress("overfit: the same with the URDF's inertias", 9)
         identification = spec.identification.model_copy(update={"inertias": "cad"})
         held = spec.model_copy(update={"identification": identification})
@@ -141,7 +145,8 @@ def _diagnosed(
         traced = _traced(model, spec, parts, processing, progress, start)
         kept = prepare_all(parts.sealed, processing)
     progress("naming", 8)
-    final = final_fit(traced)
+    model = traced.model
+    final = final_fit(replace(traced, chosen=tuple(sufficient(traced.judge, traced.chosen))))
     traced, parameters, covariance = final.traced, final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
     floor = noise_floor(parts.training, processing)
@@ -163,9 +168,10 @@ def _diagnosed(
     played = Played(robot, kept)
     told = played.predictions(models[0]), played.predictions(models[1])
     sealed_part = on_sealed(played, *told)
-    from_urdf = model.prior is not None and bool(sealed_part.by_urdf)
+    from_urdf = spec.identification.inertias == "cad" and bool(sealed_part.by_urdf)
     begin = sealed_part.by_urdf if from_urdf else told[0]
     errors = sealed_errors(played, model, traced, models[1], begin, told[1], from_urdf)
+    book = refitted(model, traced, textbook(traced.judge)) if spec.diagnosis.rounds else models[0]
     taken_off = error_parts(traced, errors)
     worth = worth_on_sealed(Played(robot, [*kept, *ends]), model, traced, models[1])
     named, candidates, rivals = named_effects(
@@ -219,6 +225,10 @@ def _diagnosed(
         assumed=assumed,
         parts=on_sealed_ends(model, models, parts.ends, processing),
         untouched=sealed_part.untouched,
+        textbook=Textbook(
+            tuple(record_of(*each) for each in _found_in(book, model, robot)),
+            played.errors(played.predictions(book)),
+        ),
         skeleton=skeleton_of(robot),
         recorded=recorded(dataset),
         large_rests=rests,
@@ -229,6 +239,14 @@ def _diagnosed(
         inertia_parts=_by_joint(robot, taken_off[INERTIAS]) if from_urdf else {},
         friction_lines=data_sheet_lines(model, traced, parameters, covariance),
     )
+
+
+def _found_in(
+    fitted: IdentifiedModel, model: Model, robot: Robot
+) -> Iterator[tuple[Effect, Sequence[str], Array]]:
+    """Effects of a model beside the declared ones, names of the joints, values."""
+    for effect, values in list(fitted.by_effect)[len(model.declared) :]:
+        yield effect, robot.joint_names, values
 
 
 def _path(
@@ -353,19 +371,23 @@ def _joint_aliases(
 
 def _absorbed(model: Model, traced: Traced) -> tuple[Absorbed, ...]:
     names = _column_names(model), model.robot.joint_names
-    found = absorbed_effects(traced.judge.white, traced.candidates, *names, traced.chosen)
+    white = traced.judge.white.without_prior if model.by_data else traced.judge.white
+    found = absorbed_effects(white, traced.candidates, *names, traced.chosen)
     return tuple(found)
 
 
 def _model(robot: Robot, base: BaseParameters, spec: Spec, still: bool) -> Model:
     """`still`: a joint does not move, and noise alone decides what only its motion shows."""
     prior, cad = None, standard_parameters(robot)
-    if spec.identification.inertias == "cad" or (still and cad[::10].any()):
+    by_data = spec.identification.inertias == "auto" and bool(cad[::10].any())
+    if by_data:
+        prior = KeptInertias(cad, prior_rows(robot, cad, 1.0))
+    elif spec.identification.inertias == "cad" or (still and cad[::10].any()):
         prior = KeptInertias(cad, prior_rows(robot, cad, spec.identification.uncertainty))
     declared = declared_effects(spec.effects, robot)
     known = weighed(spec.identification, declared, robot, base)
     rows = np.column_stack([known.rows, known.target])
-    return Model(robot, base, known.effects, prior, spec.runs, rows)
+    return Model(robot, base, known.effects, prior, spec.runs, rows, by_data)
 
 
 def _column_names(model: Model) -> list[str]:

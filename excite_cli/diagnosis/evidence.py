@@ -8,12 +8,11 @@ rest of the model held, and judged on the other. So are the directions that no o
 an effect is in all folds but that one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from excite_cli.diagnosis.cholesky import RIDGE, Cholesky
 from excite_cli.diagnosis.grams import Grams
@@ -27,15 +26,13 @@ from excite_cli.diagnosis.schur import (
 )
 from excite_cli.robot.model import Array
 
-_UNKNOWN = 1e-4  # of what all folds know
 # A column of which a fold has less of the energy is not there in it: where one run passes the
 # speeds of Stribeck friction and the other hardly does (5e-10), a size fitted to the other is
 # 30 N·m instead of 0.05, and what explains 98 % of a residual had no gain on runs left out.
 _THERE = 1e-5
 _RIDGE_ALONE = 1e-6  # of its own energy: half a run may not determine all that a run does
-# Where the other side of a fold has less of such a column than this share, both sides fit it.
-_LEAST_SIDE = 0.1
 _BY_WEIGHT = 4.0  # times what the data leave: the deviation is half of theirs, or less
+_NEXT_TO_NOTHING = 1e-6  # of a prior's precision
 _KEPT = 6  # projections that are kept: a step of a search asks for the same few again
 
 
@@ -68,7 +65,7 @@ class Evidence:
         self.total = total / np.outer(norms, norms)
         # Searches come back to the same models: what was solved once is kept.
         self._left_out: dict[tuple, Array] = {}
-        self._without: dict[tuple[int, ...], list[tuple[Array, Array]]] = {}
+        self._without: dict[tuple[int, ...], Array] = {}
         self._solved: dict[tuple[int, ...], Array] = {}
         self._on: dict[tuple, float] = {}
         self._energies: dict[tuple[int, ...], float] = {}
@@ -79,12 +76,21 @@ class Evidence:
         energies = grams.seen()[:, :-1]
         self._seen = energies > _THERE * energies.sum(axis=0)
         self._weighed = prior is not None and weighed is not None and bool(weighed.any())
+        self._weight = weighed
         self._by_data = None if prior is None or weighed is None else prior - weighed
 
     @cached_property
     def _unweighed(self) -> "Evidence":
         """The same without what was weighed."""
         return Evidence(self.grams, self.fixed, self.blocks, self.rows_of, self._by_data)
+
+    @cached_property
+    def without_prior(self) -> "Evidence":
+        """The same with so wide a prior that data and what was weighed say all; itself if none."""
+        if self._by_data is None or self._weight is None or not self._by_data.any():
+            return self
+        prior = _NEXT_TO_NOTHING * self._by_data + self._weight
+        return Evidence(self.grams, self.fixed, self.blocks, self.rows_of, prior, self._weight)
 
     @property
     def torque(self) -> int:
@@ -158,15 +164,39 @@ class Evidence:
         Its block of the inverse is the inverse of what the others leave of it.
         """
         key = tuple(chosen)
-        if key not in self._inverses:
-            self._inverses.clear()
-            self._inverses[key] = self.factor(key).solve(np.eye(len(self.columns(key))))
-        widths = [len(self.blocks[i]) for i in key]
-        start = self.fixed + sum(widths[: key.index(member)])
-        own = slice(start, start + len(self.blocks[member]))
-        left = np.asarray(np.linalg.inv(self._inverses[key][own, own]))
+        own = self._own_columns(member, key)
+        left = np.asarray(np.linalg.inv(self._inverse(key)[own, own]))
         values = (self.solve(key) * self.norms[self.columns(key)])[own]
         return gain_of_columns(self._candidates, left, left @ values, (member,), SHARED)
+
+    def schur_without(self, member: int, chosen: Sequence[int]) -> Schur:
+        """As `schur` of the chosen ones but one of them, from that of all: a projection each.
+
+        With W = N⁻¹ G_Sc, its rows W_i and the block P_ii of N⁻¹ of the member, what is left of a
+        candidate grows by W_iᵀ P_ii⁻¹ W_i, and the residual's energy by θ_iᵀ P_ii⁻¹ θ_i.
+        """
+        key, rest = tuple(chosen), tuple(i for i in chosen if i != member)
+        if self._weighed or rest in self._schurs:
+            return self.schur(rest)
+        whole, own = self.schur(key), self._own_columns(member, key)
+        inverse = np.asarray(np.linalg.inv(self._inverse(key)[own, own]))
+        values = (self.solve(key) * self.norms[self.columns(key)])[own]
+        if rest not in self._energies:
+            self._energies[rest] = self.energy(key) + float(values @ inverse @ values)
+        return whole.without(own, inverse, values)
+
+    def _own_columns(self, member: int, chosen: tuple[int, ...]) -> slice:
+        """Where a member's parameters are among those of a model."""
+        widths = [len(self.blocks[i]) for i in chosen]
+        start = self.fixed + sum(widths[: chosen.index(member)])
+        return slice(start, start + len(self.blocks[member]))
+
+    def _inverse(self, chosen: tuple[int, ...]) -> Array:
+        """Of the normal matrix of a model; that of the last one is kept."""
+        if chosen not in self._inverses:
+            self._inverses.clear()
+            self._inverses[chosen] = self.factor(chosen).solve(np.eye(len(self.columns(chosen))))
+        return self._inverses[chosen]
 
     def _schur(self, chosen: Sequence[int]) -> Schur:
         at = self.columns(chosen)
@@ -211,13 +241,6 @@ class Evidence:
         norms = self.norms[both]
         return self.grams.on(folds, rows, both, first_side) / (norms[:, None] * norms)
 
-    def _sides(
-        self, fold: int, joints: Sequence[int] | None, at: NDArray[np.intp]
-    ) -> tuple[Array, Array]:
-        """The same of the two sides of a fold."""
-        first = self._part([fold], joints, at, first_side=True)
-        return first, self._part([fold], joints, at) - first
-
     def folds_of(self, candidates: Sequence[int]) -> NDArray[np.bool_]:
         """Folds (F,) in which one of some candidates is there."""
         columns = np.concatenate([self.blocks[i] for i in candidates])
@@ -226,88 +249,79 @@ class Evidence:
     def left_out(self, chosen: Sequence[int], joints: Sequence[int] | None) -> Array:
         """Energy (F,) on the rows of `joints` of each fold, fitted to all other folds.
 
-        What other folds do not know is fitted to the other side of the fold: effects that are there
-        in no other fold, and what would tell apart from the robot those that all others have.
+        Effects that are there in no other fold are fitted to the fold itself, beside the rest.
         """
         key = (tuple(sorted(chosen)), None if joints is None else tuple(joints))
         if key not in self._left_out:
             at = self.columns(key[0])
             found = []
-            for fold, (x, open_) in enumerate(self._fitted_without(at, key[0])):
-                if open_.shape[1]:
-                    found.append(self._crosswise(fold, joints, at, (x, open_)))
-                else:
-                    found.append(_energy(self._part([fold], joints, at), x))
+            for fold, x in enumerate(self._fitted_without(at, key[0])):
+                found.append(_energy(self._part([fold], joints, at), x))
             self._left_out[key] = np.maximum(found, 0.0)
         return self._left_out[key]
 
-    def _fitted_without(
-        self, at: NDArray[np.intp], chosen: tuple[int, ...]
-    ) -> list[tuple[Array, Array]]:
-        """Parameters (k,) fitted to all folds but one, and what these do not know, of each fold."""
+    def on_sides(self, chosen: Sequence[int]) -> Array:
+        """Energy (n, 2F) of each joint on both sides of each fold, fitted to all other sides.
+
+        Sides are blocks of time in turn: every run is in both fits.
+        """
+        key = (tuple(sorted(chosen)), "sides")
+        if key not in self._left_out:
+            at, every = self.columns(key[0]), range(self.grams.folds)
+            both = np.append(at, self.torque)
+            whole = self._part(every, None, at)
+            known = self.total[both[:, None], both] - whole  # without the data
+            first = self._part(every, None, at, first_side=True)
+            found = []
+            for own in (first, whole - first):
+                other = whole - own + known
+                normal = other[:-1, :-1]
+                normal[np.diag_indices(len(at))] += RIDGE
+                found.append(np.linalg.solve(normal, other[:-1, -1]))
+            self._left_out[key] = self._on_blocks(at, lambda fold, side: found[side])
+        return self._left_out[key]
+
+    def as_new(self, chosen: Sequence[int]) -> Array:
+        """Energy (n, 2F) of each joint on both sides of each fold, fitted to all other folds alone.
+
+        What no other fold shows is not there: each fold is predicted as a new recording would be.
+        """
+        key = (tuple(sorted(chosen)), "new")
+        if key not in self._left_out:
+            at = self.columns(key[0])
+            found = self._without_folds(at)
+            self._left_out[key] = self._on_blocks(at, lambda fold, side: found[fold])
+        return self._left_out[key]
+
+    def _on_blocks(self, at: NDArray[np.intp], parameters: Callable[[int, int], Array]) -> Array:
+        """Energy (n, 2F) of each joint on both sides of each fold, with `parameters` of each."""
+        found = np.zeros((len(self.grams.joints), self.grams.folds, 2))
+        for joint in range(len(found)):
+            for fold in range(self.grams.folds):
+                first = self._part([fold], [joint], at, first_side=True)
+                for side, part in enumerate((first, self._part([fold], [joint], at) - first)):
+                    found[joint, fold, side] = _energy(part, parameters(fold, side))
+        return np.maximum(found, 0.0).reshape(len(found), -1)
+
+    def _fitted_without(self, at: NDArray[np.intp], chosen: tuple[int, ...]) -> Array:
+        """Parameters (F, k) fitted to all folds but one, what these do not show to that one."""
         if chosen not in self._without:
+            found = self._without_folds(at)
             seen = self._seen[:, at]
             seen[:, : self.fixed] = True
             alone = seen & (seen.sum(axis=0) == 1)
-            lacking = ~seen & (seen.sum(axis=0) == len(seen) - 1)
-            if self._weighed:  # a gain is told by the fold alone that has the load
-                lacking |= ~alone & (np.arange(len(at)) >= self.fixed)
-            self._without[chosen] = [
-                (x, self._unknown_without(fold, at, alone[fold], lacking[fold]))
-                for fold, x in enumerate(self._without_folds(at))
-            ]
+            for fold in np.flatnonzero(alone.any(axis=1)):
+                own = np.flatnonzero(alone[fold])
+                gram = self._folds[fold][np.ix_(at, at)]
+                rest = found[fold].copy()
+                rest[own] = 0.0
+                rhs = self._folds[fold][at[own], self.torque] - gram[own] @ rest
+                normal = gram[np.ix_(own, own)]
+                normal[np.diag_indices(len(own))] += _RIDGE_ALONE * np.diag(normal) + RIDGE
+                rest[own] = np.linalg.solve(normal, rhs)
+                found[fold] = rest
+            self._without[chosen] = found
         return self._without[chosen]
-
-    def _unknown_without(
-        self,
-        fold: int,
-        at: NDArray[np.intp],
-        alone: NDArray[np.bool_],
-        lacking: NDArray[np.bool_],
-    ) -> Array:
-        """Directions (k, d) of the parameters of which all other folds know next to nothing.
-
-        Columns that are there in this fold `alone`, and of those that it may be `lacking`, alone of
-        all, what the rest of the model could be taken for in the others.
-        """
-        open_ = np.eye(len(at))[:, alone]
-        if not lacking.any():
-            return open_
-        index = (at[:, None], at)
-        others = self.total[index] - self._folds[fold][index]
-        others[np.diag_indices(len(at))] += RIDGE
-        own, rest = np.flatnonzero(lacking), np.flatnonzero(~(lacking | alone))
-        taken = Cholesky(others[np.ix_(rest, rest)]).solve(others[np.ix_(rest, own)])
-        left = others[np.ix_(own, own)] - others[np.ix_(own, rest)] @ taken
-        shares, directions = eigh(left, others[np.ix_(own, own)])
-        unknown = directions[:, shares < _UNKNOWN]
-        more = np.zeros((len(at), unknown.shape[1]))
-        more[own], more[rest] = unknown, -taken @ unknown
-        return np.concatenate([open_, more], axis=1)
-
-    def _crosswise(
-        self,
-        fold: int,
-        joints: Sequence[int] | None,
-        at: NDArray[np.intp],
-        fitted: tuple[Array, Array],
-    ) -> float:
-        """Energy of a fold's two sides, with some directions fitted to the other side."""
-        common, open_ = fitted
-        parts = self._sides(fold, None, at)
-        judged = parts if joints is None else self._sides(fold, joints, at)
-        energies = np.array([np.sum((part[:-1, :-1] @ open_) * open_) for part in parts])
-        energy = 0.0
-        for side in (0, 1):
-            other = parts[1 - side]
-            if energies[1 - side] < _LEAST_SIDE * energies.sum():
-                other = parts[0] + parts[1]
-            rhs = open_.T @ (other[:-1, -1] - other[:-1, :-1] @ common)
-            normal = open_.T @ other[:-1, :-1] @ open_
-            normal[np.diag_indices(len(normal))] += _RIDGE_ALONE * np.diag(normal) + RIDGE
-            x = common + open_ @ np.linalg.solve(normal, rhs)
-            energy += _energy(judged[side], x)
-        return energy
 
     def _without_folds(self, at: NDArray[np.intp]) -> Array:
         """Parameters (F, k) fitted to all folds but one."""

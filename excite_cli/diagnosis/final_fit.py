@@ -4,7 +4,7 @@ What a search has named is fitted once more (`robust_solve`), with standard devi
 serial correlation, what the columns of first-order effects leave, and shapes that fit as well.
 Sizes that no effect can have are moved to the nearest possible ones, all other parameters with them
 as the covariance says. A name whose size is within two standard deviations of zero goes, the
-weakest first, and the search goes on from the others without it.
+weakest first.
 """
 
 from collections.abc import Iterator
@@ -15,10 +15,8 @@ import numpy as np
 from excite_cli.diagnosis.correlated_covariance import covariance_of
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.robust_fit import robust_solve
-from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.dynamics.nearest_inertias import half_of
-from excite_cli.effects.place import Place
 from excite_cli.robot.model import Array
 
 # Relative sd of every size, beside what noise says: filters, differentiated positions and motion
@@ -38,17 +36,13 @@ class FinalFit:
 
 def final_fit(traced: Traced) -> FinalFit:
     """Fit what was found, without what turns out to be insignificant."""
-    closed: set[Place] = set()
     while True:
         found = _fitted(traced)
         sizes = _over_error(found)
         weakest = min(sizes, key=lambda i: sizes[i], default=None)
         if weakest is None or sizes[weakest] > 1.0:
             return found
-        rest = [i for i in traced.chosen if i != weakest]
-        closed.add(traced.candidates[weakest].place)
-        again = Search(traced.judge, len(traced.chosen), closed).run(rest)
-        traced = replace(traced, chosen=tuple(again))
+        traced = replace(traced, chosen=tuple(i for i in traced.chosen if i != weakest))
 
 
 def _fitted(traced: Traced) -> FinalFit:
@@ -65,7 +59,7 @@ def _fitted(traced: Traced) -> FinalFit:
     for i, own in _places(traced, len(parameters)):
         effect, values = traced.candidates[i].effect, parameters[own]
         beside = np.delete(lines[own], own, axis=1).any()  # it is judged with what refines it
-        if not beside and not effect.possible(values, early=False):
+        if not beside and not effect.possible(values):
             whiten = np.linalg.inv(half_of(covariance[own, own]))
             shift = whiten.T @ (whiten @ (effect.nearest(values, covariance[own, own]) - values))
             parameters = parameters + covariance[:, own] @ shift

@@ -147,7 +147,7 @@ class Judgement:
             return self.rules.inflation * _PARENT_PRICE
         return self.price(candidate, dof)
 
-    def _prices(self, chosen: Sequence[int]) -> float:
+    def prices(self, chosen: Sequence[int]) -> float:
         """Price of a set."""
         refined = self.refined_by(chosen)
         return sum(self.price_beside(i, refined, self.candidates[i].width) for i in chosen)
@@ -163,7 +163,7 @@ class Judgement:
 
     def cost(self, chosen: Sequence[int]) -> float:
         """J(S)."""
-        return self.white.energy(chosen) + self._prices(chosen)
+        return self.white.energy(chosen) + self.prices(chosen)
 
     def in_order(self, schur: Schur, chosen: Sequence[int], added: Sequence[int]) -> bool:
         """Whether what `added` refines, or has in its columns, is in, or would not be accepted."""
@@ -212,9 +212,19 @@ class Judgement:
         """As `left_out_gain`, in some folds."""
         joints = sorted({j for i in added for j in self.white.rows_of[i]})
         best = -np.inf
+        single = any(self.candidates[i].effect.runs for i in (*chosen, *added))
         for evidence in (self.plain, self.white):
-            before = evidence.left_out(chosen, joints)[there].sum()
-            after = evidence.left_out([*chosen, *added], joints)[there].sum()
+            if single:  # no other fold may know it: judged on blocks in turn
+                both = there if isinstance(there, slice) else np.repeat(there, 2)
+                before, after = (
+                    evidence.on_sides(each)[np.asarray(joints)][:, both].sum()
+                    for each in (chosen, [*chosen, *added])
+                )
+            else:
+                before, after = (
+                    evidence.left_out(each, joints)[there].sum()
+                    for each in (chosen, [*chosen, *added])
+                )
             best = max(best, 1.0 - float(np.sqrt(after / max(before, 1e-300))))
         return best
 
@@ -251,7 +261,7 @@ class Judgement:
         if not twins:
             return False
         own = self.white.schur(chosen)
-        saved, needed = own.gain(*added, absorbed=SHARED).chi2, self._prices(added)
+        saved, needed = own.gain(*added, absorbed=SHARED).chi2, self.prices(added)
         for twin in (i for i, c in enumerate(self.candidates) if c.place in twins):
             beside = self.white.schur([*chosen, twin]).gain(*added, absorbed=SHARED).chi2
             if beside < needed or own.gain(twin).chi2 > saved:

@@ -19,19 +19,17 @@ class PossibleSizes:
 
     `spread(chosen)` is the covariance of the parameters of a model with these candidates; it is
     asked for only where a value is impossible: what is so by the error of the fit only is allowed
-    (`Effect.why_impossible`). `early_pass`: of a diagnosis, which does not know the
-    torque well yet. `declared`: effects whose parameters come before those of the chosen.
+    (`Effect.why_impossible`). `declared`: effects whose parameters come before those of the chosen.
     """
 
     def __init__(
         self,
         candidates: Sequence[Candidate],
-        early_pass: bool,
         spread: Spread,
         seen: Seen,
         declared: Sequence[Effect] = (),
     ) -> None:
-        self._candidates, self._early, self._seen = candidates, early_pass, seen
+        self._candidates, self._seen = candidates, seen
         self._spread, self._declared = spread, declared
 
     def __call__(self, parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
@@ -48,9 +46,9 @@ class PossibleSizes:
                 continue
             effect, values = self._candidates[i].effect, parameters[own]
             reason = effect.absurd(values, self._seen)
-            if not reason and not effect.possible(values, self._early):
+            if not reason and not effect.possible(values):
                 covariance = self._spread(chosen)[own, own]
-                reason = effect.why_impossible(values, covariance, self._early)
+                reason = effect.why_impossible(values, covariance)
             if effect.varied and not reason:
                 reason = self._too_much_taken(effect, own, parameters, chosen)
             if reason:

@@ -93,6 +93,17 @@ class NamedEffect(Shown):
 
 
 @dataclass(frozen=True)
+class Textbook:
+    """Viscous and Coulomb friction, offset and armature as far as training data left out ask.
+
+    `effects` beside the declared ones, with their values; `error` on the held-out data.
+    """
+
+    effects: tuple[EffectRecord, ...]
+    error: Errors
+
+
+@dataclass(frozen=True)
 class Overfit:
     """Mean relative errors, where joints move, of a fit that the data do not determine.
 
@@ -263,6 +274,7 @@ class Information:
 
 
 _UNCHANGED = 0.02  # of an error that no effect concerns
+_AS_GOOD = 1.02  # times the textbook's error: what is above is said to be worse
 
 
 def _lower(before: Errors, after: Errors, least: float = 1.0) -> bool:
@@ -278,7 +290,8 @@ class Diagnosis(Shown):
     motion was repeated. `parts`: errors on what is sealed beside the sealed run. `traces` of the
     training data, `sealed_traces` of the sealed ones; files of earlier versions have none.
     `untouched`: errors on the sealed data of the URDF as given, with the friction of its
-    <dynamics>; None where it has no mass, or in earlier files. `inertia_parts` (by joint): what the
+    <dynamics>; None where it has no mass, or in earlier files. `textbook`: the model that any
+    other must be better than; not in earlier files. `inertia_parts` (by joint): what the
     fit of kept inertias takes off, from that on; empty where they are free. `path`: the error
     against the number of effects; None where there are none. `inertia_names`: of `phi`, as
     `m[elbow]`; `declared` effects have the values that belong to it. `trained`: errors
@@ -313,6 +326,7 @@ class Diagnosis(Shown):
     assumed: tuple[Assumption, ...] = ()
     parts: tuple[SealedEnds, ...] = ()
     untouched: Errors | None = None
+    textbook: Textbook | None = None
     large_rests: tuple[LargeRest, ...] = ()
     joint_aliases: tuple[JointAlias, ...] = ()
     friction_lines: tuple[FrictionLine, ...] = ()
@@ -356,7 +370,16 @@ class Diagnosis(Shown):
         ):
             ends = all(_lower(part.before, part.after) for part in self.parts)
             return ends and _lower(self.before, self.after, 1.0 + _UNCHANGED)
-        return not self.effects or _lower(self.before, self.after)
+        lower = not self.effects or _lower(self.before, self.after)
+        return lower and not self.worse_than_textbook
+
+    @property
+    def worse_than_textbook(self) -> bool:
+        """Whether the textbook's model leaves clearly less of the held-out data."""
+        if self.textbook is None:
+            return False
+        least = self.textbook.error.mean_relative_moving
+        return self.after.mean_relative_moving > _AS_GOOD * least
 
     @property
     def harmful(self) -> tuple[NamedEffect, ...]:

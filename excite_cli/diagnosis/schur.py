@@ -109,6 +109,18 @@ class Schur:
         own = e.total[np.ix_(rows + e.fixed, columns + e.fixed)]
         return np.asarray(own - self._shared[:, rows].T @ self._solved[:, columns])
 
+    def without(self, own: slice, inverse: Array, values: Array) -> "Schur":
+        """After projection off the model without its columns `own` (w,).
+
+        `inverse` (w, w) of their block of N⁻¹, `values` (w,) their fitted parameters.
+        """
+        solved = self._solved[own]
+        more = inverse @ solved
+        products = np.vstack([self._shared, -more]), np.vstack([self._solved, solved])
+        diagonal = self.diagonal + np.einsum("wp,wp->p", solved, more)
+        cross = self.cross + values @ more
+        return Schur(self._candidates, products, diagonal, cross, self._told)
+
     def told_by_weight(self, candidate: int) -> bool:
         """Whether scales alone tell a candidate of one column from the model."""
         at = self._candidates.blocks[candidate] - self._candidates.fixed

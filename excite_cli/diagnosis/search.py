@@ -33,6 +33,9 @@ class Search:
         """`most` effects at most, and none at the `closed` places."""
         self.judge, self._most, self._closed = judge, most, closed
         self.white, self.plain, self.candidates = judge.white, judge.plain, judge.candidates
+        self._on_rows: dict[tuple[int, ...], list[int]] = {}
+        self._places = [c.place for c in self.candidates]
+        self._asked_for = [c.effect.asked_for for c in self.candidates]
         self._local = {  # of one column and one joint: tried in pairs
             i for i, c in enumerate(self.candidates) if len(c.rows) == 1 and c.width == 1
         }
@@ -100,17 +103,30 @@ class Search:
             chosen = [*chosen, *added]
         return chosen
 
-    def _free(self, chosen: Sequence[int], latest: Tier = Tier.LAST) -> list[int]:
+    def _near(self, i: int) -> list[int]:
+        """Candidates that show in some of a candidate's rows."""
+        rows = self.candidates[i].rows
+        if rows not in self._on_rows:
+            own = set(rows)
+            self._on_rows[rows] = [k for k, c in enumerate(self.candidates) if own & set(c.rows)]
+        return self._on_rows[rows]
+
+    def _free(
+        self,
+        chosen: Sequence[int],
+        latest: Tier = Tier.LAST,
+        among: Sequence[int] | None = None,
+    ) -> list[int]:
         """Candidates up to tier `latest` whose place is free, and so is that of what excludes."""
         taken = {self.candidates[i].place for i in chosen}
         shut = {*self._closed, *(place for i in chosen for place in self.judge.excluded(i))}
+        some = range(len(self.candidates)) if among is None else among
         return [
             i
-            for i, c in enumerate(self.candidates)
-            if c.place not in taken
-            and c.place not in shut
-            and c.place not in self._closed
-            and c.effect.asked_for <= latest
+            for i in some
+            if self._places[i] not in taken
+            and self._places[i] not in shut
+            and self._asked_for[i] <= latest
         ]
 
     def _best_one(self, chosen: list[int], latest: Tier) -> tuple[int, ...]:
@@ -185,25 +201,32 @@ class Search:
             if self.judge.bound(i, chosen):
                 continue
             rest = [k for k in chosen if k != i]
-            schur = self.white.schur(rest)
-            base = self.judge.cost(rest)
+            schur = self.white.schur_without(i, chosen)
+            energy = self.white.energy(rest)
+            base = energy + self.judge.prices(rest)
             if base < best:
                 best, found = base, rest
-            rows = set(self.candidates[i].rows)
-            near = [k for k in self._free(rest) if rows & set(self.candidates[k].rows)]
+            near = self._free(rest, among=self._near(i))
             moves: list[tuple[float, tuple[int, ...]]] = []
+            gains: dict[tuple[int, ...], float] = {}
             for k in near:
                 gain = schur.singles[k]
                 if k != i and gain.dof:
                     moves.append((gain.chi2 - self.judge.price(k, gain.dof), (k,)))
-            moves += self._pairs(schur, near)
+                    gains[(k,)] = gain.chi2
+            for saved, pair in self._pairs(schur, near):
+                moves.append((saved, pair))
+                gains[pair] = saved + self.judge.price(pair[0], 1) + self.judge.price(pair[1], 1)
             for saved, move in sorted(moves, key=lambda each: -each[0])[:_TRIED]:
                 if base - saved >= best:
                     break
                 trial = [*rest, *move]
                 if len(trial) > self._most:
                     continue
-                cost = self.judge.cost(trial)  # parents are cheaper than `saved` says
+                # parents are cheaper than `saved` says
+                cost = energy - gains[move] + self.judge.prices(trial)
+                if cost >= best:
+                    continue
                 refined = len(move) == 1 and i in self.judge.parents[move[0]]
                 if refined and not self.judge.adds(move[0], [*rest, i]):
                     continue

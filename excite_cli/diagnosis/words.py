@@ -245,6 +245,14 @@ def no_gain_in_words(found: Diagnosis) -> str:
     """
     if found.good:
         return ""
+    if found.textbook is not None and found.worse_than_textbook:
+        kinds = list(dict.fromkeys(each.kind for each in found.textbook.effects))
+        return (
+            f"The textbook's model predicts {found.sealed_run} better than what was found: "
+            f"{found.textbook.error.mean_relative_moving:.2%} of the torque is left with "
+            f"{' + '.join(kinds)} on every joint, {found.after.mean_relative_moving:.2%} with what "
+            "was found (mean over joints, where they move)."
+        )
     joints = len(found.joint_names)
     guilty = found.harmful or tuple(
         each for each in found.effects if each.verdict is SealedVerdict.NOT_CONFIRMED

@@ -236,16 +236,12 @@ class Effect(ABC):
         """
         return self.imitates
 
-    def possible(self, values: Array, early: bool) -> bool:
-        """Whether fitted `values` have signs and sizes that physics allows.
-
-        `early`: in the first passes of a diagnosis, which do not know the torque well. A change may
-        be of either sign.
-        """
+    def possible(self, values: Array) -> bool:
+        """Whether fitted `values` have signs and sizes that physics allows; a change either."""
         if self.is_change:
             return True
         given = zip(self.parameters, values, strict=True)
-        return all(parameter.allows(float(value), early) for parameter, value in given)
+        return all(parameter.allows(float(value)) for parameter, value in given)
 
     def nearest(self, values: Array, covariance: Array) -> Array:
         """The nearest values of possible signs, in units of their error.
@@ -257,7 +253,7 @@ class Effect(ABC):
             return values
         return nearest_of_sign(values, covariance, signed)
 
-    def why_impossible(self, values: Array, covariance: Array, early: bool) -> str:
+    def why_impossible(self, values: Array, covariance: Array) -> str:
         """Why values that are not `possible` cannot be the error of the fit; empty if they can.
 
         They cannot where the χ² distance to the `nearest` ones is one that chance exceeds in 1 % of
@@ -265,7 +261,7 @@ class Effect(ABC):
         what is then left of the effect must be more than its error.
         """
         near = self.nearest(values, covariance)
-        if not self.possible(near, early):
+        if not self.possible(near):
             return self.why_not(values)
         whiten = np.linalg.inv(half_of(covariance))
         far, whole = (float(np.square(whiten @ x).sum()) for x in (values - near, values))

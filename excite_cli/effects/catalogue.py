@@ -46,6 +46,9 @@ from excite_cli.errors import ConfigError, ExciteWarning, nearest
 from excite_cli.robot.model import Array, Robot
 
 GROUP = "excite.effects"
+# What every textbook's model of a joint has beside the rigid body; the rest of it where data ask.
+EVERYDAY_FRICTION = ("viscous_friction", "coulomb_friction")
+EVERYDAY = ("torque_offset", "armature")
 _OURS: tuple[type[Effect], ...] = (
     ViscousFriction,
     NonlinearViscousFriction,

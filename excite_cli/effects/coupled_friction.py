@@ -50,10 +50,10 @@ class CoupledFriction(Effect):
         """The joints turn the shaft the same way, or against each other."""
         return [{"direction": 1.0}, {"direction": -1.0}]
 
-    def possible(self, values: Array, early: bool) -> bool:
+    def possible(self, values: Array) -> bool:
         """A negative viscous part that outweighs the dry one belongs to the other direction."""
         viscous, coulomb = values
-        return super().possible(values, early) and bool(viscous * _USUAL_SPEED >= -coulomb)
+        return super().possible(values) and bool(viscous * _USUAL_SPEED >= -coulomb)
 
     @property
     def completes(self) -> bool:

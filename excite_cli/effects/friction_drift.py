@@ -46,13 +46,13 @@ class FrictionDrift(Effect):
         j, (c, b) = self.joints[0], map(real, values)
         return f"tau[{j}] += t * ({c} * s[{j}] + {b} * v[{j}]);"
 
-    def possible(self, values: Array, early: bool) -> bool:
+    def possible(self, values: Array) -> bool:
         """Whether both rates have the same sign: friction falls, or rises, as a whole."""
         return bool(values[0] * values[1] >= 0.0)
 
     def nearest(self, values: Array, covariance: Array) -> Array:
         """The nearest rates of the same sign, in units of their error."""
-        if self.possible(values, early=False):
+        if self.possible(values):
             return values
         both = np.ones(2, dtype=bool)
         found = [s * nearest_of_sign(s * values, covariance, both) for s in (1.0, -1.0)]

@@ -14,8 +14,8 @@ class Parameter:
     """A parameter: name, unit, and the range of sizes that is usual for a robot arm.
 
     `believed`: outside of it no fit is believed, however good, for the reason `because`; for sizes
-    that do not depend on how large the robot is. `believed_early` takes its place in the first
-    passes of a diagnosis. `part_of_torque`: more than the largest torque of its joint is absurd.
+    that do not depend on how large the robot is. `part_of_torque`: more than the largest torque of
+    its joint is absurd.
     """
 
     name: str
@@ -24,22 +24,20 @@ class Parameter:
     high: float
     nonnegative: bool = False
     believed: Range | None = None
-    believed_early: Range | None = None
     because: str = ""
     part_of_torque: bool = False
 
-    def allows(self, value: float, early: bool) -> bool:
-        """Whether a fitted value can be so, in an `early` pass or a later one."""
+    def allows(self, value: float) -> bool:
+        """Whether a fitted value can be so."""
         if self.nonnegative and value < 0:
             return False
-        limits = self.believed_early if early and self.believed_early else self.believed
-        return limits is None or limits[0] <= value <= limits[1]
+        return self.believed is None or self.believed[0] <= value <= self.believed[1]
 
     def why_not(self, value: float) -> str:
         """Why no fit with this value is believed; empty if it may be."""
         if self.nonnegative and value < 0:
             return f"{self.name} of {value:.3g} cannot be negative"
-        if not self.allows(value, early=False):
+        if not self.allows(value):
             return f"{self.name} of {value:.3g}: {self.because or 'out of range'}"
         return ""
 
@@ -53,12 +51,9 @@ class Parameter:
 
 
 def whole_share(name: str) -> Parameter:
-    """A share of something that is either taken away or not: one by nature.
-
-    In early passes torque that is cut or missing takes part in the fit of what it is a share of.
-    """
+    """A share of something that is either taken away or not: one by nature."""
     return Parameter(
-        name, "1", 0.3, 1.5, nonnegative=True, believed=(0.6, 1.5), believed_early=(0.18, 6.0),
+        name, "1", 0.3, 1.5, nonnegative=True, believed=(0.6, 1.5),
         because="what is taken away is taken away wholly, so it is near 1",
     )  # fmt: skip
 

@@ -95,7 +95,7 @@ class Payload(Effect):
         """Mass, first moments and inertia about the link's frame."""
         return moved(link.rotation, link.translation)
 
-    def possible(self, values: Array, early: bool) -> bool:
+    def possible(self, values: Array) -> bool:
         """Whether some body has these numbers."""
         least = smallest_eigenvalues(values, _LENGTH)[0]
         return bool(values[0] >= 0.0 and least >= -_ROUNDING * max(abs(values[0]), _LIGHTEST))

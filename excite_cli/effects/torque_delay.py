@@ -47,10 +47,10 @@ class TorqueDelay(Effect):
         arms = [arm for arm in branches(robot) if 1 < len(arm) < robot.n]
         return [every, *arms, *((j,) for j in every if robot.n > 1)]
 
-    def possible(self, values: Array, early: bool) -> bool:
+    def possible(self, values: Array) -> bool:
         """Of one joint alone, less than a moment is friction that lags a little."""
         alone = len(self.joints) == 1
-        return super().possible(values, early) and not (alone and values[0] < _SHORTEST_ALONE)
+        return super().possible(values) and not (alone and values[0] < _SHORTEST_ALONE)
 
     def absurd(self, values: Array, seen: Seen) -> str:
         """Nor is what is shorter than any clock is true to."""

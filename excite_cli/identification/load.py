@@ -135,7 +135,7 @@ def identify_load(
         )
     values = turned @ own
     spread_there = _with_systematic(values, turned @ spread @ turned.T)
-    possible = load.possible(own, early=False) or not load.why_impossible(own, spread, early=False)
+    possible = load.possible(own) or not load.why_impossible(own, spread)
     fit_error = stored.error.mean_relative_moving
     return LoadIdentification(
         link=frame.name,

@@ -113,10 +113,10 @@ def _candidates(robot: Robot, run: PreparedRun, signals: Signals, left: Array) -
 
 
 def _possible(effect: Effect, values: Array, covariance: Array) -> bool:
-    if effect.is_change or effect.possible(values, early=False):
+    if effect.is_change or effect.possible(values):
         return True
     try:
-        return not effect.why_impossible(values, covariance, early=False)
+        return not effect.why_impossible(values, covariance)
     except np.linalg.LinAlgError:
         return False
 

@@ -27,6 +27,7 @@ from excite_cli.diagnosis.records import (
     Overfit,
     Round,
     SealedEnds,
+    Textbook,
     Unexplained,
 )
 from excite_cli.identification.errors_of_torque import Errors
@@ -72,6 +73,7 @@ _LATER: dict[str, Any] = {
     "assumed": tuple[Assumption, ...],
     "parts": tuple[SealedEnds, ...],
     "untouched": Errors | None,
+    "textbook": Textbook | None,
     "large_rests": tuple[LargeRest, ...],
     "joint_aliases": tuple[JointAlias, ...],
     "friction_lines": tuple[FrictionLine, ...],
@@ -162,8 +164,9 @@ def _read(file: Any, path: Path) -> Diagnosis:
         **fields,
     )
     ends = [error for part in found.parts for error in (part.before, part.after)]
-    untouched = [found.untouched] if found.untouched else []
-    require_joints(joints, (found.before, found.after, *ends, *untouched), found.noise_floor)
+    others = [found.untouched, found.textbook and found.textbook.error]
+    known = (found.before, found.after, *ends, *(each for each in others if each))
+    require_joints(joints, known, found.noise_floor)
     if found.skeleton is not None and not found.skeleton.fits(len(joints)):
         raise ValueError("its skeleton is that of another robot")
     if not _named_joints(found) <= set(joints):
@@ -190,6 +193,7 @@ def _named_joints(found: Diagnosis) -> set[str]:
         *found.declared,
         *found.information.model,
         *found.information.rivals,
+        *(found.textbook.effects if found.textbook else ()),
         *(each.effect for each in found.effects),
         *(effect for part in found.parts for effect in part.effects),
         *(alias for each in found.effects for alias in each.aliases),

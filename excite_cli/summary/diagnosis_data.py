@@ -93,8 +93,10 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             for each in found.large_rests
         ],
         "error": {
+            "held_out_run": found.sealed_run,
             "sealed_run": found.sealed_run,
             "before": found.before.as_data(),
+            "textbook": found.textbook.error.as_data() if found.textbook else None,
             "after": found.after.as_data(),
             "parts": [_ends(part) for part in found.parts],
             "begins": "untouched" if found.inertia_parts else "before",
@@ -104,6 +106,7 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             "samples": found.after.samples,
         },
         "overfit": asdict(found.overfit) if found.overfit else None,
+        "textbook": [_record(each) for each in found.textbook.effects] if found.textbook else None,
         "path": asdict(found.path) if found.path else None,
         "assumed": [asdict(each) for each in found.assumed],
         "noise_floor": found.noise_floor,

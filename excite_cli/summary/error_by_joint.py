@@ -54,7 +54,12 @@ def _moving(found: Diagnosis) -> Table:
 
 def _errors(found: Diagnosis) -> dict[str, Errors]:
     """By heads of columns."""
-    known = {"URDF": found.untouched, "before": found.before, "after": found.after}
+    known = {
+        "URDF": found.untouched,
+        "before": found.before,
+        "textbook": found.textbook.error if found.textbook else None,
+        "after": found.after,
+    }
     return {head: each for head, each in known.items() if each is not None}
 
 

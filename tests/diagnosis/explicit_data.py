@@ -149,27 +149,37 @@ class Rows:
         """Energy per fold on the rows of `joints`, fitted to the other folds."""
         found = []
         for fold in range(max(FOLDS) + 1):
-            theta = self.fitted(chosen, self.fold != fold)
-            energy = 0.0
-            for side in (False, True):
-                here = (self.fold == fold) & (self.side == side)
-                own = self._refitted(chosen, theta, fold, self.side != side)
-                rows = here & np.isin(self.joint, joints)
-                rest = self.y[rows] - self.x[rows][:, self.columns(chosen)] @ own
-                energy += float(rest @ rest)
-            found.append(energy)
+            theta = self._refitted(chosen, self.fitted(chosen, self.fold != fold), fold)
+            found.append(self._energy(chosen, theta, (self.fold == fold), joints))
         return found
 
-    def _refitted(
-        self, chosen: Sequence[int], theta: np.ndarray, fold: int, side: np.ndarray
-    ) -> np.ndarray:
-        """What is there in this fold alone, fitted to one side of it, all else held."""
+    def on_blocks(self, chosen: Sequence[int], new: bool) -> Array:
+        """Energy (joints, 2 folds) of the sides of folds: as those of `new` recordings, fitted to
+        the other folds, or fitted to the other sides of all."""
+        found = np.zeros((2, max(FOLDS) + 1, 2))
+        for joint, fold, side in np.ndindex(found.shape):
+            kept = self.fold != fold if new else self.side != bool(side)
+            here = (self.fold == fold) & (self.side == bool(side))
+            found[joint, fold, side] = self._energy(
+                chosen, self.fitted(chosen, kept), here, [joint]
+            )
+        return found.reshape(2, -1)
+
+    def _energy(
+        self, chosen: Sequence[int], theta: Array, here: np.ndarray, joints: Sequence[int]
+    ) -> float:
+        rows = here & np.isin(self.joint, joints)
+        rest = self.y[rows] - self.x[rows][:, self.columns(chosen)] @ theta
+        return float(rest @ rest)
+
+    def _refitted(self, chosen: Sequence[int], theta: Array, fold: int) -> Array:
+        """What is there in this fold alone, fitted to it, all else held."""
         at = self.columns(chosen)
         there = np.array([np.any(self.x[self.fold != fold][:, k] != 0) for k in at])
         alone = ~there & (np.arange(len(at)) >= FIXED)
         if not alone.any():
             return theta
-        rows = (self.fold == fold) & side
+        rows = self.fold == fold
         kept = np.where(alone, 0.0, theta)
         rest = self.y[rows] - self.x[rows][:, at] @ kept
         kept[alone] = np.linalg.lstsq(self.x[rows][:, at[alone]], rest, rcond=None)[0]

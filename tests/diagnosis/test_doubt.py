@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,6 +42,9 @@ def function_of(*codes: str) -> Approximation:
     return Approximation(tuple(Covariate.of_code(code) for code in codes))
 
 
+NO_MODEL: Any = None  # none of what is tried here asks for it
+
+
 def all_but(vetoed: int) -> Allowed:
     """A veto of one candidate."""
     return lambda parameters, chosen, added: vetoed not in added
@@ -56,7 +60,7 @@ def traced(
     judge = Judgement(plain, plain, candidates, Rules(0.01, 0.01), allowed)
     return Traced(
         data, tuple(candidates), ONE, judge, tuple(chosen), np.zeros(0), (), np.ones(2), 1.0,
-        PossibleSizes(candidates, False, plain.covariance, Seen(np.ones(2), np.ones(2), 1.0)),
+        PossibleSizes(candidates, plain.covariance, Seen(np.ones(2), np.ones(2), 1.0)), NO_MODEL,
     )  # fmt: skip
 
 

@@ -61,7 +61,7 @@ def test_errors_on_folds_left_out(
 
 
 @pytest.mark.parametrize("chosen", [(4,), (0, 4), (1, 3, 4)])
-def test_an_effect_of_one_fold_is_fitted_on_one_side_of_it_and_judged_on_the_other(
+def test_an_effect_of_one_fold_is_fitted_to_it(
     both: tuple[Evidence, Rows], chosen: tuple[int, ...]
 ) -> None:
     evidence, rows = both
@@ -72,17 +72,31 @@ def test_an_effect_of_one_fold_is_fitted_on_one_side_of_it_and_judged_on_the_oth
     assert evidence.folds_of([0, 4]).all()
 
 
-def test_what_all_folds_but_one_have_is_told_from_the_robot_on_one_side_of_that_fold() -> None:
-    """As a load in all runs but one: without that one, it is as well a part of the last link."""
-    data = random_data(5)
-    loaded = [part for part, fold in enumerate(data.folds) if fold != 1]
-    columns = tuple(d[:, :, :1] * (k in loaded) for k, d in enumerate(data.declared))
-    load = Candidate(Armature((0, 1)), (0, 1), columns)
-    torque = tuple(t + 40.0 * c[:, :, 0] for t, c in zip(data.tau, columns, strict=True))
-    evidence = replace(data, tau=torque).evidence([load], WHITE)
-    noise = data.evidence([], WHITE).left_out((), [0, 1])
-    assert evidence.left_out((0,), [0, 1]) == pytest.approx(noise, rel=0.4)
-    assert evidence.left_out((), [0, 1])[1] > 30.0 * noise[1]
+@pytest.mark.parametrize("chosen", CHOSEN)
+def test_errors_on_blocks_fitted_to_the_others(
+    both: tuple[Evidence, Rows], chosen: tuple[int, ...]
+) -> None:
+    evidence, rows = both
+    new = evidence.as_new(chosen)
+    assert new.ravel() == pytest.approx(rows.on_blocks(chosen, new=True).ravel(), rel=1e-6)
+    sides = evidence.on_sides(chosen)
+    assert sides.ravel() == pytest.approx(rows.on_blocks(chosen, new=False).ravel(), rel=1e-6)
+
+
+@pytest.mark.parametrize("chosen", [c for c in CHOSEN if c])
+def test_a_model_without_one_is_a_projection_away(
+    both: tuple[Evidence, Rows], chosen: tuple[int, ...]
+) -> None:
+    evidence, rows = both
+    for member in chosen:
+        rest = [i for i in chosen if i != member]
+        found = evidence.schur_without(member, chosen).singles
+        expected = evidence._schur(rest).singles
+        for i, (one, other) in enumerate(zip(found, expected, strict=True)):
+            if i not in rest:
+                assert one.chi2 == pytest.approx(other.chi2, rel=1e-6, abs=1e-9)
+                assert one.left == pytest.approx(other.left, rel=1e-6)
+        assert evidence.energy(rest) == pytest.approx(rows.energy(rest, with_known=True), rel=1e-8)
 
 
 def test_what_a_fold_hardly_has_is_judged_as_if_it_had_none() -> None:
@@ -291,22 +305,3 @@ def test_data_that_tell_an_effect_themselves_are_not_said_to_need_a_weight() -> 
     (other, *_) = random_candidates(4)
     schur = data.evidence([gain, other], WHITE).schur(())
     assert [schur.told_by_weight(i) for i in (0, 1)] == [True, False]
-
-
-def test_a_gain_told_by_one_fold_is_fitted_on_one_side_of_it() -> None:
-    """A load that was weighed is in fold 1 alone: the others know neither it nor the gain."""
-    data, gain, _ = of_a_wrong_scale(1.0)
-    noise = replace(data, prior=None, weighed=None).evidence([], WHITE).left_out((), [0, 1])
-    there = [fold == 1 for fold in data.folds]
-    load = [d[:, :, :1] * here for d, here in zip(data.declared, there, strict=True)]
-    declared = tuple(
-        np.concatenate([d, c], axis=2) for d, c in zip(data.declared, load, strict=True)
-    )
-    torque = [d @ np.append(INERTIAS, 30.0) for d in declared]
-    tau = tuple(t + (1.0 + GAIN) * 30.0 * c[:, :, 0] for t, c in zip(data.tau, load, strict=True))
-    known = np.array([[0.0, 0.0, 0.0, 0.0, 1.0, 30.0]]) / 0.01
-    gain = replace(gain, columns=tuple(own[:, :, None] for own in torque))
-    data = replace(data, declared=declared, tau=tau, prior=known.T @ known, weighed=known.T @ known)
-    evidence = data.evidence([gain], WHITE)
-    assert evidence.left_out((0,), [0, 1]) == pytest.approx(noise, rel=0.1)
-    assert evidence.left_out((), [0, 1])[1] > 1.5 * noise[1]

@@ -54,7 +54,7 @@ def test_a_payload_is_moved_to_a_body_and_all_that_depends_on_it_too() -> None:
     fitted = given.judge.plain.solve((0, 1))[-width:]
     found = final_fit(given).parameters[-width:]
     assert fitted[5] < 0.0
-    assert candidates[1].effect.possible(found[1:], early=False)
+    assert candidates[1].effect.possible(found[1:])
     # What the body has gained of the shared column, the friction has lost.
     assert found[0] + found[5] == pytest.approx(fitted[0] + fitted[5], abs=0.05)
     assert found[0] < fitted[0] - 0.01

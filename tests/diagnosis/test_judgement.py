@@ -81,7 +81,7 @@ def judge_of(
 ) -> Judgement:
     """Samples are independent and of unit noise; sizes are those that are possible."""
     plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
-    sizes = PossibleSizes(candidates, False, spread_of(plain.covariance, 1.0), LARGE)
+    sizes = PossibleSizes(candidates, spread_of(plain.covariance, 1.0), LARGE)
     veto = sizes if allowed is None else allowed
     return Judgement(plain, plain, candidates, rules, veto)
 
@@ -193,15 +193,16 @@ def test_gains_on_runs_left_out_are_those_of_explicit_fits() -> None:
     assert not all(better)
 
 
-def test_an_effect_of_some_runs_is_judged_where_it_is(
+def test_an_effect_of_some_runs_is_judged_where_it_is_on_blocks_in_turn(
     random_judge: tuple[Judgement, Rows, Rows],
 ) -> None:
     judge, *both = random_judge
     for chosen in ([], [0]):
-        expected = max(
-            1 - np.sqrt(rows.left_out([*chosen, 4], [0])[1] / rows.left_out(chosen, [0])[1])
+        blocks = [
+            [rows.on_blocks(each, new=False)[0, 2:4].sum() for each in (chosen, [*chosen, 4])]
             for rows in both
-        )
+        ]
+        expected = max(1 - np.sqrt(after / before) for before, after in blocks)
         assert judge.left_out_gain(chosen, [4]) == pytest.approx(expected, rel=1e-3)
 
 

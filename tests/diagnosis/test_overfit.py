@@ -30,7 +30,13 @@ def timid() -> Diagnosis:
 
     No joint stands still in them: where one does, inertias are kept from the start.
     """
-    spec = load_spec(SMOKE, ["diagnosis.kinds=[viscous_friction,coulomb_friction]"])
+    spec = load_spec(
+        SMOKE,
+        [
+            "diagnosis.kinds=[viscous_friction,coulomb_friction]",
+            "identification.inertias=free",
+        ],
+    )
     robot = build_robot(spec.robot, SMOKE.parent)
     motions = []
     hardly = 0.06 * np.append(np.ones(robot.n - 1), 6.0)

@@ -63,7 +63,7 @@ def search(
     most: int = 80,
 ) -> set[int]:
     evidence = data.evidence(candidates, ONE)
-    sizes = PossibleSizes(candidates, False, spread_of(evidence.covariance, 1.0), LARGE)
+    sizes = PossibleSizes(candidates, spread_of(evidence.covariance, 1.0), LARGE)
     allowed = sizes if signs else anything
     found = Search(Judgement(evidence, evidence, candidates, rules, allowed), most).run()
     assert len(found) == len(set(found))
@@ -214,7 +214,7 @@ def test_all_that_is_chosen_has_a_possible_sign_beside_all_others(seed: int) -> 
     data, candidates = random_case(LOCAL_AND_COHERENT, seed, 0.1)
     found = sorted(search(data, candidates, signs=True))
     evidence = data.evidence(candidates, ONE)
-    sizes = PossibleSizes(candidates, False, spread_of(evidence.covariance, 1.0), LARGE)
+    sizes = PossibleSizes(candidates, spread_of(evidence.covariance, 1.0), LARGE)
     assert sizes(evidence.solve(found), found, found)
 
 
@@ -374,7 +374,7 @@ def test_what_does_not_hold_in_the_end_leaves_its_place_to_another() -> None:
     data, candidates = planted([effect("viscous_friction"), effect("armature")], [3.0, 0.0], mix)
     assert search(data, candidates) == {0}
     evidence = data.evidence(candidates, ONE)
-    sizes = PossibleSizes(candidates, False, spread_of(evidence.covariance, 1.0), LARGE)
+    sizes = PossibleSizes(candidates, spread_of(evidence.covariance, 1.0), LARGE)
     judge = Judgement(evidence, evidence, candidates, NO_VETO, sizes)
     found = Dropping(judge)
     assert set(found.run()) == {1}

@@ -29,13 +29,13 @@ def test_one_part_of_a_shaft_may_be_missing() -> None:
     """Its dry part came out below zero by the error of the fit."""
     shaft = kind_named("coupled_friction")((0, 1), {"direction": 1.0})
     covariance = np.diag([0.01, 0.04])
-    assert not shaft.possible(np.array([3.0, -0.1]), early=False)
-    assert shaft.why_impossible(np.array([3.0, -0.1]), covariance, early=False) == ""
+    assert not shaft.possible(np.array([3.0, -0.1]))
+    assert shaft.why_impossible(np.array([3.0, -0.1]), covariance) == ""
     assert shaft.nearest(np.array([3.0, -0.1]), covariance) == pytest.approx([3.0, 0.0])
-    assert "cannot be negative" in shaft.why_impossible(np.array([3.0, -2.0]), covariance, False)
+    assert "cannot be negative" in shaft.why_impossible(np.array([3.0, -2.0]), covariance)
 
 
 def test_a_shaft_with_little_dry_friction_has_one_direction() -> None:
     shaft = kind_named("coupled_friction")((0, 1), {"direction": 1.0})
-    assert shaft.possible(np.array([-0.5, 1.0]), early=False)  # of two shafts, as in a differential
-    assert not shaft.possible(np.array([-0.5, 0.1]), early=False)
+    assert shaft.possible(np.array([-0.5, 1.0]))  # of two shafts, as in a differential
+    assert not shaft.possible(np.array([-0.5, 0.1]))
