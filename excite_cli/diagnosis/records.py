@@ -357,6 +357,12 @@ class Diagnosis(Shown):
 
     @property
     def good(self) -> bool:
+        """Whether what was found predicts the sealed data better than the declared model does, and
+        no worse than the textbook's."""
+        return self.fell and not self.worse_than_textbook
+
+    @property
+    def fell(self) -> bool:
         """Whether what was found, if anything, lowers the mean error on the sealed data.
 
         Where nothing of it is in the sealed run, that error need not fall, but must not rise; it is
@@ -370,8 +376,7 @@ class Diagnosis(Shown):
         ):
             ends = all(_lower(part.before, part.after) for part in self.parts)
             return ends and _lower(self.before, self.after, 1.0 + _UNCHANGED)
-        lower = not self.effects or _lower(self.before, self.after)
-        return lower and not self.worse_than_textbook
+        return not self.effects or _lower(self.before, self.after)
 
     @property
     def worse_than_textbook(self) -> bool:

@@ -245,14 +245,8 @@ def no_gain_in_words(found: Diagnosis) -> str:
     """
     if found.good:
         return ""
-    if found.textbook is not None and found.worse_than_textbook:
-        kinds = list(dict.fromkeys(each.kind for each in found.textbook.effects))
-        return (
-            f"The textbook's model predicts {found.sealed_run} better than what was found: "
-            f"{found.textbook.error.mean_relative_moving:.2%} of the torque is left with "
-            f"{' + '.join(kinds)} on every joint, {found.after.mean_relative_moving:.2%} with what "
-            "was found (mean over joints, where they move)."
-        )
+    if found.fell:
+        return _textbook_is_better(found)
     joints = len(found.joint_names)
     guilty = found.harmful or tuple(
         each for each in found.effects if each.verdict is SealedVerdict.NOT_CONFIRMED
@@ -264,7 +258,22 @@ def no_gain_in_words(found: Diagnosis) -> str:
     return (
         f"The sealed error did not fall: {found.before.mean_relative:.2%} before, "
         f"{found.after.mean_relative:.2%} after (mean over joints, all samples of "
-        f"{found.sealed_run})." + f" {what}: {listed}." * bool(listed)
+        f"{found.sealed_run})."
+        + f" {what}: {listed}." * bool(listed)
+        + (f" {_textbook_is_better(found)}" if found.worse_than_textbook else "")
+    )
+
+
+def _textbook_is_better(found: Diagnosis) -> str:
+    """By how much, and what is in it."""
+    assert found.textbook is not None
+    kinds = dict.fromkeys(each.kind for each in found.textbook.effects)
+    return (
+        f"The textbook's model predicts {found.sealed_run} better than what was found: "
+        f"{found.textbook.error.mean_relative_moving:.2%} of the torque is left with "
+        f"{', '.join(kinds) or 'nothing added'} on every joint, "
+        f"{found.after.mean_relative_moving:.2%} with what was found (mean over joints, where they "
+        "move)."
     )
 
 

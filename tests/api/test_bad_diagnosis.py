@@ -6,9 +6,13 @@ from pathlib import Path
 import pytest
 
 from excite_cli import Case, ConfigError, plan_after, save_config
-from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.answer_words import answer_in_words
+from excite_cli.diagnosis.records import Diagnosis, Textbook
+from excite_cli.diagnosis.words import no_gain_in_words
+from excite_cli.export.found_config import found_config
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.note import Level, Note
+from excite_cli.summary.diagnosis_data import diagnosis_data
 from tests.diagnosis.synthetic_diagnosis import CONFIG, make_diagnosis, smoke_spec
 
 TOLD = "The sealed error did not fall: 10.00% before, 10.00% after"
@@ -36,6 +40,37 @@ def test_its_config_is_written_when_that_is_asked_for(
     assert not path.exists()
     save_config(path, case, bad, unconfirmed=True)
     assert "viscous_friction" in path.read_text(encoding="utf-8")
+
+
+def with_textbook(found: Diagnosis, left: float) -> Diagnosis:
+    error = replace(found.after, mean_relative_moving=left)
+    named = tuple(replace(each.effect, kind="coulomb_friction") for each in found.effects)
+    return replace(found, textbook=Textbook(named, error))
+
+
+def test_an_answer_that_the_textbook_beats_is_bad_and_the_textbook_is_offered(
+    case: Case, tmp_path: Path
+) -> None:
+    """From two per cent on: it is said first, and `--apply` writes the textbook's effects."""
+    plain = make_diagnosis(rivals=())
+    fallen = replace(plain, before=replace(plain.before, mean_relative=1.0))
+    after = fallen.after.mean_relative_moving
+    assert with_textbook(fallen, after / 1.019).good
+    worse = with_textbook(fallen, after / 1.021)
+    assert worse.fell
+    assert not worse.good
+    told = no_gain_in_words(worse)
+    assert told.startswith("The textbook's model predicts ")
+    assert "11.75% of the torque is left with coulomb_friction on every joint, 12.00% with" in told
+    assert answer_in_words(worse) == told
+    assert diagnosis_data(worse, {})["error"]["textbook"]["mean_relative_moving"] < after
+    text = found_config(case.spec, case.folder, worse, tmp_path / "new.yaml", textbook=True)
+    assert "coulomb_friction" in text
+    assert "viscous_friction" not in text
+    assert "of the textbook's model" in text
+    both = with_textbook(replace(plain, before=plain.after), after / 1.021)
+    assert no_gain_in_words(both).startswith(TOLD)
+    assert "The textbook's model predicts " in no_gain_in_words(both)
 
 
 def test_whoever_plans_after_it_is_warned(case: Case, bad: Diagnosis) -> None:
