@@ -44,6 +44,11 @@ class Model:
         return width_of(self.declared)
 
     @property
+    def is_weighed(self) -> bool:
+        """Whether scales say something of the parameters."""
+        return bool(self.weighed_columns.any())
+
+    @property
     def weighed_columns(self) -> Array:
         """As `weighed`, over the columns that are fitted: beside a prior, what differs from it."""
         rank, width = self.base.rank, self.declared_width

@@ -146,7 +146,10 @@ def _diagnosed(
         kept = prepare_all(parts.sealed, processing)
     progress("naming", 8)
     model = traced.model
-    final = final_fit(replace(traced, chosen=tuple(sufficient(traced.judge, traced.chosen))))
+    compared = bool(spec.diagnosis.rounds) and not model.is_weighed
+    if compared:
+        traced = replace(traced, chosen=tuple(sufficient(traced.judge, traced.chosen)))
+    final = final_fit(traced)
     traced, parameters, covariance = final.traced, final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
     floor = noise_floor(parts.training, processing)
@@ -171,7 +174,7 @@ def _diagnosed(
     from_urdf = spec.identification.inertias == "cad" and bool(sealed_part.by_urdf)
     begin = sealed_part.by_urdf if from_urdf else told[0]
     errors = sealed_errors(played, model, traced, models[1], begin, told[1], from_urdf)
-    book = refitted(model, traced, textbook(traced.judge)) if spec.diagnosis.rounds else models[0]
+    book = refitted(model, traced, textbook(traced.judge)) if compared else None
     taken_off = error_parts(traced, errors)
     worth = worth_on_sealed(Played(robot, [*kept, *ends]), model, traced, models[1])
     named, candidates, rivals = named_effects(
@@ -225,10 +228,7 @@ def _diagnosed(
         assumed=assumed,
         parts=on_sealed_ends(model, models, parts.ends, processing),
         untouched=sealed_part.untouched,
-        textbook=Textbook(
-            tuple(record_of(*each) for each in _found_in(book, model, robot)),
-            played.errors(played.predictions(book)),
-        ),
+        textbook=_textbook(book, model, played) if book else None,
         skeleton=skeleton_of(robot),
         recorded=recorded(dataset),
         large_rests=rests,
@@ -241,12 +241,14 @@ def _diagnosed(
     )
 
 
-def _found_in(
-    fitted: IdentifiedModel, model: Model, robot: Robot
-) -> Iterator[tuple[Effect, Sequence[str], Array]]:
-    """Effects of a model beside the declared ones, names of the joints, values."""
-    for effect, values in list(fitted.by_effect)[len(model.declared) :]:
-        yield effect, robot.joint_names, values
+def _textbook(fitted: IdentifiedModel, model: Model, played: Played) -> Textbook:
+    """Its effects beside the declared ones, and its error on the sealed data."""
+    added = list(fitted.by_effect)[len(model.declared) :]
+    names = model.robot.joint_names
+    return Textbook(
+        tuple(record_of(effect, names, values) for effect, values in added),
+        played.errors(played.predictions(fitted)),
+    )
 
 
 def _path(
@@ -379,14 +381,15 @@ def _absorbed(model: Model, traced: Traced) -> tuple[Absorbed, ...]:
 def _model(robot: Robot, base: BaseParameters, spec: Spec, still: bool) -> Model:
     """`still`: a joint does not move, and noise alone decides what only its motion shows."""
     prior, cad = None, standard_parameters(robot)
-    by_data = spec.identification.inertias == "auto" and bool(cad[::10].any())
+    declared = declared_effects(spec.effects, robot)
+    known = weighed(spec.identification, declared, robot, base)
+    rows = np.column_stack([known.rows, known.target])
+    # What was weighed tells scales from masses: beside the URDF's masses it would tell nothing.
+    by_data = spec.identification.inertias == "auto" and bool(cad[::10].any()) and not len(rows)
     if by_data:
         prior = KeptInertias(cad, prior_rows(robot, cad, 1.0))
     elif spec.identification.inertias == "cad" or (still and cad[::10].any()):
         prior = KeptInertias(cad, prior_rows(robot, cad, spec.identification.uncertainty))
-    declared = declared_effects(spec.effects, robot)
-    known = weighed(spec.identification, declared, robot, base)
-    rows = np.column_stack([known.rows, known.target])
     return Model(robot, base, known.effects, prior, spec.runs, rows, by_data)
 
 

@@ -274,7 +274,7 @@ class Information:
 
 
 _UNCHANGED = 0.02  # of an error that no effect concerns
-_AS_GOOD = 1.02  # times the textbook's error: what is above is said to be worse
+AS_GOOD = 1.02  # times the textbook's error: what is above is said to be worse
 
 
 def _lower(before: Errors, after: Errors, least: float = 1.0) -> bool:
@@ -384,7 +384,7 @@ class Diagnosis(Shown):
         if self.textbook is None:
             return False
         least = self.textbook.error.mean_relative_moving
-        return self.after.mean_relative_moving > _AS_GOOD * least
+        return self.after.mean_relative_moving > AS_GOOD * least
 
     @property
     def harmful(self) -> tuple[NamedEffect, ...]:

@@ -7,8 +7,11 @@ better than the textbook, the textbook is the answer.
 
 from collections.abc import Sequence
 
-from excite_cli.diagnosis.comparison import as_new, difference
+import numpy as np
+
+from excite_cli.diagnosis.comparison import as_new, difference, left_out
 from excite_cli.diagnosis.judgement import Judgement
+from excite_cli.diagnosis.records import AS_GOOD
 from excite_cli.diagnosis.textbook import textbook
 
 
@@ -17,7 +20,9 @@ def sufficient(judge: Judgement, found: Sequence[int]) -> list[int]:
     kept = _needed(judge, list(found))
     plain = textbook(judge)
     if set(kept) <= set(plain):  # the smaller stays unless it is clearly worse
-        return plain if as_new(judge, kept, plain).better else kept
+        more = left_out(judge.plain, kept) - left_out(judge.plain, plain)
+        worse = more > np.log(AS_GOOD) and as_new(judge, kept, plain).better
+        return plain if worse else kept
     return kept if as_new(judge, plain, kept).size > 0.0 else plain
 
 

