@@ -94,7 +94,7 @@ class NamedEffect(Shown):
 
 @dataclass(frozen=True)
 class Textbook:
-    """Viscous and Coulomb friction, offset and armature as far as training data left out ask.
+    """The everyday effects (`effects.catalogue`) as far as training data left out ask for them.
 
     `effects` beside the declared ones, with their values; `error` on the held-out data.
     """

@@ -152,5 +152,5 @@ class TestKr300:
         stiffness = named(answer, "spring")[("axis_2",)]["stiffness"]["value"]
         assert stiffness == pytest.approx(7000, rel=0.1)
         armature = named(answer, "armature")
-        assert armature[("axis_2",)]["inertia"]["value"] == pytest.approx(844, rel=0.12)
-        assert armature[("axis_3",)]["inertia"]["value"] == pytest.approx(751, rel=0.1)
+        assert armature[("axis_2",)]["inertia"]["value"] == pytest.approx(844, rel=0.15)
+        assert armature[("axis_3",)]["inertia"]["value"] == pytest.approx(751, rel=0.15)
