@@ -1,4 +1,4 @@
-"""The textbook's model: viscous and Coulomb friction, offset and armature on every joint.
+"""The textbook's model: the everyday effects of `effects.catalogue` on every joint.
 
 It is where the search begins, and what its answer must be better than. Offsets and armatures that
 a robot does not have cost what they are fitted to; so of the four sets with and without them the
