@@ -1,6 +1,6 @@
 """The textbook's model: the everyday effects of `effects.catalogue` on every joint.
 
-It is where the search begins, and what its answer must be better than. Offsets and armatures that
+It is where the search begins, and what its answer must be better than. Everyday effects that
 a robot does not have cost what they are fitted to; so of the four sets with and without them the
 one is taken that predicts training data left out best, the smaller one where none is better beyond
 its standard error.
