@@ -18,11 +18,12 @@ from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
 from excite_cli.diagnosis.error_parts import error_parts
 from excite_cli.diagnosis.error_path import error_path
-from excite_cli.diagnosis.final_fit import final_fit
+from excite_cli.diagnosis.final_fit import final_fit, over_error
 from excite_cli.diagnosis.information import information_of
 from excite_cli.diagnosis.large_rest import large_rests
 from excite_cli.diagnosis.naming import named_effects
 from excite_cli.diagnosis.overfit import is_overfit, overfit_of
+from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.plausibility import check_recorded
 from excite_cli.diagnosis.records import (
     Absorbed,
@@ -39,7 +40,7 @@ from excite_cli.diagnosis.rounds import order_of, rounds_of
 from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors, sealed_errors
 from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
 from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
-from excite_cli.diagnosis.sufficient import sufficient
+from excite_cli.diagnosis.sufficient import comparison_of, sufficient
 from excite_cli.diagnosis.textbook import textbook
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
@@ -148,9 +149,11 @@ def _diagnosed(
     model = traced.model
     compared = bool(spec.diagnosis.rounds) and not model.is_weighed
     if compared:
-        traced = replace(traced, chosen=tuple(sufficient(traced.judge, traced.chosen)))
+        compare = comparison_of(traced)
+        plain = textbook(traced.candidates, compare)
+        traced = replace(traced, chosen=tuple(sufficient(traced, compare)))
     final = final_fit(traced)
-    traced, parameters, covariance = final.traced, final.parameters, final.covariance
+    parameters, covariance = final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
     floor = noise_floor(parts.training, processing)
     models = both_models(model, traced, parameters)
@@ -174,9 +177,10 @@ def _diagnosed(
     from_urdf = spec.identification.inertias == "cad" and bool(sealed_part.by_urdf)
     begin = sealed_part.by_urdf if from_urdf else told[0]
     errors = sealed_errors(played, model, traced, models[1], begin, told[1], from_urdf)
-    book = refitted(model, traced, textbook(traced.judge)) if compared else None
+    book = refitted(model, traced, plain) if compared else None
     taken_off = error_parts(traced, errors)
-    worth = worth_on_sealed(Played(robot, [*kept, *ends]), model, traced, models[1])
+    held = Played(robot, [*kept, *ends])
+    worth = worth_on_sealed(held, model, traced, models[1], over_error(traced, final))
     named, candidates, rivals = named_effects(
         model,
         traced,
@@ -301,7 +305,10 @@ def _traced(
     def prepared(left_out: LeftOut) -> list[PreparedRun]:
         return prepare_all(parts.training, processing, left_out)
 
-    return trace(model, spec.diagnosis, prepared, parts.folds, parts.units, progress, start)
+    traced, bodies = trace(
+        model, spec.diagnosis, prepared, parts.folds, parts.units, progress, start
+    )
+    return at_its_own_torque(traced, bodies)
 
 
 def _noticed(

@@ -2,18 +2,18 @@
 
 Columns are [inertial | declared effects | candidates | torque], rows whitened. A Gram matrix is
 kept per fold and joint; their sums give the residual energy, the gain of any candidate, and the
-error on any fold left out, each by solves of the size of the model. What is there in one fold only
-(what one run carries) cannot be known from the others: it is fitted on one side of that fold, the
-rest of the model held, and judged on the other. So are the directions that no other fold knows if
-an effect is in all folds but that one.
+error on any fold left out, each by solves of the size of the model. What one run carries no other
+fold knows: models with such effects are judged on blocks of time in turn, fitted to the other
+blocks of all runs. A column that is there in one fold only for another reason is fitted to it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.diagnosis.blocks import Blocks
 from excite_cli.diagnosis.cholesky import RIDGE, Cholesky
 from excite_cli.diagnosis.grams import Grams
 from excite_cli.diagnosis.schur import (
@@ -30,7 +30,7 @@ from excite_cli.robot.model import Array
 # speeds of Stribeck friction and the other hardly does (5e-10), a size fitted to the other is
 # 30 N·m instead of 0.05, and what explains 98 % of a residual had no gain on runs left out.
 _THERE = 1e-5
-_RIDGE_ALONE = 1e-6  # of its own energy: half a run may not determine all that a run does
+_RIDGE_ALONE = 1e-6  # of its own energy: one fold may not determine all that several do
 _BY_WEIGHT = 4.0  # times what the data leave: the deviation is half of theirs, or less
 _NEXT_TO_NOTHING = 1e-6  # of a prior's precision
 _KEPT = 6  # projections that are kept: a step of a search asks for the same few again
@@ -230,16 +230,15 @@ class Evidence:
         folds: Sequence[int],
         joints: Sequence[int] | None,
         at: NDArray[np.intp],
-        first_side: bool = False,
     ) -> Array:
         """Gram matrix (k + 1, k + 1) of some folds' rows of some joints, the torque last."""
         both = np.append(at, self.torque)
         everywhere = joints is None or len(joints) == len(self.grams.joints)
-        if everywhere and len(folds) == 1 and not first_side:
+        if everywhere and len(folds) == 1:
             return np.asarray(self._folds[folds[0], both[:, None], both])
         rows = range(len(self.grams.joints)) if joints is None else joints
         norms = self.norms[both]
-        return self.grams.on(folds, rows, both, first_side) / (norms[:, None] * norms)
+        return self.grams.on(folds, rows, both) / (norms[:, None] * norms)
 
     def folds_of(self, candidates: Sequence[int]) -> NDArray[np.bool_]:
         """Folds (F,) in which one of some candidates is there."""
@@ -260,48 +259,29 @@ class Evidence:
             self._left_out[key] = np.maximum(found, 0.0)
         return self._left_out[key]
 
-    def on_sides(self, chosen: Sequence[int]) -> Array:
-        """Energy (n, 2F) of each joint on both sides of each fold, fitted to all other sides.
+    @cached_property
+    def in_turn(self) -> Blocks:
+        """Both sides of each fold (2F), blocks of time in turn, fitted to all other sides."""
+        sides = np.arange(2 * self.grams.folds) % 2
+        both = (np.stack([j.first, j.whole - j.first], axis=1) for j in self.grams.joints)
+        return self._in_blocks([each.reshape(-1, *each.shape[2:]) for each in both], sides)
 
-        Sides are blocks of time in turn: every run is in both fits.
-        """
-        key = (tuple(sorted(chosen)), "sides")
-        if key not in self._left_out:
-            at, every = self.columns(key[0]), range(self.grams.folds)
-            both = np.append(at, self.torque)
-            whole = self._part(every, None, at)
-            known = self.total[both[:, None], both] - whole  # without the data
-            first = self._part(every, None, at, first_side=True)
-            found = []
-            for own in (first, whole - first):
-                other = whole - own + known
-                normal = other[:-1, :-1]
-                normal[np.diag_indices(len(at))] += RIDGE
-                found.append(np.linalg.solve(normal, other[:-1, -1]))
-            self._left_out[key] = self._on_blocks(at, lambda fold, side: found[side])
-        return self._left_out[key]
+    @cached_property
+    def seen(self) -> Blocks:
+        """All rows at once, of the model that is fitted to them."""
+        every = [j.whole.sum(axis=0)[None] for j in self.grams.joints]
+        return self._in_blocks(every, np.zeros(1, dtype=np.intp), seen=True)
 
-    def as_new(self, chosen: Sequence[int]) -> Array:
-        """Energy (n, 2F) of each joint on both sides of each fold, fitted to all other folds alone.
-
-        What no other fold shows is not there: each fold is predicted as a new recording would be.
-        """
-        key = (tuple(sorted(chosen)), "new")
-        if key not in self._left_out:
-            at = self.columns(key[0])
-            found = self._without_folds(at)
-            self._left_out[key] = self._on_blocks(at, lambda fold, side: found[fold])
-        return self._left_out[key]
-
-    def _on_blocks(self, at: NDArray[np.intp], parameters: Callable[[int, int], Array]) -> Array:
-        """Energy (n, 2F) of each joint on both sides of each fold, with `parameters` of each."""
-        found = np.zeros((len(self.grams.joints), self.grams.folds, 2))
-        for joint in range(len(found)):
-            for fold in range(self.grams.folds):
-                first = self._part([fold], [joint], at, first_side=True)
-                for side, part in enumerate((first, self._part([fold], [joint], at) - first)):
-                    found[joint, fold, side] = _energy(part, parameters(fold, side))
-        return np.maximum(found, 0.0).reshape(len(found), -1)
+    def _in_blocks(
+        self, grams: Sequence[Array], groups: NDArray[np.intp], seen: bool = False
+    ) -> Blocks:
+        active = [np.append(joint.active, self.torque) for joint in self.grams.joints]
+        normal = [
+            each / np.outer(self.norms[at], self.norms[at])
+            for each, at in zip(grams, active, strict=True)
+        ]
+        own = self.blocks.__getitem__
+        return Blocks(active, normal, self.total, self.columns, own, groups, seen)
 
     def _fitted_without(self, at: NDArray[np.intp], chosen: tuple[int, ...]) -> Array:
         """Parameters (F, k) fitted to all folds but one, what these do not show to that one."""

@@ -1,10 +1,9 @@
-"""The fit that is told: robust, of possible sizes, and without names that mean nothing.
+"""The fit that is told: robust, and of possible sizes.
 
 What a search has named is fitted once more (`robust_solve`), with standard deviations that respect
 serial correlation, what the columns of first-order effects leave, and shapes that fit as well.
 Sizes that no effect can have are moved to the nearest possible ones, all other parameters with them
-as the covariance says. A name whose size is within two standard deviations of zero goes, the
-weakest first.
+as the covariance says.
 """
 
 from collections.abc import Iterator
@@ -27,25 +26,14 @@ _SYSTEMATIC = 0.004
 
 @dataclass(frozen=True)
 class FinalFit:
-    """What is `traced` and told, with `parameters` (k,) of the whole model and `covariance`."""
+    """What is told: `parameters` (k,) of the whole model and `covariance`."""
 
-    traced: Traced
     parameters: Array
     covariance: Array
 
 
 def final_fit(traced: Traced) -> FinalFit:
-    """Fit what was found, without what turns out to be insignificant."""
-    while True:
-        found = _fitted(traced)
-        sizes = _over_error(found)
-        weakest = min(sizes, key=lambda i: sizes[i], default=None)
-        if weakest is None or sizes[weakest] > 1.0:
-            return found
-        traced = replace(traced, chosen=tuple(i for i in traced.chosen if i != weakest))
-
-
-def _fitted(traced: Traced) -> FinalFit:
+    """Fit what was found."""
     parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
     # Placebos say by how much more than the noise model says.
     covariance = traced.inflation * covariance_of(
@@ -63,7 +51,7 @@ def _fitted(traced: Traced) -> FinalFit:
             whiten = np.linalg.inv(half_of(covariance[own, own]))
             shift = whiten.T @ (whiten @ (effect.nearest(values, covariance[own, own]) - values))
             parameters = parameters + covariance[:, own] @ shift
-    return FinalFit(traced, parameters, covariance)
+    return FinalFit(parameters, covariance)
 
 
 def _by_shape(traced: Traced, i: int) -> Array:
@@ -98,9 +86,9 @@ def _by_shape(traced: Traced, i: int) -> Array:
     return np.sqrt(weights @ from_own / weights.sum())
 
 
-def _over_error(found: FinalFit) -> dict[int, float]:
-    """Size over error of every effect that was found; of plain friction, that of the line."""
-    traced, count = found.traced, len(found.parameters)
+def over_error(traced: Traced, found: FinalFit) -> dict[int, float]:
+    """Size over two standard deviations of every effect; of plain friction, that of the line."""
+    count = len(found.parameters)
     lines = _lines(traced, count)
     shown, spread = lines @ found.parameters, lines @ found.covariance @ lines.T
     return {

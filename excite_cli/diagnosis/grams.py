@@ -1,9 +1,8 @@
 """Gram matrices per joint and fold, of those columns only that show in the joint's rows.
 
 Most candidates act on one joint: of all columns, a joint's rows hold a third or less, and what is
-zero is neither stored nor added. Every fold has two sides, blocks of time in turn: what belongs to
-a run alone is fitted on one side of it and judged on the other. The second is what the whole has
-more than the first.
+zero is neither stored nor added. Every fold has two sides, blocks of time in turn: what is fitted
+on one side is judged on the other. The second is what the whole has more than the first.
 """
 
 from collections.abc import Sequence
@@ -80,12 +79,8 @@ class Grams:
         folds: Sequence[int],
         joints: Sequence[int],
         at: NDArray[np.intp],
-        first_side: bool = False,
     ) -> Array:
-        """Sum (k, k) over some folds' rows of `joints`, of the columns `at` (k,).
-
-        Of the rows on the `first_side` of the folds only, if it is asked for.
-        """
+        """Sum (k, k) over some folds' rows of `joints`, of the columns `at` (k,)."""
         places = []
         for j in joints:
             position = self._position[j, at]
@@ -94,7 +89,7 @@ class Grams:
             places.append((j, (position[:, None], position), (there[:, None], there)))
         found = np.zeros((len(at), len(at)))
         for j, own, to in places:
-            for gram in self._summed(j, folds, first_side):
+            for gram in self._summed(j, folds):
                 part = gram[own]
                 if len(part) == len(at):
                     found += part
@@ -102,10 +97,8 @@ class Grams:
                     found[to] += part
         return found
 
-    def _summed(self, joint: int, folds: Sequence[int], first_side: bool) -> list[Array]:
+    def _summed(self, joint: int, folds: Sequence[int]) -> list[Array]:
         """Gram matrices of a joint, to be summed; the sum over all folds is kept."""
-        if first_side:
-            return [self.joints[joint].first[fold] for fold in folds]
         if len(folds) == self.folds:
             return [self._of_all[joint]]
         return [self.joints[joint].whole[fold] for fold in folds]

@@ -2,10 +2,10 @@
 
 The price of a candidate is the χ² value that one of all the tests made would exceed by chance in a
 share α of diagnoses (Bonferroni), plus a little for unusual kinds: so a step that lowers residual
-energy + prices is a test with family-wise control. What joins must also lower the error on runs
+energy + prices is a test with family-wise control. What joins must also lower the error on blocks
 left out, be large enough to matter, and have a sign and a size that physics allows. Where it takes
-scales to tell an effect from the inertias, these predict as well without it, and runs left out have
-no say.
+scales to tell an effect from the inertias, these predict as well without it, and blocks left out
+have no say.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
@@ -25,8 +24,6 @@ from excite_cli.robot.model import Array
 
 # It stays in beside its refinement unless it is useless there (χ² units).
 _PARENT_PRICE = 4.5
-_FAR_MORE = 0.15  # of the error on runs left out: more than noise makes of it
-_TRANSFER = 0.06  # least share of the gain on fitted runs that runs left out must have
 # χ² that what acts on fewer rows must save beyond, where scales alone tell either: an offset of the
 # vertical force, or a gain of it, and one of the whole wrench differ by the noise.
 _ON_FEWER_ROWS = 25.0
@@ -196,37 +193,24 @@ class Judgement:
         return max(self.p_value(candidate, gain), self.rules.least_p)
 
     def left_out_gain(self, chosen: Sequence[int], added: Sequence[int]) -> float:
-        """Share by which the RMS error on runs left out falls, on the rows that `added` touches.
+        """Share by which the RMS error of blocks left out falls, on the rows that `added` touches.
 
         The better of filtered torque and whitened torque: an effect near the noise shows in the
-        second only. An effect of single runs is not there in others: it is judged where it is.
+        second only.
         """
-        there: NDArray[np.bool_] | slice = slice(None)
-        if all(self.candidates[i].effect.runs for i in added):
-            there = self.white.folds_of(added)
-        return self._left_out_gain(chosen, added, there)
-
-    def _left_out_gain(
-        self, chosen: Sequence[int], added: Sequence[int], there: NDArray[np.bool_] | slice
-    ) -> float:
-        """As `left_out_gain`, in some folds."""
         joints = sorted({j for i in added for j in self.white.rows_of[i]})
-        best = -np.inf
-        single = any(self.candidates[i].effect.runs for i in (*chosen, *added))
-        for evidence in (self.plain, self.white):
-            if single:  # no other fold may know it: judged on blocks in turn
-                both = there if isinstance(there, slice) else np.repeat(there, 2)
-                before, after = (
-                    evidence.on_sides(each)[np.asarray(joints)][:, both].sum()
-                    for each in (chosen, [*chosen, *added])
-                )
-            else:
-                before, after = (
-                    evidence.left_out(each, joints)[there].sum()
-                    for each in (chosen, [*chosen, *added])
-                )
-            best = max(best, 1.0 - float(np.sqrt(after / max(before, 1e-300))))
-        return best
+        both = [
+            (e.in_turn.energies(chosen, joints), e.in_turn.energies([*chosen, *added], joints))
+            for e in (self.plain, self.white)
+        ]
+        return max(self._gain(before, after, added) for before, after in both)
+
+    def _gain(self, before: Array, after: Array, added: Sequence[int]) -> float:
+        """1 − the ratio of RMS errors; what single runs carry is judged where it is."""
+        if all(self.candidates[i].effect.runs for i in added):
+            there = np.repeat(self.white.folds_of(added), 2)
+            before, after = before[:, there], after[:, there]
+        return 1.0 - float(np.sqrt(after.sum() / max(before.sum(), 1e-300)))
 
     def size(self, chosen: Sequence[int], added: Sequence[int], joints: Sequence[int]) -> float:
         """What `added` explains, as a share of the torque's RMS on the joint where it is most."""
@@ -297,24 +281,6 @@ class Judgement:
             at += width
         return found
 
-    def carries_more(self, chosen: Sequence[int], one: int, other: int) -> bool:
-        """Whether `one` says far more than `other` about the same joints on runs left out.
-
-        On all of them: what changed in one run may explain all that is there, and next to nothing
-        beside what changes from run to run.
-        """
-        if not set(self.white.rows_of[one]) & set(self.white.rows_of[other]):
-            return False
-        gains = [self._left_out_gain(chosen, [i], slice(None)) for i in (one, other)]
-        return gains[0] > gains[1] + _FAR_MORE
-
-    def loses(self, rest: Sequence[int], member: int, move: Sequence[int]) -> bool:
-        """Whether runs left out would lose by the replacement what they gained by the member."""
-        if len(move) == 1 and self.told_by_weight(move[0], rest):
-            return False
-        before = self._left_out_gain(rest, [member], slice(None))
-        return self._left_out_gain(rest, move, slice(None)) < before - _FAR_MORE
-
     def told_by_weight(self, candidate: int, others: Sequence[int]) -> bool:
         """Whether it is a gain that scales alone tell from the model with the others."""
         gain = self.candidates[candidate].effect.of_whole_torque
@@ -340,7 +306,7 @@ class Judgement:
             return Verdict.TOO_SMALL
         if self._leftover(chosen, added):
             return Verdict.LEFTOVER
-        if not self._generalises(chosen, added):
+        if self.left_out_gain(chosen, added) < self.rules.gain:
             return Verdict.NO_GAIN
         return Verdict.ACCEPTED
 
@@ -355,35 +321,40 @@ class Judgement:
         paid = not holds_it or gain.chi2 > self.price(candidate, gain.dof)
         return paid and not self.too_small(chosen, [candidate])
 
-    def _generalises(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        """Whether runs left out gain, and not far less than those fitted."""
-        gain = self.left_out_gain(chosen, added)
-        if gain < self.rules.gain:
-            return False
-        joints = sorted({j for i in added for j in self.white.rows_of[i]})
-        fitted = max(
-            1.0
-            - np.sqrt(
-                e.energy_on([*chosen, *added], joints) / max(e.energy_on(chosen, joints), 1e-300)
-            )
-            for e in (self.plain, self.white)
-        )
-        return bool(gain > _TRANSFER * fitted)
-
-    def fails(self, i: int, rest: list[int], chosen: list[int]) -> bool:
-        """Whether member i does not hold beside the rest."""
-        if self.bound(i, chosen):
-            return False
-        right_sign = self.allowed(self.plain.solve(chosen), chosen, [i])
-        if any(i in self.parents[k] for k in rest):
-            return not right_sign
-        gain = self.white.gain_of(i, chosen)
-        if self.p_value(i, gain) > self.rules.significance or not right_sign:
-            return True
-        if self.told_by_weight(i, rest):
-            return self._weighs_little(i, rest)
-        return (
-            self.left_out_gain(rest, [i]) < self.rules.gain
-            or self.too_small(rest, [i])
-            or self._leftover(rest, [i])
-        )
+    def failing(self, chosen: Sequence[int]) -> list[int]:
+        """Those that do not hold beside the others."""
+        evidence = (self.plain, self.white)
+        with_it = [e.in_turn.energies(chosen) for e in evidence]
+        without = [e.in_turn.without_each(chosen) for e in evidence]
+        after = self.plain.seen.energies(chosen)[:, 0]
+        before = self.plain.seen.without_each(chosen)
+        whole = np.array([self.plain.grams.torque_energy(j) for j in range(len(after))])
+        found = []
+        for i in chosen:
+            if self.bound(i, chosen):
+                continue
+            rest = [k for k in chosen if k != i]
+            right_sign = self.allowed(self.plain.solve(chosen), chosen, [i])
+            if any(i in self.parents[k] for k in rest):
+                if not right_sign:
+                    found.append(i)
+                continue
+            if (
+                self.p_value(i, self.white.gain_of(i, chosen)) > self.rules.significance
+                or not right_sign
+            ):
+                found.append(i)
+            elif self.told_by_weight(i, rest):
+                if self._weighs_little(i, rest):
+                    found.append(i)
+            else:
+                rows = list(self.white.rows_of[i])
+                gains = [
+                    self._gain(each[i][rows], now[rows], [i])
+                    for each, now in zip(without, with_it, strict=True)
+                ]
+                size = np.sqrt(np.maximum(before[i][:, 0] - after, 0.0) / np.maximum(whole, 1e-300))
+                small = bool((size < _SMALLEST).all())
+                if max(gains) < self.rules.gain or small or self._leftover(rest, [i]):
+                    found.append(i)
+        return found

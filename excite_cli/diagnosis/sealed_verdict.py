@@ -10,7 +10,7 @@ unless it rises on a joint: inertias would take it up and predict as well. Nothi
 fitted by this.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,9 +41,16 @@ class Worth:
 
 
 def worth_on_sealed(
-    played: Played, model: Model, traced: Traced, after: IdentifiedModel
+    played: Played,
+    model: Model,
+    traced: Traced,
+    after: IdentifiedModel,
+    sizes: Mapping[int, float],
 ) -> dict[int, Worth]:
-    """Worth of every chosen candidate on the sealed runs `played`, beside all others."""
+    """Worth of every chosen candidate on the sealed runs `played`, beside all others.
+
+    `sizes` over two standard deviations: what may be zero is not confirmed.
+    """
     with_all = played.predictions(after)
     errors = played.errors(with_all)
     found = {}
@@ -58,7 +65,7 @@ def worth_on_sealed(
         rises = rises_on_one(on, errors_without, errors)
         if traced.judge.told_by_weight(i, rest) and not rises:
             verdict = SealedVerdict.WEIGHED
-        elif verdict is SealedVerdict.CONFIRMED and rises:
+        elif verdict is SealedVerdict.CONFIRMED and (rises or sizes[i] < 1.0):
             verdict = SealedVerdict.NOT_CONFIRMED
         found[i] = Worth(verdict, _removes(errors_without, errors))
     return found

@@ -46,14 +46,14 @@ class Search:
         What does not hold in the end leaves its place to others, but not to itself.
         """
         closed, chosen = self._closed, self._settled(start)
-        kept, most = self._pruned(chosen), _GROWN * len(chosen)
+        kept, most = self.pruned(chosen), _GROWN * len(chosen)
         while len(kept) < len(chosen):
             lost = {self.candidates[i].place for i in chosen if i not in kept}
             self._closed = {*self._closed, *lost}
             chosen = self._settled(kept)
             if len(chosen) > most or not self.judge.cost(chosen) < self.judge.cost(kept) - 1e-6:
                 break
-            kept = self._pruned(chosen)
+            kept = self.pruned(chosen)
         self._closed = closed
         return self._completed(kept)
 
@@ -138,18 +138,15 @@ class Search:
             i: schur.singles[i].chi2 - self.judge.price_beside(i, refined, schur.singles[i].dof)
             for i in free
         }
-        best: int | None = None
         for i in sorted(free, key=lambda i: -saved[i])[:_TRIED]:
             if saved[i] <= 0:
                 break
-            if best is not None and not self.judge.carries_more(chosen, i, best):
-                continue
             if (
                 self.judge.in_order(schur, chosen, [i])
                 and self.judge.verdict(chosen, [i]) is Verdict.ACCEPTED
             ):
-                best = i
-        return () if best is None else (best,)
+                return (i,)
+        return ()
 
     def _best_two(self, chosen: list[int], latest: Tier) -> tuple[int, ...]:
         """Two of one joint at once, where none passes alone."""
@@ -237,20 +234,15 @@ class Search:
                         or self.judge.in_order(schur, rest, move)
                     )
                     and self.judge.allowed(self.plain.solve(trial), trial, move)
-                    and not self.judge.loses(rest, i, move)  # last: it takes longest
                 ):
                     best, found = cost, trial
         return found
 
-    def _pruned(self, chosen: list[int]) -> list[int]:
+    def pruned(self, chosen: list[int]) -> list[int]:
         """Without those that, with all others in, are not significant or bring nothing."""
         while True:
-            weakest: tuple[float, list[int]] | None = None
-            for i in chosen:
-                rest = [k for k in chosen if k != i]
-                chi2_i = self.white.gain_of(i, chosen).chi2
-                if self.judge.fails(i, rest, chosen) and (weakest is None or chi2_i < weakest[0]):
-                    weakest = (chi2_i, rest)
-            if weakest is None:
+            failing = self.judge.failing(chosen)
+            if not failing:
                 return chosen
-            chosen = weakest[1]
+            weakest = min(failing, key=lambda i: self.white.gain_of(i, chosen).chi2)
+            chosen = [k for k in chosen if k != weakest]

@@ -2,17 +2,16 @@
 
 It is where the search begins, and what its answer must be better than. Everyday effects that
 a robot does not have cost what they are fitted to; so of the four sets with and without them the
-one is taken that predicts training data left out best, the smaller one where none is better beyond
-its standard error.
+one is taken that predicts training data left out best, the smaller one where none is surely better
+(`comparison`).
 """
 
 from collections.abc import Sequence
 from itertools import product
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.comparison import as_new
+from excite_cli.diagnosis.comparison import Comparison
 from excite_cli.diagnosis.declared_model import Model
-from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue, shows
 
@@ -30,13 +29,13 @@ def everyday(candidates: Sequence[Candidate]) -> list[int]:
     return _of(candidates, (*EVERYDAY_FRICTION, *EVERYDAY))
 
 
-def textbook(judge: Judgement) -> list[int]:
+def textbook(candidates: Sequence[Candidate], models: Comparison) -> list[int]:
     """The candidates of that set of the textbook's which predicts data left out best."""
     best: list[int] | None = None
     for more in product((False, True), repeat=len(EVERYDAY)):
         kinds = [kind for kind, taken in zip(EVERYDAY, more, strict=True) if taken]
-        chosen = _of(judge.candidates, (*EVERYDAY_FRICTION, *kinds))
-        if best is None or as_new(judge, best, chosen).better:
+        chosen = _of(candidates, (*EVERYDAY_FRICTION, *kinds))
+        if best is None or models.as_new(best, chosen).better:
             best = chosen
     assert best is not None
     return best

@@ -80,8 +80,8 @@ def trace(
     run_names: Sequence[str],
     progress: Progress,
     start: Sequence[Effect] = (),
-) -> Traced:
-    """Find the effects that `model` lacks.
+) -> tuple[Traced, list[ModelledRun]]:
+    """Find the effects that `model` lacks; with the runs as it sees them.
 
     `prepared` gives the training parts, without samples that effects which were found ask to leave.
     `start`: effects found in more of the same data; all numbers are fitted to these data alone.
@@ -122,7 +122,7 @@ def trace(
             attempt + 1,
         )
         if attempt > 0 and now.places == fit.places and now.close_to(fit):
-            return traced
+            return traced, bodies
         passes.append(_Pass(fit, left_out, _left_out(traced)))
         fit = now
         if attempt < _PASSES - 1:
@@ -140,10 +140,10 @@ def trace(
     assert traced is not None
     best = min(passes, key=lambda each: each.error)
     if best.error > passes[-1].error - _BETTER:
-        return traced
+        return traced, bodies
     traced = None
     take(best.left_out)
-    return _one_pass(model, spec, folds, run_names, bodies, best.fit)
+    return _one_pass(model, spec, folds, run_names, bodies, best.fit), bodies
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,7 @@ def _first_fit(
         phi = model.full_inertias(parameters)
         effects = [each.effect for each in found]
         known = (*model.declared, *effects)
-        values = _values(model, data, parameters)
+        values = values_of(model, data, parameters)
     return Fit(phi, tuple(effects), values, levels, evidence.energy(chosen)), data, found
 
 
@@ -245,7 +245,7 @@ def fit_of(model: Model, traced: Traced) -> Fit:
     return Fit(
         model.full_inertias(parameters),
         traced.effects,
-        _values(model, traced.data, parameters),
+        values_of(model, traced.data, parameters),
         traced.noise.levels(),
         plain.energy(traced.chosen),
     )
@@ -259,7 +259,8 @@ def _left_out(traced: Traced) -> float:
     return float(np.mean(np.log(squares / np.maximum(counts, 1) * traced.levels**2 + 1e-300))) / 2
 
 
-def _values(model: Model, data: TrainingData, parameters: Array) -> Array:
+def values_of(model: Model, data: TrainingData, parameters: Array) -> Array:
+    """Of the effects, declared ones and those found."""
     return parameters[data.declared[0].shape[2] - model.declared_width :]
 
 
@@ -271,7 +272,7 @@ def _one_pass(
     bodies: Sequence["ModelledRun"],
     fit: Fit,
 ) -> Traced:
-    """Columns and noise as the last fit says, then a search from the declared model."""
+    """Columns and noise as the last fit says, then a search from the textbook's model."""
     effects = (*model.declared, *fit.effects)
     signals = signals_of_all(bodies, fit.phi, effects, fit.values)
     data = training_data(model, folds, bodies, signals)
@@ -329,7 +330,8 @@ def _searched(judge: Judgement, most: int, model: Model) -> list[int]:
     inertias.
     """
     if not model.is_weighed:
-        return Search(judge, most).run(everyday(judge.candidates) if most else ())
+        search = Search(judge, most)
+        return search.run(search.pruned(everyday(judge.candidates)) if most else ())
     chosen = Search(judge, most).run()
     places = {effect.place for effect in scales(model.robot)}
     gains = [i for i, c in enumerate(judge.candidates) if c.place in places]

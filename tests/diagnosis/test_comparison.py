@@ -1,26 +1,30 @@
 """Whether a model predicts data left out better: the textbook's sets and the sufficient one."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.comparison import as_new, difference, left_out
-from excite_cli.diagnosis.judgement import Judgement, Rules
-from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.comparison import Comparison
+from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.diagnosis.sufficient import sufficient
 from excite_cli.diagnosis.textbook import everyday, textbook
+from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
-from tests.diagnosis.explicit_data import FOLDS, anything, prepared
+from excite_cli.effects.seen import Seen
+from tests.diagnosis.explicit_data import FOLDS, prepared
+from tests.diagnosis.test_doubt import traced
 
 SAMPLES = 400
+SIZES = lambda chosen: np.eye(99), Seen(np.full(2, 9.0), np.ones(2), 1.0)
 FIXED = 3
 
 
-def judge_of(sizes: Sequence[tuple[Effect, float]], seed: int = 0) -> Judgement:
+def traced_of(sizes: Sequence[tuple[Effect, float]], seed: int = 0) -> Traced:
     """A joint's torque of random columns of these effects times their sizes, and unit noise."""
     rng = np.random.default_rng(seed)
     declared = [rng.normal(size=(SAMPLES, 1, FIXED)) for _ in FOLDS]
@@ -42,15 +46,19 @@ def judge_of(sizes: Sequence[tuple[Effect, float]], seed: int = 0) -> Judgement:
     candidates = [
         Candidate(effect, (0,), tuple(own)) for (effect, _), own in zip(sizes, columns, strict=True)
     ]
-    evidence = data.evidence(candidates, NoiseModel.white(np.ones(1)))
-    return Judgement(evidence, evidence, candidates, Rules(0.01, 0.01), anything)
+    return traced(data, candidates, range(len(sizes)))
+
+
+def models_of(given: Traced) -> Comparison:
+    every = range(len(given.candidates))
+    return Comparison(given.data, given.candidates, every, given.levels, given.noise)
 
 
 def effect(kind: str, runs: tuple[str, ...] = ()) -> Effect:
     return catalogue()[kind]((0,), {}, runs)
 
 
-def everyday_judge(offset: float, armature: float, spring: float = 0.0) -> Judgement:
+def everyday_traced(offset: float, armature: float, spring: float = 0.0) -> Traced:
     kinds = {
         "viscous_friction": 1.0,
         "coulomb_friction": 1.0,
@@ -58,26 +66,30 @@ def everyday_judge(offset: float, armature: float, spring: float = 0.0) -> Judge
         "armature": armature,
         "spring": spring,
     }
-    return judge_of([(effect(kind), size) for kind, size in kinds.items()])
+    return traced_of([(effect(kind), size) for kind, size in kinds.items()])
 
 
 def test_by_how_much_a_model_is_better_and_how_surely() -> None:
-    """The energy of an effect of RMS one half beside unit noise, in units of a block's noise."""
-    judge = judge_of([(effect("viscous_friction"), 0.5), (effect("armature"), 0.0)])
-    found = difference(judge, [], [0])
-    assert found.size == pytest.approx(0.25 * 2 * (max(FOLDS) + 1), rel=0.3)
+    """Of every block the logarithm of 1.25, an effect of RMS one half beside unit noise."""
+    given = traced_of([(effect("viscous_friction"), 0.5), (effect("armature"), 0.0)])
+    models = models_of(given)
+    found = models.difference([], [0])
+    assert found.blocks == len(FOLDS) * SAMPLES * 0.02
+    assert found.size / found.blocks == pytest.approx(np.log(1.25), rel=0.2)
     assert found.better
-    assert difference(judge, [0], []).size < 0.0
-    assert not difference(judge, [0], [0, 1]).better
+    assert models.difference([0], []).size < 0.0
+    assert not models.difference([0], [0, 1]).better
+    needed = models.needed([0, 1])
+    assert needed[1].size == pytest.approx(models.difference([0], [0, 1]).size, rel=1e-6)
+    assert needed[0].size == pytest.approx(models.difference([1], [0, 1]).size, rel=1e-6)
 
 
 def test_what_one_run_shows_is_judged_on_its_other_blocks_and_is_not_in_a_new_recording() -> None:
-    judge = judge_of([(effect("payload", ("b",)), 0.5), (effect("armature"), 0.2)])
-    assert difference(judge, [], [0]).better
-    assert as_new(judge, [], [0]).size < 1.0
-    assert left_out(judge.plain, []) == pytest.approx(
-        0.5 * np.log(judge.plain.as_new([]).sum()), rel=1e-12
-    )
+    given = traced_of([(effect("payload", ("b",)), 0.5), (effect("armature"), 0.2)])
+    models = models_of(given)
+    assert models.difference([], [0]).better
+    assert models.as_new([], [0]).size < 1.0
+    assert models.error_of_new([1]) < models.error_of_new([])
 
 
 @pytest.mark.parametrize(
@@ -87,17 +99,27 @@ def test_what_one_run_shows_is_judged_on_its_other_blocks_and_is_not_in_a_new_re
 def test_offset_and_armature_are_in_the_textbook_where_data_ask(
     offset: float, armature: float, expected: set[int]
 ) -> None:
-    judge = everyday_judge(offset, armature)
-    assert set(textbook(judge)) == expected
-    assert everyday(judge.candidates) == [0, 1, 2, 3]
+    given = everyday_traced(offset, armature)
+    assert set(textbook(given.candidates, models_of(given))) == expected
+    assert everyday(given.candidates) == [0, 1, 2, 3]
+
+
+def chosen(given: Traced, found: Sequence[int]) -> set[int]:
+    return set(sufficient(replace(given, chosen=tuple(found)), models_of(given)))
 
 
 def test_the_sufficient_model_lacks_what_data_left_out_do_not_miss() -> None:
-    judge = everyday_judge(0.0, 0.5, 0.5)
-    assert set(sufficient(judge, [0, 1, 2, 3, 4])) == {0, 1, 3, 4}
+    assert chosen(everyday_traced(0.0, 0.5, 0.5), [0, 1, 2, 3, 4]) == {0, 1, 3, 4}
+
+
+def test_what_cannot_be_leaves_before_all_else() -> None:
+    """A spring that pushes away, however well it predicts."""
+    given = traced_of([(effect("spring"), -2.0), (effect("armature"), 1.0)])
+    judge = replace(given.judge, allowed=PossibleSizes(given.candidates, *SIZES))
+    assert chosen(replace(given, judge=judge), [0, 1]) == {1}
 
 
 def test_the_textbook_is_the_answer_where_nothing_beats_it() -> None:
-    judge = everyday_judge(0.5, 0.5)
-    assert set(sufficient(judge, [0, 4])) == {0, 1, 2, 3}
-    assert set(sufficient(everyday_judge(0.0, 0.0), [0, 1])) == {0, 1}  # it is that
+    given = everyday_traced(0.5, 0.5)
+    assert chosen(given, [0, 4]) == {0, 1, 2, 3}
+    assert chosen(everyday_traced(0.0, 0.0), [0, 1]) == {0, 1}  # it is that

@@ -77,10 +77,23 @@ def test_errors_on_blocks_fitted_to_the_others(
     both: tuple[Evidence, Rows], chosen: tuple[int, ...]
 ) -> None:
     evidence, rows = both
-    new = evidence.as_new(chosen)
-    assert new.ravel() == pytest.approx(rows.on_blocks(chosen, new=True).ravel(), rel=1e-6)
-    sides = evidence.on_sides(chosen)
+    sides = evidence.in_turn.energies(chosen)
     assert sides.ravel() == pytest.approx(rows.on_blocks(chosen, new=False).ravel(), rel=1e-6)
+    assert evidence.in_turn.energies(chosen, [1]) == pytest.approx(sides[1:], rel=1e-9)
+    for joint in (0, 1):
+        whole = evidence.seen.energies(chosen)[joint, 0]
+        assert whole == pytest.approx(rows.energy(chosen, [joint]), rel=1e-6)
+
+
+@pytest.mark.parametrize("chosen", [c for c in CHOSEN if c])
+def test_blocks_say_at_once_what_a_model_is_without_each_member(
+    both: tuple[Evidence, Rows], chosen: tuple[int, ...]
+) -> None:
+    evidence, _ = both
+    for blocks in (evidence.in_turn, evidence.seen):
+        for member, energies in blocks.without_each(chosen).items():
+            rest = [i for i in chosen if i != member]
+            assert energies == pytest.approx(blocks.energies(rest), rel=1e-6)
 
 
 @pytest.mark.parametrize("chosen", [c for c in CHOSEN if c])

@@ -1,11 +1,11 @@
-"""The fit that is told: nothing insignificant, nothing impossible, errors of inexact columns."""
+"""The fit that is told: nothing impossible, errors of inexact columns."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.final_fit import final_fit
+from excite_cli.diagnosis.final_fit import final_fit, over_error
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from tests.diagnosis.test_doubt import planted, traced
@@ -16,14 +16,16 @@ def one(kind: str, *joints: int) -> Effect:
     return effect(joints or (0,), {p.name: p.low for p in effect.shapes})
 
 
-def test_what_is_no_more_than_its_error_goes_and_the_rest_stays() -> None:
+def test_sizes_are_told_beside_two_standard_deviations() -> None:
     """The second is beyond its noise of 0.05, the third is not."""
     effects = [one("viscous_friction"), one("armature"), one("torque_offset")]
     torque = np.array([[3.0, 0.0], [1.0, 0.0], [0.01, 0.0]])
     data, candidates = planted(effects, torque)
-    found = final_fit(traced(data, candidates, (0, 1, 2)))
-    assert set(found.traced.chosen) == {0, 1}
-    assert found.parameters[-2:] == pytest.approx([3.0, 1.0], abs=0.1)
+    given = traced(data, candidates, (0, 1, 2))
+    found = final_fit(given)
+    sizes = over_error(given, found)
+    assert {i for i, size in sizes.items() if size > 1.0} == {0, 1}
+    assert found.parameters[-3:-1] == pytest.approx([3.0, 1.0], abs=0.1)
     assert found.covariance.shape == (len(found.parameters),) * 2
 
 
@@ -79,7 +81,7 @@ def test_a_shape_that_physics_refuses_makes_no_size_uncertain() -> None:
     mix = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.3]])
     data, candidates = planted(effects, np.array([[2.0, 2.0], [0.0, 0.0]]), mix)
     found = final_fit(traced(data, candidates, (0,), lambda x, chosen, added: 1 not in added))
-    assert found.traced.chosen == (0,)
-    assert final_fit(traced(data, candidates, (0,))).traced.chosen == ()
+    both = traced(data, candidates, (0,))
+    assert over_error(both, final_fit(both))[0] < 1.0
     assert found.parameters[-2] == pytest.approx(2.0, abs=0.1)
     assert np.sqrt(found.covariance[-2, -2]) < 0.1

@@ -167,8 +167,8 @@ def test_p_values_are_corrected_for_tests_and_inflation(
     assert judge.p_value(3, Gain(0.0, 0, 0.0)) == 1.0
 
 
-def test_gains_on_runs_left_out_are_those_of_explicit_fits() -> None:
-    """Fold by fold on stacked rows, whitened or not, on the joints that are touched."""
+def test_gains_on_blocks_left_out_are_those_of_explicit_fits() -> None:
+    """Side by side on stacked rows, whitened or not, on the joints that are touched."""
     better = []
     for seed in range(3):
         data, candidates = random_data(seed), random_candidates(seed)
@@ -185,9 +185,12 @@ def test_gains_on_runs_left_out_are_those_of_explicit_fits() -> None:
             gains = []
             for noise in noises:
                 rows = rows_of(data, candidates, noise)
-                before = sum(rows.left_out(chosen, joints))
-                gains.append(1 - np.sqrt(sum(rows.left_out([*chosen, *added], joints)) / before))
-            assert judge.left_out_gain(chosen, added) == pytest.approx(max(gains), abs=1e-9)
+                before, after = (
+                    rows.on_blocks(each, new=False)[joints].sum()
+                    for each in (chosen, [*chosen, *added])
+                )
+                gains.append(1 - np.sqrt(after / before))
+            assert judge.left_out_gain(chosen, added) == pytest.approx(max(gains), abs=1e-7)
             better.append(gains[0] > gains[1])
     assert any(better)
     assert not all(better)
@@ -242,9 +245,9 @@ def test_what_spoils_the_inertias_of_another_joint_is_not_small() -> None:
         # 1 / √(1² + declared²) is 0.1 % of the torque, then 0.25 %.
         ("viscous_friction", 1.0, 0.1, 1000.0, Verdict.TOO_SMALL),
         ("viscous_friction", 1.0, 0.1, 400.0, Verdict.ACCEPTED),
-        # 1 − 1 / √(1 + size²) is 0.5 % of the error, then 1.1 %.
+        # 1 − 1 / √(1 + size²) is 0.5 % of the error, then 1.4 %, fitted to half of the data.
         ("viscous_friction", 0.1, 1.0, 1.0, Verdict.NO_GAIN),
-        ("viscous_friction", 0.15, 1.0, 1.0, Verdict.ACCEPTED),
+        ("viscous_friction", 0.17, 1.0, 1.0, Verdict.ACCEPTED),
     ],
 )
 def test_verdicts(kind: str, size: float, noise: float, declared: float, expected: str) -> None:
@@ -274,7 +277,7 @@ def test_no_effect_is_what_another_leaves(kind: str, angle: float, left: float) 
         judge = judge_of(data, candidates)
         words = Verdict.ACCEPTED if expected else Verdict.LEFTOVER
         assert judge.verdict([0, 1], [2]) == words
-        assert judge.fails(2, [0, 1], [0, 1, 2]) != expected
+        assert (2 in judge.failing([0, 1, 2])) != expected
     assert judge.verdict([0], [2]) != Verdict.LEFTOVER  # it is not in
 
 
@@ -313,28 +316,6 @@ def test_inertias_bent_on_one_joint_leave_nothing_to_effects_of_another() -> Non
     assert judge.verdict([0], [1]) == Verdict.ACCEPTED
 
 
-@pytest.mark.parametrize(("transferred", "expected"), [(0.03, False), (0.12, True)])
-def test_runs_left_out_gain_not_far_less_than_those_fitted(
-    transferred: float, expected: bool
-) -> None:
-    """Fold 0 (parts 0 and 2) has all of the effect, the others a share of it and weak columns.
-
-    With fold 0 left out, the error falls by that share only; fitted, it is gone.
-    """
-    data, [candidate] = planted([effect("torque_offset")], np.eye(1), np.zeros((1, 2)), noise=0.01)
-    strength, value = (1.0, 0.01, 1.0, 0.01), (1.0, transferred, 1.0, transferred)
-    columns = tuple(c * s for c, s in zip(candidate.columns, strength, strict=True))
-    tau = tuple(
-        t + v * np.pad(c[:, :, 0], ((0, 0), (0, 1)))
-        for t, v, c in zip(data.tau, value, columns, strict=True)
-    )
-    data, candidate = replace(data, tau=tau), replace(candidate, columns=columns)
-    judge = judge_of(data, [candidate], Rules(0.01, 0.01))
-    assert judge.left_out_gain([], [0]) == pytest.approx(transferred, abs=0.01)
-    words = Verdict.ACCEPTED if expected else Verdict.NO_GAIN
-    assert judge.verdict([], [0]) == words
-
-
 FRICTION = {"viscous_friction": 0.0, "coulomb_friction": 0.0, "load_dependent_friction": 0.0}
 
 
@@ -348,7 +329,7 @@ def test_first_order_friction_comes_before_what_refines_it() -> None:
     assert not judge.in_order(judge.white.schur([0]), [0], [2])
 
 
-@pytest.mark.parametrize(("energy", "waits"), [(0.9, False), (1.1, True)])
+@pytest.mark.parametrize(("energy", "waits"), [(0.9, False), (1.6, True)])
 def test_a_refinement_waits_for_what_is_worth_its_price(energy: float, waits: bool) -> None:
     price = chi2.isf(0.01 / 20, 1)
     sizes = {**FRICTION, "coulomb_friction": np.sqrt(energy * price / TOTAL)}
@@ -396,10 +377,10 @@ def test_root_friction_binds_both_straight_terms(power: float, bound: bool) -> N
     assert [judge.bound(i, every) for i in every] == [bound, bound, False, False]
     assert not judge.bound(0, [0, 1, 3])
     # Bound ones stay whatever they are; other parents unless they cannot be.
-    assert judge.fails(0, [1, 2, 3], every) != bound
-    assert not judge.fails(1, [0, 2, 3], every)
-    assert judge.fails(0, [1, 3], [0, 1, 3])
-    assert judge.fails(1, [0, 3], [0, 1, 3])
+    assert (0 in judge.failing(every)) != bound
+    assert 1 not in judge.failing(every)
+    assert 0 in judge.failing([0, 1, 3])
+    assert 1 in judge.failing([0, 1, 3])
 
 
 @pytest.mark.parametrize(
@@ -419,7 +400,7 @@ def test_members_that_do_not_hold(
 ) -> None:
     sizes = {"viscous_friction": size, "armature": 2.0}
     judge = orthogonal(sizes, noise, declared, Rules(0.01, 0.01, inflation), tests)
-    assert judge.fails(0, [1], [0, 1]) == fails
+    assert (0 in judge.failing([0, 1])) == fails
 
 
 def test_members_that_share_nearly_all_they_have_hold_if_they_are_significant() -> None:
@@ -429,27 +410,8 @@ def test_members_that_share_nearly_all_they_have_hold_if_they_are_significant() 
     torque = on_joint_0([200.0, 1.0])  # 100 of each
     judge = judge_of(*planted(effects, mix, torque))
     assert judge.plain.solve([0, 1])[FIXED:] == pytest.approx([100.0, 100.0], rel=1e-4)
-    assert not judge.fails(0, [1], [0, 1])
-    assert not judge.fails(1, [0], [0, 1])
-
-
-def test_carrying_far_more_is_by_the_error_on_runs_left_out() -> None:
-    """Errors fall from √(1 + a² + b²) to √(1 + b²) or √(1 + a²)."""
-    for a, b in ((3.0, 1.0), (2.0, 1.0), (1.5, 1.0), (1.3, 1.0), (1.0, 2.0)):
-        judge = orthogonal({"viscous_friction": a, "armature": b})
-        whole = np.sqrt(1 + a**2 + b**2)
-        ahead = (np.sqrt(1 + a**2) - np.sqrt(1 + b**2)) / whole
-        assert judge.carries_more([], 0, 1) == (ahead > 0.15)
-        # A replacement of one by the other would lose as much.
-        assert judge.loses([], 0, [1]) == (ahead > 0.15)
-        assert not judge.loses([], 0, [0, 1])
-
-
-def test_effects_of_other_joints_are_not_compared() -> None:
-    effects = [effect("viscous_friction", 0), effect("viscous_friction", 1)]
-    judge = judge_of(*planted(effects, np.eye(2), np.diag([9.0, 0.0])))
-    assert judge.left_out_gain([], [0]) > 0.5
-    assert not judge.carries_more([], 0, 1)
+    assert 0 not in judge.failing([0, 1])
+    assert 1 not in judge.failing([0, 1])
 
 
 WEIGHT = 1000.0
@@ -488,7 +450,7 @@ def test_a_gain_that_takes_a_weight_to_be_told_need_not_lower_the_error(
     assert judge.told_by_weight(0, [])
     assert judge.left_out_gain([], [0]) < 0.01
     assert judge.verdict([], [0]) == expected
-    assert judge.fails(0, [], [0]) == (expected is not Verdict.ACCEPTED)
+    assert (0 in judge.failing([0])) == (expected is not Verdict.ACCEPTED)
 
 
 @pytest.mark.parametrize("std", [0.0, 30.0])
@@ -496,7 +458,7 @@ def test_without_a_weight_or_one_that_is_hardly_known_a_gain_has_no_name(std: fl
     """40 of a gain beside 30 of the scales; or inertias take it up."""
     judge = weighed(0.04, std, [effect("torque_gain")])
     assert judge.told_by_weight(0, []) == (std > 0.0)
-    assert judge.fails(0, [], [0])
+    assert 0 in judge.failing([0])
     assert Search(judge).run() == []
 
 

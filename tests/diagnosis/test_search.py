@@ -261,19 +261,6 @@ def test_one_coherent_effect_wins_over_many_local_ones() -> None:
     assert search(data, local) == {0, 1}
 
 
-@pytest.mark.parametrize("kind", ["asymmetric_friction", "spring"])
-def test_refinements_do_not_wait_for_friction_that_says_nothing_of_other_runs(kind: str) -> None:
-    """Coulomb friction of another sign in some runs is significant, but no friction of the joint.
-
-    A strong refinement alone (load-dependent friction with one motion) leaves such friction.
-    """
-    data, candidates = planted([effect("coulomb_friction"), effect(kind)], [0.0, 1.0, 1.0])
-    for part, value in enumerate((2.0, -0.7, 2.0, -0.7)):
-        data.tau[part][:, :1] += value * candidates[0].columns[part][:, :, 0]
-    assert data.evidence(candidates, ONE).schur([]).singles[0].chi2 > 15.0
-    assert search(data, candidates) == {1}
-
-
 @pytest.mark.parametrize(("power", "found"), [(0.5, {0, 1, 2}), (2.0, {2})])
 def test_root_friction_replaces_no_straight_friction_and_keeps_both_terms(
     power: float, found: set[int]
@@ -367,7 +354,7 @@ def test_what_does_not_hold_in_the_end_leaves_its_place_to_another() -> None:
     """The second explains most of what the first does; the first is dropped when all is chosen."""
 
     class Dropping(Search):
-        def _pruned(self, chosen: list[int]) -> list[int]:
+        def pruned(self, chosen: list[int]) -> list[int]:
             return [i for i in chosen if i != 0]
 
     mix = np.array([[1.0, 0.9], [0.0, 0.3]])
@@ -414,7 +401,7 @@ def test_more_names_in_place_of_those_that_do_not_hold_are_no_answer(
     sets = iter([[0, 1], second])
     holds = iter([[0], [1]])
     monkeypatch.setattr(Search, "_settled", lambda *_: next(sets, [1]))
-    monkeypatch.setattr(Search, "_pruned", lambda *_: next(holds, [1]))
+    monkeypatch.setattr(Search, "pruned", lambda *_: next(holds, [1]))
     monkeypatch.setattr(judge, "cost", lambda chosen: -float(len(chosen)))
     monkeypatch.setattr("excite_cli.diagnosis.search._GROWN", 1.0)
     assert Search(judge).run() == expected

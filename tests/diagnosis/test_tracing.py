@@ -84,7 +84,8 @@ def answer_of(
     model: Any = SimpleNamespace(declared=(), by_data=False)
     nothing = DiagnosisSpec(rounds=0)
     begin: Any = (known,) if known else ()
-    traced: Any = tracing.trace(model, nothing, prepared, (), (), lambda *_: None, begin)
+    traced: Any
+    traced, _ = tracing.trace(model, nothing, prepared, (), (), lambda *_: None, begin)
     before = began[-1]
     # The answer's own samples: those that the pass before it left.
     assert traced.taken == [(before,) if before != "declared" else ()]

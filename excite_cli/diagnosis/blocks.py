@@ -1,0 +1,115 @@
+"""Data in blocks of time, each predicted by a model that did not see it.
+
+Columns are [inertial | declared effects | candidates | torque]. With Gram matrices per joint and
+block any model is fitted without some blocks, and what it leaves of each, E_jb, is found without
+touching samples again. A member leaves a model by a downdate: with P the inverse of the normal
+matrix and P_i its columns of the member, θ falls by P_i P_ii⁻¹ θ_i.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.diagnosis.cholesky import RIDGE
+from excite_cli.robot.model import Array
+
+_KEPT = 64  # models whose fits are kept
+
+
+@dataclass(frozen=True)
+class _Fits:
+    """A model fitted without each group: columns `at` (k,), θ (G, k) and P (G, k, k)."""
+
+    at: NDArray[np.intp]
+    parameters: Array
+    inverses: Array
+
+
+class Blocks:
+    """Gram matrices `grams[j]` (B, A_j, A_j) of the rows of every joint in every block.
+
+    `active[j]` (A_j,) are their columns among all, the torque last. `total` (K, K) is their sum,
+    with what is known without the data; all are of normalised columns. `columns` gives those of the
+    model of some candidates and `own` those of one. A model is fitted without the blocks of one of
+    the `groups` (B,) to predict these, or, where they are `seen`, to all.
+    """
+
+    def __init__(
+        self,
+        active: Sequence[NDArray[np.intp]],
+        grams: Sequence[Array],
+        total: Array,
+        columns: Callable[[Sequence[int]], NDArray[np.intp]],
+        own: Callable[[int], NDArray[np.intp]],
+        groups: NDArray[np.intp],
+        seen: bool = False,
+    ) -> None:
+        self._active, self._grams, self._columns, self._own = active, grams, columns, own
+        self.groups = groups
+        size = len(total)
+        self._position = np.full((len(active), size), -1)
+        for position, at in zip(self._position, active, strict=True):
+            position[at] = np.arange(len(at))
+        self._rest = np.repeat(total[None], int(groups.max()) + 1, axis=0)  # (G, K, K)
+        for at, of_joint in zip(active, grams, strict=True):
+            for group, rest in enumerate(() if seen else self._rest):
+                rest[np.ix_(at, at)] -= of_joint[groups == group].sum(axis=0)
+        self._fitted: dict[tuple[int, ...], _Fits] = {}
+        self._energies: dict[tuple, Array] = {}
+
+    def energies(self, chosen: Sequence[int], joints: Sequence[int] | None = None) -> Array:
+        """Energy (n, B) of each joint, or of some, that is left in each block."""
+        rows = tuple(range(len(self._grams)) if joints is None else joints)
+        key = (tuple(sorted(chosen)), rows)
+        if key not in self._energies:
+            fits = self._fits(key[0])
+            (found,) = self._left(fits.at, fits.parameters[:, None], rows)
+            _keep(self._energies, key, found)
+        return self._energies[key]
+
+    def without_each(self, chosen: Sequence[int]) -> dict[int, Array]:
+        """As `energies`, (n, B) of the model without one of the chosen, of each of them."""
+        fits = self._fits(tuple(sorted(chosen)))
+        fewer = np.repeat(fits.parameters[:, None], len(chosen), axis=1)
+        places = {int(column): k for k, column in enumerate(fits.at)}
+        for k, i in enumerate(chosen):
+            own = [places[int(column)] for column in self._own(i)]
+            among = fits.inverses[:, own][:, :, own]
+            steps = np.linalg.solve(among, fits.parameters[:, own][:, :, None])
+            fewer[:, k] -= (fits.inverses[:, :, own] @ steps)[:, :, 0]
+            fewer[:, k, own] = 0.0
+        every = tuple(range(len(self._grams)))
+        return dict(zip(chosen, self._left(fits.at, fewer, every), strict=True))
+
+    def _fits(self, chosen: tuple[int, ...]) -> _Fits:
+        if chosen not in self._fitted:
+            at = self._columns(chosen)
+            normal = self._rest[:, at[:, None], at]
+            normal[:, np.arange(len(at)), np.arange(len(at))] += RIDGE
+            inverses = np.linalg.inv(normal)
+            parameters = np.asarray((inverses @ self._rest[:, at, -1][:, :, None])[:, :, 0])
+            _keep(self._fitted, chosen, _Fits(at, parameters, np.asarray(inverses)))
+        return self._fitted[chosen]
+
+    def _left(self, at: NDArray[np.intp], parameters: Array, joints: Sequence[int]) -> Array:
+        """Of m models (m, n, B) with the columns `at` (k,) and `parameters` (G, m, k)."""
+        found = np.empty((parameters.shape[1], len(joints), len(self.groups)))
+        for row, joint in enumerate(joints):
+            position = self._position[joint, at]
+            there = np.flatnonzero(position >= 0)
+            both = np.append(position[there], self._position[joint, -1])
+            grams = self._grams[joint][:, both[:, None], both]
+            w = np.empty((*parameters.shape[:2], len(both)))
+            w[:, :, :-1], w[:, :, -1] = -parameters[:, :, there], 1.0
+            for group, each in enumerate(w):  # (m, A)
+                here = self.groups == group
+                found[:, row, here] = np.einsum("bma,ma->mb", each @ grams[here], each)
+        return np.maximum(found, 0.0)
+
+
+def _keep(kept: dict, key: tuple, value: object) -> None:
+    if len(kept) >= _KEPT:
+        kept.pop(next(iter(kept)))
+    kept[key] = value
