@@ -67,8 +67,8 @@ class TestTx40:
         assert set(coupled) == {("joint_5", "joint_6")}
         found = coupled["joint_5", "joint_6"]
         assert found["viscous"]["value"] == pytest.approx(0.616, rel=0.1)
-        # Joint 6's own dry friction, 0.3 N·m beside a published 1.95, is in it: data left out do not
-        # miss it.
+        # Joint 6's own dry friction, 0.3 N·m beside the published 1.95, is in it: data left out do
+        # not miss it.
         assert found["coulomb"]["value"] == pytest.approx(1.95 + 0.3, rel=0.1)
 
     def test_its_page_of_the_gallery_says_what_the_answer_says(
