@@ -46,7 +46,7 @@ class Blocks:
         groups: NDArray[np.intp],
         seen: bool = False,
     ) -> None:
-        self._active, self._grams, self._columns, self._own = active, grams, columns, own
+        self._grams, self._columns, self._own = grams, columns, own
         self.groups = groups
         size = len(total)
         self._position = np.full((len(active), size), -1)

@@ -323,38 +323,35 @@ class Judgement:
 
     def failing(self, chosen: Sequence[int]) -> list[int]:
         """Those that do not hold beside the others."""
-        evidence = (self.plain, self.white)
-        with_it = [e.in_turn.energies(chosen) for e in evidence]
-        without = [e.in_turn.without_each(chosen) for e in evidence]
-        after = self.plain.seen.energies(chosen)[:, 0]
-        before = self.plain.seen.without_each(chosen)
+        worth = self._worth_of_each(chosen)
+        return [i for i in chosen if self._fails(i, chosen, *worth[i])]
+
+    def _worth_of_each(self, chosen: Sequence[int]) -> dict[int, tuple[float, bool]]:
+        """Gain of each beside the others on blocks left out, and whether it is large enough."""
+        both = [
+            (e.in_turn.without_each(chosen), e.in_turn.energies(chosen))
+            for e in (self.plain, self.white)
+        ]
+        seen, after = self.plain.seen.without_each(chosen), self.plain.seen.energies(chosen)
         whole = np.array([self.plain.grams.torque_energy(j) for j in range(len(after))])
-        found = []
+        found = {}
         for i in chosen:
-            if self.bound(i, chosen):
-                continue
-            rest = [k for k in chosen if k != i]
-            right_sign = self.allowed(self.plain.solve(chosen), chosen, [i])
-            if any(i in self.parents[k] for k in rest):
-                if not right_sign:
-                    found.append(i)
-                continue
-            if (
-                self.p_value(i, self.white.gain_of(i, chosen)) > self.rules.significance
-                or not right_sign
-            ):
-                found.append(i)
-            elif self.told_by_weight(i, rest):
-                if self._weighs_little(i, rest):
-                    found.append(i)
-            else:
-                rows = list(self.white.rows_of[i])
-                gains = [
-                    self._gain(each[i][rows], now[rows], [i])
-                    for each, now in zip(without, with_it, strict=True)
-                ]
-                size = np.sqrt(np.maximum(before[i][:, 0] - after, 0.0) / np.maximum(whole, 1e-300))
-                small = bool((size < _SMALLEST).all())
-                if max(gains) < self.rules.gain or small or self._leftover(rest, [i]):
-                    found.append(i)
+            rows = list(self.white.rows_of[i])
+            gain = max(self._gain(without[i][rows], now[rows], [i]) for without, now in both)
+            explained = np.maximum(seen[i] - after, 0.0)[:, 0] / np.maximum(whole, 1e-300)
+            found[i] = gain, bool((np.sqrt(explained) >= _SMALLEST).any())
         return found
+
+    def _fails(self, i: int, chosen: Sequence[int], gain: float, large: bool) -> bool:
+        if self.bound(i, chosen):
+            return False
+        if not self.allowed(self.plain.solve(chosen), chosen, [i]):
+            return True
+        rest = [k for k in chosen if k != i]
+        if any(i in self.parents[k] for k in rest):
+            return False
+        if self.p_value(i, self.white.gain_of(i, chosen)) > self.rules.significance:
+            return True
+        if self.told_by_weight(i, rest):
+            return self._weighs_little(i, rest)
+        return gain < self.rules.gain or not large or self._leftover(rest, [i])

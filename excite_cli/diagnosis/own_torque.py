@@ -26,6 +26,8 @@ _SETTLED = 1.02  # times the energy of the fit: 1 % of the error
 def at_its_own_torque(traced: Traced, bodies: Sequence[ModelledRun]) -> Traced:
     """The same effects with columns at their own torque."""
     chosen = traced.chosen
+    if not chosen:
+        return traced
     theta = robust_solve(traced.data, traced.candidates, chosen, traced.levels)
     best, least = traced, np.inf
     before: Array | None = None
@@ -66,8 +68,8 @@ def _with_columns(
     data = training_data(model, traced.data.folds, bodies, signals)
     tests = [traced.candidates[i].tests for i in traced.chosen]
     made = with_columns(list(zip(effects, tests, strict=True)), signals, data.runs)
+    fresh = {each.place: each for each in made}
     candidates = list(traced.candidates)
-    if len(made) == len(effects):
-        for i, each in zip(traced.chosen, made, strict=True):
-            candidates[i] = each
+    for i in traced.chosen:
+        candidates[i] = fresh.get(candidates[i].place, candidates[i])
     return replace(traced, data=data, candidates=tuple(candidates), phi=phi, signals=tuple(signals))

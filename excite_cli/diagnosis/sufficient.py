@@ -1,13 +1,17 @@
 """The smallest sufficient model: without what data left out do not miss.
 
 What the search named leaves one by one, the weakest first, as long as its size cannot be, or is too
-small to matter, or the model with it does not predict data left out better (`comparison`). Where
-what remains does not predict new recordings better than the textbook, the textbook is the answer.
+small to matter, or the model with it does not predict data left out better (`comparison`); but not
+what leaves others with sizes that cannot be. Where the textbook surely predicts new recordings
+better than what remains, the textbook is the answer.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from excite_cli.diagnosis.comparison import Comparison
+from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.diagnosis.records import AS_GOOD
 from excite_cli.diagnosis.textbook import everyday, textbook
 from excite_cli.diagnosis.tracing import Traced
@@ -27,28 +31,41 @@ def sufficient(traced: Traced, models: Comparison) -> list[int]:
     """The candidates found that are needed, or the textbook's."""
     kept = _needed(traced, models)
     plain = textbook(traced.candidates, models)
-    if set(kept) <= set(plain):  # the smaller stays unless it is clearly worse
-        more = models.error_of_new(kept) - models.error_of_new(plain)
-        worse = more > np.log(AS_GOOD) and models.as_new(kept, plain).better
-        return plain if worse else kept
-    return kept if models.as_new(plain, kept).size > 0.0 else plain
+    more = models.error_of_new(kept) - models.error_of_new(plain)
+    worse = more > np.log(AS_GOOD) and models.as_new(kept, plain).better
+    return plain if worse else kept
 
 
 def _needed(traced: Traced, models: Comparison) -> list[int]:
     judge, chosen = traced.judge, list(traced.chosen)
-    while chosen:
-        sizes = judge.plain.solve(chosen)
-        idle = {}
-        for i, gain in models.needed(chosen).items():
+    while True:
+        cannot = [i for i in chosen if not _can_be(judge, chosen, [i])]
+        idle = _idle(judge, chosen, models)
+        for i in sorted(idle, key=lambda i: (i not in cannot, idle[i])):
             rest = [k for k in chosen if k != i]
-            if not judge.allowed(sizes, chosen, [i]):
-                idle[i] = -np.inf
-            elif judge.told_by_weight(i, rest):
-                continue
-            elif not gain.better or judge.size(rest, [i], judge.white.rows_of[i]) < _SMALLEST:
-                idle[i] = gain.clearness
-        if not idle:
-            break
-        weakest = min(idle, key=lambda i: idle[i])
-        chosen = [k for k in chosen if k != weakest]
-    return chosen
+            if i in cannot or _can_be(judge, rest, [k for k in rest if k not in cannot]):
+                chosen = rest
+                break
+        else:
+            return chosen
+
+
+def _can_be(judge: Judgement, chosen: Sequence[int], which: Sequence[int]) -> bool:
+    """Whether the sizes of some are possible in the model of the chosen ones."""
+    return judge.allowed(judge.plain.solve(chosen), chosen, which)
+
+
+def _idle(judge: Judgement, chosen: Sequence[int], models: Comparison) -> dict[int, float]:
+    """How clearly each is needed of those that may leave."""
+    gains, found = models.needed(chosen), {}
+    for i in chosen:
+        rest = [k for k in chosen if k != i]
+        if judge.told_by_weight(i, rest):
+            continue
+        # What refines it would take its place, with a wrong size: both are in, or neither.
+        alone = judge.without(i, chosen)
+        gain = gains[i] if alone == rest else models.difference(alone, chosen)
+        small = judge.size(rest, [i], judge.white.rows_of[i]) < _SMALLEST
+        if small or not gain.better or not _can_be(judge, chosen, [i]):
+            found[i] = gain.clearness
+    return found
