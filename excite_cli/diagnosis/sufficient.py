@@ -2,8 +2,8 @@
 
 What the search named leaves one by one, the weakest first, as long as its size cannot be, or is too
 small to matter, or the model with it does not predict data left out better (`comparison`); but not
-what leaves others with sizes that cannot be. Where the textbook surely predicts new recordings
-better than what remains, the textbook is the answer.
+what leaves others with sizes that cannot be. Where what remains does not predict new recordings
+better than the textbook, the textbook is the answer.
 """
 
 from collections.abc import Sequence
@@ -31,9 +31,11 @@ def sufficient(traced: Traced, models: Comparison) -> list[int]:
     """The candidates found that are needed, or the textbook's."""
     kept = _needed(traced, models)
     plain = textbook(traced.candidates, models)
-    more = models.error_of_new(kept) - models.error_of_new(plain)
-    worse = more > np.log(AS_GOOD) and models.as_new(kept, plain).better
-    return plain if worse else kept
+    if set(kept) <= set(plain):  # the smaller stays unless it is clearly worse
+        more = models.error_of_new(kept) - models.error_of_new(plain)
+        worse = more > np.log(AS_GOOD) and models.as_new(kept, plain).better
+        return plain if worse else kept
+    return kept if models.as_new(plain, kept).better else plain
 
 
 def _needed(traced: Traced, models: Comparison) -> list[int]:
