@@ -21,6 +21,7 @@ from excite_cli.diagnosis.error_path import error_path
 from excite_cli.diagnosis.final_fit import final_fit, over_error
 from excite_cli.diagnosis.information import information_of
 from excite_cli.diagnosis.large_rest import large_rests
+from excite_cli.diagnosis.modelled_run import ModelledRun
 from excite_cli.diagnosis.naming import named_effects
 from excite_cli.diagnosis.overfit import is_overfit, overfit_of
 from excite_cli.diagnosis.own_torque import at_its_own_torque
@@ -136,22 +137,19 @@ def _diagnosed(
     model = _model(robot, base, spec, bool(standing))
     kept = prepare_all(parts.sealed, processing)  # refused early where too short
     suspicious = check_recorded(robot, parts.training, training, processing, spec.measurement)
-    traced = _traced(model, spec, parts, processing, progress)
+    traced, bodies = _traced(model, spec, parts, processing, progress)
     with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
     if with_ends.ends:
         parts = with_ends
         start = traced.effects
-        del traced  # gigabytes, of large data: not beside the next one
+        del traced, bodies  # gigabytes, of large data: not beside the next one
         processing, training = _prepared(spec, parts)
-        traced = _traced(model, spec, parts, processing, progress, start)
+        traced, bodies = _traced(model, spec, parts, processing, progress, start)
         kept = prepare_all(parts.sealed, processing)
     progress("naming", 8)
+    traced, book = _needed(traced, bodies, spec)
+    del bodies
     model = traced.model
-    compared = bool(spec.diagnosis.rounds) and not model.is_weighed
-    if compared:
-        compare = comparison_of(traced)
-        plain = textbook(traced.candidates, compare)
-        traced = replace(traced, chosen=tuple(sufficient(traced, compare)))
     final = final_fit(traced)
     parameters, covariance = final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
@@ -177,7 +175,6 @@ def _diagnosed(
     from_urdf = spec.identification.inertias == "cad" and bool(sealed_part.by_urdf)
     begin = sealed_part.by_urdf if from_urdf else told[0]
     errors = sealed_errors(played, model, traced, models[1], begin, told[1], from_urdf)
-    book = refitted(model, traced, plain) if compared else None
     taken_off = error_parts(traced, errors)
     held = Played(robot, [*kept, *ends])
     worth = worth_on_sealed(held, model, traced, models[1], over_error(traced, final))
@@ -232,7 +229,7 @@ def _diagnosed(
         assumed=assumed,
         parts=on_sealed_ends(model, models, parts.ends, processing),
         untouched=sealed_part.untouched,
-        textbook=_textbook(book, model, played) if book else None,
+        textbook=_textbook(book, model, traced, played) if book is not None else None,
         skeleton=skeleton_of(robot),
         recorded=recorded(dataset),
         large_rests=rests,
@@ -245,8 +242,9 @@ def _diagnosed(
     )
 
 
-def _textbook(fitted: IdentifiedModel, model: Model, played: Played) -> Textbook:
+def _textbook(book: Sequence[int], model: Model, traced: Traced, played: Played) -> Textbook:
     """Its effects beside the declared ones, and its error on the sealed data."""
+    fitted = refitted(model, traced, book)
     added = list(fitted.by_effect)[len(model.declared) :]
     names = model.robot.joint_names
     return Textbook(
@@ -298,8 +296,11 @@ def _traced(
     processing: Processing,
     progress: Progress,
     start: Sequence[Effect] = (),
-) -> Traced:
-    """What is found in the training parts; the effects `start` were found in more of them."""
+) -> tuple[Traced, list[ModelledRun]]:
+    """What is found in the training parts, and these as the model sees them.
+
+    The effects `start` were found in more of them.
+    """
     progress("filtering", 0)
 
     def prepared(left_out: LeftOut) -> list[PreparedRun]:
@@ -308,7 +309,21 @@ def _traced(
     traced, bodies = trace(
         model, spec.diagnosis, prepared, parts.folds, parts.units, progress, start
     )
-    return at_its_own_torque(traced, bodies)
+    return at_its_own_torque(traced, bodies), bodies
+
+
+def _needed(
+    traced: Traced, bodies: Sequence[ModelledRun], spec: Spec
+) -> tuple[Traced, list[int] | None]:
+    """What is needed of what was found, and the textbook's candidates, with which it is compared.
+
+    Not where nothing is looked for, nor where something was weighed: then None.
+    """
+    if not spec.diagnosis.rounds or traced.model.is_weighed:
+        return traced, None
+    models = comparison_of(traced)
+    needed = replace(traced, chosen=tuple(sufficient(traced, models)))
+    return at_its_own_torque(needed, bodies), textbook(traced.candidates, models)
 
 
 def _noticed(
