@@ -42,16 +42,22 @@ _GROUPS = 8  # of blocks that are left out together
 
 @dataclass(frozen=True)
 class Difference:
-    """By how much the second model predicts better, the standard error of that, and B."""
+    """By how much the second model predicts better, D, its standard error s, B, and the joints."""
 
     size: float
     error: float
     blocks: int
+    joints: int
 
     @property
     def better(self) -> bool:
         """Whether the second is better with the one confidence that is asked for."""
         return self.size > float(student.ppf(CONFIDENCE, self.blocks - 1)) * self.error
+
+    @property
+    def of_error(self) -> float:
+        """Logarithm of the ratio of RMS errors, mean over joints and blocks."""
+        return self.size / (2 * self.blocks * self.joints)
 
     @property
     def clearness(self) -> float:
@@ -99,15 +105,14 @@ class Comparison:
         """How much better `other` predicts the filtered torque of new recordings."""
         return _difference(*map(self._new.energies, (one, other)))
 
-    def error_of_new(self, chosen: Sequence[int]) -> float:
-        """Mean over the joints of the logarithm of the RMS that is left of new recordings."""
-        return _error(self._new, chosen)
-
 
 def errors_of_new(
     data: TrainingData, candidates: Sequence[Columns], levels: Array, priors: Sequence[Array]
 ) -> list[float]:
-    """As `Comparison.error_of_new`, of the model of all candidates with each of these priors."""
+    """Logarithm of the RMS that is left of new recordings, mean over the joints, with each prior.
+
+    The model is that of all candidates.
+    """
     every = range(len(candidates))
     seconds = _seconds(data, candidates, every, NoiseModel.white(levels))
     return [_error(seconds.new(prior), every) for prior in priors]
@@ -118,11 +123,11 @@ def _error(blocks: Blocks, chosen: Sequence[int]) -> float:
 
 
 def _difference(before: Array, after: Array) -> Difference:
-    blocks = before.shape[1]
+    joints, blocks = before.shape
     least = _LEAST * ((before + after) / 2.0).mean(axis=1, keepdims=True) + 1e-300
     gained: Array = np.log((before + least) / (after + least)).sum(axis=0)
     error = float(np.sqrt(blocks) * gained.std(ddof=1)) if blocks > 1 else np.inf
-    return Difference(float(gained.sum()), error, blocks)
+    return Difference(float(gained.sum()), error, blocks, joints)
 
 
 @dataclass(frozen=True)
@@ -138,6 +143,7 @@ class _Seconds:
     fixed: int
     own: dict[int, NDArray[np.intp]]
     folds: NDArray[np.intp]
+    recordings: int
 
     def in_turn(self, prior: Array | None) -> Blocks:
         """Fitted to the other blocks of all runs: what one run carries is known from these."""
@@ -146,7 +152,7 @@ class _Seconds:
 
     def new(self, prior: Array | None) -> Blocks:
         """Fitted to the other runs, as a new recording would be predicted, if there are enough."""
-        enough = int(self.folds.max()) + 1 >= _FEWEST_RUNS
+        enough = self.recordings >= _FEWEST_RUNS
         return self._left_out(prior, self.folds) if enough else self.in_turn(prior)
 
     def _left_out(self, prior: Array | None, groups: NDArray[np.intp]) -> Blocks:
@@ -193,7 +199,8 @@ def _seconds(
                 of_joint[b] += part.T @ part
         active.append(np.append(rows.active, int(ends[-1])))
         grams.append(of_joint)
-    return _Seconds(active, grams, fixed, own, folds)
+    recordings = len({part.run.name for part in data.runs})
+    return _Seconds(active, grams, fixed, own, folds, recordings)
 
 
 def _cut(data: TrainingData) -> tuple[list[NDArray[np.intp]], NDArray[np.intp]]:

@@ -2,8 +2,8 @@
 
 What the search named leaves one by one, the weakest first, as long as its size cannot be, or is too
 small to matter, or the model with it does not predict data left out better (`comparison`); but not
-what leaves others with sizes that cannot be. Where what remains does not predict new recordings
-better than the textbook, the textbook is the answer.
+what leaves others, which are needed, with sizes that cannot be. Of what remains and the textbook
+the smaller is the answer, unless the larger predicts new recordings better.
 """
 
 from collections.abc import Sequence
@@ -31,11 +31,14 @@ def sufficient(traced: Traced, models: Comparison) -> list[int]:
     """The candidates found that are needed, or the textbook's."""
     kept = _needed(traced, models)
     plain = textbook(traced.candidates, models)
-    if set(kept) <= set(plain):  # the smaller stays unless it is clearly worse
-        more = models.error_of_new(kept) - models.error_of_new(plain)
-        worse = more > np.log(AS_GOOD) and models.as_new(kept, plain).better
-        return plain if worse else kept
-    return kept if models.as_new(plain, kept).better else plain
+    smaller, larger = sorted((kept, plain), key=lambda some: _width(traced, some))
+    gained = models.as_new(smaller, larger)
+    return larger if gained.better and gained.of_error > np.log(AS_GOOD) else smaller
+
+
+def _width(traced: Traced, some: Sequence[int]) -> int:
+    """Number of parameters."""
+    return sum(traced.candidates[i].width for i in some)
 
 
 def _needed(traced: Traced, models: Comparison) -> list[int]:
@@ -45,7 +48,7 @@ def _needed(traced: Traced, models: Comparison) -> list[int]:
         idle = _idle(judge, chosen, models)
         for i in sorted(idle, key=lambda i: (i not in cannot, idle[i])):
             rest = [k for k in chosen if k != i]
-            if i in cannot or _can_be(judge, rest, [k for k in rest if k not in cannot]):
+            if i in cannot or _can_be(judge, rest, [k for k in rest if k not in idle]):
                 chosen = rest
                 break
         else:
