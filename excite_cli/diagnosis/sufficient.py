@@ -46,7 +46,7 @@ def _needed(traced: Traced, models: Comparison) -> list[int]:
     while True:
         cannot = [i for i in chosen if not _can_be(judge, chosen, [i])]
         idle = _idle(judge, chosen, models)
-        for i in sorted(idle, key=lambda i: (i not in cannot, idle[i])):
+        for i in sorted(idle, key=idle.__getitem__):
             rest = [k for k in chosen if k != i]
             if i in cannot or _can_be(judge, rest, [k for k in rest if k not in idle]):
                 chosen = rest
