@@ -3,11 +3,15 @@
 Columns are [inertial | declared effects | candidates | torque]. With Gram matrices per joint and
 block any model is fitted without some blocks, and what it leaves of each, E_jb, is found without
 touching samples again. A member leaves a model by a downdate: with P the inverse of the normal
-matrix and P_i its columns of the member, θ falls by P_i P_ii⁻¹ θ_i.
+matrix and P_i its columns of the member, θ falls by P_i P_ii⁻¹ θ_i. One more joins by what is left
+of it, S = G_cc − G_cA P G_Ac, and of its product with the torque, z: it has β = S⁻¹ z, and θ falls
+by P G_Ac β.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +50,7 @@ class Blocks:
         groups: NDArray[np.intp],
         seen: bool = False,
     ) -> None:
+        self._given = active, grams, total, columns, own
         self._grams, self._columns, self._own = grams, columns, own
         self.groups = groups
         size = len(total)
@@ -58,6 +63,11 @@ class Blocks:
                 rest[np.ix_(at, at)] -= of_joint[groups == group].sum(axis=0)
         self._fitted: dict[tuple[int, ...], _Fits] = {}
         self._energies: dict[tuple, Array] = {}
+
+    @cached_property
+    def in_pairs(self) -> "Blocks":
+        """The same, two successive blocks at a time predicted by models fitted to all others."""
+        return Blocks(*self._given, np.arange(len(self.groups)) // 2)
 
     def energies(self, chosen: Sequence[int], joints: Sequence[int] | None = None) -> Array:
         """Energy (n, B) of each joint, or of some, that is left in each block."""
@@ -82,6 +92,28 @@ class Blocks:
             fewer[:, k, own] = 0.0
         every = tuple(range(len(self._grams)))
         return dict(zip(chosen, self._left(fits.at, fewer, every), strict=True))
+
+    def with_each(
+        self, chosen: Sequence[int], more: Sequence[int], joints: Sequence[int]
+    ) -> dict[int, Array]:
+        """As `energies`, of the model with one of `more` beside the chosen, of each of them."""
+        fits = self._fits(tuple(sorted(chosen)))
+        ends = len(fits.at) + np.cumsum([0, *(len(self._own(i)) for i in more)])
+        at = np.concatenate([fits.at, *(self._own(i) for i in more)]).astype(np.intp)
+        found = np.zeros((len(self._rest), len(more), len(at)))
+        normal, rhs = self._rest[:, at[:, None], at], self._rest[:, at, -1]
+        base = slice(len(fits.at))
+        solved = fits.inverses @ normal[:, base, ends[0] :]
+        for k, own in enumerate(slice(*pair) for pair in pairwise(ends)):
+            across = solved[:, :, own.start - ends[0] : own.stop - ends[0]]
+            shared = normal[:, own, base]
+            left = normal[:, own, own] - shared @ across
+            left[:, np.arange(len(left[0])), np.arange(len(left[0]))] += RIDGE
+            beside = rhs[:, own] - (shared @ fits.parameters[:, :, None])[:, :, 0]
+            sizes = np.linalg.solve(left, beside[:, :, None])
+            found[:, k, own] = sizes[:, :, 0]
+            found[:, k, base] = fits.parameters - (across @ sizes)[:, :, 0]
+        return dict(zip(more, self._left(at, found, joints), strict=True))
 
     def _fits(self, chosen: tuple[int, ...]) -> _Fits:
         if chosen not in self._fitted:

@@ -16,16 +16,11 @@ from excite_cli.robot.model import Array
 
 def confirmed_shares(plain: Evidence, chosen: Sequence[int], joint: int) -> Array:
     """Shares (K,) for the candidates of `plain` beyond the `chosen` ones, which come first."""
-    before = float(plain.left_out(chosen, [joint]).sum())
-    after = np.array(
-        [plain.left_out([*chosen, i], [joint]).sum() for i in range(len(chosen), len(plain.blocks))]
-    )
-    rest = plain.energy_on(chosen, [joint])
-    fitted = np.array(
-        [plain.energy_on([*chosen, i], [joint]) for i in range(len(chosen), len(plain.blocks))]
-    )
-    # What grows explains nothing, by however much: of nearly nothing, by more than numbers hold.
-    left = [
-        np.minimum(now, once) / max(once, 1e-300) for now, once in ((after, before), (fitted, rest))
-    ]
-    return np.clip(1.0 - np.maximum(*left), 0.0, 1.0)
+    others = range(len(chosen), len(plain.blocks))
+    shares = []
+    for blocks in (plain.by_fold, plain.seen):
+        before = float(blocks.energies(chosen, [joint]).sum())
+        after = blocks.with_each(chosen, others, [joint])
+        # What grows explains nothing, by however much: of nearly nothing, more than numbers hold.
+        shares.append([min(after[i].sum(), before) / max(before, 1e-300) for i in others])
+    return np.clip(1.0 - np.max(shares, axis=0), 0.0, 1.0)

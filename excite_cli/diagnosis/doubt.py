@@ -107,7 +107,8 @@ def _weaker_than_its_runs(traced: Traced, i: int, joint: int, explained: float) 
     others = {fold for fold, here in zip(traced.data.folds, there, strict=True) if not here}
     if folds & others:  # of many runs several are one fold, and what is left is known by fold
         return False
-    return traced.judge.plain.energy_on(traced.chosen, [joint], sorted(folds)) > explained
+    left = traced.judge.plain.in_turn.energies(traced.chosen, [joint]).reshape(-1, 2).sum(axis=1)
+    return bool(left[sorted(folds)].sum() > explained)
 
 
 def _may_not_repeat(

@@ -1,9 +1,9 @@
 """How many of the effects are worth their complexity: the error against their number.
 
-Effects join in the order in which the rounds of the diagnosis took them. Chosen is by training runs
-left out of the fit, never by the sealed one: the best number is that of the least error there, and
+Effects join in the order in which the rounds of the diagnosis took them. Chosen is by training data
+left out of the fit, never by the sealed ones: the best number is that of the least error there, and
 the smallest model is the first within one standard error of it (Breiman et al. 1984), the standard
-deviation over the runs left out divided by the root of their number.
+deviation over the training runs divided by the root of their number.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.robot.model import Array
 
-_FEWEST = 3  # runs left out, of which a standard error says something
+_FEWEST = 3  # runs, of which a standard error says something
 
 
 def error_path(traced: Traced, order: Sequence[int], sealed: SealedErrors) -> ErrorPath | None:
@@ -39,12 +39,12 @@ def error_path(traced: Traced, order: Sequence[int], sealed: SealedErrors) -> Er
 
 
 def _left_out(traced: Traced, steps: Sequence[tuple[int, ...]]) -> Array:
-    """Share (steps, runs left out) of the declared model's RMS that remains.
+    """Share (steps, runs) of the declared model's RMS that remains of blocks left out in turn.
 
     Mean over the joints of which a run says something; runs that say nothing are left away.
     """
-    plain, joints = traced.judge.plain, range(traced.data.n)
-    energies = np.array([[plain.left_out(step, [j]) for j in joints] for step in steps])
+    blocks, n = traced.judge.plain.in_turn, traced.data.n
+    energies = np.array([blocks.energies(s).reshape(n, -1, 2).sum(axis=2) for s in steps])
     first = energies[0]  # (joints, folds)
     seen = first > 0.0
     shares = np.sqrt(np.where(seen, energies / np.where(seen, first, 1.0), 0.0)).sum(axis=1)

@@ -1,10 +1,9 @@
 """All that the search needs, as Gram matrices: any model is judged without touching samples again.
 
 Columns are [inertial | declared effects | candidates | torque], rows whitened. A Gram matrix is
-kept per fold and joint; their sums give the residual energy, the gain of any candidate, and the
-error on any fold left out, each by solves of the size of the model. What one run carries no other
-fold knows: models with such effects are judged on blocks of time in turn, fitted to the other
-blocks of all runs. A column that is there in one fold only for another reason is fitted to it.
+kept per fold, side (blocks of time in turn) and joint; their sums give the residual energy, the
+gain of any candidate, and the error on sides left out, each by solves of the size of the model.
+What one run carries no other run knows: so one side of all runs is fitted to predict the other.
 """
 
 from collections.abc import Sequence
@@ -26,11 +25,9 @@ from excite_cli.diagnosis.schur import (
 )
 from excite_cli.robot.model import Array
 
-# A column of which a fold has less of the energy is not there in it: where one run passes the
-# speeds of Stribeck friction and the other hardly does (5e-10), a size fitted to the other is
-# 30 N·m instead of 0.05, and what explains 98 % of a residual had no gain on runs left out.
+# A column of which a fold has less of the energy is not there in it: one run passes the speeds of
+# Stribeck friction and another hardly does (5e-10).
 _THERE = 1e-5
-_RIDGE_ALONE = 1e-6  # of its own energy: one fold may not determine all that several do
 _BY_WEIGHT = 4.0  # times what the data leave: the deviation is half of theirs, or less
 _NEXT_TO_NOTHING = 1e-6  # of a prior's precision
 _KEPT = 6  # projections that are kept: a step of a search asks for the same few again
@@ -64,10 +61,7 @@ class Evidence:
         self.norms = norms
         self.total = total / np.outer(norms, norms)
         # Searches come back to the same models: what was solved once is kept.
-        self._left_out: dict[tuple, Array] = {}
-        self._without: dict[tuple[int, ...], Array] = {}
         self._solved: dict[tuple[int, ...], Array] = {}
-        self._on: dict[tuple, float] = {}
         self._energies: dict[tuple[int, ...], float] = {}
         self._factors: dict[tuple[int, ...], Cholesky] = {}
         self._inverses: dict[tuple[int, ...], Array] = {}  # of the last model
@@ -134,11 +128,11 @@ class Evidence:
         normal = self.total[np.ix_(at, at)] + RIDGE * np.eye(len(at))
         return Cholesky(normal).solve(self.total[at, self.torque]) / self.norms[at]
 
-    def covariance(self, chosen: Sequence[int]) -> Array:
-        """Covariance of `solve`'s parameters for unit noise."""
-        at = self.columns(chosen)
-        inverse = self.factor(chosen).solve(np.eye(len(at)))
-        return np.asarray(inverse / np.outer(self.norms[at], self.norms[at]))
+    def covariance(self, chosen: Sequence[int], directions: Array | None = None) -> Array:
+        """Covariance of `solve`'s parameters for unit noise, or of sums (k, d) of these."""
+        norms = self.norms[self.columns(chosen)]
+        sums = (np.eye(len(norms)) if directions is None else directions) / norms[:, None]
+        return np.asarray(sums.T @ self.factor(chosen).solve(sums))
 
     def energy(self, chosen: Sequence[int]) -> float:
         """Residual energy (with the prior's, if any) of the model with the chosen candidates."""
@@ -220,44 +214,10 @@ class Evidence:
         told = (left > SHARED * own) & (left > _BY_WEIGHT * by_data)
         return np.asarray(told & (by_data < ABSORBED * own))
 
-    @cached_property
-    def _folds(self) -> Array:
-        """Normalised Gram matrices of the folds (F, K, K)."""
-        return self.grams.by_fold() / np.outer(self.norms, self.norms)
-
-    def _part(
-        self,
-        folds: Sequence[int],
-        joints: Sequence[int] | None,
-        at: NDArray[np.intp],
-    ) -> Array:
-        """Gram matrix (k + 1, k + 1) of some folds' rows of some joints, the torque last."""
-        both = np.append(at, self.torque)
-        everywhere = joints is None or len(joints) == len(self.grams.joints)
-        if everywhere and len(folds) == 1:
-            return np.asarray(self._folds[folds[0], both[:, None], both])
-        rows = range(len(self.grams.joints)) if joints is None else joints
-        norms = self.norms[both]
-        return self.grams.on(folds, rows, both) / (norms[:, None] * norms)
-
     def folds_of(self, candidates: Sequence[int]) -> NDArray[np.bool_]:
         """Folds (F,) in which one of some candidates is there."""
         columns = np.concatenate([self.blocks[i] for i in candidates])
         return np.asarray(self._seen[:, columns].any(axis=1))
-
-    def left_out(self, chosen: Sequence[int], joints: Sequence[int] | None) -> Array:
-        """Energy (F,) on the rows of `joints` of each fold, fitted to all other folds.
-
-        Effects that are there in no other fold are fitted to the fold itself, beside the rest.
-        """
-        key = (tuple(sorted(chosen)), None if joints is None else tuple(joints))
-        if key not in self._left_out:
-            at = self.columns(key[0])
-            found = []
-            for fold, x in enumerate(self._fitted_without(at, key[0])):
-                found.append(_energy(self._part([fold], joints, at), x))
-            self._left_out[key] = np.maximum(found, 0.0)
-        return self._left_out[key]
 
     @cached_property
     def in_turn(self) -> Blocks:
@@ -265,6 +225,11 @@ class Evidence:
         sides = np.arange(2 * self.grams.folds) % 2
         both = (np.stack([j.first, j.whole - j.first], axis=1) for j in self.grams.joints)
         return self._in_blocks([each.reshape(-1, *each.shape[2:]) for each in both], sides)
+
+    @property
+    def by_fold(self) -> Blocks:
+        """The same sides, those of a fold fitted to all other folds."""
+        return self.in_turn.in_pairs
 
     @cached_property
     def seen(self) -> Blocks:
@@ -283,51 +248,6 @@ class Evidence:
         own = self.blocks.__getitem__
         return Blocks(active, normal, self.total, self.columns, own, groups, seen)
 
-    def _fitted_without(self, at: NDArray[np.intp], chosen: tuple[int, ...]) -> Array:
-        """Parameters (F, k) fitted to all folds but one, what these do not show to that one."""
-        if chosen not in self._without:
-            found = self._without_folds(at)
-            seen = self._seen[:, at]
-            seen[:, : self.fixed] = True
-            alone = seen & (seen.sum(axis=0) == 1)
-            for fold in np.flatnonzero(alone.any(axis=1)):
-                own = np.flatnonzero(alone[fold])
-                gram = self._folds[fold][np.ix_(at, at)]
-                rest = found[fold].copy()
-                rest[own] = 0.0
-                rhs = self._folds[fold][at[own], self.torque] - gram[own] @ rest
-                normal = gram[np.ix_(own, own)]
-                normal[np.diag_indices(len(own))] += _RIDGE_ALONE * np.diag(normal) + RIDGE
-                rest[own] = np.linalg.solve(normal, rhs)
-                found[fold] = rest
-            self._without[chosen] = found
-        return self._without[chosen]
-
-    def _without_folds(self, at: NDArray[np.intp]) -> Array:
-        """Parameters (F, k) fitted to all folds but one."""
-        index = (at[:, None], at)
-        normal = self.total[index] - self._folds[:, at[:, None], at]
-        diagonal = np.arange(len(at))
-        normal[:, diagonal, diagonal] += RIDGE
-        rhs = self.total[at, self.torque] - self._folds[:, at, self.torque]
-        return np.asarray(np.linalg.solve(normal, rhs[:, :, None])[:, :, 0])
-
-    def energy_on(
-        self,
-        chosen: Sequence[int],
-        joints: Sequence[int] | None,
-        folds: Sequence[int] | None = None,
-    ) -> float:
-        """Residual energy on the rows of `joints` in `folds`, of the model fitted to everything."""
-        every = tuple(range(self.grams.folds) if folds is None else folds)
-        key = (tuple(chosen), None if joints is None else tuple(joints), every)
-        if key not in self._on:
-            at = self.columns(chosen)
-            part = self._part(every, joints, at)
-            self._on[key] = max(_energy(part, self.solve(chosen) * self.norms[at]), 0.0)
-        return self._on[key]
-
-
-def _energy(gram: Array, x: Array) -> float:
-    """‖y − C x‖² from the Gram matrix of [C y]."""
-    return float(gram[-1, -1] - 2 * x @ gram[:-1, -1] + x @ gram[:-1, :-1] @ x)
+    def energy_on(self, chosen: Sequence[int], joints: Sequence[int] | None) -> float:
+        """Residual energy on the rows of `joints`, of the model fitted to everything."""
+        return float(self.seen.energies(chosen, joints).sum())

@@ -7,7 +7,6 @@ on one side is judged on the other. The second is what the whole has more than t
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,9 +39,6 @@ class Grams:
     def __init__(self, joints: Sequence[JointGram], size: int) -> None:
         self.joints, self.size = tuple(joints), size
         self._active = [np.append(joint.active, size - 1) for joint in self.joints]
-        self._position = np.full((len(self.joints), size), -1)
-        for position, active in zip(self._position, self._active, strict=True):
-            position[active] = np.arange(len(active))
 
     @property
     def folds(self) -> int:
@@ -56,13 +52,6 @@ class Grams:
             self._add(found, fold)
         return found
 
-    def by_fold(self) -> Array:
-        """Sums (F, K, K) over joints."""
-        found = np.zeros((self.folds, self.size, self.size))
-        for fold in range(self.folds):
-            self._add(found[fold], fold)
-        return found
-
     def _add(self, to: Array, fold: int) -> None:
         for joint, active in zip(self.joints, self._active, strict=True):
             to[np.ix_(active, active)] += joint.whole[fold]
@@ -73,39 +62,6 @@ class Grams:
         for joint, active in zip(self.joints, self._active, strict=True):
             found[:, active] += np.einsum("fkk->fk", joint.whole)
         return found
-
-    def on(
-        self,
-        folds: Sequence[int],
-        joints: Sequence[int],
-        at: NDArray[np.intp],
-    ) -> Array:
-        """Sum (k, k) over some folds' rows of `joints`, of the columns `at` (k,)."""
-        places = []
-        for j in joints:
-            position = self._position[j, at]
-            there = np.flatnonzero(position >= 0)
-            position = position[there]
-            places.append((j, (position[:, None], position), (there[:, None], there)))
-        found = np.zeros((len(at), len(at)))
-        for j, own, to in places:
-            for gram in self._summed(j, folds):
-                part = gram[own]
-                if len(part) == len(at):
-                    found += part
-                else:
-                    found[to] += part
-        return found
-
-    def _summed(self, joint: int, folds: Sequence[int]) -> list[Array]:
-        """Gram matrices of a joint, to be summed; the sum over all folds is kept."""
-        if len(folds) == self.folds:
-            return [self._of_all[joint]]
-        return [self.joints[joint].whole[fold] for fold in folds]
-
-    @cached_property
-    def _of_all(self) -> list[Array]:
-        return [joint.whole.sum(axis=0) for joint in self.joints]
 
     def torque_energy(self, joint: int) -> float:
         """Energy of the torque itself on a joint's rows."""

@@ -199,11 +199,13 @@ class Judgement:
         second only.
         """
         joints = sorted({j for i in added for j in self.white.rows_of[i]})
-        both = [
-            (e.in_turn.energies(chosen, joints), e.in_turn.energies([*chosen, *added], joints))
-            for e in (self.plain, self.white)
-        ]
-        return max(self._gain(before, after, added) for before, after in both)
+        gains = []
+        for e in (self.plain, self.white):
+            before = e.in_turn.energies(chosen, joints)
+            *others, last = added
+            after = e.in_turn.with_each([*chosen, *others], [last], joints)[last]
+            gains.append(self._gain(before, after, added))
+        return max(gains)
 
     def _gain(self, before: Array, after: Array, added: Sequence[int]) -> float:
         """1 − the ratio of RMS errors; what single runs carry is judged where it is."""
@@ -214,13 +216,12 @@ class Judgement:
 
     def size(self, chosen: Sequence[int], added: Sequence[int], joints: Sequence[int]) -> float:
         """What `added` explains, as a share of the torque's RMS on the joint where it is most."""
-        largest = 0.0
-        for joint in joints:
-            before = self.plain.energy_on(chosen, [joint])
-            after = self.plain.energy_on([*chosen, *added], [joint])
-            whole = self.plain.grams.torque_energy(joint)
-            largest = max(largest, (before - after) / max(whole, 1e-300))
-        return float(np.sqrt(largest))
+        *others, last = added
+        before = self.plain.seen.energies(chosen, joints)
+        after = self.plain.seen.with_each([*chosen, *others], [last], joints)[last]
+        whole = [self.plain.grams.torque_energy(joint) for joint in joints]
+        explained = np.maximum(before - after, 0.0)[:, 0] / np.maximum(whole, 1e-300)
+        return float(np.sqrt(explained.max(initial=0.0)))
 
     def too_small(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
         """Whether it may go without loss.

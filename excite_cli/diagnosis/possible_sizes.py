@@ -6,20 +6,20 @@ import numpy as np
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.effects.base import Effect
-from excite_cli.effects.parameter import deviation
 from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array
 
 _ERRORS = 2.0  # deviations by which what is there may be less than what is taken
-Spread = Callable[[Sequence[int]], Array]
+Spread = Callable[[Sequence[int], Array], Array]
 
 
 class PossibleSizes:
     """Judges fitted sizes of effects.
 
-    `spread(chosen)` is the covariance of the parameters of a model with these candidates; it is
-    asked for only where a value is impossible: what is so by the error of the fit only is allowed
-    (`Effect.why_impossible`). `declared`: effects whose parameters come before those of the chosen.
+    `spread(chosen, directions)` is the covariance (d, d) of d sums (k, d) of the k parameters of
+    a model with these candidates; it is asked for only where a value is impossible: what is so by
+    the error of the fit only is allowed (`Effect.why_impossible`). `declared`: effects whose
+    parameters come before those of the chosen.
     """
 
     def __init__(
@@ -47,8 +47,8 @@ class PossibleSizes:
             effect, values = self._candidates[i].effect, parameters[own]
             reason = effect.absurd(values, self._seen)
             if not reason and not effect.possible(values):
-                covariance = self._spread(chosen)[own, own]
-                reason = effect.why_impossible(values, covariance)
+                directions = np.eye(len(parameters))[:, own]
+                reason = effect.why_impossible(values, self._spread(chosen, directions))
             if effect.varied and not reason:
                 reason = self._too_much_taken(effect, own, parameters, chosen)
             if reason:
@@ -66,7 +66,8 @@ class PossibleSizes:
         there = float(slopes @ parameters) + float(slope @ parameters[own])
         if taken <= there:
             return ""
-        if there > 0.0 and taken - there <= _ERRORS * deviation(slopes, self._spread(chosen)):
+        variance = float(self._spread(chosen, slopes[:, None])[0, 0])
+        if there > 0.0 and taken - there <= _ERRORS * np.sqrt(max(variance, 0.0)):
             return ""
         return f"{taken:.3g} of {effect.kind} is more than the {effect.varied} that it varies"
 
@@ -84,15 +85,6 @@ class PossibleSizes:
         return found
 
 
-def spread_of(covariance: Callable[[Sequence[int]], Array], inflation: float) -> Spread:
-    """`inflation` times `covariance`; the last one is kept, since it is asked for repeatedly."""
-    last: dict[tuple[int, ...], Array] = {}
-
-    def spread(chosen: Sequence[int]) -> Array:
-        key = tuple(chosen)
-        if key not in last:
-            last.clear()
-            last[key] = inflation * covariance(key)
-        return last[key]
-
-    return spread
+def spread_of(covariance: Spread, inflation: float) -> Spread:
+    """`inflation` times `covariance`."""
+    return lambda chosen, directions: inflation * covariance(chosen, directions)

@@ -218,14 +218,11 @@ def _obvious(plain: Evidence, base: list[int], joint: int) -> list[int]:
     found: list[int] = []
     while len(found) < _MOST_NAMED:
         model = [*base, *found]
-        before = plain.left_out(model, [joint]).sum()
-        after = {
-            i: plain.left_out([*model, i], [joint]).sum()
-            for i in range(len(base), len(plain.blocks))
-            if i not in found
-        }
-        best = min(after, key=lambda i: after[i])
-        if after[best] > (1.0 - _PLAIN_TO_SEE) ** 2 * before:
+        before = plain.by_fold.energies(model, [joint]).sum()
+        others = [i for i in range(len(base), len(plain.blocks)) if i not in found]
+        after = plain.by_fold.with_each(model, others, [joint])
+        best = min(after, key=lambda i: after[i].sum())
+        if after[best].sum() > (1.0 - _PLAIN_TO_SEE) ** 2 * before:
             break
         found.append(best)
     return found
@@ -244,18 +241,17 @@ def _best(
 ) -> tuple[float, int] | None:
     schur = white.schur(chosen)
     best: tuple[float, int] | None = None
-    for i in range(first, len(white.blocks)):
-        if i in chosen:
-            continue
+    others = [i for i in range(first, len(white.blocks)) if i not in chosen]
+    before = plain.by_fold.energies(chosen, [joint]).sum()
+    after = plain.by_fold.with_each(chosen, others, [joint])
+    for i in others:
         gain = schur.gain(i)
         if gain.dof == 0:
             continue
         p = float(tests * chi2.sf(gain.chi2 / inflation, gain.dof))
         if p > significance:
             continue
-        after = plain.left_out([*chosen, i], [joint]).sum()
-        before = plain.left_out(chosen, [joint]).sum()
-        if 1.0 - np.sqrt(after / max(before, 1e-300)) < least_gain:
+        if 1.0 - np.sqrt(after[i].sum() / max(before, 1e-300)) < least_gain:
             continue
         score = gain.chi2 / inflation - float(chi2.isf(significance / tests, gain.dof))
         if best is None or score > best[0]:

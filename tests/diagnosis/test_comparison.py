@@ -16,11 +16,12 @@ from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.seen import Seen
+from excite_cli.measurement.run_identity import RunId
 from tests.diagnosis.explicit_data import FOLDS, prepared
 from tests.diagnosis.test_doubt import traced
 
 SAMPLES = 400
-SIZES = lambda chosen: np.eye(99), Seen(np.full(2, 9.0), np.ones(2), 1.0)
+SIZES = lambda _, sums: sums.T @ sums, Seen(np.full(2, 9.0), np.ones(2), 1.0)
 FIXED = 3
 
 
@@ -41,7 +42,9 @@ def traced_of(sizes: Sequence[tuple[Effect, float]], seed: int = 0) -> Traced:
         + sum(size * own[part].sum(axis=2) for (_, size), own in zip(sizes, columns, strict=True))
         for part in range(len(FOLDS))
     ]
-    runs = tuple(prepared(np.ones((SAMPLES, 1), bool)) for _ in FOLDS)
+    runs = tuple(
+        replace(prepared(np.ones((SAMPLES, 1), bool)), run=RunId(str(fold))) for fold in FOLDS
+    )
     data = TrainingData(runs, FOLDS, tuple(declared), tuple(tau))
     candidates = [
         Candidate(effect, (0,), tuple(own)) for (effect, _), own in zip(sizes, columns, strict=True)
@@ -92,6 +95,14 @@ def test_what_one_run_shows_is_judged_on_its_other_blocks_and_is_not_in_a_new_re
     assert models.as_new([], [1]).of_error > 0.0
 
 
+def test_parts_of_one_recording_are_no_new_recordings() -> None:
+    """Each is a stretch of the same motion, and may be the only one in which something shows."""
+    given = traced_of([(effect("payload", ("b",)), 0.5), (effect("armature"), 0.2)])
+    one = tuple(replace(run, run=RunId("log")) for run in given.data.runs)
+    models = models_of(replace(given, data=replace(given.data, runs=one)))
+    assert models.as_new([], [0]).better
+
+
 @pytest.mark.parametrize(
     ("offset", "armature", "expected"),
     [(0.0, 0.0, {0, 1}), (0.5, 0.0, {0, 1, 2}), (0.0, 0.5, {0, 1, 3}), (0.5, 0.5, {0, 1, 2, 3})],
@@ -112,7 +123,7 @@ def test_the_sufficient_model_lacks_what_data_left_out_do_not_miss() -> None:
     assert chosen(everyday_traced(0.0, 0.5, 0.5), [0, 1, 2, 3, 4]) == {0, 1, 3, 4}
 
 
-def test_what_cannot_be_leaves_before_all_else() -> None:
+def test_what_cannot_be_leaves() -> None:
     """A spring that pushes away, however well it predicts."""
     given = traced_of([(effect("spring"), -2.0), (effect("armature"), 1.0)])
     judge = replace(given.judge, allowed=PossibleSizes(given.candidates, *SIZES))

@@ -90,13 +90,19 @@ def test_errors_are_those_of_the_fitted_columns() -> None:
 
 
 class Plain:
-    """Energies on runs left out (folds,) by the number of chosen candidates."""
+    """Energies of both sides of each run (n, 2 F) by the number of chosen candidates."""
 
-    def __init__(self, shares: list[list[float]]) -> None:
-        self.shares = np.array(shares)
+    def __init__(self, shares: list[list[float]], moves: Any = True) -> None:
+        self.shares, self.moves = np.array(shares), moves
 
-    def left_out(self, chosen: tuple[int, ...], joints: list[int]) -> Array:
-        return 7.0 * (1.0 + joints[0]) * np.square(self.shares[len(chosen)])
+    @property
+    def in_turn(self) -> "Plain":
+        return self
+
+    def energies(self, chosen: tuple[int, ...]) -> Array:
+        weights = 7.0 * (1.0 + np.arange(JOINTS))[:, None]
+        by_run = np.where(self.moves, weights * np.square(self.shares[len(chosen)]), 0.0)
+        return np.stack([0.25 * by_run, 0.75 * by_run], axis=2).reshape(JOINTS, -1)
 
 
 def path_of(shares: list[list[float]]) -> Any:
@@ -121,19 +127,16 @@ def test_the_smallest_model_is_within_one_standard_error_of_the_best() -> None:
 def test_runs_that_move_some_joints_only_count_for_those() -> None:
     """As short moves do; nothing is known where no run says anything."""
 
-    class Short(Plain):
-        def left_out(self, chosen: tuple[int, ...], joints: list[int]) -> Array:
-            moves = np.array([joints == [0], joints == [1], False])
-            return np.where(moves, super().left_out(chosen, joints), 0.0)
-
+    moves = np.array([[True, False, False], [False, True, False], [False] * 3])
     outcome: Any = SimpleNamespace(
-        judge=SimpleNamespace(plain=Short([[1.0] * 3, [0.5, 0.1, 0.7]])), data=SimpleNamespace(n=2)
+        judge=SimpleNamespace(plain=Plain([[1.0] * 3, [0.5, 0.1, 0.7]], moves[:JOINTS])),
+        data=SimpleNamespace(n=JOINTS),
     )
     path = error_path(outcome, (0,), made_up((0,)))
     assert path is not None
     assert path.left_out == pytest.approx((1.0, 0.3))
     assert not path.enough
-    outcome.judge.plain = Short([[0.0] * 3, [0.0] * 3])
+    outcome.judge.plain = Plain([[0.0] * 3, [0.0] * 3])
     assert error_path(outcome, (0,), made_up((0,))) is None
 
 

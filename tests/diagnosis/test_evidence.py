@@ -49,25 +49,8 @@ def test_parameters_and_energies(both: tuple[Evidence, Rows], chosen: tuple[int,
     assert evidence.energy_on(chosen, None) == pytest.approx(rows.energy(chosen), rel=1e-8)
 
 
-@pytest.mark.parametrize("chosen", [c for c in CHOSEN if 4 not in c])
-@pytest.mark.parametrize("joints", [[0], [1], [0, 1]])
-def test_errors_on_folds_left_out(
-    both: tuple[Evidence, Rows], chosen: tuple[int, ...], joints: list[int]
-) -> None:
-    evidence, rows = both
-    assert evidence.left_out(chosen, joints) == pytest.approx(
-        rows.left_out(chosen, joints), rel=1e-7
-    )
-
-
-@pytest.mark.parametrize("chosen", [(4,), (0, 4), (1, 3, 4)])
-def test_an_effect_of_one_fold_is_fitted_to_it(
-    both: tuple[Evidence, Rows], chosen: tuple[int, ...]
-) -> None:
-    evidence, rows = both
-    for joints in ([0], [0, 1]):
-        found, expected = evidence.left_out(chosen, joints), rows.left_out(chosen, joints)
-        assert found == pytest.approx(expected, rel=1e-4)
+def test_an_effect_of_one_fold_is_there_in_it_alone(both: tuple[Evidence, Rows]) -> None:
+    evidence, _ = both
     assert evidence.folds_of([4]).tolist() == [False, True, False]
     assert evidence.folds_of([0, 4]).all()
 
@@ -94,6 +77,19 @@ def test_blocks_say_at_once_what_a_model_is_without_each_member(
         for member, energies in blocks.without_each(chosen).items():
             rest = [i for i in chosen if i != member]
             assert energies == pytest.approx(blocks.energies(rest), rel=1e-6)
+
+
+@pytest.mark.parametrize("chosen", CHOSEN)
+@pytest.mark.parametrize("joints", [[0], [1], [0, 1]])
+def test_blocks_say_at_once_what_a_model_is_with_each_of_others(
+    both: tuple[Evidence, Rows], chosen: tuple[int, ...], joints: list[int]
+) -> None:
+    evidence, _ = both
+    others = [i for i in range(len(evidence.blocks)) if i not in chosen]
+    for blocks in (evidence.in_turn, evidence.seen):
+        for other, energies in blocks.with_each(chosen, others, joints).items():
+            more = [*chosen, other]
+            assert energies == pytest.approx(blocks.energies(more, joints), rel=1e-6)
 
 
 @pytest.mark.parametrize("chosen", [c for c in CHOSEN if c])
@@ -123,7 +119,8 @@ def test_what_a_fold_hardly_has_is_judged_as_if_it_had_none() -> None:
     )
     there = replace(data, tau=torque).evidence([replace(candidate, columns=columns)], WHITE)
     assert there.folds_of([0]).tolist() == [True, False, False]
-    assert there.left_out((0,), [0])[0] < 0.2 * there.left_out((), [0])[0]
+    without, with_it = (there.in_turn.energies(chosen, [0]) for chosen in ((), (0,)))
+    assert with_it[0, :2].sum() < 0.2 * without[0, :2].sum()
 
 
 def test_columns_that_data_hardly_tell_apart_are_told_apart() -> None:
@@ -253,7 +250,7 @@ def test_rows_that_are_not_usable_do_not_count() -> None:
     for noise in (WHITE, autoregression()):
         one = data.evidence(candidates, noise)
         other = replace(data, tau=wild).evidence(candidates, noise)
-        assert np.array_equal(one.grams.by_fold(), other.grams.by_fold())
+        assert np.array_equal(one.grams.total(), other.grams.total())
 
 
 def test_residuals_are_the_torque_less_the_model() -> None:

@@ -46,7 +46,7 @@ def possible(
     All parameters have this standard `error`.
     """
     spread = error**2 * np.eye(3 + len(values))
-    allowed = PossibleSizes([candidate(kind, joints)], lambda _: spread, seen)
+    allowed = PossibleSizes([candidate(kind, joints)], lambda _, d: d.T @ spread @ d, seen)
     return allowed(np.array([-1.0, -1e9, 7.0, *values]), [0], [0])
 
 
@@ -67,7 +67,7 @@ def test_friction_that_depends_on_the_angle_takes_no_more_than_there_is() -> Non
 
         def allowed(values: list[float], chosen: list[int], declared: int = 0, s: Array = spread):
             known = [each.effect for each in candidates[:declared]]
-            sizes = PossibleSizes(candidates, lambda _: s, LARGE, known)
+            sizes = PossibleSizes(candidates, lambda _, d: d.T @ s @ d, LARGE, known)
             return sizes(np.array(values), chosen, [2])
 
         for times, there in ((0.99, True), (1.01, False)):
@@ -123,7 +123,7 @@ def test_absurd_sizes_are_told_with_their_reason() -> None:
         ("torque_delay", np.array([-2e-4]), "-0.2 ms is less than time stamps are true to"),
     ):
         spread = 1e-20 * np.eye(len(values))
-        judge = PossibleSizes([candidate(kind)], lambda _, s=spread: s, robot)
+        judge = PossibleSizes([candidate(kind)], lambda _, d, s=spread: d.T @ s @ d, robot)
         assert words in judge.why_not(values, [0], [0])
     assert possible("elasticity", 1e-3, seen=robot)
     assert possible("torque_delay", 4e-4, seen=robot, joints=(0, 1))
@@ -213,7 +213,7 @@ def test_only_the_added_are_judged_each_by_its_own_parameters(
         values[2] = Payload.planted(0.1, {})[1]
     declared = np.full(data.draw(st.integers(0, 4)), -5.0)
     spread = 1e-30 * np.eye(100)
-    allowed = PossibleSizes(candidates, lambda _: spread, LARGE)
+    allowed = PossibleSizes(candidates, lambda _, d: d.T @ spread[: len(d), : len(d)] @ d, LARGE)
     assert allowed(np.concatenate([declared, *(values[i] for i in chosen)]), chosen, added)
     # Impossible for friction and for an encoder, but not for the force of a cable.
     values[wrong][0] = -5.0
