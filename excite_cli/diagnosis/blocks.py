@@ -24,11 +24,15 @@ _KEPT = 64  # models whose fits are kept
 
 @dataclass(frozen=True)
 class _Fits:
-    """A model fitted without each group: columns `at` (k,), θ (G, k) and P (G, k, k)."""
+    """A model fitted without each group: columns `at` (k,), θ (G, k) and P (G, k, k).
+
+    `exact`: not by a downdate, each of which costs digits.
+    """
 
     at: NDArray[np.intp]
     parameters: Array
     inverses: Array
+    exact: bool = True
 
 
 class Blocks:
@@ -62,6 +66,7 @@ class Blocks:
             for group, rest in enumerate(() if seen else self._rest):
                 rest[np.ix_(at, at)] -= of_joint[groups == group].sum(axis=0)
         self._fitted: dict[tuple[int, ...], _Fits] = {}
+        self._whole: tuple[frozenset[int], _Fits] | None = None
         self._energies: dict[tuple, Array] = {}
 
     @cached_property
@@ -115,15 +120,42 @@ class Blocks:
             found[:, k, base] = fits.parameters - (across @ sizes)[:, :, 0]
         return dict(zip(more, self._left(at, found, joints), strict=True))
 
+    def fit(self, chosen: Sequence[int]) -> None:
+        """Fit a model of which others that lack one member will be asked."""
+        fits = self._fits(tuple(sorted(chosen)))
+        if fits.exact:
+            self._whole = frozenset(chosen), fits
+
     def _fits(self, chosen: tuple[int, ...]) -> _Fits:
         if chosen not in self._fitted:
-            at = self._columns(chosen)
-            normal = self._rest[:, at[:, None], at]
-            normal[:, np.arange(len(at)), np.arange(len(at))] += RIDGE
-            inverses = np.linalg.inv(normal)
-            parameters = np.asarray((inverses @ self._rest[:, at, -1][:, :, None])[:, :, 0])
-            _keep(self._fitted, chosen, _Fits(at, parameters, np.asarray(inverses)))
+            _keep(self._fitted, chosen, self._without_one(chosen) or self._anew(chosen))
         return self._fitted[chosen]
+
+    def _anew(self, chosen: tuple[int, ...]) -> _Fits:
+        at = self._columns(chosen)
+        normal = self._rest[:, at[:, None], at]
+        normal[:, np.arange(len(at)), np.arange(len(at))] += RIDGE
+        inverses = np.linalg.inv(normal)
+        parameters = np.asarray((inverses @ self._rest[:, at, -1][:, :, None])[:, :, 0])
+        return _Fits(at, parameters, np.asarray(inverses))
+
+    def _without_one(self, chosen: tuple[int, ...]) -> _Fits | None:
+        """By a downdate, where it lacks one member of the model that is at hand (`fit`)."""
+        if self._whole is None or len(self._whole[0]) != len(chosen) + 1:
+            return None
+        more, fits = self._whole
+        gone = more.difference(chosen)
+        if len(gone) > 1:
+            return None
+        out = np.isin(fits.at, self._own(*gone))
+        own, kept = np.flatnonzero(out), np.flatnonzero(~out)
+        across = fits.inverses[:, kept[:, None], own]
+        among = fits.inverses[:, own[:, None], own]
+        both = np.concatenate([fits.parameters[:, own, None], np.swapaxes(across, 1, 2)], axis=2)
+        steps = np.linalg.solve(among, both)
+        parameters = fits.parameters[:, kept] - (across @ steps[:, :, :1])[:, :, 0]
+        inverses = fits.inverses[:, kept[:, None], kept] - across @ steps[:, :, 1:]
+        return _Fits(fits.at[kept], parameters, inverses, exact=False)
 
     def _left(self, at: NDArray[np.intp], parameters: Array, joints: Sequence[int]) -> Array:
         """Of m models (m, n, B) with the columns `at` (k,) and `parameters` (G, m, k)."""

@@ -66,6 +66,7 @@ class Evidence:
         self._factors: dict[tuple[int, ...], Cholesky] = {}
         self._inverses: dict[tuple[int, ...], Array] = {}  # of the last model
         self._schurs: dict[tuple[int, ...], Schur] = {}
+        self._whole: tuple[int, ...] = ()
         self._candidates = CandidateBases(self.total, fixed, self.blocks)
         energies = grams.seen()[:, :-1]
         self._seen = energies > _THERE * energies.sum(axis=0)
@@ -144,13 +145,45 @@ class Evidence:
         return self._energies[key]
 
     def schur(self, chosen: Sequence[int]) -> Schur:
-        """What is left of every candidate once the chosen model has taken its part."""
+        """What is left of every candidate once the chosen model has taken its part.
+
+        Where that of a model with one member more is known, it is a projection away.
+        """
         key = tuple(chosen)
         if key not in self._schurs:
+            more = None if self._weighed else self._with_one_more(key)
+            if more is None:
+                found, self._whole = self._schur(key), key
+            else:
+                found = self._projected(key, more)
             if len(self._schurs) == _KEPT:
                 self._schurs.pop(next(iter(self._schurs)))
-            self._schurs[key] = self._schur(key)
+            self._schurs[key] = found
         return self._schurs[key]
+
+    def _with_one_more(self, chosen: tuple[int, ...]) -> tuple[int, ...] | None:
+        """The last model that was solved, if it has one member more."""
+        key = self._whole
+        if key not in self._schurs or len(key) != len(chosen) + 1:
+            return None
+        member = next((a for a, b in zip(key, chosen, strict=False) if a != b), key[-1])
+        return key if chosen == tuple(i for i in key if i != member) else None
+
+    def _projected(self, rest: tuple[int, ...], key: tuple[int, ...]) -> Schur:
+        """That of the model `key` without the one member that is not in `rest`.
+
+        With W = N⁻¹ G_Sc, its rows W_i and the block P_ii of N⁻¹ of the member, what is left of a
+        candidate grows by W_iᵀ P_ii⁻¹ W_i, and the residual's energy by θ_iᵀ P_ii⁻¹ θ_i.
+        """
+        (member,) = set(key) - set(rest)
+        own = self._own_columns(member, key)
+        inverse = np.asarray(np.linalg.inv(self._inverse(key)[own, own]))
+        values = (self.solve(key) * self.norms[self.columns(key)])[own]
+        if rest not in self._energies:
+            self._energies[rest] = self.energy(key) + float(values @ inverse @ values)
+        whole = self._schurs.pop(key)
+        self._schurs[key] = whole  # the next to be asked for lacks another member
+        return whole.without(own, inverse, values)
 
     def gain_of(self, member: int, chosen: Sequence[int]) -> Gain:
         """What one of the chosen candidates adds to the others, from the inverse of them all.
@@ -162,22 +195,6 @@ class Evidence:
         left = np.asarray(np.linalg.inv(self._inverse(key)[own, own]))
         values = (self.solve(key) * self.norms[self.columns(key)])[own]
         return gain_of_columns(self._candidates, left, left @ values, (member,), SHARED)
-
-    def schur_without(self, member: int, chosen: Sequence[int]) -> Schur:
-        """As `schur` of the chosen ones but one of them, from that of all: a projection each.
-
-        With W = N⁻¹ G_Sc, its rows W_i and the block P_ii of N⁻¹ of the member, what is left of a
-        candidate grows by W_iᵀ P_ii⁻¹ W_i, and the residual's energy by θ_iᵀ P_ii⁻¹ θ_i.
-        """
-        key, rest = tuple(chosen), tuple(i for i in chosen if i != member)
-        if self._weighed or rest in self._schurs:
-            return self.schur(rest)
-        whole, own = self.schur(key), self._own_columns(member, key)
-        inverse = np.asarray(np.linalg.inv(self._inverse(key)[own, own]))
-        values = (self.solve(key) * self.norms[self.columns(key)])[own]
-        if rest not in self._energies:
-            self._energies[rest] = self.energy(key) + float(values @ inverse @ values)
-        return whole.without(own, inverse, values)
 
     def _own_columns(self, member: int, chosen: tuple[int, ...]) -> slice:
         """Where a member's parameters are among those of a model."""

@@ -158,6 +158,12 @@ class Judgement:
             for k in chosen
         )
 
+    def expect(self, chosen: Sequence[int]) -> None:
+        """Prepare for judging sets that lack one of the chosen."""
+        self.white.schur(chosen)
+        for blocks in (self.plain.in_turn, self.white.in_turn, self.plain.seen):
+            blocks.fit(chosen)
+
     def cost(self, chosen: Sequence[int]) -> float:
         """J(S)."""
         return self.white.energy(chosen) + self.prices(chosen)

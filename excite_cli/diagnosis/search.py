@@ -194,11 +194,12 @@ class Search:
     def _best_replacement(self, chosen: list[int]) -> list[int] | None:
         """The set with the lowest J that differs in one member."""
         best, found = self.judge.cost(chosen) - 1e-6, None
+        self.judge.expect(chosen)
         for i in chosen:
             if self.judge.bound(i, chosen):
                 continue
             rest = [k for k in chosen if k != i]
-            schur = self.white.schur_without(i, chosen)
+            schur = self.white.schur(rest)
             energy = self.white.energy(rest)
             base = energy + self.judge.prices(rest)
             if base < best:

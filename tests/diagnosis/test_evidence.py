@@ -93,13 +93,32 @@ def test_blocks_say_at_once_what_a_model_is_with_each_of_others(
 
 
 @pytest.mark.parametrize("chosen", [c for c in CHOSEN if c])
+def test_a_model_of_blocks_without_one_is_a_downdate_away(
+    both: tuple[Evidence, Rows], chosen: tuple[int, ...]
+) -> None:
+    evidence, _ = both
+    for blocks in (evidence.in_turn, evidence.seen):
+        for member in chosen:
+            rest = tuple(sorted(i for i in chosen if i != member))
+            expected = blocks._anew(rest)
+            blocks._fitted.clear()
+            blocks.fit(chosen)
+            found = blocks._fits(rest)
+            assert not found.exact
+            assert found.at.tolist() == expected.at.tolist()
+            assert found.parameters == pytest.approx(expected.parameters, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("chosen", [c for c in CHOSEN if c])
 def test_a_model_without_one_is_a_projection_away(
     both: tuple[Evidence, Rows], chosen: tuple[int, ...]
 ) -> None:
     evidence, rows = both
     for member in chosen:
         rest = [i for i in chosen if i != member]
-        found = evidence.schur_without(member, chosen).singles
+        evidence._schurs.clear()
+        evidence.schur(chosen)
+        found = evidence.schur(rest).singles
         expected = evidence._schur(rest).singles
         for i, (one, other) in enumerate(zip(found, expected, strict=True)):
             if i not in rest:
