@@ -20,14 +20,14 @@ def smallest_in_words(path: ErrorPath) -> str:
     """How many effects are enough, by what, and what that costs on sealed data."""
     count, least = path.smallest, path.left_out[path.best]
     text = (
-        f"{count} of the {len(path.effects)} effects are enough: on runs left out they leave "
-        f"{path.left_out[count]:.1%} of the declared model's error, all of them "
+        f"{count} of the {len(path.effects)} effects are enough: on training data left out they "
+        f"leave {path.left_out[count]:.1%} of the declared model's error, all of them "
         f"{path.left_out[-1]:.1%}; the least is {least:.1%} ± {path.standard_error:.1%}. Sealed: "
         f"{path.sealed[count]:.2%} with {count}, {path.sealed[-1]:.2%} with all. "
         "--apply NEW.yaml --smallest writes these alone."
     )
     if not path.enough:
-        text += " (Two runs left out say little of that standard error.)"
+        text += " (Two runs say little of that standard error.)"
     return text
 
 
