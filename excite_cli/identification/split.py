@@ -20,6 +20,10 @@ from excite_cli.measurement.run_identity import Part, RunId
 
 # A single run is cut into about this many blocks of one to two seconds; every third is sealed.
 _BLOCKS, _SHORTEST, _LONGEST = 9, 1.0, 2.0
+# Samples that a block has at least: the filters for slow recordings (cut off at a fifth of their
+# rate) take 21 at its borders, and 15 give the dozen averages that a part should have. Of 83
+# simulated recordings five, at 10 and 25 Hz, were refused for blocks of a second or two.
+_SAMPLES = 36
 _MOST_BLOCKS = 120  # of long ones: each loses its borders, and costs its share of time
 _MOST_SAMPLES = 400_000  # of a part
 _EVERY = 3
@@ -159,6 +163,7 @@ def _folds(training: list[Run]) -> tuple[int, ...]:
 
 def _blocks(run: Run, block: float | None) -> Split:
     length = min(max(run.duration / _BLOCKS, _SHORTEST), _LONGEST)
+    length = max(length, min(_SAMPLES * run.step, run.duration / _EVERY))
     length = block or max(length, run.duration / _MOST_BLOCKS)
     count = round(run.duration / length)
     if count < _EVERY:

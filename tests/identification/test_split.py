@@ -82,6 +82,15 @@ def test_blocks_of_a_single_run_share_nothing_and_lose_nothing(
     assert str(len(found.sealed)) in found.sealed_name
 
 
+@pytest.mark.parametrize(("seconds", "rate"), [(10.0, 10.0), (15.0, 10.0), (9.0, 25.0)])
+def test_parts_of_a_slow_recording_are_long_enough_for_its_filters(
+    seconds: float, rate: float
+) -> None:
+    parts = split(data(run("a", seconds, rate)))
+    for part in (*parts.training, *parts.sealed):
+        assert len(part.t) >= 32
+
+
 def test_a_long_run_has_sealed_blocks_all_over() -> None:
     found = split(data(run("only", 60.0)))
     middles = [float(each.t.mean()) for each in found.sealed]
