@@ -45,7 +45,7 @@ def _needed(traced: Traced, models: Comparison) -> list[int]:
     judge, chosen = traced.judge, list(traced.chosen)
     while True:
         cannot = [i for i in chosen if not _can_be(judge, chosen, [i])]
-        idle = _idle(judge, chosen, models)
+        idle = _idle(judge, chosen, cannot, models)
         for i in sorted(idle, key=idle.__getitem__):
             rest = [k for k in chosen if k != i]
             if i in cannot or _can_be(judge, rest, [k for k in rest if k not in idle]):
@@ -60,7 +60,9 @@ def _can_be(judge: Judgement, chosen: Sequence[int], which: Sequence[int]) -> bo
     return judge.allowed(judge.plain.solve(chosen), chosen, which)
 
 
-def _idle(judge: Judgement, chosen: Sequence[int], models: Comparison) -> dict[int, float]:
+def _idle(
+    judge: Judgement, chosen: Sequence[int], cannot: Sequence[int], models: Comparison
+) -> dict[int, float]:
     """How clearly each is needed of those that may leave."""
     gains, found = models.needed(chosen), {}
     for i in chosen:
@@ -71,6 +73,6 @@ def _idle(judge: Judgement, chosen: Sequence[int], models: Comparison) -> dict[i
         alone = judge.without(i, chosen)
         gain = gains[i] if alone == rest else models.difference(alone, chosen)
         small = judge.size(rest, [i], judge.white.rows_of[i]) < _SMALLEST
-        if small or not gain.better or not _can_be(judge, chosen, [i]):
+        if small or not gain.better or i in cannot:
             found[i] = gain.clearness
     return found

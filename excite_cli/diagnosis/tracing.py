@@ -2,10 +2,10 @@
 
 Noise is estimated with the effects in that are found so far (a residual that still holds a strong
 slow effect looks like noise with a long memory and hides it); columns that look at the torque of
-the model follow the fit. Every pass searches from the textbook's effects anew (`textbook`: a search
-from what the last pass found kept the TX40 in a valley of 42 %, 8 % otherwise), until a pass finds
+the model follow the fit. Every pass searches from the textbook's effects anew (from what the last
+pass found, a KR300 was left with 6.3 % for 5.6, though a Go2 with 8.5 for 10), until a pass finds
 what the pass before it found. Passes may also go round (what is found asks for other samples to be
-left out, with which it is lost): then the answer is the pass with the least error on data left out.
+left out, with which it is lost): then the answer is the pass with the least error on runs left out.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -148,7 +148,7 @@ def trace(
 
 @dataclass(frozen=True)
 class _Pass:
-    """What a pass began from, and the error of what it found on blocks left out."""
+    """What a pass began from, and the error of what it found on runs left out."""
 
     fit: "Fit"
     left_out: LeftOut
@@ -252,7 +252,7 @@ def fit_of(model: Model, traced: Traced) -> Fit:
 
 
 def _left_out(traced: Traced) -> float:
-    """Logarithm of the RMS that is left of blocks left out, mean over the joints."""
+    """Logarithm of the RMS that is left of runs left out, mean over the joints."""
     squares = traced.judge.plain.by_fold.energies(traced.chosen).sum(axis=1)
     counts = sum(run.usable.sum(axis=0) for run in traced.data.runs)
     return float(np.mean(np.log(squares / np.maximum(counts, 1) * traced.levels**2 + 1e-300))) / 2
