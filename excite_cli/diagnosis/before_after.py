@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from excite_cli.diagnosis.declared_model import Model, width_of
-from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import urdf_friction
@@ -70,8 +69,7 @@ def both_models(
 
 def refitted(model: Model, traced: Traced, chosen: Sequence[int]) -> IdentifiedModel:
     """The model with these of the candidates, fitted to the training data."""
-    parameters = robust_solve(traced.data, traced.candidates, chosen, traced.levels)
-    return _fitted(model, traced, chosen, parameters)
+    return _fitted(model, traced, chosen, traced.fitted(chosen))
 
 
 def _fitted(

@@ -106,22 +106,6 @@ class Comparison:
         return _difference(*map(self._new.energies, (one, other)))
 
 
-def errors_of_new(
-    data: TrainingData, candidates: Sequence[Columns], levels: Array, priors: Sequence[Array]
-) -> list[float]:
-    """Logarithm of the RMS that is left of new recordings, mean over the joints, with each prior.
-
-    The model is that of all candidates.
-    """
-    every = range(len(candidates))
-    seconds = _seconds(data, candidates, every, NoiseModel.white(levels))
-    return [_error(seconds.new(prior), every) for prior in priors]
-
-
-def _error(blocks: Blocks, chosen: Sequence[int]) -> float:
-    return 0.5 * float(np.mean(np.log(blocks.energies(chosen).sum(axis=1) + 1e-300)))
-
-
 def _difference(before: Array, after: Array) -> Difference:
     joints, blocks = before.shape
     least = _LEAST * ((before + after) / 2.0).mean(axis=1, keepdims=True) + 1e-300

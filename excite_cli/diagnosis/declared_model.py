@@ -25,7 +25,7 @@ class KeptInertias:
 class Model:
     """What is known before: robot, declared effects, a prior on the inertias, states of runs.
 
-    `by_data`: how wide the prior is the data choose (`inertia_prior`).
+    `vague`: the prior is no word of the user's, who left the inertias to the data.
     `weighed` (m, r + k + 1): rows [W target] in standard deviations, over the base parameters and
     the parameters of the declared effects.
     """
@@ -36,7 +36,7 @@ class Model:
     prior: KeptInertias | None
     states: States = field(default_factory=dict)
     weighed: Array | None = None
-    by_data: bool = False
+    vague: bool = False
 
     @property
     def declared_width(self) -> int:

@@ -1,6 +1,6 @@
-"""The fit that is told: robust, and of possible sizes.
+"""The fit that is told: with honest deviations, and of possible sizes.
 
-What a search has named is fitted once more (`robust_solve`), with standard deviations that respect
+What a search has named is fitted by weighted least squares, with standard deviations that respect
 serial correlation, what the columns of first-order effects leave, and shapes that fit as well.
 Sizes that no effect can have are moved to the nearest possible ones, all other parameters with them
 as the covariance says.
@@ -13,7 +13,6 @@ import numpy as np
 
 from excite_cli.diagnosis.correlated_covariance import covariance_of
 from excite_cli.diagnosis.friction_line import friction_lines
-from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.robot.model import Array
@@ -34,7 +33,7 @@ class FinalFit:
 
 def final_fit(traced: Traced) -> FinalFit:
     """Fit what was found."""
-    parameters = robust_solve(traced.data, traced.candidates, traced.chosen, traced.levels)
+    parameters = traced.fitted(traced.chosen)
     # Placebos say by how much more than the noise model says.
     covariance = traced.inflation * covariance_of(
         traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels

@@ -14,7 +14,6 @@ import numpy as np
 
 from excite_cli.diagnosis.candidates import with_columns
 from excite_cli.diagnosis.modelled_run import ModelledRun, signals_of_all, training_data
-from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.tracing import Traced, values_of
 from excite_cli.effects.base import Effect
 from excite_cli.robot.model import Array
@@ -28,7 +27,7 @@ def at_its_own_torque(traced: Traced, bodies: Sequence[ModelledRun]) -> Traced:
     chosen = traced.chosen
     if not chosen:
         return traced
-    theta = robust_solve(traced.data, traced.candidates, chosen, traced.levels)
+    theta = traced.fitted(chosen)
     best, least = traced, np.inf
     before: Array | None = None
     for _ in range(_ROUNDS):
@@ -36,7 +35,7 @@ def at_its_own_torque(traced: Traced, bodies: Sequence[ModelledRun]) -> Traced:
         left = _energy(now, theta)
         if left < least:
             best, least, before = now, left, theta
-            theta = robust_solve(now.data, now.candidates, chosen, traced.levels)
+            theta = now.fitted(chosen)
             if left <= _SETTLED * _energy(now, theta):
                 break
         else:

@@ -3,7 +3,7 @@
 The error of a joint where it moves is e(S) = RMS(τ − τ_S) / RMS(τ) of the model with the effects S,
 fitted anew to the training data. It is quadratic in the fitted parameters, so it needs no samples:
 Gram matrices of the sealed columns (at the final model) and torque. What these do not hold at the
-ends, robust weights and columns that look at the model's own torque, joins in equal steps; so e(∅)
+ends, columns that look at the model's own torque, joins in equal steps; so e(∅)
 and e(all) are the errors that are reported, to rounding.
 
 Where the URDF's inertias are kept within their uncertainty, the way begins at the URDF untouched,
@@ -49,7 +49,7 @@ class _Fit:
     """Fits of models with any of those `who` join, to the training data."""
 
     def __init__(self, model: Model, traced: Traced, from_urdf: bool) -> None:
-        self._evidence = traced.judge.plain
+        self._traced = traced
         held = model.prior is not None and from_urdf
         self._held = len(model.prior.mean) if model.prior is not None and held else 0
         chosen = sorted(traced.chosen)
@@ -66,12 +66,10 @@ class _Fit:
         at = [np.arange(self._fixed), *(self._at[i] for i in chosen)]
         found = np.zeros(self._count)
         if INERTIAS in joined or not self._held:
-            found[np.concatenate(at).astype(np.intp)] = self._evidence.solve(chosen)
+            found[np.concatenate(at).astype(np.intp)] = self._traced.fitted(chosen)
         else:
             at[0] = at[0][self._held :]
-            found[np.concatenate(at).astype(np.intp)] = self._evidence.solve_beside(
-                chosen, self._held
-            )
+            found[np.concatenate(at).astype(np.intp)] = self._traced.fitted(chosen, self._held)
         return found
 
 

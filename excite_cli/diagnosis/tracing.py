@@ -10,6 +10,7 @@ left out, with which it is lost): then the answer is the pass with the least err
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from excite_cli.diagnosis.candidates import Candidate, possible_effects, with_co
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.in_runs import SeenRuns
-from excite_cli.diagnosis.inertia_prior import best_share, with_share
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.modelled_run import (
     ModelledRun,
@@ -71,6 +71,23 @@ class Traced:
         """The effects that were found."""
         return tuple(self.candidates[i].effect for i in self.chosen)
 
+    @cached_property
+    def _least_squares(self) -> tuple[Evidence, dict[int, int]]:
+        """Of what was chosen and of the textbook's effects, and where each of them is in it."""
+        members = sorted({*self.chosen, *everyday(self.candidates)})
+        own = [self.candidates[i] for i in members]
+        evidence = self.data.evidence(own, NoiseModel.white(self.levels))
+        return evidence, {i: at for at, i in enumerate(members)}
+
+    def fitted(self, chosen: Sequence[int], held: int = 0) -> Array:
+        """Parameters (k,) of the model with these of what was chosen, or the textbook's effects.
+
+        Weighted least squares, as in `identify`; the first `held` parameters are zero and left out.
+        """
+        evidence, at = self._least_squares
+        own = [at[i] for i in chosen]
+        return evidence.solve_beside(own, held) if held else evidence.solve(own)
+
 
 def trace(
     model: Model,
@@ -92,12 +109,7 @@ def trace(
     bodies = [ModelledRun(model, *each) for each in zip(runs, columns, strict=True)]
     del runs, columns  # the next ones take their place
     plain = textbook_effects(model) if spec.rounds and not model.is_weighed else []
-    if model.by_data:
-        beginning, data, found = _first_fit(model, folds, bodies, plain)
-        model = with_share(model, best_share(data, found, beginning.levels))
-        for body in bodies:
-            body.model = model
-    fit, _, _ = _first_fit(model, folds, bodies, start or plain)
+    fit = _first_fit(model, folds, bodies, start or plain)
     passes: list[_Pass] = []
 
     def take(wanted: LeftOut) -> None:
@@ -214,7 +226,7 @@ def _first_fit(
     folds: Sequence[int],
     bodies: Sequence["ModelledRun"],
     effects: Sequence[Effect],
-) -> tuple[Fit, TrainingData, list[Candidate]]:
+) -> Fit:
     """The declared model with these effects, rows weighted by what it leaves."""
     known = (*model.declared, *effects)
     phi = standard_parameters(model.robot)
@@ -235,7 +247,7 @@ def _first_fit(
         effects = [each.effect for each in found]
         known = (*model.declared, *effects)
         values = values_of(model, data, parameters)
-    return Fit(phi, tuple(effects), values, levels, evidence.energy(chosen)), data, found
+    return Fit(phi, tuple(effects), values, levels, evidence.energy(chosen))
 
 
 def fit_of(model: Model, traced: Traced) -> Fit:

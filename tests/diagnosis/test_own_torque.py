@@ -10,7 +10,6 @@ import pytest
 from excite_cli.diagnosis import own_torque
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.own_torque import at_its_own_torque
-from excite_cli.diagnosis.robust_fit import robust_solve
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.robot.model import Array
 from tests.diagnosis.test_doubt import planted, traced
@@ -46,8 +45,8 @@ def test_a_gain_of_what_is_found_beside_it_is_fitted_as_it_predicts(
     monkeypatch.setattr(own_torque, "values_of", lambda *given: given[-1])
     start = traced(data, at(np.zeros(9)), (0, 1, 2))
     found = at_its_own_torque(start, [])
-    theta = robust_solve(found.data, found.candidates, found.chosen, found.levels)
+    theta = found.fitted(found.chosen)
     assert theta[-3:] == pytest.approx([3.0, 1.0, gain], abs=0.1)
     # A fit at the first columns: sizes of a gain that is not there.
-    rough = robust_solve(start.data, start.candidates, start.chosen, start.levels)
+    rough = start.fitted(start.chosen)
     assert abs(rough[-3] - 3.0) > 0.1

@@ -68,11 +68,7 @@ def answer_of(
     monkeypatch.setattr(
         tracing,
         "_first_fit",
-        lambda *given: (
-            fit_of(None, SimpleNamespace(name=known)) if given[-1] else start,
-            None,
-            None,
-        ),
+        lambda *given: fit_of(None, SimpleNamespace(name=known)) if given[-1] else start,
     )
     monkeypatch.setattr(tracing, "inertial_columns", lambda model, runs: [None for _ in runs])
     monkeypatch.setattr(tracing, "fit_of", fit_of)
@@ -81,7 +77,7 @@ def answer_of(
     rest = Fit(name="rest", places={"rest"}, effects=())
     monkeypatch.setattr(tracing, "beside_cuts", lambda fit: rest)
     monkeypatch.setattr(tracing, "_without_kinds", lambda spec, effects: spec)
-    model: Any = SimpleNamespace(declared=(), by_data=False)
+    model: Any = SimpleNamespace(declared=(), vague=False)
     nothing = DiagnosisSpec(rounds=0)
     begin: Any = (known,) if known else ()
     traced: Any
