@@ -40,7 +40,12 @@ from excite_cli.diagnosis.records import (
 from excite_cli.diagnosis.rounds import order_of, rounds_of
 from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors, sealed_errors
 from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
-from excite_cli.diagnosis.single_runs import assumptions, on_sealed_ends, runs_of_their_own
+from excite_cli.diagnosis.single_runs import (
+    assumptions,
+    differences_told,
+    on_sealed_ends,
+    runs_of_their_own,
+)
 from excite_cli.diagnosis.sufficient import comparison_of, sufficient
 from excite_cli.diagnosis.textbook import textbook
 from excite_cli.diagnosis.traces import Dependence, Traces
@@ -215,6 +220,7 @@ def _diagnosed(
             *suspicious,
             *standing,
             *_filter_bias(model, models[1], spec, parts.training, processing),
+            *differences_told(traced),
             *_noticed(assumed, floor, robot, parts.training),
         ),
         processing=_choices(processing, traced, parts, training),

@@ -1,6 +1,9 @@
 """Effects of single runs: what is assumed of the sealed run, and what they are worth elsewhere.
 
-Such an effect is not in the sealed run unless the configuration says so. So the ends of the
+Of two recordings neither says what is usual: by how much more friction, offset or gain there is in
+one of them is told, and the model has what suits both (`differences_told`).
+
+Any other such effect is not in the sealed run unless the configuration says so. So the ends of the
 training runs that carry one are sealed, too (`split.with_ends_sealed`), and the errors there are
 measured.
 """
@@ -11,17 +14,71 @@ from excite_cli.diagnosis.before_after import Played, on_sealed
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.records import Assumption, SealedEnds
+from excite_cli.diagnosis.tracing import Traced, differences
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import Processing
 from excite_cli.identification.split import Split
-from excite_cli.measurement.dataset import Run
+from excite_cli.measurement.dataset import Finding, Run
+
+_MOST_TOLD = 4
 
 
 def runs_of_their_own(effects: Sequence[Effect]) -> set[str]:
     """Runs that have an effect for all of their time: one with a shape may have its own window."""
     return {run for effect in effects if not effect.shapes for run in effect.runs}
+
+
+def differences_told(traced: Traced) -> tuple[Finding, ...]:
+    """One line on all by which two recordings differ beyond chance; no line if by nothing."""
+    judge, model = traced.judge, traced.model
+    open_ = list(differences(traced.candidates, traced.data, model))
+    chosen, found = list(traced.chosen), list[int]()
+    while len(found) < _MOST_TOLD:
+        singles = judge.white.schur(chosen).singles
+        saved = {i: singles[i].chi2 - judge.price(i, singles[i].dof) for i in open_}
+        best = max(saved, key=saved.__getitem__, default=None)
+        if best is None or saved[best] <= 0.0:
+            break
+        if judge.verdict(chosen, [best]) is Verdict.ACCEPTED:
+            chosen.append(best)
+            found.append(best)
+        taken = traced.candidates[best].effect
+        open_ = [
+            i
+            for i in open_
+            if i != best
+            and (best not in found or not _of_one_place(taken, traced.candidates[i].effect))
+        ]
+    if not found:
+        return ()
+    effects = [traced.candidates[i].effect for i in found]
+    sizes = judge.plain.solve(chosen)[-sum(len(each.parameters) for each in effects) :]
+    joints, parts, at = model.robot.joint_names, [], 0
+    for each in effects:
+        on = " and ".join(joints[j] for j in each.joints)
+        unit = each.unit_on(each.parameters[0].unit, model.robot.sliding)
+        size = f"{sizes[at]:+.3g}{'' if unit == '1' else f' {unit}'}"
+        parts.append(f"{each.kind} of {on} by {size} in {', '.join(each.runs)}")
+        at += len(each.parameters)
+    one, other = sorted({run.run.name for run in traced.data.runs})
+    states = ", ".join(dict.fromkeys(f"{each.kind}: %s" for each in effects))
+    declared = ", ".join(
+        f"{run}: {{{states.replace('%s', label)}}}" for run, label in ((one, "a"), (other, "b"))
+    )
+    text = (
+        f"{one} and {other} differ: {'; '.join(parts)}. Of two recordings neither says which is "
+        "usual, so this is not in the model, which has what suits both. Record a third one, or "
+        f"declare the states: runs: {{{declared}}}"
+    )
+    return (Finding("runs_differ", "warning", text),)
+
+
+def _of_one_place(one: Effect, other: Effect) -> bool:
+    """Whether the one is the other in the other run."""
+    return one.kind == other.kind and one.joints == other.joints
 
 
 def assumptions(effects: Sequence[Effect], parts: Split, model: Model) -> tuple[Assumption, ...]:

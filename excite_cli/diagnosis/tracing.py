@@ -8,7 +8,7 @@ what the pass before it found. Passes may also go round (what is found asks for 
 left out, with which it is lost): then the answer is the pass with the least error on runs left out.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -37,6 +37,7 @@ from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_paramete
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import scales
 from excite_cli.effects.seen import Seen
+from excite_cli.identification.declared_states import declared_sets
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
@@ -327,26 +328,38 @@ def _one_pass(
         model.declared,
     )
     judge = Judgement(white, plain, candidates, rules, sizes, found)
-    chosen = _searched(judge, spec.rounds, model)
+    chosen = _searched(judge, spec.rounds, data, model)
     return Traced(
         data, tuple(candidates), noise, judge, tuple(chosen), fit.phi, tuple(signals),
         fit.levels, inflation, sizes, model,
     )  # fmt: skip
 
 
-def _searched(judge: Judgement, most: int, model: Model) -> list[int]:
+def _searched(judge: Judgement, most: int, data: TrainingData, model: Model) -> list[int]:
     """The best set found from the textbook's; if something was weighed, from nothing or all gains.
 
     A scale that all joints share, or nearly, takes the gains of all: each alone is at odds with the
     inertias.
     """
+    closed = {judge.candidates[i].place for i in differences(judge.candidates, data, model)}
+    search = Search(judge, most, closed)
     if not model.is_weighed:
-        search = Search(judge, most)
         return search.run(search.pruned(everyday(judge.candidates)) if most else ())
-    chosen = Search(judge, most).run()
+    chosen = search.run()
     places = {effect.place for effect in scales(model.robot)}
     gains = [i for i, c in enumerate(judge.candidates) if c.place in places]
-    return min(chosen, Search(judge, most).run(gains), key=judge.cost)
+    return min(chosen, search.run(gains), key=judge.cost)
+
+
+def differences(candidates: Sequence[Candidate], data: TrainingData, model: Model) -> Iterator[int]:
+    """Changes of which two recordings do not say which of them is usual, and nobody else does.
+
+    What one of the two has more of says nothing of a third.
+    """
+    if len({run.run.name for run in data.runs}) == 2:
+        for i, c in enumerate(candidates):
+            if c.effect.is_change and declared_sets(c.effect.kind, model.states) is None:
+                yield i
 
 
 def _seen(data: TrainingData, signals: Sequence[Signals]) -> Seen:
