@@ -21,6 +21,7 @@ _TRIED = 12  # best candidates whose gain on runs left out is looked at in a ste
 # Of data too few to hold any name others come in its place, and more of them: 60 effects of 260
 # candidates after 4 rounds of short moves, and a diagnosis of 17 minutes.
 _GROWN = 1.5
+_MOST_TURNS = 20  # through all members, to replace them
 _PAIRED = 14  # candidates of one joint that are tried in pairs
 
 
@@ -183,60 +184,55 @@ class Search:
         return found
 
     def _polish(self, chosen: list[int]) -> list[int]:
-        """Drop or replace (by one, or by two of the same joint) while J falls."""
-        for _ in range(2 * len(chosen) + 4):
-            better = self._best_replacement(chosen)
-            if better is None:
-                return chosen
-            chosen = better
+        """Drop or replace one after the other (by one, or by two of its joint) while J falls."""
+        for _ in range(_MOST_TURNS):
+            before = chosen
+            for i in before:
+                if i in chosen and not self.judge.bound(i, chosen):
+                    chosen = self._replaced(i, chosen)
+            if chosen == before:
+                break
         return chosen
 
-    def _best_replacement(self, chosen: list[int]) -> list[int] | None:
-        """The set with the lowest J that differs in one member."""
-        best, found = self.judge.cost(chosen) - 1e-6, None
+    def _replaced(self, i: int, chosen: list[int]) -> list[int]:
+        """The set of the lowest J that differs in the member i, or has no such member."""
+        best, found = self.judge.cost(chosen) - 1e-6, chosen
         self.judge.expect(chosen)
-        for i in chosen:
-            if self.judge.bound(i, chosen):
+        rest = [k for k in chosen if k != i]
+        schur = self.white.schur(rest)
+        energy = self.white.energy(rest)
+        base = energy + self.judge.prices(rest)
+        if base < best:
+            best, found = base, rest
+        near = self._free(rest, among=self._near(i))
+        moves: list[tuple[float, tuple[int, ...]]] = []
+        gains: dict[tuple[int, ...], float] = {}
+        for k in near:
+            gain = schur.singles[k]
+            if k != i and gain.dof:
+                moves.append((gain.chi2 - self.judge.price(k, gain.dof), (k,)))
+                gains[(k,)] = gain.chi2
+        for saved, pair in self._pairs(schur, near):
+            moves.append((saved, pair))
+            gains[pair] = saved + self.judge.price(pair[0], 1) + self.judge.price(pair[1], 1)
+        for saved, move in sorted(moves, key=lambda each: -each[0])[:_TRIED]:
+            if base - saved >= best:
+                break
+            trial = [*rest, *move]
+            if len(trial) > self._most:
                 continue
-            rest = [k for k in chosen if k != i]
-            schur = self.white.schur(rest)
-            energy = self.white.energy(rest)
-            base = energy + self.judge.prices(rest)
-            if base < best:
-                best, found = base, rest
-            near = self._free(rest, among=self._near(i))
-            moves: list[tuple[float, tuple[int, ...]]] = []
-            gains: dict[tuple[int, ...], float] = {}
-            for k in near:
-                gain = schur.singles[k]
-                if k != i and gain.dof:
-                    moves.append((gain.chi2 - self.judge.price(k, gain.dof), (k,)))
-                    gains[(k,)] = gain.chi2
-            for saved, pair in self._pairs(schur, near):
-                moves.append((saved, pair))
-                gains[pair] = saved + self.judge.price(pair[0], 1) + self.judge.price(pair[1], 1)
-            for saved, move in sorted(moves, key=lambda each: -each[0])[:_TRIED]:
-                if base - saved >= best:
-                    break
-                trial = [*rest, *move]
-                if len(trial) > self._most:
-                    continue
-                # parents are cheaper than `saved` says
-                cost = energy - gains[move] + self.judge.prices(trial)
-                if cost >= best:
-                    continue
-                refined = len(move) == 1 and i in self.judge.parents[move[0]]
-                if refined and not self.judge.adds(move[0], [*rest, i]):
-                    continue
-                if (
-                    cost < best
-                    and (
-                        (refined and not self.candidates[move[0]].effect.imitates)
-                        or self.judge.in_order(schur, rest, move)
-                    )
-                    and self.judge.allowed(self.plain.solve(trial), trial, move)
-                ):
-                    best, found = cost, trial
+            # parents are cheaper than `saved` says
+            cost = energy - gains[move] + self.judge.prices(trial)
+            if cost >= best:
+                continue
+            refined = len(move) == 1 and i in self.judge.parents[move[0]]
+            if refined and not self.judge.adds(move[0], [*rest, i]):
+                continue
+            if (
+                (refined and not self.candidates[move[0]].effect.imitates)
+                or self.judge.in_order(schur, rest, move)
+            ) and self.judge.allowed(self.plain.solve(trial), trial, move):
+                best, found = cost, trial
         return found
 
     def pruned(self, chosen: list[int]) -> list[int]:
