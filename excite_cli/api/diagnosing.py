@@ -53,6 +53,7 @@ def diagnose(
     workers: Workers | None = None,
     progress: Callable[[str, int], None] = lambda text, done: None,
     tell: Tell = log_note,
+    ended: Callable[[], bool] = lambda: False,
 ) -> Diagnosis:
     """What the declared model lacks: `excite diagnose`.
 
@@ -61,7 +62,8 @@ def diagnose(
     (`good` is false), that is written with `apply_unconfirmed` only, and where the textbook's model
     is better (`worse_than_textbook`), that one is. `smallest`: with the fewest
     effects that are within one standard error of the best on runs left out. `workers`
-    (`open_workers`) share the runs; every number is the same without.
+    (`open_workers`) share the runs; every number is the same without. `ended` is asked between the
+    steps of the search: once it is true, or after `diagnosis.max_seconds`, the answer so far is it.
 
     Returns
     -------
@@ -85,7 +87,7 @@ def diagnose(
     with held({"output": output, "apply": apply}, overwrite, inputs), at_hand(workers):
         dataset = dataset_of(problem, data, tell)
         found = diagnose_dataset(
-            problem.robot, robot_base(problem), dataset, problem.spec, sealed, progress
+            problem.robot, robot_base(problem), dataset, problem.spec, sealed, progress, ended
         )
         found = replace(
             found,

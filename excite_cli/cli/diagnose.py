@@ -9,6 +9,8 @@ from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
 
+_ASKED = "the answer so far follows in some seconds; Ctrl-C again ends the command without it."
+
 
 def diagnose(
     config: options.Config,
@@ -60,7 +62,7 @@ def diagnose(
     to named effects, with their size, certainty, and what these data cannot tell them from. The
     sealed run is used once, for the error before and after, and for the verdict on every effect. A
     single run is cut into blocks, every third sealed. --workers share the runs, with the same
-    numbers.
+    numbers. Ctrl-C, or diagnosis.max_seconds, ends the search with the answer so far.
 
     Exit status 1: effects were found, but the error on the sealed run did not fall.
 
@@ -72,12 +74,14 @@ def diagnose(
     from excite_cli.api.loading import load_case
     from excite_cli.api.threads import single_threaded
     from excite_cli.api.working import working
+    from excite_cli.cli.answer_so_far import answer_so_far
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with (
         single_threaded(),
         working(workers, scheduler, 1, terminal.tell) as place,
         terminal.live("diagnose", 10) as line,
+        answer_so_far(lambda: terminal.say(_ASKED)) as ended,
     ):
         found = diagnose_data(
             load_case(config, overrides or ()),
@@ -91,6 +95,7 @@ def diagnose(
             workers=place,
             progress=line,
             tell=terminal.tell,
+            ended=ended,
         )
     written = {"diagnosis": output, "config": apply if found.good or apply_unconfirmed else None}
     terminal.show(diagnosis_answer(found, str(config), written, verbose))

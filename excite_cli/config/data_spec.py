@@ -250,6 +250,9 @@ class DiagnosisSpec(Section):
     block: Positive | None = Field(
         None, description="[s] length of the blocks a single run is cut into"
     )
+    max_seconds: Positive | None = Field(
+        None, description="[s] after which the search ends with the answer so far"
+    )
 
     @field_validator("kinds")
     @classmethod

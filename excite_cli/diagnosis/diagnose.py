@@ -27,6 +27,7 @@ from excite_cli.diagnosis.overfit import is_overfit, overfit_of
 from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.plausibility import check_recorded
 from excite_cli.diagnosis.records import (
+    CUT_SHORT,
     Absorbed,
     Approximation,
     Assumption,
@@ -95,12 +96,15 @@ def diagnose(
     spec: Spec,
     sealed: str | None = None,
     progress: Progress = lambda text, done: None,
+    ended: Callable[[], bool] = lambda: False,
 ) -> Diagnosis:
     """Find what the declared model of `spec` lacks, and measure the error before and after.
 
     Inertias are kept near the URDF's where the data are silent (`_UNSURE`), unless the config says
     how. Where a fit of free ones is worse than what it was fitted to by far, or than the untouched
     URDF, the same is done with the URDF's kept, and the error of that is told (`overfit`).
+
+    The search ends with the answer so far after `diagnosis.max_seconds`, or once it is `ended`.
 
     Nothing of the sealed part is used but for `before` and `after`. Texts of the configuration and
     versions are left to the caller (`dataclasses.replace`).
@@ -112,15 +116,20 @@ def diagnose(
     FileError
         The data cannot be what the configuration says (joint order, signs), or are too short.
     """
-    found = _diagnosed(robot, base, dataset, spec, sealed, progress)
-    if not is_overfit(found, spec.identification.inertias):
+    began, seconds = time.monotonic(), spec.diagnosis.max_seconds
+
+    def over() -> bool:
+        return ended() or (seconds is not None and time.monotonic() - began > seconds)
+
+    found = _diagnosed(robot, base, dataset, spec, sealed, progress, over)
+    if over() or not is_overfit(found, spec.identification.inertias):
         return found
     kept: Diagnosis | None = None
     if found.untouched is not None and spec.identification.inertias == "free":
         progress("overfit: the same with the URDF's inertias", 9)
         identification = spec.identification.model_copy(update={"inertias": "cad"})
         held = spec.model_copy(update={"identification": identification})
-        kept = _diagnosed(robot, base, dataset, held, sealed, lambda text, done: None)
+        kept = _diagnosed(robot, base, dataset, held, sealed, lambda text, done: None, over)
     return replace(found, overfit=overfit_of(found, kept))
 
 
@@ -131,6 +140,7 @@ def _diagnosed(
     spec: Spec,
     sealed: str | None,
     progress: Progress,
+    over: Callable[[], bool],
 ) -> Diagnosis:
     started = time.monotonic()
     check_declared_runs(spec, dataset)
@@ -148,15 +158,16 @@ def _diagnosed(
     model = _model(robot, base, spec, bool(standing))
     kept = prepare_all(parts.sealed, processing)  # refused early where too short
     suspicious = check_recorded(robot, parts.training, training, processing, spec.measurement)
-    traced, bodies = _traced(model, spec, parts, processing, progress)
+    traced, bodies = _traced(model, spec, parts, processing, progress, over)
     with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
-    if with_ends.ends:
+    if with_ends.ends and not over():
         parts = with_ends
         start = traced.effects
         del traced, bodies  # gigabytes, of large data: not beside the next one
         processing, training = _prepared(spec, parts)
-        traced, bodies = _traced(model, spec, parts, processing, progress, start)
+        traced, bodies = _traced(model, spec, parts, processing, progress, over, start)
         kept = prepare_all(parts.sealed, processing)
+    cut_short = _cut_short(over(), spec, time.monotonic() - started)
     progress("naming", 8)
     traced, book = _needed(traced, bodies, spec)
     del bodies
@@ -220,6 +231,7 @@ def _diagnosed(
             *suspicious,
             *standing,
             *_filter_bias(model, models[1], spec, parts.training, processing),
+            *cut_short,
             *differences_told(traced),
             *_noticed(assumed, floor, robot, parts.training),
         ),
@@ -307,6 +319,7 @@ def _traced(
     parts: Split,
     processing: Processing,
     progress: Progress,
+    over: Callable[[], bool],
     start: Sequence[Effect] = (),
 ) -> tuple[Traced, list[ModelledRun]]:
     """What is found in the training parts, and these as the model sees them.
@@ -319,7 +332,7 @@ def _traced(
         return prepare_all(parts.training, processing, left_out)
 
     traced, bodies = trace(
-        model, spec.diagnosis, prepared, parts.folds, parts.units, progress, start
+        model, spec.diagnosis, prepared, parts.folds, parts.units, progress, start, over
     )
     return at_its_own_torque(traced, bodies), bodies
 
@@ -336,6 +349,18 @@ def _needed(
     models = comparison_of(traced)
     needed = replace(traced, chosen=tuple(sufficient(traced, models)))
     return at_its_own_torque(needed, bodies), textbook(traced.candidates, models)
+
+
+def _cut_short(over: bool, spec: Spec, seconds: float) -> tuple[Finding, ...]:
+    """That the search did not come to its end."""
+    if not over or not spec.diagnosis.rounds:
+        return ()
+    text = (
+        f"the search was ended after {seconds:.0f} s, with the answer so far: what else is missing "
+        "was not looked for. Without diagnosis.max_seconds, and without Ctrl-C, it goes on to its "
+        "end"
+    )
+    return (Finding(CUT_SHORT, "warning", text),)
 
 
 def _noticed(

@@ -27,6 +27,7 @@ _PARENT_PRICE = 4.5
 # χ² that what acts on fewer rows must save beyond, where scales alone tell either: an offset of the
 # vertical force, or a gain of it, and one of the whole wrench differ by the noise.
 _ON_FEWER_ROWS = 25.0
+_KEPT = 4096  # verdicts that are kept: a step of the search asks for the last one's again
 _SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
 
 
@@ -59,6 +60,7 @@ class Judgement:
     found: Sequence[int] = ()
     _thresholds: dict[tuple[int, int], float] = field(default_factory=dict)
     _price: dict[tuple[int, int], float] = field(default_factory=dict, init=False)
+    _verdicts: dict[tuple, Verdict] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         """Look up who refines whom, and which kinds exclude each other."""
@@ -303,6 +305,14 @@ class Judgement:
 
     def verdict(self, chosen: Sequence[int], added: Sequence[int]) -> Verdict:
         """Accepted, or why `added` may not join the chosen ones."""
+        key = tuple(sorted(chosen)), tuple(added)
+        if key not in self._verdicts:
+            if len(self._verdicts) == _KEPT:
+                self._verdicts.clear()
+            self._verdicts[key] = self._verdict(chosen, added)
+        return self._verdicts[key]
+
+    def _verdict(self, chosen: Sequence[int], added: Sequence[int]) -> Verdict:
         together = [*chosen, *added]
         if not self.allowed(self.plain.solve(together), together, added):
             return Verdict.IMPOSSIBLE_SIGN

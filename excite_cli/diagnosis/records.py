@@ -273,6 +273,7 @@ class Information:
     noise: Array
 
 
+CUT_SHORT = "cut_short"  # the kind of a finding: the search did not come to its end
 _UNCHANGED = 0.02  # of an error that no effect concerns
 AS_GOOD = 1.02  # times the textbook's error: what is above is said to be worse
 
@@ -406,7 +407,8 @@ class Diagnosis(Shown):
     @property
     def complete(self) -> bool:
         """Whether the declared model lacks nothing: no effect, and nothing is left but noise."""
-        return not self.effects and not self.joints_left
+        ended = any(each.kind == CUT_SHORT for each in self.findings)
+        return not (self.effects or self.joints_left or ended)
 
     @property
     def approximations(self) -> tuple[NamedEffect, ...]:

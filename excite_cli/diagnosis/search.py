@@ -6,10 +6,11 @@ with local ones on all rows at once: one parameter that explains many joints win
 explain one each.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
+from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.diagnosis.schur import Schur
 from excite_cli.diagnosis.verdict import Verdict
@@ -29,10 +30,15 @@ class Search:
     """A search from the declared model for the set that is judged best."""
 
     def __init__(
-        self, judge: Judgement, most: int = _MOST_STEPS, closed: Collection[Place] = ()
+        self,
+        judge: Judgement,
+        most: int = _MOST_STEPS,
+        closed: Collection[Place] = (),
+        over: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`most` effects at most, and none at the `closed` places."""
-        self.judge, self._most, self._closed = judge, most, closed
+        """`most` effects at most, and none at the `closed` places; what is there when it is `over`
+        is the answer."""
+        self.judge, self._most, self._closed, self._over = judge, most, closed, over
         self.white, self.plain, self.candidates = judge.white, judge.plain, judge.candidates
         self._on_rows: dict[tuple[int, ...], list[int]] = {}
         self._places = [c.place for c in self.candidates]
@@ -48,7 +54,7 @@ class Search:
         """
         closed, chosen = self._closed, self._settled(start)
         kept, most = self.pruned(chosen), _GROWN * len(chosen)
-        while len(kept) < len(chosen):
+        while len(kept) < len(chosen) and not self._over():
             lost = {self.candidates[i].place for i in chosen if i not in kept}
             self._closed = {*self._closed, *lost}
             chosen = self._settled(kept)
@@ -97,7 +103,7 @@ class Search:
 
     def _forward(self, chosen: list[int], latest: Tier) -> list[int]:
         """Add candidates up to tier `latest` while one (or two of a joint) passes."""
-        while len(chosen) < self._most:
+        while len(chosen) < self._most and not self._over():
             added = self._best_one(chosen, latest) or self._best_two(chosen, latest)
             if not added or len(chosen) + len(added) > self._most:
                 break
@@ -188,7 +194,7 @@ class Search:
         for _ in range(_MOST_TURNS):
             before = chosen
             for i in before:
-                if i in chosen and not self.judge.bound(i, chosen):
+                if i in chosen and not (self._over() or self.judge.bound(i, chosen)):
                     chosen = self._replaced(i, chosen)
             if chosen == before:
                 break
@@ -236,10 +242,25 @@ class Search:
         return found
 
     def pruned(self, chosen: list[int]) -> list[int]:
-        """Without those that, with all others in, are not significant or bring nothing."""
+        """Without those that, with all others in, are not significant or bring nothing.
+
+        The weakest leaves first, of each joint at once: what it leaves to others is on that joint.
+        """
         while True:
             failing = self.judge.failing(chosen)
             if not failing:
                 return chosen
-            weakest = min(failing, key=lambda i: self.white.gain_of(i, chosen).chi2)
-            chosen = [k for k in chosen if k != weakest]
+            gains = {i: self.white.gain_of(i, chosen).chi2 for i in failing}
+            weakest = weakest_apart(gains, self.candidates)
+            chosen = [k for k in chosen if k not in weakest]
+
+
+def weakest_apart(strength: Mapping[int, float], candidates: Sequence[Candidate]) -> list[int]:
+    """The weakest of some, with the weakest of those that share no joint with them, and so on."""
+    found: list[int] = []
+    taken: set[int] = set()
+    for i in sorted(strength, key=strength.__getitem__):
+        if taken.isdisjoint(candidates[i].rows):
+            found.append(i)
+        taken.update(candidates[i].rows)
+    return found

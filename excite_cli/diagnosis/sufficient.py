@@ -13,6 +13,7 @@ import numpy as np
 from excite_cli.diagnosis.comparison import Comparison
 from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.diagnosis.records import AS_GOOD
+from excite_cli.diagnosis.search import weakest_apart
 from excite_cli.diagnosis.textbook import everyday, textbook
 from excite_cli.diagnosis.tracing import Traced
 
@@ -46,13 +47,16 @@ def _needed(traced: Traced, models: Comparison) -> list[int]:
     while True:
         cannot = [i for i in chosen if not _can_be(judge, chosen, [i])]
         idle = _idle(judge, chosen, cannot, models)
-        for i in sorted(idle, key=idle.__getitem__):
-            rest = [k for k in chosen if k != i]
-            if i in cannot or _can_be(judge, rest, [k for k in rest if k not in idle]):
-                chosen = rest
-                break
-        else:
+        leaving, open_ = list[int](), dict(idle)
+        while open_ and not leaving:
+            for i in weakest_apart(open_, judge.candidates):
+                rest = [k for k in chosen if k != i and k not in leaving]
+                if i in cannot or _can_be(judge, rest, [k for k in rest if k not in idle]):
+                    leaving.append(i)
+                del open_[i]
+        if not leaving:
             return chosen
+        chosen = [k for k in chosen if k not in leaving]
 
 
 def _can_be(judge: Judgement, chosen: Sequence[int], which: Sequence[int]) -> bool:

@@ -98,8 +98,11 @@ def trace(
     run_names: Sequence[str],
     progress: Progress,
     start: Sequence[Effect] = (),
+    over: Callable[[], bool] = lambda: False,
 ) -> tuple[Traced, list[ModelledRun]]:
     """Find the effects that `model` lacks; with the runs as it sees them.
+
+    What is found when it is `over` is the answer, whatever the passes say.
 
     `prepared` gives the training parts, without samples that effects which were found ask to leave.
     `start`: effects found in more of the same data; all numbers are fitted to these data alone.
@@ -126,7 +129,7 @@ def trace(
     cuts: Mapping[int, float] = {}
     for attempt in range(_PASSES):
         traced = None  # its columns are gigabytes, of large data: not beside the next ones
-        traced = _one_pass(model, spec, folds, run_names, bodies, fit)
+        traced = _one_pass(model, spec, folds, run_names, bodies, fit, over)
         now = fit_of(model, traced)
         count = len(traced.chosen)
         progress(
@@ -134,7 +137,7 @@ def trace(
             f"{len(traced.candidates)} candidates",
             attempt + 1,
         )
-        if attempt > 0 and now.places == fit.places and now.close_to(fit):
+        if over() or (attempt > 0 and now.places == fit.places and now.close_to(fit)):
             return traced, bodies
         passes.append(_Pass(fit, left_out, _left_out(traced)))
         fit = now
@@ -147,7 +150,7 @@ def trace(
                 take(LeftOut.by((*model.declared, *rest.effects), cutting))
                 blind = _without_kinds(spec, cutting)
                 traced = None
-                traced = _one_pass(model, blind, folds, run_names, bodies, rest)
+                traced = _one_pass(model, blind, folds, run_names, bodies, rest, over)
                 fit = fit_of(model, traced)
             take(LeftOut.by((*model.declared, *fit.effects)))
     assert traced is not None
@@ -156,7 +159,7 @@ def trace(
         return traced, bodies
     traced = None
     take(best.left_out)
-    return _one_pass(model, spec, folds, run_names, bodies, best.fit), bodies
+    return _one_pass(model, spec, folds, run_names, bodies, best.fit, over), bodies
 
 
 @dataclass(frozen=True)
@@ -283,6 +286,7 @@ def _one_pass(
     run_names: Sequence[str],
     bodies: Sequence["ModelledRun"],
     fit: Fit,
+    over: Callable[[], bool],
 ) -> Traced:
     """Columns and noise as the last fit says, then a search from the textbook's model."""
     effects = (*model.declared, *fit.effects)
@@ -328,21 +332,23 @@ def _one_pass(
         model.declared,
     )
     judge = Judgement(white, plain, candidates, rules, sizes, found)
-    chosen = _searched(judge, spec.rounds, data, model)
+    chosen = _searched(judge, spec.rounds, data, model, over)
     return Traced(
         data, tuple(candidates), noise, judge, tuple(chosen), fit.phi, tuple(signals),
         fit.levels, inflation, sizes, model,
     )  # fmt: skip
 
 
-def _searched(judge: Judgement, most: int, data: TrainingData, model: Model) -> list[int]:
+def _searched(
+    judge: Judgement, most: int, data: TrainingData, model: Model, over: Callable[[], bool]
+) -> list[int]:
     """The best set found from the textbook's; if something was weighed, from nothing or all gains.
 
     A scale that all joints share, or nearly, takes the gains of all: each alone is at odds with the
     inertias.
     """
     closed = {judge.candidates[i].place for i in differences(judge.candidates, data, model)}
-    search = Search(judge, most, closed)
+    search = Search(judge, most, closed, over)
     if not model.is_weighed:
         return search.run(search.pruned(everyday(judge.candidates)) if most else ())
     chosen = search.run()

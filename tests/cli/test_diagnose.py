@@ -11,7 +11,7 @@ import h5py
 import pytest
 import yaml
 
-from excite_cli.api.diagnosing import save_config
+from excite_cli.api.diagnosing import diagnose, save_config
 from excite_cli.api.loading import load_case
 from excite_cli.config.load import load_spec
 from excite_cli.store.diagnosis_file import read_diagnosis
@@ -365,3 +365,24 @@ def test_help_has_an_example(excite: Program) -> None:
     assert run.returncode == 0
     assert "excite diagnose ur10.yaml measured.h5" in run.stdout
     assert "--sealed" in run.stdout
+
+
+@pytest.mark.parametrize("asked", [0, 1, 7])
+def test_an_answer_so_far_exists_at_any_time(outcome: Outcome, asked: int) -> None:
+    """The search is ended after it asked so many times: what it had is told, and that it ended."""
+    times = iter(range(10**9))
+    case = load_case(SMOKE, ["diagnosis.kinds=" + KINDS])
+    found = diagnose(case, outcome.data, ended=lambda: next(times) >= asked)
+    assert [each.kind for each in found.findings].count("cut_short") == 1
+    assert not found.complete
+    assert found.after.mean_relative_moving < found.before.mean_relative_moving
+
+
+def test_seconds_that_are_over_end_the_search(
+    outcome: Outcome, cache: Path, tmp_path: Path
+) -> None:
+    seconds = ("--set", "diagnosis.max_seconds=1e-9")
+    answer = Program(tmp_path, cache).answer("diagnose", SMOKE, outcome.data, *QUICK, *seconds)
+    (told,) = [each["text"] for each in answer["findings"] if each["kind"] == "cut_short"]
+    assert "with the answer so far" in told
+    assert "diagnosis.max_seconds" in told
