@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
-from excite_cli.diagnosis.schur import SHARED, Gain, Schur
+from excite_cli.diagnosis.schur import Gain, Schur
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.place import Place
 from excite_cli.robot.model import Array
@@ -240,56 +240,6 @@ class Judgement:
         others = [j for j in range(len(self.plain.grams.joints)) if j not in own]
         return all(self.size(chosen, added, joints) < _SMALLEST for joints in (own, others))
 
-    def _leftover(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        """Whether `added` is no more than what the form of other effects leaves of them."""
-        return self._small_beside(chosen, added) or self._less_than_twin(chosen, added)
-
-    def _less_than_twin(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        """Whether `added` saves less than the twin of a chosen effect, or nothing beside it.
-
-        Of two that exclude each other neither is exact: what one leaves, the other explains, and
-        so does many another effect.
-        """
-        twins = {place for k in chosen for place in self.excluded(k)}
-        if not twins:
-            return False
-        own = self.white.schur(chosen)
-        saved, needed = own.gain(*added, absorbed=SHARED).chi2, self.prices(added)
-        for twin in (i for i, c in enumerate(self.candidates) if c.place in twins):
-            beside = self.white.schur([*chosen, twin]).gain(*added, absorbed=SHARED).chi2
-            if beside < needed or own.gain(twin).chi2 > saved:
-                return True
-        return False
-
-    def _small_beside(self, chosen: Sequence[int], added: Sequence[int]) -> bool:
-        """Whether it explains less than other effects may leave on every joint it touches."""
-        together = [*chosen, *added]
-        leaves = self._left_beside(together)
-        for joint in sorted({j for i in added for j in self.white.rows_of[i]}):
-            after = self.plain.energy_on(together, [joint])
-            own = self.plain.energy_on(chosen, [joint]) - after
-            left = [
-                share * (self.plain.energy_on([c for c in together if c != k], [joint]) - after)
-                for k, share in leaves.items()
-                if k in chosen and joint in self.white.rows_of[k]
-            ]
-            if own > max(left, default=0.0):
-                return False
-        return True
-
-    def _left_beside(self, chosen: Sequence[int]) -> dict[int, float]:
-        """Share of their energy that the forms of chosen effects may leave, where there is any."""
-        values = self.plain.solve(chosen)
-        at = len(values) - sum(self.candidates[i].width for i in chosen)
-        found = {}
-        for i in chosen:
-            width = self.candidates[i].width
-            share = self.candidates[i].effect.leftover(values[at : at + width])
-            if share > 0.0:
-                found[i] = share
-            at += width
-        return found
-
     def told_by_weight(self, candidate: int, others: Sequence[int]) -> bool:
         """Whether it is a gain that scales alone tell from the model with the others."""
         gain = self.candidates[candidate].effect.of_whole_torque
@@ -321,8 +271,6 @@ class Judgement:
             return Verdict.TOO_SMALL if little else Verdict.ACCEPTED
         if self.too_small(chosen, added):
             return Verdict.TOO_SMALL
-        if self._leftover(chosen, added):
-            return Verdict.LEFTOVER
         if self.left_out_gain(chosen, added) < self.rules.gain:
             return Verdict.NO_GAIN
         return Verdict.ACCEPTED
@@ -371,4 +319,4 @@ class Judgement:
             return True
         if self.told_by_weight(i, rest):
             return self._weighs_little(i, rest)
-        return gain < self.rules.gain or not large or self._leftover(rest, [i])
+        return gain < self.rules.gain or not large

@@ -7,10 +7,10 @@ explain one each.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
-from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.diagnosis.schur import Schur
 from excite_cli.diagnosis.verdict import Verdict
@@ -22,8 +22,10 @@ _TRIED = 12  # best candidates whose gain on runs left out is looked at in a ste
 # Of data too few to hold any name others come in its place, and more of them: 60 effects of 260
 # candidates after 4 rounds of short moves, and a diagnosis of 17 minutes.
 _GROWN = 1.5
-_MOST_TURNS = 20  # through all members, to replace them
 _PAIRED = 14  # candidates of one joint that are tried in pairs
+
+_Move = tuple[int, tuple[int, ...]]  # a member, and who comes in its place
+T = TypeVar("T")
 
 
 class Search:
@@ -190,26 +192,50 @@ class Search:
         return found
 
     def _polish(self, chosen: list[int]) -> list[int]:
-        """Drop or replace one after the other (by one, or by two of its joint) while J falls."""
-        for _ in range(_MOST_TURNS):
-            before = chosen
-            for i in before:
-                if i in chosen and not (self._over() or self.judge.bound(i, chosen)):
-                    chosen = self._replaced(i, chosen)
-            if chosen == before:
+        """Drop or replace (by one, or by two of the same joint) while J falls.
+
+        The best of all moves is made, with the best of those that share no joint with it, and so
+        on, where J falls more by all of them.
+        """
+        for _ in range(2 * len(chosen) + 4):
+            moves = self._moves(chosen)
+            if not moves:
                 break
+            best = min(moves, key=moves.__getitem__)
+            several = list(chosen)
+            for move in weakest_apart(moves, self._rows_of_move):
+                several = _with_move(several, *move)
+            one = _with_move(chosen, *best)
+            chosen = min(one, several, key=self.judge.cost)
         return chosen
 
-    def _replaced(self, i: int, chosen: list[int]) -> list[int]:
-        """The set of the lowest J that differs in the member i, or has no such member."""
-        best, found = self.judge.cost(chosen) - 1e-6, chosen
+    def _rows_of_move(self, move: _Move) -> set[int]:
+        member, instead = move
+        return {j for i in (member, *instead) for j in self.candidates[i].rows}
+
+    def _moves(self, chosen: list[int]) -> dict[_Move, float]:
+        """The best move of every member that lowers J, and the J that it gives."""
         self.judge.expect(chosen)
+        found = {}
+        for i in chosen:
+            if self._over():
+                return {}
+            if not self.judge.bound(i, chosen):
+                cost, move = self._replaced(i, chosen)
+                if move is not None:
+                    found[i, move] = cost
+        return found
+
+    def _replaced(self, i: int, chosen: list[int]) -> tuple[float, tuple[int, ...] | None]:
+        """The lowest J of a set that differs in the member i, and who comes in its place."""
+        best: float = self.judge.cost(chosen) - 1e-6
+        found: tuple[int, ...] | None = None
         rest = [k for k in chosen if k != i]
         schur = self.white.schur(rest)
         energy = self.white.energy(rest)
         base = energy + self.judge.prices(rest)
         if base < best:
-            best, found = base, rest
+            best, found = base, ()
         near = self._free(rest, among=self._near(i))
         moves: list[tuple[float, tuple[int, ...]]] = []
         gains: dict[tuple[int, ...], float] = {}
@@ -238,8 +264,8 @@ class Search:
                 (refined and not self.candidates[move[0]].effect.imitates)
                 or self.judge.in_order(schur, rest, move)
             ) and self.judge.allowed(self.plain.solve(trial), trial, move):
-                best, found = cost, trial
-        return found
+                best, found = cost, move
+        return best, found
 
     def pruned(self, chosen: list[int]) -> list[int]:
         """Without those that, with all others in, are not significant or bring nothing.
@@ -251,16 +277,21 @@ class Search:
             if not failing:
                 return chosen
             gains = {i: self.white.gain_of(i, chosen).chi2 for i in failing}
-            weakest = weakest_apart(gains, self.candidates)
+            weakest = weakest_apart(gains, lambda i: self.candidates[i].rows)
             chosen = [k for k in chosen if k not in weakest]
 
 
-def weakest_apart(strength: Mapping[int, float], candidates: Sequence[Candidate]) -> list[int]:
-    """The weakest of some, with the weakest of those that share no joint with them, and so on."""
-    found: list[int] = []
+def _with_move(chosen: Sequence[int], member: int, instead: Sequence[int]) -> list[int]:
+    """The set with others in a member's place."""
+    return [*(k for k in chosen if k != member), *instead]
+
+
+def weakest_apart(strength: Mapping[T, float], rows_of: Callable[[T], Collection[int]]) -> list[T]:
+    """The weakest of some, with the weakest of those that share no joint with it, and so on."""
+    found: list[T] = []
     taken: set[int] = set()
-    for i in sorted(strength, key=strength.__getitem__):
-        if taken.isdisjoint(candidates[i].rows):
-            found.append(i)
-        taken.update(candidates[i].rows)
+    for each in sorted(strength, key=strength.__getitem__):
+        if taken.isdisjoint(rows_of(each)):
+            found.append(each)
+        taken.update(rows_of(each))
     return found

@@ -49,7 +49,7 @@ def _needed(traced: Traced, models: Comparison) -> list[int]:
         idle = _idle(judge, chosen, cannot, models)
         leaving, open_ = list[int](), dict(idle)
         while open_ and not leaving:
-            for i in weakest_apart(open_, judge.candidates):
+            for i in weakest_apart(open_, lambda i: judge.candidates[i].rows):
                 rest = [k for k in chosen if k != i and k not in leaving]
                 if i in cannot or _can_be(judge, rest, [k for k in rest if k not in idle]):
                     leaving.append(i)

@@ -10,7 +10,6 @@ class Verdict(StrEnum):
     NOT_SIGNIFICANT = "not significant"
     IMPOSSIBLE_SIGN = "impossible sign"
     TOO_SMALL = "too small to matter"
-    LEFTOVER = "what another effect leaves"
     NO_GAIN = "no gain on runs left out"
     LATER = "later"
     EXPLAINED = "another explains it"

@@ -100,10 +100,6 @@ class Backlash(Effect):
         """What the unknown way in which flanks meet makes of the share."""
         return _MISSED * values
 
-    def leftover(self, values: Array) -> float:
-        """How flanks meet is not known exactly."""
-        return 1e-2
-
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """Small ones: a flight more or less changes much."""
         return steps_by_ratio(self.shape[name], _FINER)

@@ -306,13 +306,6 @@ class Effect(ABC):
         """Standard deviations (p,) that the inexactness of its columns gives to its parameters."""
         return np.zeros(len(values))
 
-    def leftover(self, values: Array) -> float:
-        """Share of its energy that its columns may leave or add: what is no more is no effect.
-
-        Above zero where columns are first order or their form is not known exactly.
-        """
-        return 0.0
-
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """By how much shape parameter `name` is changed, up and down, once the effect is found.
 

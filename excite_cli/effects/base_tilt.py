@@ -16,7 +16,6 @@ import numpy as np
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
 from excite_cli.effects.c_code import all_joints, reals
-from excite_cli.effects.directional import left_by_angles
 from excite_cli.effects.mjcf_parts import MjcfParts
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
@@ -42,10 +41,6 @@ class BaseTilt(Effect):
     def model_error(self, values: Array) -> Array:
         """What those moments make of the angles; measured on simulated arms."""
         return np.full(2, _MISSED * float(np.linalg.norm(values)))
-
-    def leftover(self, values: Array) -> float:
-        """A tilt also shows moments of the first links that a level base hides."""
-        return left_by_angles(values, 1e-2)
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]

@@ -82,10 +82,6 @@ class DahlFriction(Effect):
         """Many: where friction stands far above the noise, a few per cent of it are seen."""
         return steps_by_ratio(self.shape[name], _FINER)
 
-    def leftover(self, values: Array) -> float:
-        """How friction builds up is not known exactly."""
-        return 2e-2
-
     def forgets_over(self) -> tuple[tuple[int, float], ...]:
         """Four distances: of what was before a record, 2 % are left then."""
         return tuple((j, _FORGOTTEN * self.shape["distance"]) for j in self.joints)

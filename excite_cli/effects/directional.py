@@ -14,12 +14,6 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.robot.model import Array
 
 _STEP = 1e-5  # rad
-_SECOND_ORDER = 1.5  # of the first order, per rad
-
-
-def left_by_angles(angles: Array, least: float) -> float:
-    """Share of its energy that an effect linear in these angles [rad] leaves; `least` or more."""
-    return max(least, (_SECOND_ORDER * float(np.linalg.norm(angles))) ** 2)
 
 
 def slope_of_gradient(

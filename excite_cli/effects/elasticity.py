@@ -51,13 +51,6 @@ class Elasticity(Effect):
         """What the next order, (motion's frequency over the resonance)², makes of it."""
         return _MISSED * values
 
-    def leftover(self, values: Array) -> float:
-        """Columns are of first order, and nothing in them turns with friction at a reversal.
-
-        Where dry friction winds the gear up, 4 % of a Panda's elasticity looked like a memory.
-        """
-        return 5e-2
-
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
     ) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
 from excite_cli.effects.c_code import all_joints, real
-from excite_cli.effects.directional import left_by_angles, slope_of_gradient
+from excite_cli.effects.directional import slope_of_gradient
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
 
@@ -35,10 +35,6 @@ class EncoderOffset(Effect):
     def model_error(self, values: Array) -> Array:
         """What the second order makes of it, as a share the offset itself [rad] or less."""
         return _MISSED * values**2
-
-    def leftover(self, values: Array) -> float:
-        """Of an angle the columns are the first order only."""
-        return left_by_angles(values, 2e-3)
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]

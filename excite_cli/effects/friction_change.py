@@ -25,7 +25,6 @@ from excite_cli.robot.model import Array, Robot
 # Of the span; the last is a straight line. Steps of single runs explain what a coarse grid leaves.
 _TIME_CONSTANTS = (0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 1.0, 20.0)
 _OVER = 0.9  # of the change, by the second recording: a step
-_LEFT = 0.03  # of its energy: no warming up is an exponential
 _FEWEST = 3  # recordings: two differ by a step as well as by a trend
 
 
@@ -81,10 +80,6 @@ class FrictionChange(Effect):
         """The same with a time constant that is smaller by `step`."""
         constant = self.shape["time_constant"] - step
         return replace(self, shape={**self.shape, "time_constant": constant})
-
-    def leftover(self, values: Array) -> float:
-        """What another curve from its start to its end would leave of it."""
-        return _LEFT
 
     def progress(self, start: float) -> float:
         """φ at a time on the campaign's clock [s]."""

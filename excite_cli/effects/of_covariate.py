@@ -16,9 +16,6 @@ from excite_cli.effects.c_code import real
 from excite_cli.robot.model import Array, Robot
 
 PER_UNIT = "/unit"
-# Of its energy. Friction that thinned as exp(−c) left 0.05 and 0.07 of it in simulated campaigns,
-# which went by other names: most runs are warm, and the cold one is far from the line.
-_LEFT = 0.1
 _SAME = 1e-9  # of its size: a column that changes by less stands still
 
 
@@ -45,10 +42,6 @@ class OfCovariate(Effect):
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """The reference is no choice."""
         return ()
-
-    def leftover(self, values: Array) -> float:
-        """What another curve over the column would leave of it."""
-        return _LEFT
 
     def deviation_of(self, signals: Signals) -> Array:
         """δ (T,)."""

@@ -43,10 +43,6 @@ class StribeckFriction(Effect):
         """Whether its peak reaches beyond the samples in which the joint hardly moves."""
         return self.shape.get("stribeck_speed", np.inf) >= speed
 
-    def leftover(self, values: Array) -> float:
-        """How friction falls with speed is not known exactly."""
-        return 2e-2
-
     def columns(self, signals: Signals) -> Array:
         """exp(−(v_j/v_s)²) sgn v_j, (T, 1, 1)."""
         v = signals.v[:, list(self.joints), None]

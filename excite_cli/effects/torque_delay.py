@@ -62,10 +62,6 @@ class TorqueDelay(Effect):
         """What the second order makes of it."""
         return _MISSED * np.abs(values)
 
-    def leftover(self, values: Array) -> float:
-        """Of a delay the columns are the first order only."""
-        return 1e-2
-
     def columns(self, signals: Signals) -> Array:
         """−d(torque)/dt, (T, len(joints), 1)."""
         return -signals.rate(signals.torque[:, list(self.joints)])[:, :, None]

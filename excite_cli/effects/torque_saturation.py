@@ -74,10 +74,6 @@ class TorqueSaturation(Effect):
         """At the level."""
         return ((self.joints[0], self.shape["level"]),)
 
-    def leftover(self, values: Array) -> float:
-        """The form of a cut-off is not known exactly."""
-        return 4e-3
-
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """Small ones: a level is seen directly."""
         return steps_by_ratio(self.shape[name], _FINER)

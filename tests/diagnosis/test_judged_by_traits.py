@@ -72,13 +72,6 @@ REFINED: Mapping[str, tuple[str, ...]] = {
     "load_dependent_friction": ("coulomb_friction",),
     "position_friction": ("coulomb_friction",),
 }
-# Share of its energy for values of 0.1, and whether its twin is another kind.
-LEAVES = {
-    "base_tilt": 0.045, "encoder_offset": 0.0225, "torque_saturation": 4e-3, "elasticity": 5e-2,
-    "backlash": 1e-2, "torque_delay": 1e-2, "stribeck_friction": 2e-2, "friction_change": 3e-2,
-    "dahl_friction": 2e-2,
-    "covariate_friction": 0.1, "covariate_offset": 0.1,
-}  # fmt: skip
 
 
 def a_search(effects: Sequence[Effect], mix: Array, torque: Sequence[float]) -> Search:
@@ -136,11 +129,7 @@ def test_noise_is_measured_with_all_usual_effects_in() -> None:
 @pytest.mark.parametrize("kind", list(STATED))
 def test_it_waits_for_what_it_refines(kind: str) -> None:
     """Everything exact that is worth its price is there: only what it refines is in its way."""
-    others = [
-        name
-        for name, one in catalogue().items()
-        if len(one.parameters) == 1 and one.leftover is Effect.leftover
-    ]
+    others = [name for name, one in catalogue().items() if len(one.parameters) == 1]
     effects = [of(kind), *(of(name) for name in others if name != kind)]
     width = len(effects[0].parameters) + len(effects) - 1
     search = a_search(effects, np.eye(width), np.ones(width))
@@ -150,22 +139,6 @@ def test_it_waits_for_what_it_refines(kind: str) -> None:
     for k, one in enumerate(effects[1:], start=1):
         rest = [i for i in range(1, len(effects)) if i != k]
         assert search.judge.in_order(search.white.schur(rest), rest, [0]) == (one.kind not in ahead)
-
-
-@pytest.mark.parametrize("kind", list(STATED))
-def test_what_its_form_leaves_is_no_other_effect(kind: str) -> None:
-    """It has RMS 100 with values of 0.1; an armature explains a little more, or less, beside it."""
-    one, share = of(kind), LEAVES.get(kind, 0.0)
-    width = len(one.parameters)
-    mix = np.eye(width + 1)
-    mix[:width] *= 100.0 / 0.1 / np.sqrt(width)
-    for factor, left in ((0.98, share > 0.0), (1.02, False)):
-        size = 100.0 * np.sqrt(share * factor) if share else 1.0
-        torque = [*(100.0 / np.sqrt(width) * np.ones(width)), size]
-        data, candidates = planted([one, effect("armature")], mix, on_joint_0(torque), noise=0.1)
-        plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
-        judge = Judgement(plain, plain, candidates, Rules(ALPHA, 0.01), anything)
-        assert (1 in judge.failing([0, 1])) == left
 
 
 @pytest.mark.parametrize("kind", ["nonlinear_viscous_friction", "coupled_friction", "armature"])

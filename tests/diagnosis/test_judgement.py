@@ -255,67 +255,6 @@ def test_verdicts(kind: str, size: float, noise: float, declared: float, expecte
     assert judge.verdict([], [0]) == expected
 
 
-@pytest.mark.parametrize(
-    ("kind", "angle", "left"),
-    [
-        ("encoder_offset", 0.1, 0.0225),  # (1.5 · 0.1)²
-        ("encoder_offset", -0.1, 0.0225),
-        ("encoder_offset", 0.01, 2e-3),
-        ("elasticity", 0.1, 5e-2),
-        ("torque_gain", 0.1, 0.0),
-    ],
-)
-def test_no_effect_is_what_another_leaves(kind: str, angle: float, left: float) -> None:
-    """One of RMS 100 leaves so much of its energy; a spring of size beside it is no angle."""
-    energy = left * 100.0**2
-    effects = [effect("spring"), effect(kind), effect("torque_offset"), effect("armature")]
-    mix = np.diag([1.0, 1.0, 100.0 / abs(angle), 1.0, 1.0])
-    for share, expected in ((0.98, energy == 0.0), (1.02, True)):
-        size = np.sqrt(share * energy) if energy else 1.0
-        torque = np.array([50.0, 9.0, 100.0 * np.sign(angle), size, 0.0])
-        data, candidates = planted(effects, mix, on_joint_0(list(torque)), noise=0.1)
-        judge = judge_of(data, candidates)
-        words = Verdict.ACCEPTED if expected else Verdict.LEFTOVER
-        assert judge.verdict([0, 1], [2]) == words
-        assert (2 in judge.failing([0, 1, 2])) != expected
-    assert judge.verdict([0], [2]) != Verdict.LEFTOVER  # it is not in
-
-
-def test_what_two_effects_leave_is_not_added_up() -> None:
-    effects = [effect("elasticity"), effect("torque_delay"), effect("torque_offset")]
-    mix = np.diag([1e5, 1e4, 1.0])  # 5 % and 1 % of 100² are 500 and 100
-    for energy, expected in ((450.0, Verdict.LEFTOVER), (550.0, Verdict.ACCEPTED)):
-        torque = on_joint_0([100.0, 100.0, np.sqrt(energy)])
-        judge = judge_of(*planted(effects, mix, torque, noise=0.1))
-        assert judge.verdict([0, 1], [2]) == expected
-
-
-def test_an_effect_leaves_nothing_on_other_joints() -> None:
-    """One of joint 0 leaves something there; an effect of both joints is more on joint 1."""
-    effects = [effect("elasticity", 0), effect("torque_offset", 1), effect("base_tilt", 0, 1)]
-    mix = np.diag([1e5, 1.0, 100.0, 1.0])
-    torque = np.array([[100.0, 0.0], [0.0, 1.0], [5.0, 5.0], [0.0, 0.0]])
-    judge = judge_of(*planted(effects, mix, torque, noise=0.1))
-    assert judge.verdict([0], [1]) == Verdict.ACCEPTED
-    assert judge.verdict([0], [2]) == Verdict.ACCEPTED
-    torque[2] = [5.0, 0.0]
-    data, candidates = planted([effects[0], effect("torque_offset")], mix[:2, :2], torque[[0, 2]],
-                               noise=0.1)  # fmt: skip
-    assert judge_of(data, candidates).verdict([0], [1]) == Verdict.LEFTOVER
-
-
-def test_inertias_bent_on_one_joint_leave_nothing_to_effects_of_another() -> None:
-    """Without elasticity, which looks like a declared column, joint 1 would be explained worse."""
-    effects = [effect("elasticity", 0), effect("torque_offset", 1)]
-    data, (first, second) = planted(effects, np.diag([1e5, 1.0]), np.diag([100.0, 1.0]), noise=0.1)
-    bent = tuple(c + 1e5 * d[:, :1, :1] for c, d in zip(first.columns, data.declared, strict=True))
-    for tau, declared in zip(data.tau, data.declared, strict=True):
-        tau[:, 0] += 100.0 * declared[:, 0, 0]
-    judge = judge_of(data, [replace(first, columns=bent), second])
-    assert 0.05 * judge.plain.energy_on([1], [1]) > TOTAL
-    assert judge.verdict([0], [1]) == Verdict.ACCEPTED
-
-
 FRICTION = {"viscous_friction": 0.0, "coulomb_friction": 0.0, "load_dependent_friction": 0.0}
 
 

@@ -5,8 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import excite_cli
 from excite_cli.effects.base import Effect, Tier
@@ -19,7 +17,6 @@ KINDS = catalogue()
 NAMES = sorted(KINDS)
 STRAIGHT = ("viscous_friction", "coulomb_friction")
 APART = ({"backlash", "elasticity"}, {"friction_change", "covariate_friction"})
-ANGLES = ("encoder_offset", "base_tilt")
 PACKAGE = Path(excite_cli.__file__).parent
 
 
@@ -94,32 +91,6 @@ def test_the_other_name_of_a_kind_is_the_same_columns(name: str, robot: Robot) -
     both = np.concatenate([own, others], axis=1)
     ranks = {int(np.linalg.matrix_rank(x)) for x in (own, others, both)}
     assert ranks == {own.shape[1]}
-
-
-@pytest.mark.parametrize(
-    ("kind", "values", "expected"),
-    [
-        ("viscous_friction", [50.0], 0.0),
-        ("spring", [1e3, -1e3], 0.0),
-        ("elasticity", [1e-4], 5e-2),
-        ("elasticity", [1e3], 5e-2),  # of no angle: the size does not matter
-        ("encoder_offset", [0.01], 2e-3),  # (1.5 · 0.01)² is less
-        ("encoder_offset", [-0.1], 0.0225),
-        ("base_tilt", [0.06, -0.08], 0.0225),
-    ],
-)
-def test_what_a_first_order_column_leaves(kind: str, values: list[float], expected: float) -> None:
-    assert smallest(KINDS[kind]).leftover(np.array(values)) == pytest.approx(expected)
-
-
-@settings(max_examples=60, deadline=None, derandomize=True)
-@given(angle=st.floats(-0.5, 0.5), name=st.sampled_from(NAMES))
-def test_a_larger_angle_never_leaves_less(angle: float, name: str) -> None:
-    effect = smallest(KINDS[name])
-    least, some, more = (effect.leftover(np.array([k * angle])) for k in (0.0, 1.0, 1.5))
-    assert 0.0 <= least <= some <= more
-    if name not in ANGLES:
-        assert least == more
 
 
 def _texts(tree: ast.AST) -> list[str]:
