@@ -31,6 +31,9 @@ from excite_cli.workers.base import Tell
 _STICKING = 0.02  # s
 _SMEARED = 0.5  # periods of the cut-off by which the filter smears a reversal
 _NOISE = 0.01  # rad (m), RMS, beyond what any encoder adds
+# Of a run's rate, for the cut-off of its positions: the filter begins on three periods of it, ten
+# samples at least.
+_HIGHEST_GIVEN = 0.3
 _FEWEST = 8  # decimated samples a run needs to say anything
 
 
@@ -355,7 +358,7 @@ def _require_smooth(run: Run, smoothed: Array, cutoff: float) -> None:
 
 
 def _smooth(x: Array, cutoff: float, fs: float, name: str) -> Array:
-    if cutoff >= fs / 2:  # cut-offs are chosen for the rate that most runs have
+    if cutoff > _HIGHEST_GIVEN * fs:  # set by hand for another rate
         raise FileError(
             f"run '{name}' was recorded at {fs:.4g} Hz: too slow for the cut-off of the positions, "
             f"{cutoff:.3g} Hz. Record all runs at one rate, or lower measurement.filter.position."

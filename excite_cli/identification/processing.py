@@ -27,6 +27,7 @@ _PARALLEL_BY_BANDWIDTH, _HIGHEST_PARALLEL, _LOWEST_PARALLEL = 6.0, 12.0, 4.0
 GAUSSIAN = float(np.sqrt(np.log(2.0)) / (2.0 * np.pi))
 GAUSSIAN_REACH = 3.5  # half width of the average in standard deviations
 DEFAULT_MOVING = 0.02  # rad/s
+_SAME_RATE = 0.02  # share by which clocks differ
 _ENOUGH = 12  # averages that a part of a run should give
 
 
@@ -70,8 +71,10 @@ def choose_processing(
     frequency, power = spectra(runs, fs)
     bandwidth = _bandwidth(frequency, power)
     reasons: list[str] = []
-    position = _position_cutoff(spec, frequency, power, fs, bandwidth, reasons)
-    parallel = _parallel_cutoff(spec, bandwidth, fs, reasons)
+    slowest = min(1.0 / run.step for run in runs)  # of every run the same is left
+    highest = (fs if _of_rate(slowest, fs) else slowest) * HIGHEST_BY_RATE
+    position = _position_cutoff(spec, frequency, power, fs, bandwidth, highest, reasons)
+    parallel = _parallel_cutoff(spec, bandwidth, highest / HIGHEST_BY_RATE, reasons)
     rate = float(spec.rate) if spec.rate != "auto" else (4.0 * parallel if parallel else fs)
     rate = min(rate, fs)
     stride = 1
@@ -97,16 +100,28 @@ def spectra(runs: Sequence[Run], fs: float) -> tuple[Array, Array]:
     """Mean spectrum of the positions (F, n) over the runs, on one grid of frequencies."""
     length = min(min(len(run.t) for run in runs), max(64, int(5.0 * fs)))
     total, weight = np.zeros(1), 0.0
-    for run, power in zip(runs, each(_spectrum, (fs, length), [r.q for r in runs]), strict=True):
+    grid: Array = np.asarray(np.fft.rfftfreq(length, 1.0 / fs))
+    tasks = [(run.q, 1.0 / run.step) for run in runs]
+    for run, power in zip(runs, each(_spectrum, (fs, length, grid), tasks), strict=True):
         total, weight = total + power * len(run.t), weight + len(run.t)
-    return np.asarray(np.fft.rfftfreq(length, 1.0 / fs)), total / weight
+    return grid, total / weight
 
 
-def _spectrum(shared: tuple[float, int], q: Array, tell: Tell) -> Array:
+def _of_rate(rate: float, fs: float) -> bool:
+    """Whether a run is of the rate that most runs have, but for its clock."""
+    return abs(rate - fs) < _SAME_RATE * fs
+
+
+def _spectrum(shared: tuple[float, int, Array], task: tuple[Array, float], tell: Tell) -> Array:
+    """Power (F, n) on the grid; beyond half of its own rate, what it has there."""
     from scipy.signal import welch  # takes a second to import
 
-    fs, length = shared
-    return np.asarray(welch(q, fs, nperseg=length, axis=0, detrend="linear")[1])
+    (fs, length, grid), (q, rate) = shared, task
+    if _of_rate(rate, fs):
+        return np.asarray(welch(q, fs, nperseg=length, axis=0, detrend="linear")[1])
+    own = min(max(round(length * rate / fs), 16), len(q))
+    frequency, power = welch(q, rate, nperseg=own, axis=0, detrend="linear")
+    return np.stack([np.interp(grid, frequency, column) for column in power.T], axis=1)
 
 
 def _bandwidth(frequency: Array, power: Array) -> float:
@@ -119,7 +134,13 @@ def _bandwidth(frequency: Array, power: Array) -> float:
 
 
 def _position_cutoff(
-    spec: FilterSpec, frequency: Array, power: Array, fs: float, bandwidth: float, reasons: list
+    spec: FilterSpec,
+    frequency: Array,
+    power: Array,
+    fs: float,
+    bandwidth: float,
+    highest: float,
+    reasons: list,
 ) -> float | None:
     if spec.position != "auto":
         return _given_cutoff("position", spec.position, fs)
@@ -128,10 +149,10 @@ def _position_cutoff(
     last = [frequency[np.flatnonzero(~column)[0]] if not column.all() else fs for column in above.T]
     found = float(np.median(last))
     lowest = max(_LOWEST_POSITION, 5.0 * bandwidth)
-    chosen = float(min(max(found, lowest), _HIGHEST_POSITION, HIGHEST_BY_RATE * fs))
+    chosen = float(min(max(found, lowest), _HIGHEST_POSITION, highest))
     reasons.append(
         f"positions cut off at {chosen:.3g} Hz: their spectrum meets its floor at {found:.3g} Hz "
-        f"(kept within {lowest:.3g} and {min(_HIGHEST_POSITION, HIGHEST_BY_RATE * fs):.3g} Hz)"
+        f"(kept within {lowest:.3g} and {min(_HIGHEST_POSITION, highest):.3g} Hz)"
     )
     return chosen
 

@@ -49,6 +49,21 @@ def test_cutoffs_keep_the_motion_and_rates_keep_the_cutoffs(fs: float, top: floa
     assert len(found.reasons) == 2
 
 
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0)])
+def test_runs_of_several_rates_have_a_cutoff_that_the_slowest_can_bear(
+    order: tuple[int, int, int],
+) -> None:
+    """The bandwidth is that of the motion, whatever the rate at which it was recorded."""
+    runs = [run_of(fs, 5.0) for fs in (1000.0, 1000.0, 100.0)]
+    found = choose_processing([runs[k] for k in order], FilterSpec())
+    alone = choose_processing(runs[:2], FilterSpec())
+    assert alone.position_cutoff is not None
+    assert alone.position_cutoff > 20.0
+    assert found.position_cutoff is not None
+    assert found.position_cutoff <= 20.0
+    assert found.bandwidth == pytest.approx(alone.bandwidth, abs=0.45)
+
+
 def test_more_noise_gives_a_lower_cutoff_of_the_positions() -> None:
     fine, coarse = (chosen(run_of(500.0, 1.0, noise=x)).position_cutoff for x in (1e-9, 1e-2))
     assert fine is not None
