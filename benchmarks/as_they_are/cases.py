@@ -238,7 +238,7 @@ def _motion(
         most = (0.03 if slow else fastest[j]) / np.abs(v[:, j]).max()
         scale = min(room, most)
         q[:, j], v[:, j], a[:, j] = scale * q[:, j], scale * v[:, j], scale * a[:, j]
-        free = half[j] - np.abs(q[:, j]).max()
+        free = max(half[j] - np.abs(q[:, j]).max(), 0.0)  # rounding where all of it is used
         q[:, j] += middle[j] + rng.uniform(-free, free)
     return t, q, v, a
 
