@@ -198,7 +198,7 @@ class IdentificationSpec(Section):
     inertias: Literal["auto", "free", "cad"] = Field(
         "auto",
         description="cad: kept at the URDF's values within `uncertainty`; auto: free in identify, "
-        "and in diagnose kept near the URDF's (0.7 of a value is one standard deviation)",
+        "and in diagnose kept near the URDF's (0.3 of a value is one standard deviation)",
     )
     uncertainty: Positive = Field(
         0.1, description="one standard deviation of the URDF's inertial parameters, as a share"

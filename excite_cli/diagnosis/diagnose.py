@@ -83,10 +83,11 @@ from excite_cli.robot.skeleton import skeleton_of
 # Standard deviation of the URDF's inertial parameters, as a share, where the config has none. What
 # is left of held-out data beside the textbook's effects, on 33 simulated robots with inertias 30 %
 # off, relative to the best share of each: 1.00 with 0.3, 1.06 with 1, 1.27 with free inertias, 1.14
-# with that of 0.3, 1, 3, 10, 100 which predicts blocks left out best. URDFs of real robots are
-# worse; left by the whole diagnosis with 0.3, 0.5, 0.7, 1: TX40 8.5, 9.0, 8.1, 8.2 %, UR10 6.5,
-# 6.3, 6.3, 6.4, KR300 split C 6.0, 5.6, 5.9, 5.9, A 6.6, 5.7, 5.9, 7.4, Med 7 26, 26, 20, 24.
-_UNSURE = 0.7
+# with that of 0.3, 1, 3, 10, 100 which predicts blocks left out best. Left of real logs by all that
+# is found with 0.3, 0.5, 1: TX40 8.5, 9.0, 8.2 %, UR10 6.5, 6.3, 6.4, KR300 split C 6.0, 5.6, 5.9,
+# A 5.5, 5.7, 7.4, Med 7 25, 26, 24. With 0.5, of a simulated arm whose URDF is right, one small
+# friction came with fourteen of size zero.
+_UNSURE = 0.3
 Progress = Callable[[str, int], None]
 
 

@@ -30,7 +30,7 @@ class Named(str):
 def answer_of(
     monkeypatch: pytest.MonkeyPatch, found: list[str], errors: list[float], known: str = ""
 ) -> tuple[str, list[str]]:
-    """What the traced answer found, and what the passes began from, in order.
+    """What the traced answer of four passes found, and what these began from, in order.
 
     `known`: what was found in more of the same data, to begin from. A pass that begins from `rest`,
     what is beside a cut, finds `clean`.
@@ -73,6 +73,7 @@ def answer_of(
     monkeypatch.setattr(tracing, "inertial_columns", lambda model, runs: [None for _ in runs])
     monkeypatch.setattr(tracing, "fit_of", fit_of)
     monkeypatch.setattr(tracing, "_one_pass", one_pass)
+    monkeypatch.setattr(tracing, "_PASSES", 4)
     monkeypatch.setattr(tracing, "_left_out", lambda traced: errors[traced.attempt])
     rest = Fit(name="rest", places={"rest"}, effects=())
     monkeypatch.setattr(tracing, "beside_cuts", lambda fit: rest)
