@@ -20,7 +20,6 @@ from typing import Any
 
 from benchmarks.marked_part import MarkedPart
 from excite_cli.atomic import write_text_atomically
-from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
 
 DATA = Path(__file__).parents[1] / "data"
 PART = MarkedPart("real robots", "benchmarks.real_robots")
@@ -195,19 +194,6 @@ def tiago(answers: Sequence[Answer]) -> str:
     )
 
 
-def beside_textbook(answers: Sequence[Answer]) -> str:
-    """The textbook's error, and what was named beside friction, offset and armature."""
-    (answer,) = answers
-    textbook = answer.content["error"]["textbook"]["mean_relative_moving"]
-    more = {each["kind"]: None for each in answer.content["effects"]}
-    named = [
-        f"{kind.replace('_', ' ')} of {told(answer.joints(kind))}"
-        for kind in more
-        if kind not in (*EVERYDAY_FRICTION, *EVERYDAY)
-    ]
-    return f"{friction(answer)}; {told(named)}; the textbook's model leaves {percent(textbook)}"
-
-
 LOGS = (
     Log("Stäubli TX40, 9 s, every third second sealed", "tx40", "tx40.h5", tx40),
     Log("UR10 (CB3), 27 s, from the rosbag", "ur10_cb", "ur10_exciting_trajectory.db3", ur10),
@@ -218,9 +204,6 @@ LOGS = (
     Log("TIAGo, torso and arm, 80 s, currents with assumed constants", "tiago", "tiago.h5", tiago),
     Log("the same, without the four torques that are warned of", "tiago", "tiago.h5", tiago,
         (("--set", f"measurement.without_torque=[{','.join(_USELESS)}]"),)),
-    Log("KUKA Med 7, 16 s that hardly excite", "med7", "med7.h5", beside_textbook),
-    Log("Unitree Go2, legs in the air, 23 s, torque by its drives' law", "go2", "go2.h5",
-        beside_textbook),
 )  # fmt: skip
 
 

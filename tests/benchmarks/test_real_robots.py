@@ -9,7 +9,6 @@ from benchmarks.real_robots import (
     LOGS,
     PART,
     Answer,
-    beside_textbook,
     kr300,
     kr300_cad,
     percent,
@@ -62,17 +61,6 @@ def test_a_row() -> None:
         "none; load-dependent on none"
     )
     assert ur10([found]) == cells[3]
-
-
-def test_what_is_named_beside_the_textbook_and_what_that_leaves() -> None:
-    on = {"coulomb_friction": "a", "viscous_friction": "a", "armature": "b"}
-    plain = [effect(kind, joint, size=1.0) for kind, joint in on.items()]
-    gains = [effect("torque_gain", joint, gain=0.1) for joint in "ba"]
-    found = answer(["a", "b"], *plain, *gains)
-    found.content["error"]["textbook"] = {"mean_relative_moving": 0.112}
-    assert beside_textbook([found]) == (
-        "friction on a; torque gain of a and b; the textbook's model leaves 11 %"
-    )
 
 
 def test_published_values_that_were_missed_are_named() -> None:
