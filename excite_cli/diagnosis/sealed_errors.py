@@ -3,8 +3,8 @@
 The error of a joint where it moves is e(S) = RMS(τ − τ_S) / RMS(τ) of the model with the effects S,
 fitted anew to the training data. It is quadratic in the fitted parameters, so it needs no samples:
 Gram matrices of the sealed columns (at the final model) and torque. What these do not hold at the
-ends, columns that look at the model's own torque, joins in equal steps; so e(∅)
-and e(all) are the errors that are reported, to rounding.
+ends, columns that look at the model's own torque, joins in equal steps; so e(∅) and e(all) are the
+errors that are reported, to rounding.
 
 Where the URDF's inertias are kept within their uncertainty, the way begins at the URDF untouched,
 and their fit is one of those who join: they take up much of what an effect holds.

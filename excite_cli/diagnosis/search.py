@@ -206,7 +206,7 @@ class Search:
             for move in weakest_apart(moves, self._rows_of_move):
                 several = _with_move(several, *move)
             one = _with_move(chosen, *best)
-            chosen = min(one, several, key=self.judge.cost)
+            chosen = min(one, several, key=self.judge.cost) if len(several) <= self._most else one
         return chosen
 
     def _rows_of_move(self, move: _Move) -> set[int]:

@@ -350,7 +350,10 @@ def _searched(
     closed = {judge.candidates[i].place for i in differences(judge.candidates, data, model)}
     search = Search(judge, most, closed, over)
     if not model.is_weighed:
-        return search.run(search.pruned(everyday(judge.candidates)) if most else ())
+        chosen = search.run(search.pruned(everyday(judge.candidates)) if most else ())
+        if over():  # a pass that was cut short may know less than the one before it
+            return min(chosen, search.pruned(list(judge.found)), key=judge.cost)
+        return chosen
     chosen = search.run()
     places = {effect.place for effect in scales(model.robot)}
     gains = [i for i, c in enumerate(judge.candidates) if c.place in places]

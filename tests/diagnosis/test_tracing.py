@@ -8,8 +8,12 @@ import pytest
 
 from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis import tracing
+from excite_cli.diagnosis.judgement import Judgement, Rules
+from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.left_out import LeftOut
+from tests.diagnosis.explicit_data import anything, effect
+from tests.diagnosis.test_doubt import planted
 
 
 class Fit(SimpleNamespace):
@@ -148,3 +152,14 @@ def test_a_search_without_cuts_knows_no_kind_of_them() -> None:
     assert (blind.exclude, blind.rounds) == (["backlash", "torque_saturation"], 60)
     alone = DiagnosisSpec(kinds=["torque_saturation"])
     assert tracing._without_kinds(alone, [cut]).rounds == 0
+
+
+def test_a_pass_that_is_cut_short_keeps_what_the_pass_before_it_found() -> None:
+    """At once over, the search alone knows the textbook's offset, and no spring."""
+    effects = [effect("spring"), effect("torque_offset")]
+    data, candidates = planted(effects, np.array([[5.0, 0.0]] * 3))
+    plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
+    model: Any = SimpleNamespace(is_weighed=False, states={})
+    for found, named in ((), [1]), ((0, 1), [0, 1]):
+        judge = Judgement(plain, plain, candidates, Rules(0.01, 0.01), anything, found)
+        assert sorted(tracing._searched(judge, 60, data, model, lambda: True)) == named
