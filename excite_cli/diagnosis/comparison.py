@@ -82,6 +82,7 @@ class Comparison:
         """Of models of the `members` of the candidates; `levels` (n,) [N·m] weigh the joints."""
         given = data, candidates, members
         plain, white = _seconds(*given, NoiseModel.white(levels)), _seconds(*given, noise)
+        self._rows = {i: candidates[i].rows for i in members}
         self._in_turn = [each.in_turn(data.prior) for each in (plain, white)]
         self._new = plain.new(data.prior)
 
@@ -91,12 +92,20 @@ class Comparison:
         return max(found, key=lambda each: each.clearness)
 
     def needed(self, chosen: Sequence[int]) -> dict[int, Difference]:
-        """How much better the chosen ones predict than without one, of each of them."""
+        """How much better the chosen ones predict than without one, of each of them.
+
+        Of what acts on several joints, on those but the one that gains most: an effect of one joint
+        that has no name yet passes for a tilt of the base, or for friction of two joints.
+        """
         found: dict[int, Difference] = {}
         for each in self._in_turn:
             after = each.energies(chosen)
             for i, before in each.without_each(chosen).items():
                 own = _difference(before, after)
+                rows = self._rows[i]
+                if len(rows) > 1:
+                    others = _without_the_best(before, after, rows)
+                    own = min(own, others, key=lambda each: each.clearness)
                 if i not in found or own.clearness > found[i].clearness:
                     found[i] = own
         return found
@@ -104,6 +113,13 @@ class Comparison:
     def as_new(self, one: Sequence[int], other: Sequence[int]) -> Difference:
         """How much better `other` predicts the filtered torque of new recordings."""
         return _difference(*map(self._new.energies, (one, other)))
+
+
+def _without_the_best(before: Array, after: Array, rows: Sequence[int]) -> Difference:
+    """On these joints without the one that gains most."""
+    gains = [_difference(before[[j]], after[[j]]).size for j in rows]
+    others = [j for j in rows if j != rows[int(np.argmax(gains))]]
+    return _difference(before[others], after[others])
 
 
 def _difference(before: Array, after: Array) -> Difference:

@@ -51,6 +51,7 @@ from excite_cli.diagnosis.sufficient import comparison_of, sufficient
 from excite_cli.diagnosis.textbook import textbook
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
+from excite_cli.diagnosis.undecided import undecided
 from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import assumption_in_words
@@ -342,14 +343,15 @@ def _traced(
 def _needed(
     traced: Traced, bodies: Sequence[ModelledRun], spec: Spec
 ) -> tuple[Traced, list[int] | None]:
-    """What is needed of what was found, and the textbook's candidates, with which it is compared.
+    """What is needed of what was found, or left open, and the textbook's candidates.
 
     Not where nothing is looked for, nor where something was weighed: then None.
     """
     if not spec.diagnosis.rounds or traced.model.is_weighed:
         return traced, None
     models = comparison_of(traced)
-    needed = replace(traced, chosen=tuple(sufficient(traced, models)))
+    chosen = sufficient(traced, models)
+    needed = replace(traced, chosen=(*chosen, *undecided(traced, chosen)))
     return at_its_own_torque(needed, bodies), textbook(traced.candidates, models)
 
 

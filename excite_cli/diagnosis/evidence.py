@@ -121,14 +121,6 @@ class Evidence:
             self._solved[key] = self.factor(key).solve(self.total[at, self.torque]) / self.norms[at]
         return self._solved[key]
 
-    def solve_beside(self, chosen: Sequence[int], held: int) -> Array:
-        """As `solve`, with the first `held` parameters at zero and left out."""
-        at = self.columns(chosen)[held:]
-        if not len(at):
-            return np.zeros(0)
-        normal = self.total[np.ix_(at, at)] + RIDGE * np.eye(len(at))
-        return Cholesky(normal).solve(self.total[at, self.torque]) / self.norms[at]
-
     def covariance(self, chosen: Sequence[int], directions: Array | None = None) -> Array:
         """Covariance of `solve`'s parameters for unit noise, or of sums (k, d) of these."""
         norms = self.norms[self.columns(chosen)]

@@ -61,15 +61,21 @@ class _Fit:
         self._fixed, self._count = fixed, int(ends[-1])
 
     def parameters(self, joined: tuple[int, ...]) -> Array:
-        """All parameters (k,); zero of effects that did not join, and of inertias if kept."""
+        """All parameters (k,); zero of effects that did not join, and of inertias if kept.
+
+        Of the first and the last of all as they are told; of those between, roughly.
+        """
+        roughly = joined not in ((), self.who)
         chosen = tuple(i for i in joined if i != INERTIAS)
         at = [np.arange(self._fixed), *(self._at[i] for i in chosen)]
         found = np.zeros(self._count)
         if INERTIAS in joined or not self._held:
-            found[np.concatenate(at).astype(np.intp)] = self._traced.fitted(chosen)
+            found[np.concatenate(at).astype(np.intp)] = self._traced.fitted(chosen, 0, roughly)
         else:
             at[0] = at[0][self._held :]
-            found[np.concatenate(at).astype(np.intp)] = self._traced.fitted(chosen, self._held)
+            found[np.concatenate(at).astype(np.intp)] = self._traced.fitted(
+                chosen, self._held, roughly
+            )
         return found
 
 

@@ -4,10 +4,10 @@ Without it, the model is fitted anew to the training data: so is what refines it
 would take its place. What the effect removes is the difference of the mean relative errors of the
 torque, where joints move: of one that stands the stiction may be any, and no model says it. Blocks
 of the sealed part are drawn with replacement, the same for both errors, and say whether it is above
-or below zero beyond chance. An effect of several joints that removes error on one and adds it on
-another is not confirmed. What only weighing tells from the inertias is not judged by this error,
-unless it rises on a joint: inertias would take it up and predict as well. Nothing is chosen or
-fitted by this.
+or below zero beyond chance. An effect of several joints is confirmed where it removes error from
+those, too, that are not the one from which it removes most, and adds it on none. What only weighing
+tells from the inertias is not judged by this error, unless it rises on a joint: inertias would take
+it up and predict as well. Nothing is chosen or fitted by this.
 """
 
 from collections.abc import Mapping, Sequence
@@ -61,8 +61,14 @@ def worth_on_sealed(
         removed = removed_in_draws(played.runs, without, with_all)
         lower = errors_without.mean_relative - errors.mean_relative
         verdict = sealed_verdict(removed, lower)
-        on = [model.robot.joint_names[j] for j in traced.candidates[i].effect.joints]
+        joints = traced.candidates[i].effect.joints
+        on = [model.robot.joint_names[j] for j in joints]
         rises = rises_on_one(on, errors_without, errors)
+        if verdict is SealedVerdict.CONFIRMED and len(joints) > 1:
+            gains = [errors_without.relative[name] - errors.relative[name] for name in on]
+            best = joints[int(np.argmax(np.nan_to_num(gains)))]
+            others = removed_in_draws(played.runs, without, with_all, beside=best)
+            verdict = sealed_verdict(others, lower)
         if traced.judge.told_by_weight(i, rest) and not rises:
             verdict = SealedVerdict.WEIGHED
         elif verdict is SealedVerdict.CONFIRMED and (rises or sizes[i] < 1.0):
@@ -93,12 +99,20 @@ def sealed_verdict(removed: Array, lower: float) -> SealedVerdict:
 
 
 def removed_in_draws(
-    runs: Sequence[PreparedRun], without: Sequence[Prediction], with_it: Sequence[Prediction]
+    runs: Sequence[PreparedRun],
+    without: Sequence[Prediction],
+    with_it: Sequence[Prediction],
+    beside: int | None = None,
 ) -> Array:
-    """What is removed from the mean relative error where joints move; (0,) of too few blocks."""
+    """What is removed from the mean relative error where joints move; (0,) of too few blocks.
+
+    Of all joints, or those `beside` one.
+    """
     moving = sum(run.step * (run.valid & run.moving).any(axis=1).sum() for run in runs)
     block = min(max(moving / _WANTED, _SHORTEST), _LONGEST)
     (worse, size), (better, _) = (_moving_sums(runs, each, block) for each in (without, with_it))
+    if beside is not None:
+        worse, better, size = (np.delete(x, beside, axis=1) for x in (worse, better, size))
     moves = size.any(axis=1)
     if np.count_nonzero(moves) < _FEWEST:
         return np.zeros(0)

@@ -29,10 +29,13 @@ from excite_cli.diagnosis.modelled_run import (
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import placebos_of
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
+from excite_cli.diagnosis.reach import Reach
 from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.textbook import everyday, textbook_effects
 from excite_cli.diagnosis.training import TrainingData
+from excite_cli.diagnosis.usual_motion import UsualMotion
+from excite_cli.diagnosis.weighted_fit import WeightedFit
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import scales
@@ -66,6 +69,7 @@ class Traced:
     inflation: float
     sizes: PossibleSizes
     model: Model
+    usual: UsualMotion
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -73,21 +77,28 @@ class Traced:
         return tuple(self.candidates[i].effect for i in self.chosen)
 
     @cached_property
-    def _least_squares(self) -> tuple[Evidence, dict[int, int]]:
+    def _least_squares(self) -> tuple[WeightedFit, dict[int, int]]:
         """Of what was chosen and of the textbook's effects, and where each of them is in it."""
         members = sorted({*self.chosen, *everyday(self.candidates)})
         own = [self.candidates[i] for i in members]
-        evidence = self.data.evidence(own, NoiseModel.white(self.levels))
-        return evidence, {i: at for at, i in enumerate(members)}
+        return WeightedFit(self.data, own), {i: at for at, i in enumerate(members)}
 
-    def fitted(self, chosen: Sequence[int], held: int = 0) -> Array:
+    def fitted(self, chosen: Sequence[int], held: int = 0, roughly: bool = False) -> Array:
         """Parameters (k,) of the model with these of what was chosen, or the textbook's effects.
 
         Weighted least squares, as in `identify`; the first `held` parameters are zero and left out.
+        `roughly`: with weights near those of the model with all that was chosen, a fifth of the
+        time.
         """
-        evidence, at = self._least_squares
-        own = [at[i] for i in chosen]
-        return evidence.solve_beside(own, held) if held else evidence.solve(own)
+        fit, at = self._least_squares
+        near = self._weights if roughly else None
+        return fit([at[i] for i in chosen], held, near)[0]
+
+    @cached_property
+    def _weights(self) -> Array:
+        """What the model with all that was chosen leaves of every joint (n,) [N·m]."""
+        fit, at = self._least_squares
+        return fit([at[i] for i in self.chosen])[1]
 
 
 def trace(
@@ -325,17 +336,19 @@ def _one_pass(
     placebos = placebos_of(data, candidates, usual, noise, white)
     inflation = placebos.inflation
     rules = Rules(spec.significance, spec.gain, inflation, placebos.least_p)
+    motion = UsualMotion(model.robot, fit.phi, signals)
     sizes = PossibleSizes(
         candidates,
         spread_of(white.covariance, inflation),
         _seen(data, signals),
         model.declared,
+        Reach(candidates, data, motion, everyday(candidates)),
     )
     judge = Judgement(white, plain, candidates, rules, sizes, found)
     chosen = _searched(judge, spec.rounds, data, model, over)
     return Traced(
         data, tuple(candidates), noise, judge, tuple(chosen), fit.phi, tuple(signals),
-        fit.levels, inflation, sizes, model,
+        fit.levels, inflation, sizes, model, motion,
     )  # fmt: skip
 
 

@@ -43,6 +43,7 @@ def function_of(*codes: str) -> Approximation:
 
 
 NO_MODEL: Any = None  # none of what is tried here asks for it
+NO_MOTION: Any = None
 
 
 def all_but(vetoed: int) -> Allowed:
@@ -61,6 +62,7 @@ def traced(
     return Traced(
         data, tuple(candidates), ONE, judge, tuple(chosen), np.zeros(0), (), np.ones(2), 1.0,
         PossibleSizes(candidates, plain.covariance, Seen(np.ones(2), np.ones(2), 1.0)), NO_MODEL,
+        NO_MOTION,
     )  # fmt: skip
 
 

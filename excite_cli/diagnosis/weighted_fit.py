@@ -1,0 +1,80 @@
+"""Weighted least squares of models of some candidates, each joint weighed by what it leaves itself.
+
+As in `identify`: x minimises Σ_j ‖τ_j − C_j x‖² / σ_j² and what the prior says, and
+σ_j² = ‖τ_j − C_j x‖² / (N_j − p N_j / N), in turn until they settle. Of N_j rows of a joint and
+p parameters; from Gram matrices of the rows as they are.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.diagnosis.cholesky import RIDGE, Cholesky
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.training import Columns, TrainingData
+from excite_cli.robot.model import Array
+
+_ROUNDS, _SETTLED = 30, 1e-6
+_EXACT = 1e-9  # of the torque: what is less is rounding
+
+
+class WeightedFit:
+    """Fits models with some of the candidates."""
+
+    def __init__(self, data: TrainingData, candidates: Sequence[Columns]) -> None:
+        self._counts = sum(run.usable.sum(axis=0) for run in data.runs)
+        found = data.evidence(candidates, NoiseModel.white(np.ones(data.n)))
+        self._evidence = found
+        self._grams = [(joint.active, joint.whole.sum(axis=0)) for joint in found.grams.joints]
+        self._prior = np.zeros((found.torque + 1,) * 2)
+        if data.prior is not None:
+            known = np.append(np.arange(found.fixed), found.torque)
+            self._prior[np.ix_(known, known)] = data.prior
+        whole = np.array([gram[-1, -1] for _, gram in self._grams])
+        self._floor = np.maximum(_EXACT * np.sqrt(whole / np.maximum(self._counts, 1)), 1e-12)
+
+    def __call__(
+        self, chosen: Sequence[int], held: int = 0, near: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Parameters x (k,) of the model and σ (n,); the first `held` are zero and left out.
+
+        With weights `near` (n,) to begin from, weights follow once, which is enough of a model
+        that leaves about as much.
+        """
+        columns = self._evidence.columns(chosen)[held:]
+        count = len(columns)
+        prior = self._prior[np.ix_(*[np.append(columns, self._evidence.torque)] * 2)]
+        where = np.full(self._evidence.torque, -1)
+        where[columns] = np.arange(count)
+        own = []  # of each joint, where its columns are in the model, and their products
+        for active, gram in self._grams:
+            there = np.flatnonzero(where[active] >= 0)
+            rows = np.append(there, len(active))
+            own.append((np.append(where[active[there]], count), gram[np.ix_(rows, rows)]))
+        share = 1.0 - count / max(float(np.sum(self._counts)), 1.0)
+        freedom = np.maximum(self._counts * share, 1.0)
+        sigma = np.ones(len(own)) if near is None else near
+        x = _solved(prior, own, sigma)
+        for _ in range(_ROUNDS if near is None else 1):
+            both = np.append(-x, 1.0)
+            squares = np.array([both[at] @ gram @ both[at] for at, gram in own])
+            now = np.maximum(np.sqrt(np.maximum(squares, 0.0) / freedom), self._floor)
+            settled = np.abs(now - sigma).max() <= _SETTLED * now.max()
+            sigma, x = now, _solved(prior, own, now)
+            if settled:
+                break
+        return x, sigma
+
+
+def _solved(prior: Array, own: Sequence[tuple[NDArray[np.intp], Array]], sigma: Array) -> Array:
+    """The least-squares solution, joints weighed by `sigma`."""
+    if len(prior) == 1:  # the torque's column alone
+        return np.zeros(0)
+    total = prior.copy()
+    for (at, gram), each in zip(own, sigma, strict=True):
+        total[np.ix_(at, at)] += gram / each**2
+    norms = np.sqrt(np.maximum(np.diag(total)[:-1], 1e-200))
+    normal = total[:-1, :-1] / np.outer(norms, norms)
+    normal[np.diag_indices(len(norms))] += RIDGE
+    return Cholesky(normal).solve(total[:-1, -1] / norms) / norms

@@ -1,0 +1,175 @@
+"""What is said of places that the data do not reach: a usual motion, and sizes judged along it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.diagnosis.candidates import Candidate, with_columns
+from excite_cli.diagnosis.judgement import Judgement, Rules
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.possible_sizes import PossibleSizes
+from excite_cli.diagnosis.reach import Reach, torque_seen
+from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.diagnosis.undecided import undecided
+from excite_cli.diagnosis.usual_motion import UsualMotion
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.catalogue import catalogue
+from excite_cli.effects.seen import Seen
+from excite_cli.robot.model import Array, Robot, build_robot
+from tests.diagnosis.explicit_data import prepared
+from tests.diagnosis.test_doubt import NO_MODEL
+from tests.effects.motions import signals_at
+
+SAMPLES, STEP = 1000, 0.02
+SLOW, FAST = 0.02, 2.0  # rad/s
+TORQUE = 3.0  # N·m
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return build_robot(RobotSpec(urdf="example-robot-data:ur5"))
+
+
+def crept(robot: Robot, fastest: float) -> Signals:
+    """Sines of this speed about the middle of every joint's range."""
+    t = STEP * np.arange(SAMPLES)
+    w = np.linspace(0.7, 1.3, robot.n) * 2.0
+    wt = t[:, None] * w
+    return signals_at(
+        robot, t, fastest / w * np.sin(wt), fastest * np.cos(wt), -fastest * w * np.sin(wt)
+    )
+
+
+def usual(robot: Robot, seen: Signals) -> UsualMotion:
+    return UsualMotion(robot, standard_parameters(robot), [seen])
+
+
+def made(
+    robot: Robot, seen: Signals, effects: Sequence[Effect], tau: Array
+) -> tuple[TrainingData, list[Candidate]]:
+    run = prepared(np.ones(tau.shape, bool), seen.q, seen.v, tau)
+    data = TrainingData((run,), (0,), (np.zeros((*tau.shape, 0)),), (tau,))
+    return data, with_columns([(each, 1) for each in effects], [seen], [run])
+
+
+def kind(name: str, joint: int = 1, **shape: float) -> Effect:
+    return catalogue()[name]((joint,), shape)
+
+
+def test_the_usual_motion_is_smooth_and_within_the_limits(robot: Robot) -> None:
+    s = usual(robot, crept(robot, SLOW)).signals
+    lower, upper = robot.limits.ranges()
+    assert (s.q >= lower).all()
+    assert (s.q <= upper).all()
+    assert (np.abs(s.v) <= robot.limits.velocity).all()
+    inner = slice(1, -1)
+    assert s.rate(s.q)[inner] == pytest.approx(s.v[inner], abs=2e-2)
+    assert s.rate(s.v)[inner] == pytest.approx(s.a[inner], abs=1e-1)
+    assert np.abs(s.v).max(axis=0).min() > 10 * SLOW
+
+
+def test_it_is_never_slower_than_what_was_seen(robot: Robot) -> None:
+    fast = crept(robot, FAST)
+    fast = replace(fast, v=np.where(np.arange(robot.n) == 1, 40.0, fast.v))
+    width = [np.abs(usual(robot, each).signals.v[:, 1]).max() for each in (fast, crept(robot, 0.1))]
+    assert width[0] > width[1]
+
+
+def test_a_spring_of_a_joint_that_crept_is_not_known(robot: Robot) -> None:
+    """It is 0.15 N·m in the data and would be 20 at the ends; all torque is 3 N·m."""
+    seen = crept(robot, SLOW)
+    tau = np.full((SAMPLES, robot.n), TORQUE)
+    effects = [kind("spring"), kind("viscous_friction"), kind("torque_offset")]
+    data, candidates = made(robot, seen, effects, tau)
+    assert torque_seen(data) == pytest.approx(np.full(robot.n, TORQUE))
+    reach = Reach(candidates, data, usual(robot, seen), always=[1])
+    stiff = np.array([20.0, 0.0])
+    reason = reach.why_not(0, stiff)
+    assert "over the joint's range and speed" in reason
+    assert f"all torque {TORQUE:.3g}" in reason
+    assert not reach.why_not(0, stiff / 40)  # no more than there is of torque
+    assert not reach.why_not(1, np.array([1e3]))  # every robot has it
+    assert not reach.why_not(2, np.array([1e3]))  # as large in the data
+    assert reach.why_not(0, -stiff)
+
+
+def test_what_was_seen_over_the_range_may_be_any(robot: Robot) -> None:
+    seen = crept(robot, FAST)
+    data, candidates = made(robot, seen, [kind("spring")], np.full((SAMPLES, robot.n), TORQUE))
+    reach = Reach(candidates, data, usual(robot, seen))
+    assert not reach.why_not(0, np.array([20.0, 0.0]))
+
+
+def test_nothing_is_said_of_what_some_runs_have(robot: Robot) -> None:
+    seen = crept(robot, SLOW)
+    some = replace(kind("viscous_friction"), runs=("",))
+    data, candidates = made(robot, seen, [some], np.full((SAMPLES, robot.n), TORQUE))
+    assert not Reach(candidates, data, usual(robot, seen)).why_not(0, np.array([1e6]))
+
+
+def test_it_is_a_reason_why_a_size_is_impossible(robot: Robot) -> None:
+    seen = crept(robot, SLOW)
+    data, candidates = made(robot, seen, [kind("spring")], np.full((SAMPLES, robot.n), TORQUE))
+    large = Seen(np.full(robot.n, 1e9), np.ones(robot.n), 1.0)
+    sizes = PossibleSizes(
+        candidates, lambda _, d: d.T @ d, large, (), Reach(candidates, data, usual(robot, seen))
+    )
+    assert "the joint's range and speed" in sizes.why_not(np.array([20.0, 0.0]), [0], [0])
+
+
+def found_with(
+    robot: Robot,
+    seen: Signals,
+    effects: Sequence[Effect],
+    tau: Array,
+    level: float,
+) -> Traced:
+    """The first of these was found, beside noise of this level [N·m]."""
+    data, candidates = made(robot, seen, effects, tau)
+    noise = NoiseModel.white(np.full(robot.n, level))
+    evidence = data.evidence(candidates, noise)
+    seen_sizes = Seen(np.full(robot.n, 9.0), np.ones(robot.n), 1.0)
+    sizes = PossibleSizes(candidates, evidence.covariance, seen_sizes)
+    judge = Judgement(evidence, evidence, candidates, Rules(0.01, 0.01), sizes)
+    return Traced(
+        data, tuple(candidates), noise, judge, (0,), np.zeros(0), (), noise.sigma, 1.0, sizes,
+        NO_MODEL, usual(robot, seen),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("fastest", "inertia", "left_open"), [(SLOW, 0.3, True), (FAST, 0.01, False)]
+)
+def test_armature_stays_where_the_data_do_not_say_that_there_is_none(
+    robot: Robot, fastest: float, inertia: float, left_open: bool
+) -> None:
+    """Of a joint that crept it may be any; of one that was fast it is next to nothing."""
+    seen = crept(robot, fastest)
+    noise = 0.1 * np.random.default_rng(0).normal(size=seen.v.shape)
+    given = found_with(
+        robot, seen, [kind("coulomb_friction"), kind("armature")],
+        TORQUE * np.sign(seen.v) + inertia * seen.a + noise, 0.1,
+    )  # fmt: skip
+    assert undecided(given, [0]) == ([1] if left_open else [])
+    assert undecided(given, [0, 1]) == []
+
+
+def test_what_the_chosen_ones_have_among_their_columns_does_not_stay(robot: Robot) -> None:
+    seen = crept(robot, SLOW)
+    effects = [kind("asymmetric_friction"), kind("coulomb_friction")]
+    given = found_with(robot, seen, effects, TORQUE * np.sign(seen.v), 1.0)
+    assert undecided(given, [0]) == []
+
+
+def test_nor_what_would_be_negative(robot: Robot) -> None:
+    seen = crept(robot, SLOW)
+    effects = [kind("coulomb_friction"), kind("viscous_friction")]
+    tau = TORQUE * np.sign(seen.v) - 20.0 * seen.v
+    assert undecided(found_with(robot, seen, effects, tau, 1e-3), [0]) == []
+    tau = TORQUE * np.sign(seen.v) + 20.0 * seen.v
+    assert undecided(found_with(robot, seen, effects, tau, 1e-3), [0]) == [1]
