@@ -49,8 +49,11 @@ class PossibleSizes:
             effect, values = self._candidates[i].effect, parameters[own]
             reason = effect.absurd(values, self._seen)
             if not reason and not effect.possible(values):
-                directions = np.eye(len(parameters))[:, own]
-                reason = effect.why_impossible(values, self._spread(chosen, directions))
+                if effect.is_all_or_nothing:
+                    reason = effect.why_not(values)
+                else:
+                    directions = np.eye(len(parameters))[:, own]
+                    reason = effect.why_impossible(values, self._spread(chosen, directions))
             if not reason and self._reach is not None:
                 reason = self._reach.why_not(i, values)
             if effect.varied and not reason:

@@ -22,6 +22,7 @@ _TRIED = 12  # best candidates whose gain on runs left out is looked at in a ste
 # Of data too few to hold any name others come in its place, and more of them: 60 effects of 260
 # candidates after 4 rounds of short moves, and a diagnosis of 17 minutes.
 _GROWN = 1.5
+_LOWER = 1e-6  # of J: less is rounding
 _PAIRED = 14  # candidates of one joint that are tried in pairs
 
 _Move = tuple[int, tuple[int, ...]]  # a member, and who comes in its place
@@ -60,7 +61,7 @@ class Search:
             lost = {self.candidates[i].place for i in chosen if i not in kept}
             self._closed = {*self._closed, *lost}
             chosen = self._settled(kept)
-            if len(chosen) > most or not self.judge.cost(chosen) < self.judge.cost(kept) - 1e-6:
+            if len(chosen) > most or not self.judge.cost(chosen) < self.judge.cost(kept) - _LOWER:
                 break
             kept = self.pruned(chosen)
         self._closed = closed
@@ -195,40 +196,63 @@ class Search:
         """Drop or replace (by one, or by two of the same joint) while J falls.
 
         The best of all moves is made, with the best of those that share no joint with it, and so
-        on, where J falls more by all of them.
+        on, where J falls more by all of them. Moves on joints where nothing has changed since are
+        not looked for anew until nothing else lowers J.
         """
+        known: dict[int, tuple[_Move, float]] = {}  # the best move of a member, and what it saves
+        tried: set[int] = set()  # members whose moves are known, or that have none
         for _ in range(2 * len(chosen) + 4):
-            moves = self._moves(chosen)
-            if not moves:
+            fresh = not tried
+            self.judge.expect(chosen)
+            for i in chosen:
+                if self._over():
+                    return chosen
+                if i not in tried:
+                    tried.add(i)
+                    move = self._best_move(i, chosen)
+                    if move is not None:
+                        known[i] = move
+            before = self.judge.cost(chosen)
+            then = self._moved(chosen, {move: -saved for move, saved in known.values()})
+            if known and self.judge.cost(then) < before - _LOWER:
+                changed = {j for i in {*chosen} ^ {*then} for j in self.candidates[i].rows}
+                tried = {i for i in tried if changed.isdisjoint(self._rows_known(i, known))}
+                known = {i: each for i, each in known.items() if i in tried}
+                chosen = then
+            elif fresh:
                 break
-            best = min(moves, key=moves.__getitem__)
-            several = list(chosen)
-            for move in weakest_apart(moves, self._rows_of_move):
-                several = _with_move(several, *move)
-            one = _with_move(chosen, *best)
-            chosen = min(one, several, key=self.judge.cost) if len(several) <= self._most else one
+            else:  # elsewhere little has changed, and perhaps enough
+                known, tried = {}, set()
         return chosen
+
+    def _moved(self, chosen: list[int], moves: Mapping[_Move, float]) -> list[int]:
+        """The set after the best move, or after those of all joints, whichever has the lower J."""
+        if not moves:
+            return chosen
+        several = chosen
+        for move in weakest_apart(moves, self._rows_of_move):
+            several = _with_move(several, *move)
+        one = _with_move(chosen, *min(moves, key=moves.__getitem__))
+        return min(one, several, key=self.judge.cost) if len(several) <= self._most else one
+
+    def _rows_known(self, i: int, known: Mapping[int, tuple[_Move, float]]) -> set[int]:
+        """Joints on which a member is, or who may come in its place."""
+        return self._rows_of_move(known[i][0] if i in known else (i, ()))
 
     def _rows_of_move(self, move: _Move) -> set[int]:
         member, instead = move
         return {j for i in (member, *instead) for j in self.candidates[i].rows}
 
-    def _moves(self, chosen: list[int]) -> dict[_Move, float]:
-        """The best move of every member that lowers J, and the J that it gives."""
-        self.judge.expect(chosen)
-        found = {}
-        for i in chosen:
-            if self._over():
-                return {}
-            if not self.judge.bound(i, chosen):
-                cost, move = self._replaced(i, chosen)
-                if move is not None:
-                    found[i, move] = cost
-        return found
+    def _best_move(self, i: int, chosen: list[int]) -> tuple[_Move, float] | None:
+        """The best move of a member that lowers J, and by how much."""
+        if self.judge.bound(i, chosen):
+            return None
+        cost, instead = self._replaced(i, chosen)
+        return None if instead is None else ((i, instead), self.judge.cost(chosen) - cost)
 
     def _replaced(self, i: int, chosen: list[int]) -> tuple[float, tuple[int, ...] | None]:
         """The lowest J of a set that differs in the member i, and who comes in its place."""
-        best: float = self.judge.cost(chosen) - 1e-6
+        best: float = self.judge.cost(chosen) - _LOWER
         found: tuple[int, ...] | None = None
         rest = [k for k in chosen if k != i]
         schur = self.white.schur(rest)

@@ -87,8 +87,7 @@ class Traced:
         """Parameters (k,) of the model with these of what was chosen, or the textbook's effects.
 
         Weighted least squares, as in `identify`; the first `held` parameters are zero and left out.
-        `roughly`: with weights near those of the model with all that was chosen, a fifth of the
-        time.
+        `roughly`: with the weights of the model with all that was chosen, a tenth of the time.
         """
         fit, at = self._least_squares
         near = self._weights if roughly else None

@@ -39,8 +39,7 @@ class WeightedFit:
     ) -> tuple[Array, Array]:
         """Parameters x (k,) of the model and σ (n,); the first `held` are zero and left out.
 
-        With weights `near` (n,) to begin from, weights follow once, which is enough of a model
-        that leaves about as much.
+        With weights `near` (n,) these are σ.
         """
         columns = self._evidence.columns(chosen)[held:]
         count = len(columns)
@@ -56,7 +55,7 @@ class WeightedFit:
         freedom = np.maximum(self._counts * share, 1.0)
         sigma = np.ones(len(own)) if near is None else near
         x = _solved(prior, own, sigma)
-        for _ in range(_ROUNDS if near is None else 1):
+        for _ in range(_ROUNDS if near is None else 0):
             both = np.append(-x, 1.0)
             squares = np.array([both[at] @ gram @ both[at] for at, gram in own])
             now = np.maximum(np.sqrt(np.maximum(squares, 0.0) / freedom), self._floor)
