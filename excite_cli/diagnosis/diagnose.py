@@ -16,6 +16,7 @@ from excite_cli.diagnosis.data_sheet_line import data_sheet_lines
 from excite_cli.diagnosis.declared_model import KeptInertias, Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
+from excite_cli.diagnosis.elsewhere import needed_elsewhere
 from excite_cli.diagnosis.error_parts import error_parts
 from excite_cli.diagnosis.error_path import error_path
 from excite_cli.diagnosis.final_fit import final_fit, over_error
@@ -51,7 +52,6 @@ from excite_cli.diagnosis.sufficient import comparison_of, sufficient
 from excite_cli.diagnosis.textbook import textbook
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.tracing import Traced, trace
-from excite_cli.diagnosis.undecided import undecided
 from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import assumption_in_words
@@ -343,7 +343,7 @@ def _traced(
 def _needed(
     traced: Traced, bodies: Sequence[ModelledRun], spec: Spec
 ) -> tuple[Traced, list[int] | None]:
-    """What is needed of what was found, or left open, and the textbook's candidates.
+    """What is needed of what was found, here or elsewhere, and the textbook's candidates.
 
     Not where nothing is looked for, nor where something was weighed: then None.
     """
@@ -351,7 +351,7 @@ def _needed(
         return traced, None
     models = comparison_of(traced)
     chosen = sufficient(traced, models)
-    needed = replace(traced, chosen=(*chosen, *undecided(traced, chosen)))
+    needed = replace(traced, chosen=(*chosen, *needed_elsewhere(traced, chosen)))
     return at_its_own_torque(needed, bodies), textbook(traced.candidates, models)
 
 

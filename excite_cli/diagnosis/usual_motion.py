@@ -2,7 +2,7 @@
 
 Recordings show a part of what a robot can do. Where a joint crept, nothing is known of what it does
 at speed, however well every second of the recording is predicted. So sizes are judged along this
-motion as well (`reach`, `undecided`).
+motion as well (`reach`, `elsewhere`).
 """
 
 from collections.abc import Sequence
