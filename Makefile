@@ -76,7 +76,7 @@ trust: $(STAMP)          ## broken and hostile files, kills, full disks, determi
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.determinism
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.stubborn --times 20
 
-real: $(STAMP)           ## logs of four real robots, into the table of docs/results.md (three minutes)
+real: $(STAMP)           ## logs of six real robots, into the table of docs/results.md (three minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.real_robots --markdown docs/results.md
 
 gallery: $(STAMP)        ## the same logs, a page with pictures for each robot (ten minutes)

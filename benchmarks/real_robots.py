@@ -20,6 +20,7 @@ from typing import Any
 
 from benchmarks.marked_part import MarkedPart
 from excite_cli.atomic import write_text_atomically
+from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
 
 DATA = Path(__file__).parents[1] / "data"
 PART = MarkedPart("real robots", "benchmarks.real_robots")
@@ -167,15 +168,17 @@ def kr300(answers: Sequence[Answer]) -> str:
 
 def kr300_cad(answers: Sequence[Answer]) -> str:
     """The spring over the three splits, and the armatures of the data sheet."""
-    stiffness = sorted(answer.value("spring", "stiffness", "axis_2") / 1e3 for answer in answers)
+    every = [answer.value("spring", "stiffness", "axis_2") / 1e3 for answer in answers]
+    stiffness = sorted(each for each in every if each == each) or [float("nan")]
+    named = "" if len(stiffness) == len(every) else f"{len(stiffness)} of "
     spread = " to ".join(dict.fromkeys(f"{each:.1f}" for each in (stiffness[0], stiffness[-1])))
     sheet = {"axis_2": 844.0, "axis_3": 751.0}
     worst = max(abs(answer.value("armature", "inertia", axis) / value - 1)
                 for answer in answers for axis, value in sheet.items())  # fmt: skip
     return (
         f"the hydraulic spring of axis_2, {spread} kN·m/rad "
-        f"over the {len(answers)} splits (about 7 known); armatures of {told(list(sheet))} within "
-        f"{percent(worst)} of the data sheet"
+        f"over {named}the {len(answers)} splits (about 7 known); armatures of {told(list(sheet))} "
+        f"within {percent(worst)} of the data sheet"
     )
 
 
@@ -194,6 +197,19 @@ def tiago(answers: Sequence[Answer]) -> str:
     )
 
 
+def beside_textbook(answers: Sequence[Answer]) -> str:
+    """The textbook's error, and what was named beside friction, offset and armature."""
+    (answer,) = answers
+    textbook = answer.content["error"]["textbook"]["mean_relative_moving"]
+    more = {each["kind"]: None for each in answer.content["effects"]}
+    named = [
+        f"{kind.replace('_', ' ')} of {told(answer.joints(kind))}"
+        for kind in more
+        if kind not in (*EVERYDAY_FRICTION, *EVERYDAY)
+    ]
+    return f"{friction(answer)}; {told(named)}; the textbook's model leaves {percent(textbook)}"
+
+
 LOGS = (
     Log("Stäubli TX40, 9 s, every third second sealed", "tx40", "tx40.h5", tx40),
     Log("UR10 (CB3), 27 s, from the rosbag", "ur10_cb", "ur10_exciting_trajectory.db3", ur10),
@@ -204,6 +220,9 @@ LOGS = (
     Log("TIAGo, torso and arm, 80 s, currents with assumed constants", "tiago", "tiago.h5", tiago),
     Log("the same, without the four torques that are warned of", "tiago", "tiago.h5", tiago,
         (("--set", f"measurement.without_torque=[{','.join(_USELESS)}]"),)),
+    Log("KUKA Med 7, 16 s that hardly excite", "med7", "med7.h5", beside_textbook),
+    Log("Unitree Go2, legs in the air, 23 s, torque by its drives' law", "go2", "go2.h5",
+        beside_textbook),
 )  # fmt: skip
 
 

@@ -36,11 +36,12 @@ from excite_cli.summary.diagnosis_data import diagnosis_data
 TARGET = Path(__file__).parent / "gallery"
 ROBOTS = tuple(dict.fromkeys(log.folder for log in LOGS))
 _WIDTH = 1170  # px of a picture
+LARGEST = 150_000  # bytes of one
 _INDEX = f"""{HEAD}
 
 # Gallery of real robots
 
-Logs of four robots, by their authors, each diagnosed from its URDF alone: from the log to the
+Logs of six robots, by their authors, each diagnosed from its URDF alone: from the log to the
 residual, to names, to the error before and after, and to what stays unexplained. Made by
 `make gallery` from the files in `data/`; every number and picture is of the run that made the page.
 Errors are relative, on data that the fit never saw, mean over joints, where joints move.
@@ -96,12 +97,20 @@ def drawn(found: Diagnosis, kinds: Sequence[str], target: Path) -> dict[str, str
             continue
         path = target.with_name(f"{target.name}-{figure}.png")
         save_figure(draw(), path, "png")
-        with Image.open(path) as picture:
-            size = (_WIDTH, round(picture.height * _WIDTH / picture.width))
-            small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
-        small.quantize(palette=_palette(), dither=Image.Dither.NONE).save(path, optimize=True)
+        _shrink(path)
         names[figure] = path.name
     return names
+
+
+def _shrink(path: Path) -> None:
+    """A picture as wide as a page, or less, in few colours and bytes."""
+    with Image.open(path) as picture:
+        whole, width = picture.convert("RGB"), _WIDTH
+    while width == _WIDTH or path.stat().st_size >= LARGEST:
+        size = (width, round(whole.height * width / whole.width))
+        small = whole.resize(size, Image.Resampling.LANCZOS)
+        small.quantize(palette=_palette(), dither=Image.Dither.NONE).save(path, optimize=True)
+        width = round(0.9 * width)
 
 
 def _palette() -> Image.Image:

@@ -17,7 +17,7 @@ _SECONDS, _STEP, _PERIOD = 20.0, 0.02, 10.0  # s
 _HARMONICS = 5
 _REACHED = 0.8  # of the range
 _PACE = 0.5  # of the fastest speed
-# About the middle of the range, rad or m, and rad/s or m/s: limits may be wider, or there are none.
+# From zero, rad or m, and rad/s or m/s: limits may be wider, or there are none.
 _FARTHEST, _FASTEST = 2.5, 2.5
 
 

@@ -9,6 +9,7 @@ from benchmarks.real_robots import (
     LOGS,
     PART,
     Answer,
+    beside_textbook,
     kr300,
     kr300_cad,
     percent,
@@ -63,6 +64,17 @@ def test_a_row() -> None:
     assert ur10([found]) == cells[3]
 
 
+def test_what_is_named_beside_the_textbook_and_what_that_leaves() -> None:
+    on = {"coulomb_friction": "a", "viscous_friction": "a", "armature": "b"}
+    plain = [effect(kind, joint, size=1.0) for kind, joint in on.items()]
+    gains = [effect("torque_gain", joint, gain=0.1) for joint in "ba"]
+    found = answer(["a", "b"], *plain, *gains)
+    found.content["error"]["textbook"] = {"mean_relative_moving": 0.112}
+    assert beside_textbook([found]) == (
+        "friction on a; torque gain of a and b; the textbook's model leaves 11 %"
+    )
+
+
 def test_published_values_that_were_missed_are_named() -> None:
     viscous = (8.05, 5.53, 1.97, 1.11, 1.86, 0.8)  # the last is 23 % off
     coulomb = (7.14, 8.26, 6.34, 2.48, 3.03)  # joint 6 has none
@@ -95,6 +107,8 @@ def test_the_spring_with_inertias_free_and_kept() -> None:
     words = kr300_cad(splits)
     assert "6.9 to 7.1 kN·m/rad over the 2 splits" in words
     assert "within 7.0 % of the data sheet" in words
+    splits[0].content["effects"].pop(0)
+    assert "7.1 kN·m/rad over 1 of the 2 splits" in kr300_cad(splits)
 
 
 def test_what_tiago_leaves_open() -> None:
