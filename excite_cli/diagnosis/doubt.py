@@ -6,7 +6,7 @@ the part that depends on some quantity (`unexplained`) or can be predicted from 
 what an effect of an impossible sign or size would explain. The effect is an approximation
 
 * if what is left is a function of the same quantity as the effect (friction: speed), and U > 0.1 E,
-* or if U > E, whatever it depends on,
+* or if U > E, whatever it depends on, unless inertias nearly take the effect up,
 * or if a curve without a name does as well (`curves`), or more than noise is left for sure of a
   form that was not seen to repeat (a wave of less than three periods),
 * or if it is a change in some runs that explains less than is left in these, noise included,
@@ -74,7 +74,8 @@ def approximations(
             each = left[name]
             structure = each.share_of_residual * rest
             same = _same_quantity(traced, i, each.depends_on, joint_names)
-            if structure > (_SAME_QUANTITY if same else 1.0) * explained:
+            says = same or not _taken_up(traced, i)
+            if says and structure > (_SAME_QUANTITY if same else 1.0) * explained:
                 found[i] = Approximation(covariates=each.depends_on)
                 continue
         if name in more and _of_its_own(traced, i, more[name]):
@@ -153,13 +154,19 @@ def _of_its_own(traced: Traced, i: int, rest: LargeRest) -> bool:
 
     What inertias nearly take up has next to no E, however large it is.
     """
-    effect, judge = traced.candidates[i].effect, traced.judge
-    if effect.refines or effect.runs:
-        return True  # what lacks a name is most easily called so
-    if _is_constant(effect):
+    effect = traced.candidates[i].effect
+    if _is_constant(effect) and not (effect.refines or effect.runs):
         return rest.predictable > _PREDICTABLE  # else it is the mean of nothing
+    return not _taken_up(traced, i)
+
+
+def _taken_up(traced: Traced, i: int) -> bool:
+    """Whether the rest of the model nearly takes candidate i up; not what lacks a name mostly."""
+    effect, judge = traced.candidates[i].effect, traced.judge
+    if effect.refines or effect.runs or _is_constant(effect):
+        return False
     others = judge.without(i, traced.chosen)
-    return judge.white.schur(others).gain(i, absorbed=SHARED).left > _OF_ITS_OWN
+    return bool(judge.white.schur(others).gain(i, absorbed=SHARED).left <= _OF_ITS_OWN)
 
 
 def _limit_of_mean(traced: Traced, i: int, rest: LargeRest) -> float | None:

@@ -49,8 +49,8 @@ class PossibleSizes:
             effect, values = self._candidates[i].effect, parameters[own]
             reason = effect.absurd(values, self._seen)
             if not reason and not effect.possible(values):
-                if effect.is_all_or_nothing:
-                    reason = effect.why_not(values)
+                if len(values) == 1 and type(effect).nearest is Effect.nearest:
+                    reason = effect.why_not(values)  # the nearest is nothing, whatever the error
                 else:
                     directions = np.eye(len(parameters))[:, own]
                     reason = effect.why_impossible(values, self._spread(chosen, directions))

@@ -30,7 +30,8 @@ def torque_seen(data: TrainingData) -> Array:
 class Reach:
     """Judges fitted sizes of candidates; those `always` known, which every robot has, may be any.
 
-    Nor is anything said of what some runs have, or what follows time or a column of the log.
+    Nor is anything said of what some runs have, what follows time or a column of the log, or how
+    bodies and the base are: those are known from all joints.
     """
 
     def __init__(
@@ -67,7 +68,9 @@ class Reach:
 
     def _both(self, c: Candidate) -> tuple[Array, Array] | None:
         """Mean squares along the usual motion and in the data; None: nothing is said of it."""
-        if c.effect.runs or c.effect.covariate or "time" in c.effect.function_of:
+        effect = c.effect
+        of_joints = effect.scope in ("joint", "pair") and not effect.carried
+        if effect.runs or effect.covariate or "time" in effect.function_of or not of_joints:
             return None
         usual = self._usual.squares(c.effect)
         if not np.isfinite(usual).all():

@@ -253,11 +253,6 @@ class Effect(ABC):
             return values
         return nearest_of_sign(values, covariance, signed)
 
-    @property
-    def is_all_or_nothing(self) -> bool:
-        """Whether nothing is left of values that are not `possible`, whatever their error."""
-        return len(self.parameters) == 1 and type(self).nearest is Effect.nearest
-
     def why_impossible(self, values: Array, covariance: Array) -> str:
         """Why values that are not `possible` cannot be the error of the fit; empty if they can.
 
