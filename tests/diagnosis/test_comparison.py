@@ -18,7 +18,7 @@ from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.seen import Seen
 from excite_cli.measurement.run_identity import RunId
 from tests.diagnosis.explicit_data import FOLDS, prepared
-from tests.diagnosis.test_doubt import traced
+from tests.diagnosis.test_doubt import planted, traced
 
 SAMPLES = 400
 SIZES = lambda _, sums: sums.T @ sums, Seen(np.full(2, 9.0), np.ones(2), 1.0)
@@ -134,3 +134,12 @@ def test_the_textbook_is_the_answer_where_nothing_beats_it() -> None:
     given = everyday_traced(0.5, 0.5)
     assert chosen(given, [0, 4]) == {0, 1, 2, 3}
     assert chosen(everyday_traced(0.0, 0.0), [0, 1]) == {0, 1}  # it is that
+
+
+@pytest.mark.parametrize(("second", "better"), [(0.0, False), (1.0, True)])
+def test_what_acts_on_two_joints_must_predict_both_better(second: float, better: bool) -> None:
+    """Of one of them alone half of it predicts both together better, and it is another effect."""
+    data, candidates = planted([catalogue()["viscous_friction"]((0, 1))], np.array([[1.0, second]]))
+    given = traced(data, candidates, [0])
+    assert models_of(given).difference([], [0]).better
+    assert models_of(given).needed([0])[0].better is better

@@ -56,6 +56,15 @@ def test_draws_tell_what_is_removed_from_the_mean_relative_error() -> None:
     assert removed_in_draws([run], [better], [worse]).max() < 0.0
 
 
+def test_they_tell_it_of_the_joints_beside_one() -> None:
+    run, worse, better = recording(5.0)
+    torque = np.column_stack([better.torque[:, 0], worse.torque[:, 1]])
+    one = replace(better, torque=torque)  # on the first joint alone
+    assert removed_in_draws([run], [worse], [one]).min() > 0.0
+    assert np.all(removed_in_draws([run], [worse], [one], beside=0) == 0.0)
+    assert removed_in_draws([run], [worse], [one], beside=1).min() > 0.0
+
+
 def test_few_blocks_are_no_evidence_nor_is_a_robot_that_stands() -> None:
     """Four blocks, of 0.2 s at least, may agree by chance."""
     for run, worse, better in (recording(0.8), recording(5.0, still=True)):
