@@ -197,8 +197,9 @@ class IdentificationSpec(Section):
     )
     inertias: Literal["auto", "free", "cad"] = Field(
         "auto",
-        description="cad: kept at the URDF's values within `uncertainty`; auto: free in identify, "
-        "and in diagnose kept near the URDF's (0.3 of a value is one standard deviation)",
+        description="what the URDF's values are worth: auto: one standard deviation is 0.3 of a "
+        "value; free: the value itself; cad: `uncertainty` of it. auto and free are wider where "
+        "the data show that the URDF is farther off",
     )
     uncertainty: Positive = Field(
         0.1, description="one standard deviation of the URDF's inertial parameters, as a share"

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from math import isnan
 
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.overfit import overfit_in_words
 from excite_cli.diagnosis.records import Diagnosis, FrictionLine, NamedEffect, mean_of_known
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import (
@@ -35,8 +34,7 @@ def answer_in_words(found: Diagnosis) -> str:
     """One to five sentences, from the records alone."""
     if not found.good:
         return no_gain_in_words(found)
-    doubt = [overfit_in_words(found.overfit)] if found.overfit else []
-    said = [*doubt, _missing(found), *_left(found), _next(found)]
+    said = [_missing(found), *_left(found), _next(found)]
     return " ".join(sentence for sentence in said if sentence)
 
 
@@ -185,7 +183,7 @@ def _left(found: Diagnosis) -> list[str]:
 
 def _next(found: Diagnosis) -> str:
     """What to do: tell apart what fits as well, by a motion, or go on with what was found."""
-    if not found.effects or found.overfit:  # that says itself what to do
+    if not found.effects:
         return ""
     if _in_vain(found):
         warned = sum(each.severity == "warning" for each in found.findings)

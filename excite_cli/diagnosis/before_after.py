@@ -64,7 +64,8 @@ def both_models(
     model: Model, traced: Traced, parameters: Array
 ) -> tuple[IdentifiedModel, IdentifiedModel]:
     """The declared model fitted to the training data, and the one with `parameters`."""
-    return refitted(model, traced, ()), _fitted(model, traced, traced.chosen, parameters)
+    found = _fitted(model, traced, traced.chosen, parameters)
+    return refitted(model, traced, ()) if traced.chosen else found, found
 
 
 def refitted(model: Model, traced: Traced, chosen: Sequence[int]) -> IdentifiedModel:

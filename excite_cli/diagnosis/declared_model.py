@@ -9,16 +9,8 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.identification.declared_states import States
-from excite_cli.identification.prior import inertial_prior
+from excite_cli.identification.prior import InertialPrior, inertial_prior
 from excite_cli.robot.model import Array, Robot
-
-
-@dataclass(frozen=True)
-class KeptInertias:
-    """Inertias kept at the URDF's: mean φ₀ (P,) and precision (P,) of the standard parameters."""
-
-    mean: Array
-    precision: Array
 
 
 @dataclass(frozen=True)
@@ -33,7 +25,7 @@ class Model:
     robot: Robot
     base: BaseParameters
     declared: tuple[Effect, ...]
-    prior: KeptInertias | None
+    prior: InertialPrior | None
     states: States = field(default_factory=dict)
     weighed: Array | None = None
     vague: bool = False
@@ -46,25 +38,29 @@ class Model:
     @property
     def is_weighed(self) -> bool:
         """Whether scales say something of the parameters."""
-        return bool(self.weighed_columns.any())
+        return self.weighed is not None and bool(self.weighed.any())
 
     @property
-    def weighed_columns(self) -> Array:
-        """As `weighed`, over the columns that are fitted: beside a prior, what differs from it."""
-        rank, width = self.base.rank, self.declared_width
-        rows = np.zeros((0, rank + width + 1)) if self.weighed is None else self.weighed
+    def scales(self) -> Array:
+        """`weighed`, or no rows."""
+        width = self.base.rank + self.declared_width + 1
+        return np.zeros((0, width)) if self.weighed is None else self.weighed
+
+    @property
+    def known(self) -> Array:
+        """Rows as `weighed` of all that is known without data: the scales' and the prior's."""
         if self.prior is None:
-            return rows
-        of_phi = rows[:, :rank] @ self.base.mapping
-        rest = rows[:, -1:] - of_phi @ self.prior.mean[:, None]
-        return np.hstack([of_phi, rows[:, rank:-1], rest])
+            return self.scales
+        return np.concatenate([self.scales, self.prior.rows(self.base, self.declared_width)])
+
+    @property
+    def by_urdf(self) -> Array:
+        """φ_B (r,) of the URDF."""
+        return np.asarray(self.base.mapping @ standard_parameters(self.robot))
 
     def full_inertias(self, parameters: Array) -> Array:
         """Full φ (P,) nearest to the URDF's that agrees with the fitted inertial parameters."""
-        cad = standard_parameters(self.robot)
-        if self.prior is not None:
-            return np.asarray(self.prior.mean + parameters[: len(cad)])
-        nearest = inertial_prior(self.robot, cad, 1.0)
+        nearest = inertial_prior(self.robot, standard_parameters(self.robot), 1.0)
         return nearest.completed(self.base, parameters[: self.base.rank])
 
 

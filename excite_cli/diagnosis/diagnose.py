@@ -13,18 +13,17 @@ from excite_cli.diagnosis.aliases import joint_aliases, other_name
 from excite_cli.diagnosis.before_after import Played, both_models, on_sealed, refitted
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines
-from excite_cli.diagnosis.declared_model import KeptInertias, Model
+from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
 from excite_cli.diagnosis.elsewhere import needed_elsewhere
 from excite_cli.diagnosis.error_parts import error_parts
 from excite_cli.diagnosis.error_path import error_path
-from excite_cli.diagnosis.final_fit import final_fit, over_error
+from excite_cli.diagnosis.final_fit import final_fit, over_error, regression
 from excite_cli.diagnosis.information import information_of
 from excite_cli.diagnosis.large_rest import large_rests
 from excite_cli.diagnosis.modelled_run import ModelledRun
 from excite_cli.diagnosis.naming import named_effects
-from excite_cli.diagnosis.overfit import is_overfit, overfit_of
 from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.plausibility import check_recorded
 from excite_cli.diagnosis.records import (
@@ -56,7 +55,7 @@ from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.regressor import standard_parameter_names, standard_parameters
+from excite_cli.dynamics.regressor import standard_parameter_names
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
@@ -70,7 +69,7 @@ from excite_cli.identification.prepare import (
     require_motion,
     standing_still,
 )
-from excite_cli.identification.prior import prior_rows
+from excite_cli.identification.prior import prior_of
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split, with_ends_sealed
@@ -81,14 +80,6 @@ from excite_cli.measurement.recorded import recorded
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.skeleton import skeleton_of
 
-# Standard deviation of the URDF's inertial parameters, as a share, where the config has none. What
-# is left of held-out data beside the textbook's effects, on 33 simulated robots with inertias 30 %
-# off, relative to the best share of each: 1.00 with 0.3, 1.06 with 1, 1.27 with free inertias, 1.14
-# with that of 0.3, 1, 3, 10, 100 which predicts blocks left out best. Left of real logs by all that
-# is found with 0.3, 0.5, 1: TX40 8.5, 9.0, 8.2 %, UR10 6.5, 6.3, 6.4, KR300 split C 6.0, 5.6, 5.9,
-# A 5.5, 5.7, 7.4, Med 7 25, 26, 24. With 0.5, of a simulated arm whose URDF is right, one small
-# friction came with fourteen of size zero.
-_UNSURE = 0.3
 Progress = Callable[[str, int], None]
 
 
@@ -103,9 +94,7 @@ def diagnose(
 ) -> Diagnosis:
     """Find what the declared model of `spec` lacks, and measure the error before and after.
 
-    Inertias are kept near the URDF's where the data are silent (`_UNSURE`), unless the config says
-    how. Where a fit of free ones is worse than what it was fitted to by far, or than the untouched
-    URDF, the same is done with the URDF's kept, and the error of that is told (`overfit`).
+    Inertias are kept near the URDF's where the data are silent (`identification.inertias`).
 
     The search ends with the answer so far after `diagnosis.max_seconds`, or once it is `ended`.
 
@@ -119,33 +108,11 @@ def diagnose(
     FileError
         The data cannot be what the configuration says (joint order, signs), or are too short.
     """
-    began, seconds = time.monotonic(), spec.diagnosis.max_seconds
+    started, seconds = time.monotonic(), spec.diagnosis.max_seconds
 
     def over() -> bool:
-        return ended() or (seconds is not None and time.monotonic() - began > seconds)
+        return ended() or (seconds is not None and time.monotonic() - started > seconds)
 
-    found = _diagnosed(robot, base, dataset, spec, sealed, progress, over)
-    if over() or not is_overfit(found, spec.identification.inertias):
-        return found
-    kept: Diagnosis | None = None
-    if found.untouched is not None and spec.identification.inertias == "free":
-        progress("overfit: the same with the URDF's inertias", 9)
-        identification = spec.identification.model_copy(update={"inertias": "cad"})
-        held = spec.model_copy(update={"identification": identification})
-        kept = _diagnosed(robot, base, dataset, held, sealed, lambda text, done: None, over)
-    return replace(found, overfit=overfit_of(found, kept))
-
-
-def _diagnosed(
-    robot: Robot,
-    base: BaseParameters,
-    dataset: Dataset,
-    spec: Spec,
-    sealed: str | None,
-    progress: Progress,
-    over: Callable[[], bool],
-) -> Diagnosis:
-    started = time.monotonic()
     check_declared_runs(spec, dataset)
     parts = split(dataset, sealed, spec.diagnosis.block, spec.identification.needed_runs)
     check_left_to_fit(spec, parts)
@@ -158,7 +125,7 @@ def _diagnosed(
         (*spec.measurement.without_torque, *robot.unmeasured),
     )
     standing = standing_still(training, robot.joint_names)
-    model = _model(robot, base, spec, bool(standing))
+    model = _model(robot, base, spec)
     kept = prepare_all(parts.sealed, processing)  # refused early where too short
     suspicious = check_recorded(robot, parts.training, training, processing, spec.measurement)
     traced, bodies = _traced(model, spec, parts, processing, progress, over)
@@ -175,7 +142,7 @@ def _diagnosed(
     traced, book = _needed(traced, bodies, spec)
     del bodies
     model = traced.model
-    final = final_fit(traced)
+    final = final_fit(traced, regression(traced))
     parameters, covariance = final.parameters, final.covariance
     unexplained, dependence = _unexplained(traced, robot)
     floor = noise_floor(parts.training, processing)
@@ -212,7 +179,8 @@ def _diagnosed(
         taken_off,
         spec.diagnosis.carrying_links,
     )
-    base_values, base_std = _base_parameters(model, parameters, covariance)
+    rank = base.rank
+    base_std = np.where(final.seen, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)[:rank]
     assumed = assumptions(traced.effects, parts, model)
     return Diagnosis(
         config="",
@@ -240,7 +208,7 @@ def _diagnosed(
         ),
         processing=_choices(processing, traced, parts, training),
         phi=model.full_inertias(parameters),
-        base_values=base_values,
+        base_values=parameters[:rank],
         base_std=base_std,
         information=information_of(model, traced, rivals),
         versions={},
@@ -441,40 +409,23 @@ def _absorbed(model: Model, traced: Traced) -> tuple[Absorbed, ...]:
     return tuple(found)
 
 
-def _model(robot: Robot, base: BaseParameters, spec: Spec, still: bool) -> Model:
-    """`still`: a joint does not move, and noise alone decides what only its motion shows."""
-    prior, cad = None, standard_parameters(robot)
+def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:
     declared = declared_effects(spec.effects, robot)
     known = weighed(spec.identification, declared, robot, base)
     rows = np.column_stack([known.rows, known.target])
-    # What was weighed tells scales from masses: beside the URDF's masses it would tell nothing.
-    vague = spec.identification.inertias == "auto" and bool(cad[::10].any()) and not len(rows)
-    if vague:
-        prior = KeptInertias(cad, prior_rows(robot, cad, _UNSURE))
-    elif spec.identification.inertias == "cad" or (still and cad[::10].any()):
-        prior = KeptInertias(cad, prior_rows(robot, cad, spec.identification.uncertainty))
+    prior = prior_of(spec.identification, robot, len(rows) > 0)
+    vague = prior is not None and spec.identification.inertias != "cad"
     return Model(robot, base, known.effects, prior, spec.runs, rows, vague)
 
 
 def _column_names(model: Model) -> list[str]:
     """Names of the inertial columns that the search saw, then of the declared effects'."""
     base = model.base
-    names = list(base.names) if model.prior else [base.names[k] for k in base.selection]
+    names = [base.names[k] for k in base.selection]
     for effect in model.declared:
         where = "+".join(model.robot.joint_names[j] for j in effect.joints)
         names += [f"{parameter.name}[{where}]" for parameter in effect.parameters]
     return names
-
-
-def _base_parameters(model: Model, parameters: Array, covariance: Array) -> tuple[Array, Array]:
-    rank = model.base.rank
-    if model.prior is None:
-        return parameters[:rank], np.sqrt(np.maximum(np.diag(covariance)[:rank], 0.0))
-    mapping = model.base.mapping
-    count = mapping.shape[1]
-    spread = mapping @ covariance[:count, :count] @ mapping.T
-    phi = model.full_inertias(parameters)
-    return mapping @ phi, np.sqrt(np.maximum(np.diag(spread), 0.0))
 
 
 def _choices(

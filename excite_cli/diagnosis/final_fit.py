@@ -11,10 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from excite_cli.diagnosis.correlated_covariance import covariance_of
 from excite_cli.diagnosis.friction_line import friction_lines
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.dynamics.nearest_inertias import half_of
+from excite_cli.identification.factors import Mask
+from excite_cli.identification.fit import usual_sizes
+from excite_cli.identification.least_squares import LinearFit, fit_rows
 from excite_cli.robot.model import Array
 
 # Relative sd of every size, beside what noise says: filters, differentiated positions and motion
@@ -25,19 +27,29 @@ _SYSTEMATIC = 0.004
 
 @dataclass(frozen=True)
 class FinalFit:
-    """What is told: `parameters` (k,) of the whole model and `covariance`."""
+    """What is told: `parameters` (k,) of the whole model and `covariance`; `seen` in the data."""
 
     parameters: Array
     covariance: Array
+    seen: Mask
 
 
-def final_fit(traced: Traced) -> FinalFit:
-    """Fit what was found."""
-    parameters = traced.fitted(traced.chosen)
-    # Placebos say by how much more than the noise model says.
-    covariance = traced.inflation * covariance_of(
-        traced.data, traced.candidates, traced.chosen, traced.noise, traced.levels
+def regression(traced: Traced) -> LinearFit:
+    """What was found beside the declared model, by the regression of `identify` (`wls`)."""
+    known, effects = traced.model.known, (*traced.model.declared, *traced.effects)
+    more = np.zeros((len(known), sum(len(effect.parameters) for effect in traced.effects)))
+    return fit_rows(
+        traced.data.rows(traced.candidates, traced.chosen),
+        "wls",
+        (np.hstack([known[:, :-1], more]), known[:, -1]) if len(known) else None,
+        usual_sizes(traced.model.robot, traced.model.base, effects),
     )
+
+
+def final_fit(traced: Traced, linear: LinearFit) -> FinalFit:
+    """What is told of a regression of what was found."""
+    parameters = linear.x
+    covariance = np.where(np.isfinite(linear.covariance), linear.covariance, 0.0)
     for i, own in _places(traced, len(parameters)):
         error = traced.candidates[i].effect.model_error(parameters[own])
         error = np.hypot(error, _SYSTEMATIC * parameters[own])
@@ -50,7 +62,7 @@ def final_fit(traced: Traced) -> FinalFit:
             whiten = np.linalg.inv(half_of(covariance[own, own]))
             shift = whiten.T @ (whiten @ (effect.nearest(values, covariance[own, own]) - values))
             parameters = parameters + covariance[:, own] @ shift
-    return FinalFit(parameters, covariance)
+    return FinalFit(parameters, covariance, linear.seen)
 
 
 def _by_shape(traced: Traced, i: int) -> Array:

@@ -16,11 +16,6 @@ from excite_cli.diagnosis.tracing import Traced
 def information_of(model: Model, traced: Traced, rivals: Sequence[Rival]) -> Information:
     """Triangular factor of the training data's columns, whitened, for the next motion."""
     data = replace(traced.data, prior=None, weighed=None)
-    if model.prior is not None:
-        selection = model.base.selection
-        count = model.base.mapping.shape[1]
-        keep = np.concatenate([selection, np.arange(count, data.declared[0].shape[2])])
-        data = replace(data, declared=tuple(d[:, :, keep] for d in data.declared))
     unique: dict[tuple, Rival] = {}
     for alias, values in rivals:
         unique.setdefault(traced.candidates[alias.candidate].place, (alias, values))

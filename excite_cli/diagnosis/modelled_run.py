@@ -23,10 +23,7 @@ from excite_cli.workers.base import Tell
 
 
 class ModelledRun:
-    """A run's rigid-body quantities; `inertial` (M, n, k): averages of the columns that are fitted.
-
-    These are all standard parameters beside a prior, and the base parameters' columns without.
-    """
+    """A run's rigid-body quantities; `inertial` (M, n, r): averages of base parameters' columns."""
 
     def __init__(self, model: Model, run: PreparedRun, inertial: Array) -> None:
         self.model = model
@@ -75,7 +72,7 @@ def _load(shared: tuple[Robot, Array], run: PreparedRun, tell: Tell) -> Array:
 
 
 def inertial_columns(model: Model, runs: Sequence[PreparedRun]) -> list[Array]:
-    """Averages (M, n, k) of the inertial columns of every run."""
+    """Averages (M, n, r) of the base parameters' columns of every run."""
     spool = Spool()
     return [spool.keep(columns) for columns in each(_inertial, model, runs)]
 
@@ -83,9 +80,7 @@ def inertial_columns(model: Model, runs: Sequence[PreparedRun]) -> list[Array]:
 def _inertial(model: Model, run: PreparedRun, tell: Tell) -> Array:
     phi = standard_parameters(model.robot)
     columns = RigidBody(model.robot, phi, run.q, run.v, run.a).regressor
-    if model.prior is None:
-        columns = columns[:, :, model.base.selection]
-    return run.averaged_for_fit(columns)
+    return run.averaged_for_fit(columns[:, :, model.base.selection])
 
 
 def training_data(
@@ -100,25 +95,16 @@ def training_data(
     parts = [
         (spool.keep(columns), spool.keep(tau)) for columns, tau in each(_declared, model, tasks)
     ]
-    rows = model.weighed_columns
-    weighed = rows.T @ rows
-    prior = weighed.copy()
-    if model.prior is not None:
-        at = np.arange(len(model.prior.precision))
-        prior[at, at] += model.prior.precision
     runs = tuple(body.run for body in modelled)
     declared, torques = zip(*parts, strict=True)
+    prior, weighed = (rows.T @ rows for rows in (model.known, model.scales))
     return TrainingData(runs, tuple(folds), declared, torques, prior, weighed)
 
 
 def _declared(
     model: Model, task: tuple[PreparedRun, Array, Signals], tell: Tell
 ) -> tuple[Array, Array]:
-    """Inertial columns and those of the declared effects, and torque less what is known of it."""
+    """Inertial columns and those of the declared effects, and torque."""
     run, inertial, signals = task
-    if model.prior is None:
-        tau = for_base_columns(model.robot, model.base, run)
-    else:
-        tau = run.tau_fit - inertial @ model.prior.mean
     own = run.averaged_for_fit(effect_columns(model.declared, signals))
-    return np.concatenate([inertial, own], axis=2), tau
+    return np.concatenate([inertial, own], axis=2), for_base_columns(model.robot, model.base, run)

@@ -104,20 +104,6 @@ class Textbook:
 
 
 @dataclass(frozen=True)
-class Overfit:
-    """Mean relative errors, where joints move, of a fit that the data do not determine.
-
-    On the data that it was fitted to, on the sealed ones, and there by the URDF untouched and by
-    what a diagnosis finds with the URDF's inertias `kept` (None where that cannot be done).
-    """
-
-    training: float
-    sealed: float
-    untouched: float | None
-    kept: float | None
-
-
-@dataclass(frozen=True)
 class ErrorPath:
     """Errors with the first 0, 1, … K effects in the order of the rounds; `effects` in this order.
 
@@ -296,7 +282,7 @@ class Diagnosis(Shown):
     fit of kept inertias takes off, from that on; empty where they are free. `path`: the error
     against the number of effects; None where there are none. `inertia_names`: of `phi`, as
     `m[elbow]`; `declared` effects have the values that belong to it. `trained`: errors
-    of the model with effects on the data that it was fitted to; `overfit` if they say that it is.
+    of the model with effects on the data that it was fitted to.
     `skeleton`: where the joints are, to draw the robot, `recorded`: when; not in earlier files.
     """
 
@@ -335,7 +321,6 @@ class Diagnosis(Shown):
     path: ErrorPath | None = None
     inertia_names: tuple[str, ...] = ()
     trained: Errors | None = None
-    overfit: Overfit | None = None
     skeleton: Skeleton | None = None
     recorded: Recorded = field(default_factory=Recorded)
 

@@ -50,10 +50,9 @@ class _Fit:
 
     def __init__(self, model: Model, traced: Traced, from_urdf: bool) -> None:
         self._traced = traced
-        held = model.prior is not None and from_urdf
-        self._held = len(model.prior.mean) if model.prior is not None and held else 0
+        self._held = model.by_urdf if from_urdf else np.zeros(0)
         chosen = sorted(traced.chosen)
-        self.who = (*([INERTIAS] if held else []), *chosen)
+        self.who = (*([INERTIAS] if from_urdf else []), *chosen)
         self.effects = (*model.declared, *(traced.candidates[i].effect for i in chosen))
         fixed = traced.data.declared[0].shape[2]
         ends = fixed + np.cumsum([0, *(traced.candidates[i].width for i in chosen)])
@@ -61,7 +60,7 @@ class _Fit:
         self._fixed, self._count = fixed, int(ends[-1])
 
     def parameters(self, joined: tuple[int, ...]) -> Array:
-        """All parameters (k,); zero of effects that did not join, and of inertias if kept.
+        """All parameters (k,); zero of effects that did not join, the URDF's of kept inertias.
 
         Of the first and the last of all as they are told; of those between, roughly.
         """
@@ -69,13 +68,8 @@ class _Fit:
         chosen = tuple(i for i in joined if i != INERTIAS)
         at = [np.arange(self._fixed), *(self._at[i] for i in chosen)]
         found = np.zeros(self._count)
-        if INERTIAS in joined or not self._held:
-            found[np.concatenate(at).astype(np.intp)] = self._traced.fitted(chosen, 0, roughly)
-        else:
-            at[0] = at[0][self._held :]
-            found[np.concatenate(at).astype(np.intp)] = self._traced.fitted(
-                chosen, self._held, roughly
-            )
+        held = np.zeros(0) if INERTIAS in joined else self._held
+        found[np.concatenate(at).astype(np.intp)] = self._traced.fitted(chosen, held, roughly)
         return found
 
 
@@ -89,8 +83,7 @@ class SealedErrors:
     """Errors of models with any of those `who` join: chosen candidates, and `INERTIAS` if kept.
 
     Of every joint a Gram matrix, or none. Its columns: those of all parameters, candidates in
-    ascending order; what the fit lacks of the reported prediction, first and last; the torque that
-    is known without a fit; the torque.
+    ascending order; what the fit lacks of the reported prediction, first and last; the torque.
     """
 
     def __init__(self, fit: _Fit, grams: Sequence[Array | None]) -> None:
@@ -102,7 +95,7 @@ class SealedErrors:
         """Relative errors (n,) where joints move, of the model with some, in ascending order."""
         if joined not in self._known:
             share = len(joined) / max(len(self._fit.who), 1)
-            weights = np.array([*-self._fit.parameters(joined), share - 1.0, -share, -1.0, 1.0])
+            weights = np.array([*-self._fit.parameters(joined), share - 1.0, -share, 1.0])
             self._known[joined] = np.array([_error(gram, weights) for gram in self._grams])
         return self._known[joined]
 
@@ -123,22 +116,17 @@ def _grams(
     for run, *told in zip(played.runs, first, last, strict=True):
         body = RigidBody(model.robot, after.phi, run.q, run.v, run.a)
         signals = with_effects(seen_of(run, body), after.effects, after.values)
-        inertial, own = body.regressor, effect_columns(fit.effects, signals)
+        inertial = body.regressor[:, :, model.base.selection]
+        own = effect_columns(fit.effects, signals)
         torques = [run.averaged_torque(each.torque) for each in told]
         for j in range(n):
             kept = run.valid[:, j] & run.moving[:, j]
             of_inertias = apply(run.valid_averages[j], inertial[:, j])[kept]
-            known = np.zeros(len(of_inertias))
-            if model.prior is None:
-                of_inertias = of_inertias[:, model.base.selection]
-            else:
-                known = of_inertias @ model.prior.mean
             columns = np.hstack([of_inertias, apply(run.valid_averages[j], own[:, j])[kept]])
             lacks = [
-                torque[kept, j] - known - columns @ x
-                for torque, x in zip(torques, solved, strict=True)
+                torque[kept, j] - columns @ x for torque, x in zip(torques, solved, strict=True)
             ]
-            rows = np.column_stack([columns, *lacks, known, run.tau[kept, j]])
+            rows = np.column_stack([columns, *lacks, run.tau[kept, j]])
             own_sum, counts[j] = sums[j], counts[j] + len(rows)
             sums[j] = rows.T @ rows if own_sum is None else own_sum + rows.T @ rows
     return [

@@ -2,11 +2,12 @@
 
 What the search named leaves one by one, the weakest first, as long as its size cannot be, or is too
 small to matter, or the model with it does not predict data left out better (`comparison`); but not
-what leaves others, which are needed, with sizes that cannot be. Of what remains and the textbook
-the smaller is the answer, unless the larger predicts new recordings better.
+what leaves others, which are needed, with sizes that cannot be. The same is done with the
+textbook's. Of what remains of both the smaller is the answer, unless the larger predicts new
+recordings better; where the textbook as it is does, that or all that was found.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -32,11 +33,22 @@ def comparison_of(traced: Traced) -> Comparison:
 
 def sufficient(traced: Traced, models: Comparison) -> list[int]:
     """The candidates found that are needed, or the textbook's."""
-    kept = _needed(traced, models)
     plain = textbook(traced.candidates, models)
-    smaller, larger = sorted((kept, plain), key=lambda some: _width(traced, some))
-    gained = models.as_new(smaller, larger)
-    return larger if gained.better and gained.of_error > np.log(AS_GOOD) else smaller
+    whole = [list(traced.chosen), plain]
+    needed = (_needed(traced.judge, some, models) for some in whole)
+    best = _smallest(traced, needed, models)
+    with_plain = _smallest(traced, [best, plain], models)
+    return best if with_plain == best else _smallest(traced, [best, *whole], models)
+
+
+def _smallest(traced: Traced, sets: Iterable[list[int]], models: Comparison) -> list[int]:
+    """The smallest, unless a larger one predicts new recordings better."""
+    best, *larger = sorted(sets, key=lambda some: _width(traced, some))
+    for some in larger:
+        gained = models.as_new(best, some)
+        if gained.better and gained.of_error > np.log(AS_GOOD):
+            best = some
+    return best
 
 
 def _width(traced: Traced, some: Sequence[int]) -> int:
@@ -44,8 +56,9 @@ def _width(traced: Traced, some: Sequence[int]) -> int:
     return sum(traced.candidates[i].width for i in some)
 
 
-def _needed(traced: Traced, models: Comparison) -> list[int]:
-    judge, chosen = traced.judge, list(traced.chosen)
+def _needed(judge: Judgement, some: Sequence[int], models: Comparison) -> list[int]:
+    """Those of some candidates that are needed beside each other."""
+    chosen = list(some)
     while True:
         cannot = [i for i in chosen if not _can_be(judge, chosen, [i])]
         idle = _idle(judge, chosen, cannot, models)

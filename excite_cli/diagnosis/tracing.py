@@ -43,6 +43,7 @@ from excite_cli.effects.seen import Seen
 from excite_cli.identification.declared_states import declared_sets
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.prepare import PreparedRun
+from excite_cli.identification.prior import InertialPrior, as_wide_as_needed
 from excite_cli.robot.model import Array
 
 _PASSES = 5  # with four, the level of a cut torque was 1.1 % off
@@ -83,10 +84,12 @@ class Traced:
         own = [self.candidates[i] for i in members]
         return WeightedFit(self.data, own), {i: at for at, i in enumerate(members)}
 
-    def fitted(self, chosen: Sequence[int], held: int = 0, roughly: bool = False) -> Array:
+    def fitted(
+        self, chosen: Sequence[int], held: Array | None = None, roughly: bool = False
+    ) -> Array:
         """Parameters (k,) of the model with these of what was chosen, or the textbook's effects.
 
-        Weighted least squares, as in `identify`; the first `held` parameters are zero and left out.
+        Weighted least squares, as in `identify`; the first parameters are those that are `held`.
         `roughly`: with the weights of the model with all that was chosen, a tenth of the time.
         """
         fit, at = self._least_squares
@@ -123,6 +126,8 @@ def trace(
     bodies = [ModelledRun(model, *each) for each in zip(runs, columns, strict=True)]
     del runs, columns  # the next ones take their place
     plain = textbook_effects(model) if spec.rounds and not model.is_weighed else []
+    if model.vague:
+        model = _beside(model, folds, bodies, start or plain)
     fit = _first_fit(model, folds, bodies, start or plain)
     passes: list[_Pass] = []
 
@@ -233,6 +238,24 @@ def _without_kinds(spec: DiagnosisSpec, effects: Sequence[Effect]) -> DiagnosisS
     others = spec.kinds == "all" or not {*spec.kinds} <= kinds
     rounds = spec.rounds if others else 0
     return spec.model_copy(update={"exclude": sorted(kinds), "rounds": rounds})
+
+
+def _beside(
+    model: Model, folds: Sequence[int], bodies: Sequence[ModelledRun], effects: Sequence[Effect]
+) -> Model:
+    """The model whose prior is as wide as what is fitted beside these effects asks for."""
+    assert model.prior is not None
+    signals = signals_of_all(bodies, standard_parameters(model.robot), (), np.zeros(0))
+    data = training_data(model, folds, bodies, signals)
+    found = with_columns([(effect, 1) for effect in effects], signals, data.runs)
+
+    def fitted(prior: InertialPrior) -> tuple[Array, Model]:
+        tried = replace(model, prior=prior)
+        rows = tried.known
+        fit = WeightedFit(replace(data, prior=rows.T @ rows), found)
+        return fit(range(len(found)))[0], tried
+
+    return as_wide_as_needed(model.prior, model.base, fitted)[1]
 
 
 def _first_fit(

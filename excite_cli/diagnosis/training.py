@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.grams import Grams, JointGram, joined
 from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.identification.covariance import Rows
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.out_of_core import forget
+from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
@@ -44,7 +45,7 @@ class TrainingData:
     """Parts of runs with the columns of the declared model.
 
     `declared[i]` (M_i, n, k): inertial columns, then those of the declared effects. `folds` says
-    which parts are left out together. Beside kept inertias, `tau` is what the URDF's leave.
+    which parts are left out together.
 
     `prior` (k + 1, k + 1): Gram matrix of rows [W target] of unit variance, what is known of the
     parameters without these data; `weighed`: the part of it that scales say. None: nothing.
@@ -149,6 +150,16 @@ class TrainingData:
             [self.runs[part].usable[:, joint] for part in parts],
             [self.sides[part] for part in parts],
         )
+
+    def rows(self, candidates: Sequence[Columns], chosen: Sequence[int]) -> list[Rows]:
+        """Rows of every run for the regression of `identify`."""
+        spool, found = Spool(), []
+        for part, run in enumerate(self.runs):
+            joints = [self.columns(candidates, chosen, part, joint) for joint in range(self.n)]
+            columns = spool.keep(np.stack(joints, axis=1))
+            found.append(Rows(columns, self.tau[part], run.usable, rounding=run.rounding))
+            forget()
+        return found
 
     def residuals(
         self, candidates: Sequence[Columns], chosen: Sequence[int], parameters: Array

@@ -35,22 +35,28 @@ class WeightedFit:
         self._floor = np.maximum(_EXACT * np.sqrt(whole / np.maximum(self._counts, 1)), 1e-12)
 
     def __call__(
-        self, chosen: Sequence[int], held: int = 0, near: Array | None = None
+        self,
+        chosen: Sequence[int],
+        held: Array | None = None,
+        near: Array | None = None,
     ) -> tuple[Array, Array]:
-        """Parameters x (k,) of the model and σ (n,); the first `held` are zero and left out.
+        """Parameters x (k,) of the model and σ (n,); the first ones are those that are `held`.
 
         With weights `near` (n,) these are σ.
         """
-        columns = self._evidence.columns(chosen)[held:]
+        held = np.zeros(0) if held is None else held
+        columns = self._evidence.columns(chosen)[len(held) :]
         count = len(columns)
-        prior = self._prior[np.ix_(*[np.append(columns, self._evidence.torque)] * 2)]
+        at = np.concatenate([columns, np.arange(len(held)), [self._evidence.torque]])
+        prior = _less(self._prior[np.ix_(at, at)], count, held)
         where = np.full(self._evidence.torque, -1)
         where[columns] = np.arange(count)
         own = []  # of each joint, where its columns are in the model, and their products
         for active, gram in self._grams:
             there = np.flatnonzero(where[active] >= 0)
-            rows = np.append(there, len(active))
-            own.append((np.append(where[active[there]], count), gram[np.ix_(rows, rows)]))
+            rows = np.concatenate([there, np.arange(len(held)), [len(active)]])
+            rest = _less(gram[np.ix_(rows, rows)], len(there), held)
+            own.append((np.append(where[active[there]], count), rest))
         share = 1.0 - count / max(float(np.sum(self._counts)), 1.0)
         freedom = np.maximum(self._counts * share, 1.0)
         sigma = np.ones(len(own)) if near is None else near
@@ -63,7 +69,15 @@ class WeightedFit:
             sigma, x = now, _solved(prior, own, now)
             if settled:
                 break
-        return x, sigma
+        return np.concatenate([held, x]), sigma
+
+
+def _less(gram: Array, free: int, held: Array) -> Array:
+    """Products of `free` columns and of the torque less what the others, `held`, give of it."""
+    change = np.zeros((len(gram), free + 1))
+    change[:free, :free] = np.eye(free)
+    change[free:, -1] = np.append(-held, 1.0)
+    return np.asarray(change.T @ gram @ change) if len(held) else gram
 
 
 def _solved(prior: Array, own: Sequence[tuple[NDArray[np.intp], Array]], sigma: Array) -> Array:

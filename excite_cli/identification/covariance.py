@@ -9,18 +9,22 @@ E‖e‖² = tr Ω − tr(H Ω), and Ω is enlarged accordingly. What is naive, 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.sparse import csr_matrix
 
 from excite_cli.identification.factors import Mask
 from excite_cli.identification.noise import Noise, noise_of
-from excite_cli.out_of_core import Spool
+from excite_cli.out_of_core import forget
 from excite_cli.robot.model import Array
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 
 MOST_ENLARGED = 4.0
+_NEIGHBOURS, _LEAST = 12, 1.0
+_STRETCH = 4096  # samples; what is farther apart is independent
 _UNSTABLE = 1.0 - 1e-9
 
 
@@ -68,21 +72,14 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
 
     With `weights` in a run (robust fits) the weighted residual is what is modelled.
     """
-    p, n = len(x), len(sigma)
-    noises, meat, trace = [], np.zeros((p, p)), np.zeros(n)
-    eaten, white, plain = np.zeros(n), np.zeros(p), 0
-    parts, spool = [], Spool()
+    p = len(x)
+    noises, meat = [], np.zeros((p, p))
+    white, plain = np.zeros(p), 0
     for run, own in zip(runs, each(_part, (x, inverse, sigma), runs), strict=True):
         noises.append(own.noise)
-        parts.append((spool.keep(own.spread), own.noise))
-        eaten += own.eaten
-        trace += own.trace
+        meat += own.meat
         white += own.white
         plain += int(run.usable.sum())
-    ratio = np.clip(eaten / np.maximum(trace, 1e-300), 0.0, 1.0 - 1.0 / MOST_ENLARGED)
-    enlarged = np.sqrt(1.0 / (1.0 - ratio))
-    for own in each(_meat, enlarged, parts):
-        meat += own
     for run in runs:
         for j, rounding in enumerate(run.rounding):
             if rounding is not None:
@@ -99,23 +96,11 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
 
 @dataclass(frozen=True)
 class _Part:
-    """What a run adds: its noise, its columns spread by it (M, n, p), and sums."""
+    """What a run adds: its noise, and to the sandwich's inside (p, p) and white noise's (p,)."""
 
     noise: Noise
-    spread: Array
-    eaten: Array
-    trace: Array
+    meat: Array
     white: Array
-
-
-def _meat(enlarged: Array, part: tuple[Array, Noise], tell: Tell) -> Array:
-    """What a run adds to the sandwich's inside (p, p)."""
-    spread, noise = part
-    covariance = noise.innovation * np.outer(enlarged, enlarged)
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    mixed = np.einsum("tjp,jk->tkp", spread, root).reshape(-1, spread.shape[2])
-    return np.asarray(mixed.T @ mixed)
 
 
 def _part(shared: tuple[Array, Array, Array], run: Rows, tell: Tell) -> _Part:
@@ -124,19 +109,63 @@ def _part(shared: tuple[Array, Array, Array], run: Rows, tell: Tell) -> _Part:
     if run.weights is not None:
         residual = residual * run.weights
     noise = noise_of(residual, run.usable)
-    columns = np.where(run.usable[..., None], run.columns, 0.0)
-    spread = noise.spread_back(columns) / np.square(sigma)[:, None]
-    own = np.diag(noise.innovation)
-    projected = spread @ inverse
-    variance = own * np.array([_gain(a) for a in noise.polynomials])
-    scores = (columns @ inverse) * (np.sqrt(variance) / np.square(sigma))[:, None]
-    return _Part(
-        noise,
-        spread,
-        own * np.einsum("tjp,tjp->j", projected, spread) * np.square(sigma),
-        variance * run.usable.sum(axis=0),
-        np.square(scores).sum(axis=(0, 1)),
-    )
+    values, vectors = np.linalg.eigh(inverse)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    own = np.sqrt(np.diag(noise.innovation) * [_gain(each) for each in noise.polynomials])
+    meat, white = np.zeros_like(inverse), np.zeros(len(x))
+    for start in range(0, len(residual), _STRETCH):
+        cut = slice(start, start + _STRETCH)
+        usable = run.usable[cut]
+        columns = np.where(usable[..., None], run.columns[cut], 0.0) / sigma[:, None]
+        stretch = noise, residual[cut], usable
+        more = [_more(*stretch, j, columns[:, j] @ root) for j in range(len(sigma))]
+        meat += _meat(noise, columns / sigma[:, None], np.array(more))
+        scores = (columns @ inverse) * (own / sigma)[:, None]
+        white += np.square(scores).sum(axis=(0, 1))
+        forget()
+    return _Part(noise, meat, white)
+
+
+def _meat(noise: Noise, columns: Array, more: Array) -> Array:
+    """Σ_t,s c_t Ω_ts c_sᵀ (p, p), with Ω of the noise with so many times more power (n, F).
+
+    The noise was there before the first sample: so columns are spread back before it as well.
+    """
+    count = 2 * (more.shape[1] - 1)
+    before = np.zeros((count - len(columns), *columns.shape[1:]))
+    spread = rfft(noise.spread_back(np.concatenate([before, columns])), axis=0)
+    spread *= np.sqrt(more.T)[:, :, None]
+    spread[1:-1] *= np.sqrt(2.0)  # frequencies that stand for two
+    values, vectors = np.linalg.eigh(noise.innovation)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    both = np.concatenate([spread.real, spread.imag])
+    mixed = np.einsum("fjp,jk->fkp", both, root).reshape(-1, columns.shape[2])
+    return np.asarray(mixed.T @ mixed / count)
+
+
+def _more(noise: Noise, residual: Array, usable: Mask, joint: int, leverage: Array) -> Array:
+    """How many times more power (F,) residuals of a joint have than the model says; 1 at least.
+
+    The periodogram of a residual over what is expected of it, Σ_k r_k w_k exp(−iωk) with r the
+    autocovariance of the model and w that of the mask, less what the fit has eaten: with L Lᵀ the
+    hat matrix of `leverage` L (M, p), the share ‖DFT L‖²/M at each frequency.
+    """
+    at, own = usable[:, joint], noise.innovation[joint, joint]
+    count = 2 * next_fast_len(len(residual), real=True)
+    spectrum = own / np.square(np.abs(rfft(noise.polynomials[joint], count)))
+    gate = np.square(np.abs(rfft(at.astype(float), count)))
+    expected = np.maximum(rfft(irfft(spectrum, count) * irfft(gate, count)).real, 1e-300)
+    eaten = np.square(np.abs(rfft(leverage, count, axis=0))).sum(axis=1) / max(int(at.sum()), 1)
+    left = 1.0 - np.minimum(_smooth(eaten), 1.0 - 1.0 / MOST_ENLARGED)
+    power = np.square(np.abs(rfft(residual[:, joint], count)))
+    return np.maximum(_smooth(power) / (_smooth(expected) * left), _LEAST)
+
+
+def _smooth(spectrum: Array) -> Array:
+    """Means over `_NEIGHBOURS` frequencies on either side, which the ends reflect."""
+    mode: Any = "reflect" if len(spectrum) > _NEIGHBOURS else "edge"
+    wide = np.pad(spectrum, _NEIGHBOURS, mode=mode)
+    return np.convolve(wide, np.ones(2 * _NEIGHBOURS + 1) / (2 * _NEIGHBOURS + 1), "valid")
 
 
 def _gain(polynomial: Array) -> float:

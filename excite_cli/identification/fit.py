@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from excite_cli.config.data_spec import IdentificationSpec
+from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.effects.base import Effect, Parameter, Value
@@ -26,7 +27,12 @@ from excite_cli.identification.implausible_links import marked
 from excite_cli.identification.least_squares import LinearFit, fit_rows
 from excite_cli.identification.link_changes import LinkChange, inertial_covariance, link_changes
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.prior import InertialPrior, inertial_prior
+from excite_cli.identification.prior import (
+    InertialPrior,
+    as_wide_as_needed,
+    inertial_prior,
+    prior_of,
+)
 from excite_cli.identification.regression import (
     Regression,
     RunColumns,
@@ -34,7 +40,6 @@ from excite_cli.identification.regression import (
     signals_of,
     with_effects,
 )
-from excite_cli.identification.weak_directions import WeakDirections, weak_directions
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.record import Shown
@@ -148,24 +153,27 @@ def fit(
     robot, base = regression.robot, regression.base
     cad = standard_parameters(robot)
     keep = spec.inertias == "cad"
-    prior = inertial_prior(robot, cad, spec.uncertainty if keep else 1.0)
     more = np.column_stack(known) if known is not None and len(known[0]) else None
-    regression, linear, weak = _settled(regression, spec, (prior if keep else None, more), prior)
-    found = _record(regression, spec, linear, weak, prior)
+    given = prior_of(spec, robot, more is not None)
+    regression, linear, given = _settled(regression, spec, given, more)
+    found = _record(regression, spec, linear, given)
     if not spec.consistent:
         return found
-    data = linear if weak is None else weak.alone  # the prior of consistent sets is another one
-    share = np.sqrt(np.clip(data.samples / max(int(data.count.sum()), 1), 0.0, 1.0))
-    factor = data.factor * (share if share > 0 else 1.0)
-    if more is not None:
-        factor = triangle_of(np.concatenate([factor, more]))
+    prior = given or inertial_prior(robot, cad, 1.0)
+
+    def with_known(factor: Array) -> Array:
+        return factor if more is None else triangle_of(np.concatenate([factor, more]))
+
+    factor = with_known(linear.factor)
     signs = np.array([p.nonnegative for p in effect_parameters(regression.effects)], bool)
     # What `cad` is worth is the user's word; where inertias are free nobody said.
     solve_for = consistent_parameters if keep else consistent_near_prior
     consistent = solve_for(factor, base, prior, body_lengths(robot, cad), signs)
     if not consistent.solved:
         return replace(found, consistent=consistent)
-    covariance = inertial_covariance(factor, base, prior)
+    # As many samples as there are independent ones.
+    share = float(np.clip(linear.samples / max(int(linear.count.sum()), 1), 1e-6, 1.0))
+    covariance = inertial_covariance(with_known(linear.factor * np.sqrt(share)), base, prior)
     links = link_changes(robot, consistent.phi, covariance, prior)
     links = marked(robot, links, consistent.phi, covariance, prior)
     return replace(found, consistent=consistent, links=links)
@@ -174,42 +182,51 @@ def fit(
 def _settled(
     regression: Regression,
     spec: IdentificationSpec,
-    known: tuple[InertialPrior | None, Array | None],
-    completion: InertialPrior,
-) -> tuple[Regression, LinearFit, WeakDirections | None]:
+    prior: InertialPrior | None,
+    more: Array | None,
+) -> tuple[Regression, LinearFit, InertialPrior | None]:
     """Fit, with columns that follow the model rebuilt until their torque settles.
 
-    `known`: the prior on inertias, and rows [A b] on all parameters. Without a prior, directions
-    that the data hardly show keep to the URDF.
+    `prior` on inertias, which comes back as wide as it was needed, and rows `more` [A b] on all
+    parameters.
     """
-    base, (prior, more) = regression.base, known
+    base = regression.base
     k = sum(len(effect.parameters) for effect in regression.effects)
-    given = [] if more is None else [more]
-    if prior is not None:
-        whiten, target = prior.on_base(base)
-        given.append(np.column_stack([whiten, np.zeros((len(whiten), k)), target]))
-    usual = np.sqrt(np.square(base.mapping) @ np.square(completion.std))
-    sizes = np.append(usual, [p.high for p in effect_parameters(regression.effects)])
-    follow, weak = follows_model(regression), None
-    for _ in range(_REBUILDS if follow else 1):
-        rows = all_rows(regression.runs)
-        linear = fit_rows(rows, spec.method, _together(given), sizes)
-        if prior is None and completion.known:
-            weak = weak_directions(linear, base, completion)
-            if len(weak.rows):
-                rows_of_urdf = weak.rows / spec.uncertainty
-                of_all = np.insert(rows_of_urdf, [base.rank] * k, 0.0, axis=1)
-                linear = fit_rows(rows, spec.method, _together([*given, of_all]), sizes)
-        if not follow:
-            break
+    completion = inertial_prior(regression.robot, standard_parameters(regression.robot), 1.0)
+    sizes = usual_sizes(regression.robot, base, regression.effects)
+
+    def fitted(prior: InertialPrior | None) -> tuple[Array, LinearFit]:
+        given = [] if more is None else [more]
+        if prior is not None:
+            given.append(prior.rows(base, k))
+        found = fit_rows(all_rows(regression.runs), spec.method, _together(given), sizes)
+        return found.x, found
+
+    if prior is None or spec.inertias == "cad":
+        linear = fitted(prior)[1]
+    else:
+        prior, linear = as_wide_as_needed(prior, base, fitted)
+    for _ in range(_REBUILDS if follows_model(regression) else 0):
         before = [run.effects @ linear.x[base.rank :] for run in regression.runs]
         phi = completion.completed(base, linear.x[: base.rank])
         regression = rebuilt(regression, phi, linear.x[base.rank :])
         after = [run.effects @ linear.x[base.rank :] for run in regression.runs]
+        linear = fitted(prior)[1]
         change = float(np.linalg.norm(np.concatenate(after) - np.concatenate(before)))
         if change <= _SETTLED * max(float(np.linalg.norm(np.concatenate(before))), 1e-12):
             break
-    return regression, linear, weak
+    return regression, linear, prior
+
+
+def usual_sizes(robot: Robot, base: BaseParameters, effects: Sequence[Effect]) -> Array:
+    """How large parameters (r + k,) usually are: base parameters, then those of the effects."""
+    prior = inertial_prior(robot, standard_parameters(robot), 1.0)
+    return np.append(usual_of(base, prior), [p.high for p in effect_parameters(effects)])
+
+
+def usual_of(base: BaseParameters, prior: InertialPrior) -> Array:
+    """Standard deviations (r,) of base parameters by what the URDF is worth."""
+    return np.sqrt(np.square(base.mapping) @ np.square(prior.std))
 
 
 def _together(given: Sequence[Array]) -> tuple[Array, Array] | None:
@@ -262,24 +279,22 @@ def _record(
     regression: Regression,
     spec: IdentificationSpec,
     linear: LinearFit,
-    weak: WeakDirections | None,
-    prior: InertialPrior,
+    prior: InertialPrior | None,
 ) -> Fit:
     robot, base, effects = regression.robot, regression.base, regression.effects
+    completion = inertial_prior(robot, standard_parameters(robot), 1.0)
     parameters = effect_parameters(effects)
     std = np.sqrt(np.diag(linear.covariance))
     size = np.abs(linear.x)
     relative = np.where(size > 0, std / np.where(size > 0, size, 1.0), np.inf)
-    usual = np.sqrt(np.square(base.mapping) @ np.square(prior.std))
+    usual = usual_of(base, prior or completion)
     smallest = np.array([parameter.low for parameter in parameters])
-    if spec.inertias == "cad":  # known by the data, if they say more than the prior does
+    kept = np.zeros(base.rank, bool)
+    if prior is not None:  # known by the data, if they say more than the prior does
         known = std[: base.rank] <= _KNOWN_BEYOND_PRIOR * usual
+        kept = ~known
     else:
         known = (relative[: base.rank] <= _FIXED) | (std[: base.rank] <= _FIXED * usual)
-    kept = np.zeros(base.rank, bool)
-    if weak is not None and len(weak.rows):  # the deviation is then the URDF's
-        kept = weak.deviations > 1.0
-        known &= weak.deviations <= _FIXED
     fixed = (relative[base.rank :] <= _FIXED) | (std[base.rank :] <= smallest)
     identifiable = linear.seen & np.concatenate([known, fixed])
     return Fit(
@@ -308,7 +323,7 @@ def _record(
         essential=identifiable if spec.inertias == "cad" else _essential(linear, std),
         covariance=linear.covariance,
         noise=linear.noise,
-        phi=prior.completed(base, linear.x[: base.rank]),
+        phi=completion.completed(base, linear.x[: base.rank]),
         count=int(linear.count.sum()),
         samples=linear.samples,
         kept=tuple(base.names[index] for index in base.selection[kept]),

@@ -2,8 +2,7 @@
 
 `ols` weights all joints alike, `wls` by the noise of each joint (Gautier 1997), `irls` further
 lowers the weight of outliers. The fit works on triangular factors per run and joint (`factors`);
-its covariance respects that noise is serially correlated (`covariance`). Against a prior, samples
-count by the number of independent ones that they stand for.
+its covariance respects that noise is serially correlated (`covariance`).
 """
 
 from collections.abc import Sequence
@@ -78,10 +77,6 @@ def fit_rows(
         weights, sigma, solution = _reweighted(runs, solution, floor, extra)
         factors = factors_of(runs, weights=weights)
     found = _covariance(runs, weights, solution, sigma, extra)
-    if extra is not None:
-        sigma = sigma * np.sqrt(max(int(count.sum()) / max(found.samples, 1.0), 1.0))
-        solution = solve(stacked(factors, sigma, extra))
-        found = _covariance(runs, weights, solution, sigma, extra)
     noise = np.sqrt(residual_squares(factors, solution.x) / np.maximum(count, 1))
     noise = np.maximum(noise, floor)
     covariance = np.where(np.outer(solution.seen, solution.seen), found.matrix, 0.0)

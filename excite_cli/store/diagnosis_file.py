@@ -24,7 +24,6 @@ from excite_cli.diagnosis.records import (
     JointAlias,
     LargeRest,
     NamedEffect,
-    Overfit,
     Round,
     SealedEnds,
     Textbook,
@@ -81,7 +80,6 @@ _LATER: dict[str, Any] = {
     "path": ErrorPath | None,
     "inertia_names": tuple[str, ...],
     "trained": Errors | None,
-    "overfit": Overfit | None,
     "skeleton": Skeleton | None,
     "recorded": Recorded,
 }

@@ -105,7 +105,6 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             "training": found.trained.as_data() if found.trained else None,
             "samples": found.after.samples,
         },
-        "overfit": asdict(found.overfit) if found.overfit else None,
         "textbook": [_record(each) for each in found.textbook.effects] if found.textbook else None,
         "path": asdict(found.path) if found.path else None,
         "assumed": [asdict(each) for each in found.assumed],

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import null_space
 
-from excite_cli.diagnosis.declared_model import KeptInertias, Model, width_of
+from excite_cli.diagnosis.declared_model import Model, width_of
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.catalogue import catalogue
@@ -47,16 +47,6 @@ def test_what_the_urdf_says_already_changes_nothing(model: Model) -> None:
     assert model.full_inertias(model.base.mapping @ cad) == pytest.approx(cad, abs=1e-9)
 
 
-def test_kept_inertias_are_their_mean_and_the_fitted_change(model: Model) -> None:
-    """With a prior, all standard parameters are fitted, as changes."""
-    rng = np.random.default_rng(3)
-    count = 10 * model.robot.n_bodies
-    mean, change = rng.normal(size=count), rng.normal(size=count)
-    kept = replace(model, prior=KeptInertias(mean, np.ones(count)))
-    found = kept.full_inertias(np.concatenate([change, [1e6] * 4]))
-    assert found == pytest.approx(mean + change)
-
-
 def test_widths_are_those_of_linear_parameters(model: Model) -> None:
     effects = tuple(catalogue()[kind]((0,)) for kind in ("spring", "armature", "payload"))
     assert width_of(effects) == 2 + 1 + 10
@@ -65,15 +55,21 @@ def test_widths_are_those_of_linear_parameters(model: Model) -> None:
 
 
 @pytest.mark.parametrize("kept", [False, True])
-def test_what_was_weighed_is_said_of_the_columns_that_are_fitted(model: Model, kept: bool) -> None:
-    """It is as far from any φ, whether base parameters are fitted or changes of all inertias."""
+def test_what_is_known_is_what_scales_say_and_the_urdf(model: Model, kept: bool) -> None:
     rng = np.random.default_rng(6)
-    count, effects = 10 * model.robot.n_bodies, (catalogue()["spring"]((0,)),)
-    mean, change, own = rng.normal(size=count), rng.normal(size=count), rng.normal(size=2)
-    rows = rng.normal(size=(3, model.base.rank + 2 + 1))
-    prior = KeptInertias(mean, np.ones(count)) if kept else None
-    known = replace(model, declared=effects, prior=prior, weighed=rows).weighed_columns
-    fitted = change if kept else model.base.mapping @ (mean + change)
-    missed = rows @ np.concatenate([model.base.mapping @ (mean + change), own, [-1.0]])
-    assert known @ np.concatenate([fitted, own, [-1.0]]) == pytest.approx(missed)
-    assert replace(model, prior=prior).weighed_columns.shape == (0, len(fitted) + 1)
+    effects, base = (catalogue()["spring"]((0,)),), model.base
+    weighed = rng.normal(size=(3, base.rank + 2 + 1))
+    cad = standard_parameters(model.robot)
+    prior = inertial_prior(model.robot, cad, 0.3) if kept else None
+    known = replace(model, declared=effects, prior=prior, weighed=weighed)
+    assert known.is_weighed
+    assert known.known[:3] == pytest.approx(weighed)
+    assert len(known.known) == 3 + kept * base.rank
+    # The prior's rows are zero at the URDF, whatever the spring is.
+    at_urdf = np.concatenate([base.mapping @ cad, rng.normal(size=2), [-1.0]])
+    assert known.known[3:] @ at_urdf == pytest.approx(0.0, abs=1e-9)
+    bare = replace(model, prior=prior)
+    assert not bare.is_weighed
+    assert bare.scales.shape == (0, base.rank + 1)
+    assert bare.known.shape == (kept * base.rank, base.rank + 1)
+    assert bare.by_urdf == pytest.approx(base.mapping @ cad)

@@ -68,14 +68,14 @@ def test_errors_are_those_of_the_fitted_columns() -> None:
     """With the reported predictions at both ends, whatever the fit says there."""
     rng = np.random.default_rng(1)
     rows = rng.normal(size=(50, 3))  # columns of one declared parameter and two candidates
-    known, tau = rng.normal(size=50), rng.normal(size=50)
+    tau = rng.normal(size=50)
     first, last = rng.normal(size=50), rng.normal(size=50)
     fits = {(): [1.0, 0, 0], (0,): [0.5, 2.0, 0], (1,): [0.3, 0, -1.0], (0, 1): [0.1, 1.5, -0.8]}
     lacks = [
-        told - known - rows @ np.array(fits[each])
+        told - rows @ np.array(fits[each])
         for told, each in ((first, ()), (last, (0, 1)))
     ]  # fmt: skip
-    block = np.column_stack([rows, *lacks, known, tau])
+    block = np.column_stack([rows, *lacks, tau])
     fit: Any = SimpleNamespace(who=(0, 1), parameters=lambda joined: np.array(fits[joined]))
     errors = SealedErrors(fit, [block.T @ block, None])
 
@@ -84,7 +84,7 @@ def test_errors_are_those_of_the_fitted_columns() -> None:
 
     assert errors.of(())[0] == pytest.approx(relative(first))
     assert errors.of((0, 1))[0] == pytest.approx(relative(last))
-    half = known + rows @ np.array(fits[(0,)]) + (lacks[0] + lacks[1]) / 2
+    half = rows @ np.array(fits[(0,)]) + (lacks[0] + lacks[1]) / 2
     assert errors.of((0,))[0] == pytest.approx(relative(half))
     assert np.isnan(errors.of((0,))[1])
 

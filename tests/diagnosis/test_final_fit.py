@@ -5,10 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.final_fit import final_fit, over_error
+from excite_cli.diagnosis.final_fit import FinalFit, final_fit, over_error
+from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.identification.least_squares import fit_rows
 from tests.diagnosis.test_doubt import planted, traced
+
+
+def told(given: Traced) -> FinalFit:
+    return final_fit(given, fit_rows(given.data.rows(given.candidates, given.chosen)))
 
 
 def one(kind: str, *joints: int) -> Effect:
@@ -22,7 +28,7 @@ def test_sizes_are_told_beside_two_standard_deviations() -> None:
     torque = np.array([[3.0, 0.0], [1.0, 0.0], [0.01, 0.0]])
     data, candidates = planted(effects, torque)
     given = traced(data, candidates, (0, 1, 2))
-    found = final_fit(given)
+    found = told(given)
     sizes = over_error(given, found)
     assert {i for i, size in sizes.items() if size > 1.0} == {0, 1}
     assert found.parameters[-3:-1] == pytest.approx([3.0, 1.0], abs=0.1)
@@ -33,11 +39,11 @@ def test_deviations_hold_what_the_columns_of_an_effect_miss() -> None:
     data, candidates = planted([one("elasticity")], np.array([[2.0, 0.0]]))
     given = traced(data, candidates, (0,))
     effect = candidates[0].effect
-    found = final_fit(given)
+    found = told(given)
     missed = effect.model_error(found.parameters[-1:])[0]
     assert missed > 0.1
     exact = replace(given, candidates=(replace(candidates[0], effect=one("armature")),))
-    noise = final_fit(exact).covariance[-1, -1]
+    noise = told(exact).covariance[-1, -1]
     assert found.covariance[-1, -1] == pytest.approx(noise + missed**2)
 
 
@@ -54,7 +60,7 @@ def test_a_payload_is_moved_to_a_body_and_all_that_depends_on_it_too() -> None:
     )
     given = traced(data, candidates, (0, 1))
     fitted = given.judge.plain.solve((0, 1))[-width:]
-    found = final_fit(given).parameters[-width:]
+    found = told(given).parameters[-width:]
     assert fitted[5] < 0.0
     assert candidates[1].effect.possible(found[1:])
     # What the body has gained of the shared column, the friction has lost.
@@ -68,9 +74,9 @@ def test_deviations_hold_shapes_that_fit_as_well() -> None:
     shapes = [kind((0,), {"stribeck_speed": speed}) for speed in (0.1, 0.11)]
     torque = np.array([[3.0, 0.0], [0.0, 0.0]])
     data, candidates = planted(shapes, torque, np.array([[1.0, 2.0], [0.0, 1e-6]]))
-    found = final_fit(traced(data, candidates, (0,)))
+    found = told(traced(data, candidates, (0,)))
     assert np.sqrt(found.covariance[-1, -1]) == pytest.approx(1.5 / np.sqrt(2.0), rel=0.05)
-    alone = final_fit(traced(data, candidates[:1], (0,)))
+    alone = told(traced(data, candidates[:1], (0,)))
     assert np.sqrt(alone.covariance[-1, -1]) < 0.1
 
 
@@ -80,8 +86,8 @@ def test_a_shape_that_physics_refuses_makes_no_size_uncertain() -> None:
     effects: list[Effect] = [shaft((0, 1), {"direction": s}) for s in (1.0, -1.0)]
     mix = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.3]])
     data, candidates = planted(effects, np.array([[2.0, 2.0], [0.0, 0.0]]), mix)
-    found = final_fit(traced(data, candidates, (0,), lambda x, chosen, added: 1 not in added))
+    found = told(traced(data, candidates, (0,), lambda x, chosen, added: 1 not in added))
     both = traced(data, candidates, (0,))
-    assert over_error(both, final_fit(both))[0] < 1.0
+    assert over_error(both, told(both))[0] < 1.0
     assert found.parameters[-2] == pytest.approx(2.0, abs=0.1)
     assert np.sqrt(found.covariance[-2, -2]) < 0.1

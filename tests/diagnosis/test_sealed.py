@@ -29,7 +29,7 @@ from excite_cli.trajectory.fourier import FourierTrajectory
 
 SECONDS, RATE = 5.0, 200.0
 # What may differ: what is measured on the sealed part, and the time it took.
-FREE = {"before", "after", "textbook", "untouched", "overfit", "sealed_traces", "seconds"}
+FREE = {"before", "after", "textbook", "untouched", "sealed_traces", "seconds"}
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ import pytest
 
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.weighted_fit import WeightedFit
-from excite_cli.identification.covariance import Rows
 from excite_cli.identification.least_squares import fit_rows
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import FIXED, PRIOR, random_candidates, random_data
@@ -20,14 +19,9 @@ MODELS = ((), (0,), (1, 2), (0, 1, 3, 4))
 @pytest.mark.parametrize("seed", [1, 2])
 def test_it_is_the_fit_of_identify(chosen: tuple[int, ...], seed: int) -> None:
     data, candidates = random_data(seed), random_candidates(seed)
-    rows = []
-    for part, (run, tau) in enumerate(zip(data.runs, data.tau, strict=True)):
-        columns = np.stack(
-            [data.columns(candidates, chosen, part, joint) for joint in range(data.n)], axis=1
-        )
-        rows.append(Rows(columns, tau * [1.0, 7.0], run.usable))
-    scaled = tuple(tau * [1.0, 7.0] for tau in data.tau)  # joints of unequal noise
-    found = WeightedFit(_with(data, scaled), candidates)(chosen)[0]
+    data = _with(data, tuple(tau * [1.0, 7.0] for tau in data.tau))  # joints of unequal noise
+    found = WeightedFit(data, candidates)(chosen)[0]
+    rows = data.rows(candidates, chosen)
     assert found == pytest.approx(fit_rows(rows, "wls").x, rel=1e-9, abs=1e-12)
 
 
@@ -40,12 +34,15 @@ def test_a_prior_holds_what_it_knows() -> None:
 
 
 def test_what_is_held_is_left_out() -> None:
-    """Of the first parameters zero, the others are those of a model without their columns."""
+    """The others are those of a model of the torque that is left, without their columns."""
     data, candidates = random_data(4), random_candidates(4)
-    found = WeightedFit(data, candidates)([1, 2], FIXED)[0]
+    held = np.array([0.3, 2.0, -1.0, 0.5])
+    found = WeightedFit(data, candidates)([1, 2], held)[0]
     bare = random_data(4)
-    bare = _with(bare, bare.tau, tuple(each[:, :, :0] for each in bare.declared))
-    assert found == pytest.approx(WeightedFit(bare, candidates)([1, 2])[0], rel=1e-9)
+    left = tuple(tau - own @ held for tau, own in zip(bare.tau, bare.declared, strict=True))
+    bare = _with(bare, left, tuple(each[:, :, :0] for each in bare.declared))
+    assert found[:FIXED] == pytest.approx(held)
+    assert found[FIXED:] == pytest.approx(WeightedFit(bare, candidates)([1, 2])[0], rel=1e-9)
 
 
 def _with(

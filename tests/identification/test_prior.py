@@ -1,9 +1,12 @@
+from typing import Literal
+
 import numpy as np
 import pytest
 
+from excite_cli.config.data_spec import IdentificationSpec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
-from excite_cli.identification.prior import inertial_prior, prior_rows
+from excite_cli.identification.prior import inertial_prior, prior_of
 from excite_cli.robot.model import Robot
 from tests.robot.random_robots import random_robot
 
@@ -53,5 +56,38 @@ def test_zeros_of_the_urdf_may_move_a_little(robot: Robot) -> None:
     assert (std > 0).all()
     assert std[0] == pytest.approx(0.1 * cad[0])
     assert std[2] < 0.1 * cad[0]
-    assert prior_rows(robot, cad, 0.1) == pytest.approx(1 / std**2)
-    assert prior_rows(robot, cad, 0.2) == pytest.approx(0.25 / std**2)
+
+
+@pytest.mark.parametrize("factor", [1.1, 1e4])
+def test_a_placeholder_is_worth_what_the_fit_says(
+    robot: Robot, base: BaseParameters, factor: float
+) -> None:
+    """Masses a ten-thousandth of the true ones: the prior becomes as wide as they are off."""
+    cad = standard_parameters(robot)
+    prior = inertial_prior(robot, cad, 0.3)
+    truth = base.mapping @ (factor * cad)
+    wide = prior.widened(base, truth)
+    if factor < 2:
+        assert wide is prior
+        return
+    whiten, target = wide.on_base(base)
+    assert np.median(np.abs(whiten @ truth - target)) == pytest.approx(0.6745)
+    off = truth.copy()
+    off[0] += 1e9  # what one parameter takes up says nothing of the others
+    assert np.median(prior.widened(base, off).std / wide.std) == pytest.approx(1.0, rel=0.5)
+
+
+def test_what_the_urdf_is_worth(robot: Robot) -> None:
+    cad = standard_parameters(robot)
+
+    def share(inertias: Literal["auto", "free", "cad"], weighed: bool = False) -> float | None:
+        spec = IdentificationSpec(inertias=inertias, uncertainty=0.07)
+        prior = prior_of(spec, robot, weighed)
+        return None if prior is None else float(prior.std[0] / cad[0])
+
+    assert share("auto") == pytest.approx(0.3)
+    assert share("free") == pytest.approx(1.0)
+    assert share("cad") == share("cad", weighed=True) == pytest.approx(0.07)
+    assert share("auto", weighed=True) is None
+    assert inertial_prior(robot, cad, 1.0).known
+    assert not inertial_prior(robot, np.zeros(len(cad)), 1.0).known
