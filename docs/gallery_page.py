@@ -14,7 +14,7 @@ from excite_cli.summary.diagnosis import absorbed_parts, unexplained_in_words
 from excite_cli.summary.error_by_joint import error_tables
 from excite_cli.summary.error_path import path_parts
 from excite_cli.summary.friction_lines import friction_table
-from excite_cli.summary.named_effects import approximation_table, effect_parts
+from excite_cli.summary.named_effects import approximation_parts, effect_parts
 
 HEAD = "---\nhide: [toc]\n---\n\n<!-- Made by `python -m docs.make_gallery`; edit nothing here. -->"
 # Figures of the first answer, and of the others; torque in time has one for each sealed run.
@@ -111,7 +111,7 @@ def _residual(first: Diagnosed) -> list[str]:
 def _names(first: Diagnosed) -> list[str]:
     found = first.found
     parts: list[Part] = [*(effect_parts(found, False) if found.named else ["No effect is named."])]
-    parts += [approximation_table(found)] if found.approximations else []
+    parts += approximation_parts(found, verbose=False)
     parts += [friction_table(found.friction_lines)] if found.friction_lines else []
     tables = [part for part in parts if isinstance(part, Table)]
     small = [part for part in parts if isinstance(part, str) and "cannot be told" not in part]

@@ -83,7 +83,8 @@ def _missing(found: Diagnosis) -> str:
         for each in found.named
         if _weighed(each)
     ]
-    others = [each for each in found.named if not _rubs(each) and not _weighed(each)]
+    doubtful = (SealedVerdict.NOT_CONFIRMED, SealedVerdict.HARMFUL, SealedVerdict.WEIGHED)
+    others = [each for each in found.named if not _rubs(each) and each.verdict not in doubtful]
     fall = found.fall if found.fall > 0.0 else float("inf")
     worth = [each for each in others if each.takes_off >= _WORTH_SAYING * fall]
     worth.sort(key=lambda each: -each.takes_off)

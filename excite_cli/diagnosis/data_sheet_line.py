@@ -9,14 +9,20 @@ sheets and other fits call f_v and f_c is the line
 linear in θ, so its standard deviations follow from the covariance of θ.
 """
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
 import numpy as np
 
+from excite_cli.diagnosis.before_after import Played
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.records import FrictionLine
+from excite_cli.diagnosis.sealed_verdict import worth_of_friction
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import straight_friction
 from excite_cli.effects.parameter import Value, deviation
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import effect_columns
 from excite_cli.robot.model import Array
 
@@ -33,6 +39,33 @@ def data_sheet_lines(
     """
     lines = (_line(j, model, traced, parameters, covariance) for j in range(model.robot.n))
     return tuple(line for line in lines if line is not None)
+
+
+def with_worth(
+    lines: Sequence[FrictionLine],
+    held: Played,
+    traced: Traced,
+    after: IdentifiedModel,
+    taken_off: Mapping[int, Array],
+) -> tuple[FrictionLine, ...]:
+    """The lines with what all friction of each joint is worth on held-out data.
+
+    `taken_off`: what each effect takes off the joints' errors.
+    """
+    names, found = traced.model.robot.joint_names, []
+    for line in lines:
+        own, worth = worth_of_friction(held, traced.model, traced, after, names.index(line.joint))
+        told = replace(line, kinds=tuple(traced.candidates[i].effect.kind for i in own))
+        if worth is not None:
+            parts = np.sum([taken_off[i] for i in own], axis=0)
+            told = replace(
+                told,
+                verdict=worth.verdict,
+                removes=worth.removes,
+                parts=dict(zip(names, map(float, parts), strict=True)),
+            )
+        found.append(told)
+    return tuple(found)
 
 
 def _line(

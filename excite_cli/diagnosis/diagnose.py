@@ -12,7 +12,7 @@ from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import joint_aliases, other_name
 from excite_cli.diagnosis.before_after import Played, both_models, on_sealed, refitted
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.data_sheet_line import data_sheet_lines
+from excite_cli.diagnosis.data_sheet_line import data_sheet_lines, with_worth
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
@@ -180,6 +180,7 @@ def diagnose(
         spec.diagnosis.carrying_links,
     )
     rank = base.rank
+    lines = data_sheet_lines(model, traced, parameters, covariance)
     base_std = np.where(final.seen, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)[:rank]
     assumed = assumptions(traced.effects, parts, model)
     return Diagnosis(
@@ -233,7 +234,7 @@ def diagnose(
         inertia_names=standard_parameter_names(robot),
         path=_path(traced, candidates, errors, worth),
         inertia_parts=_by_joint(robot, taken_off[INERTIAS]) if from_urdf else {},
-        friction_lines=data_sheet_lines(model, traced, parameters, covariance),
+        friction_lines=with_worth(lines, held, traced, models[1], taken_off),
     )
 
 

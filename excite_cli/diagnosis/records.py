@@ -127,13 +127,19 @@ class FrictionLine:
     """Viscous and Coulomb friction of a joint as data sheets give it.
 
     The straight line f_v v + f_c sgn v nearest to all friction of the joint over the speeds in the
-    training data; `curved` where that is more than the two terms themselves.
+    training data; `curved` where that is more than the two terms themselves. `kinds` are those that
+    were found on this joint alone; where these are several, `verdict`, `removes` and `parts` are of
+    all of them together, as of a `NamedEffect`.
     """
 
     joint: str
     viscous: Value
     coulomb: Value
     curved: bool
+    kinds: tuple[str, ...] = ()
+    verdict: SealedVerdict | None = None
+    removes: dict[str, Removed] = field(default_factory=dict)
+    parts: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ it up and predict as well. Nothing is chosen or fitted by this.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,29 +52,62 @@ def worth_on_sealed(
     `sizes` over two standard deviations: what may be zero is not confirmed.
     """
     with_all = played.predictions(after)
-    errors = played.errors(with_all)
     found = {}
     for i in traced.chosen:
         rest = traced.judge.without(i, traced.chosen)
         without = played.predictions(refitted(model, traced, rest))
-        errors_without = played.errors(without)
-        removed = removed_in_draws(played.runs, without, with_all)
-        lower = errors_without.mean_relative - errors.mean_relative
-        verdict = sealed_verdict(removed, lower)
         joints = traced.candidates[i].effect.joints
-        on = [model.robot.joint_names[j] for j in joints]
-        rises = rises_on_one(on, errors_without, errors)
-        if verdict is SealedVerdict.CONFIRMED and len(joints) > 1:
-            gains = [errors_without.relative[name] - errors.relative[name] for name in on]
-            best = joints[int(np.argmax(np.nan_to_num(gains)))]
-            others = removed_in_draws(played.runs, without, with_all, beside=best)
-            verdict = sealed_verdict(others, lower)
+        worth, rises = _worth(played, without, with_all, joints)
+        verdict = worth.verdict
         if traced.judge.told_by_weight(i, rest) and not rises:
             verdict = SealedVerdict.WEIGHED
-        elif verdict is SealedVerdict.CONFIRMED and (rises or sizes[i] < 1.0):
+        elif verdict is SealedVerdict.CONFIRMED and sizes[i] < 1.0:
             verdict = SealedVerdict.NOT_CONFIRMED
-        found[i] = Worth(verdict, _removes(errors_without, errors))
+        found[i] = replace(worth, verdict=verdict)
     return found
+
+
+def worth_of_friction(
+    played: Played, model: Model, traced: Traced, after: IdentifiedModel, joint: int
+) -> tuple[tuple[int, ...], Worth | None]:
+    """The chosen candidates that are friction of one joint alone, and their worth together.
+
+    None of less than two: that of one is known.
+    """
+    own = tuple(
+        i
+        for i in traced.chosen
+        if (effect := traced.candidates[i].effect).friction
+        and effect.joints == (joint,)
+        and not (effect.runs or effect.is_change)
+    )
+    if len(own) < 2:
+        return own, None
+    rest = [i for i in traced.chosen if i not in own]
+    without = played.predictions(refitted(model, traced, rest))
+    return own, _worth(played, without, played.predictions(after), (joint,))[0]
+
+
+def _worth(
+    played: Played,
+    without: Sequence[Prediction],
+    with_it: Sequence[Prediction],
+    joints: Sequence[int],
+) -> tuple[Worth, bool]:
+    """What acts on some joints, by predictions; and whether the error of one of these rises."""
+    errors_without, errors = played.errors(without), played.errors(with_it)
+    lower = errors_without.mean_relative - errors.mean_relative
+    verdict = sealed_verdict(removed_in_draws(played.runs, without, with_it), lower)
+    on = [played.robot.joint_names[j] for j in joints]
+    rises = rises_on_one(on, errors_without, errors)
+    if verdict is SealedVerdict.CONFIRMED and len(joints) > 1:
+        gains = [errors_without.relative[name] - errors.relative[name] for name in on]
+        best = joints[int(np.argmax(np.nan_to_num(gains)))]
+        others = removed_in_draws(played.runs, without, with_it, beside=best)
+        verdict = sealed_verdict(others, lower)
+    if verdict is SealedVerdict.CONFIRMED and rises:
+        verdict = SealedVerdict.NOT_CONFIRMED
+    return Worth(verdict, _removes(errors_without, errors)), rises
 
 
 def rises_on_one(joints: Sequence[str], without: Errors, with_it: Errors) -> bool:

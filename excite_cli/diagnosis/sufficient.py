@@ -2,9 +2,9 @@
 
 What the search named leaves one by one, the weakest first, as long as its size cannot be, or is too
 small to matter, or the model with it does not predict data left out better (`comparison`); but not
-what leaves others, which are needed, with sizes that cannot be. The same is done with the
-textbook's. Of what remains of both the smaller is the answer, unless the larger predicts new
-recordings better; where the textbook as it is does, that or all that was found.
+what leaves others, which are needed, with sizes that cannot be. Of what remains and the textbook
+the smaller is the answer, unless the larger predicts new recordings better. Where that is the
+textbook, what is needed of it, and all that was found, are asked as well.
 """
 
 from collections.abc import Iterable, Sequence
@@ -34,11 +34,11 @@ def comparison_of(traced: Traced) -> Comparison:
 def sufficient(traced: Traced, models: Comparison) -> list[int]:
     """The candidates found that are needed, or the textbook's."""
     plain = textbook(traced.candidates, models)
-    whole = [list(traced.chosen), plain]
-    needed = (_needed(traced.judge, some, models) for some in whole)
-    best = _smallest(traced, needed, models)
-    with_plain = _smallest(traced, [best, plain], models)
-    return best if with_plain == best else _smallest(traced, [best, *whole], models)
+    found = list(traced.chosen)
+    kept = _needed(traced.judge, found, models)
+    if _smallest(traced, [kept, plain], models) == kept:
+        return kept
+    return _smallest(traced, [kept, _needed(traced.judge, plain, models), found, plain], models)
 
 
 def _smallest(traced: Traced, sets: Iterable[list[int]], models: Comparison) -> list[int]:

@@ -34,7 +34,7 @@ from excite_cli.summary.error_by_joint import error_tables
 from excite_cli.summary.error_path import path_parts
 from excite_cli.summary.friction_lines import friction_table
 from excite_cli.summary.named_effects import (
-    approximation_table,
+    approximation_parts,
     effect_parts,
     effect_table,
     other_names,
@@ -70,11 +70,10 @@ def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
     if verbose:
         parts.append(_data_in_words(found))
         parts += [_round_table(found, each) for each in found.rounds]
-    if found.named:
+    if found.effects:
         parts += effect_parts(found, verbose)
-    if found.approximations:
-        parts.append(approximation_table(found))
-    parts += [friction_table(found.friction_lines)] if _has_curves(found) else []
+    parts += approximation_parts(found, verbose)
+    parts += [friction_table(found.friction_lines)] if verbose and _has_curves(found) else []
     parts += changes_in_words(found)
     parts += [*absorbed_parts(found), *unexplained_in_words(found)]
     parts += [text for texts in rests_in_words(found) for text in texts]

@@ -17,6 +17,7 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.cells import points
+from excite_cli.summary.friction_lines import friction_rows
 
 _SIZE = "size ± std"
 
@@ -24,10 +25,12 @@ _SIZE = "size ± std"
 def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
     """The named effects, small ones in one line, and what each cannot be told from."""
     everything = len(found.joint_names)
-    shown, small = by_worth(found.named, found)
+    curves, own = ([], set()) if verbose else friction_rows(found)
+    named = [each for each in found.named if not _is_part(each, own)]
+    shown, small = by_worth([*curves, *named], found)
     if verbose or len(small) < 2:  # a line about one is no shorter than the one
         shown, small = [*shown, *small], []
-    parts: Parts = [effect_table(shown, everything, verbose)]
+    parts: Parts = [effect_table(shown, everything, verbose)] if shown else []
     if small:
         listed = ", ".join(
             what_and_where(each.effect, everything)
@@ -39,8 +42,19 @@ def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
             "(--verbose: sizes)"
         )
     parts += weighed_in_words(found)
-    parts += [text for named in found.named for text in other_names(named, everything)]
-    return [*parts, *(_joint_alias(each, everything) for each in found.joint_aliases)]
+    parts += [text for each in named for text in other_names(each, everything)]
+    told = (
+        each
+        for each in found.joint_aliases
+        if not own & {(one.kind, joint) for one in each.named for joint in one.joints}
+    )
+    return [*parts, *(_joint_alias(each, everything) for each in told)]
+
+
+def _is_part(named: NamedEffect, own: set[tuple[str, str]]) -> bool:
+    """Whether it is a part of some joint's friction; `own`: kinds and joints of these."""
+    record = named.effect
+    return not record.runs and len(record.joints) == 1 and (record.kind, record.joints[0]) in own
 
 
 def effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -> Table:
@@ -91,18 +105,27 @@ def what_and_where(record: EffectRecord, everything: int) -> str:
     return f"{record.kind} on {place_in_words(record, everything)}"
 
 
-def approximation_table(found: Diagnosis) -> Table:
-    """Effects that lower the error but only come near what is there, and what that may be."""
+def approximation_parts(found: Diagnosis, verbose: bool) -> Parts:
+    """Effects that lower the error but only come near what is there, and what that may be.
+
+    Not those of friction that is told as one.
+    """
+    own = set() if verbose else friction_rows(found)[1]
+    shown = [each for each in found.approximations if not _is_part(each, own)]
+    return [_approximation_table(shown, len(found.joint_names))] if shown else []
+
+
+def _approximation_table(shown: Sequence[NamedEffect], everything: int) -> Table:
     rows = tuple(
         (
             each.effect.kind,
-            place_in_words(each.effect, len(found.joint_names)),
+            place_in_words(each.effect, everything),
             "\n".join(value_in_words(name, value) for name, value in each.parameters.items()),
             points(each.takes_off),
             sealed_in_words(each),
             approximation_in_words(each.approximates) if each.approximates else "",
         )
-        for each in found.approximations
+        for each in shown
     )
     return Table(
         "Approximations: they come near something else that is there",

@@ -27,7 +27,7 @@ SPEC = parse_spec(
 ARM = Path(__file__).resolve().parents[2] / "data" / "smoke_arm.urdf"
 BIASED = [
     {"position": "none", "parallel": "none"},
-    {"position": 0.8},
+    {"position": 0.6},
     {"position": 1.0, "parallel": 20.0},
 ]
 SOUND = [
