@@ -90,6 +90,7 @@ campaigns: $(STAMP)      ## runs that differ, short moves, faulty packets; many 
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.runs
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.orders
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.noises
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.coverage --seed 2
 
 # Development and CI use the pinned versions of requirements/ci.txt, checked by their hashes; the
 # program alone takes what pyproject.toml allows, as it does in an environment of a user's own.
