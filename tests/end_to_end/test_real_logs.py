@@ -89,10 +89,16 @@ class TestTx40:
         assert rows[0][1:3] == tuple(percent(e["mean_relative_moving"]) for e in (before, after))
         told = re.findall(r"^\| (\w+) \| ([\w, ]+) \| ", text, re.MULTILINE)
         small = re.findall(r"(\w+) on (joint_\d|all joints)", text)
+        lines = answer["friction_lines"]
+        rubbing = {
+            (kind, line["joint"]) for line in lines if line["verdict"] for kind in line["kinds"]
+        }
+        assert rubbing
         for effect in answer["effects"]:
             every = len(effect["joints"]) == len(after["relative_moving"])
             where = "all joints" if every else ", ".join(effect["joints"])
-            assert (effect["kind"], where) in {*told, *small}
+            kind = "friction" if (effect["kind"], where) in rubbing else effect["kind"]
+            assert (kind, where) in {*told, *small}
         for finding in answer["findings"]:
             assert escaped(f"{finding['severity']}: {finding['text']}") in text
         assert len(list(page.parent.glob("tx40-1-*.png"))) == text.count("](tx40-1-") == 5
