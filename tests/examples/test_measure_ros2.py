@@ -132,7 +132,10 @@ def test_a_signal_cancels_the_motion(start: Start, tmp_path: Path) -> None:
     time.sleep(0.5)
     process.terminate()
     process.send_signal(signal.SIGINT)  # Ctrl-C reaches the command and what started it
-    assert "stopped by SIG" in refusal(process)
+    _, stderr = process.communicate(timeout=60)
+    # On a busy machine the second may come when Python has put its own handlers back to end.
+    assert process.returncode in (1, -signal.SIGINT)
+    assert "stopped by SIG" in stderr
     assert saw.read_text().splitlines()[-1] == "cancelled True"
 
 
