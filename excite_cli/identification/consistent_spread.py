@@ -1,14 +1,14 @@
 """How near the URDF the consistent set stays: as near as the data let it.
 
-With free inertias the prior about the URDF is as wide as its values, so that it decides nothing
+Where nobody says what the URDF is worth, the prior about it is so wide that it decides nothing
 that the data show. What they hardly show is then left to the noise and to the errors of the model,
 which pull weak directions far away. So the prior is narrowed as long as the misfit of the data
 stays what it was:
 
     ‖R x − z‖² ≤ ‖R x₁ − z‖² + 9
 
-R, z are in units of noise that respects serial correlation, so that the fit is worse by no more
-than three standard deviations; x₁ is the fit with the prior as it was given. First all deviations
+R, z are in units of each joint's noise, so that the fit is worse by no more than three standard
+deviations of independent noise; x₁ is the fit with the prior as it was given. First all deviations
 are multiplied by s, in steps; the misfit only grows as s falls, hence the first step that is too
 much ends this. Then links that still differ much are held one by one, the farthest first, wholly
 or, where the data do not let that be, in their mass.

@@ -2,9 +2,10 @@
 
 With x̂ − x = B Σ_t c_tᵀ e_t/σ², B = (CᵀC/σ²)⁻¹, the covariance is B S B with S = Cᵀ Ω C. Ω follows
 from an autoregressive model per joint and run, and from the correlation of its innovations between
-joints. Residuals are smaller than the noise, for the fit has eaten some of it; per joint
-E‖e‖² = tr Ω − tr(H Ω), and Ω is enlarged accordingly. What is naive, σ²B, takes 1,200 samples for
-1,200 pieces of information; with such noise they carry the information of some 150.
+joints, in noise that was there before the first sample. Where the periodogram of a residual has
+more power than that model (a hum, which it does not resolve), less what the fit has eaten of it, Ω
+has that power. What is naive, σ²B, takes 1,200 samples for 1,200 pieces of information; with such
+noise they carry the information of some 150.
 """
 
 from collections.abc import Sequence
@@ -23,6 +24,8 @@ from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 
 MOST_ENLARGED = 4.0
+# Frequencies on either side, half a cycle of the run apart, over which a periodogram is averaged: 3
+# to 20 cover alike. Times the power that the model expects: it has its own at least.
 _NEIGHBOURS, _LEAST = 12, 1.0
 _STRETCH = 4096  # samples; what is farther apart is independent
 _UNSTABLE = 1.0 - 1e-9

@@ -20,9 +20,9 @@ from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.robot.model import Array, Robot
 
-# Floors: of m in shares of the mean mass, of the others in shares of m ℓ and m ℓ².
 Fit = TypeVar("Fit")
 
+# Floors: of m in shares of the mean mass, of the others in shares of m ℓ and m ℓ².
 _MASS_SHARE, _MOMENT_FLOOR, _INERTIA_FLOOR = 0.1, 0.2, 0.1
 _MEDIAN = 0.6745  # of |z|, z normal
 _AS_USUAL, _WIDENINGS = 1.05, 8

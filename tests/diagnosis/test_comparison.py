@@ -143,3 +143,12 @@ def test_what_acts_on_two_joints_must_predict_both_better(second: float, better:
     given = traced(data, candidates, [0])
     assert models_of(given).difference([], [0]).better
     assert models_of(given).needed([0])[0].better is better
+
+
+def test_one_recording_asks_for_more() -> None:
+    """What is left out of it is a part of the same motion."""
+    given = traced_of([(effect("viscous_friction"), 1.0)])
+    run = RunId("only")
+    alone = replace(given.data, runs=tuple(replace(r, run=run) for r in given.data.runs))
+    several = models_of(given).difference([], [0]).confidence
+    assert models_of(replace(given, data=alone)).difference([], [0]).confidence > several

@@ -4,6 +4,7 @@ Columns are made up: only the traits of a kind and the energy that it explains m
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from excite_cli.diagnosis.tracing import _usual
 from excite_cli.effects.base import Effect, Signals, Tier
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.left_out import LeftOut
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import anything, effect
 from tests.diagnosis.test_judgement import TOTAL, on_joint_0, planted
@@ -226,6 +228,23 @@ def test_peaks_of_friction_below_the_speeds_that_count_are_not_looked_for(
     assert len(speeds) == left
     assert all(speed >= slowest for speed in speeds)
     assert len(found) == left + 1
+
+
+def test_what_changes_with_time_needs_three_recordings() -> None:
+    """Or somebody who asks for it by name."""
+    robot = random_robot(4, joints=1, branches=False, prismatic=False)
+    run = signals_of(robot, 300)
+
+    def drifts(count: int, spec: DiagnosisSpec) -> bool:
+        names = [f"run_{k}" for k in range(count)]
+        runs = [replace(run, run=RunId(name)) for name in names]
+        seen = SeenRuns(robot, runs, [each.load for each in runs], names)
+        return any(e.kind == "friction_drift" for e, _ in possible_effects(spec, (), seen, {}))
+
+    every = DiagnosisSpec(exclude=("friction_change",))  # which asks when runs were recorded
+    assert not drifts(2, every)
+    assert drifts(3, every)
+    assert drifts(2, DiagnosisSpec(kinds=("friction_drift",)))
 
 
 def test_a_touch_of_a_moment_is_none() -> None:
