@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.config.data_spec import DiagnosisSpec
+from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.in_runs import SeenRuns, changes, effects_of_runs
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.diagnosis.run_sets import sets_looked_at
@@ -25,9 +26,6 @@ from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 
 _TOGETHER = 16  # effects that are filtered at once
-# Recordings that show a change with time. Left of the KR300's split C with a drift of two 6.3 %,
-# without 5.5, of A 6.1 and 5.5, of B 5.8 and 5.4.
-_FEWEST_RUNS = 3
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ def possible_effects(
     names = list(catalogue()) if spec.kinds == "all" else list(spec.kinds)
     if not seen.covariates:
         names = [name for name in names if not catalogue()[name].follows_covariate]
-    if spec.kinds == "all" and len(seen.trained) < _FEWEST_RUNS:
+    if spec.kinds == "all" and len(seen.trained) < rules.RUNS_OF_A_DRIFT:
         names = [name for name in names if "time" not in catalogue()[name].function_of]
     if not seen.robot.base_joints:
         names = [name for name in names if catalogue()[name].scope != "base"]

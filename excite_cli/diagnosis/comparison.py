@@ -1,8 +1,8 @@
-"""The one comparison: does a model predict data left out better than another?
+"""The one comparison: would a model predict a new recording better than another?
 
-The training data are cut into blocks b of a second (`blocks`), and each is predicted by models
-fitted without it: to the other blocks of all runs, or, where a new recording is to be predicted and
-there are three or more, to the other runs alone. With E_jb the energy that is left on joint j,
+The training data are cut into blocks b of a second, and each is predicted by models fitted without
+it: to the other runs alone, if there are three or more, and else to the blocks in which the joint
+is elsewhere, without one quarter of its travel each. With E_jb the energy that is left on joint j,
 
     d_b = Σ_j log((E_jb(S) + ε_j) / (E_jb(S') + ε_j)),    D = Σ_b d_b,    s² = B · var(d_b):
 
@@ -14,7 +14,7 @@ average block. S' is better where D > t s, t of Student's distribution with B �
 at the one confidence, which is higher for one recording alone.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -22,26 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.blocks import Blocks
-from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.training import Columns, TrainingData
 from excite_cli.robot.model import Array
 
-# One-sided. With 0.5 friction by load of 0.1 % that nobody had put in stayed in a simulated arm's
-# model; with 0.9 logs of real robots were predicted worse (left on held-out data: KR300 split C 6.2
-# for 5.7 %, split A 6.1 for 5.0, TX40 8.2 for 7.8, UR10 6.6 for 6.5).
-CONFIDENCE = 0.6
-# The same of one recording, of which what is left out is a part of the same motion. With 0.6, 0.8
-# and 0.9: three robots of the battery 1.05, 0.76, 0.76 times the textbook, 1.69, 1.06, 1.07 and
-# 1.04, 1.13, 1.14; 35 others (geometric mean) 0.648 and 0.644; TX40 8.1, 8.1, 9.0 %, UR10 6.4, 6.5,
-# 6.4, Med 7 26, 24, 24.
-OF_ONE_RECORDING = 0.8
 _LEAST = 0.05  # of what is left of an average block
 # Fitted to one run alone the other is hardly predicted, the more so by a larger model: the KR300's
 # split A was given the textbook, 6.2 %, for 5.4 %.
 _FEWEST_RUNS = 3
 SECONDS = 1.0  # of a block: beyond the memory of what is left, of real arms 0.1 to 0.5 s
 _MOST = 96  # blocks: of an hour-long log they are longer
+_PARTS = 4  # of a joint's travel
 _GROUPS = 8  # of blocks that are left out together
 
 
@@ -53,7 +45,7 @@ class Difference:
     error: float
     blocks: int
     joints: int
-    confidence: float = CONFIDENCE
+    confidence: float = 0.5
 
     @property
     def better(self) -> bool:
@@ -65,17 +57,9 @@ class Difference:
         """Logarithm of the ratio of RMS errors, mean over joints and blocks."""
         return self.size / (2 * self.blocks * self.joints)
 
-    @property
-    def clearness(self) -> float:
-        """Size over error."""
-        return self.size / max(self.error, 1e-300)
-
 
 class Comparison:
-    """Compares models of some candidates: on the filtered torque, and on the whitened one.
-
-    An effect near the noise shows in the whitened torque only; so the clearer of both counts.
-    """
+    """Compares models of some candidates on the filtered torque."""
 
     def __init__(
         self,
@@ -83,55 +67,32 @@ class Comparison:
         candidates: Sequence[Columns],
         members: Collection[int],
         levels: Array,
-        noise: NoiseModel,
     ) -> None:
         """Of models of the `members` of the candidates; `levels` (n,) [N·m] weigh the joints."""
-        given = data, candidates, members
-        plain, white = _seconds(*given, NoiseModel.white(levels)), _seconds(*given, noise)
-        self._rows = {i: candidates[i].rows for i in members}
-        self._in_turn = [each.in_turn(data.prior) for each in (plain, white)]
-        self._new = plain.new(data.prior)
-        self._confidence = OF_ONE_RECORDING if plain.recordings < 2 else CONFIDENCE
+        seconds = _seconds(data, candidates, members, levels)
+        self._new, self._same = seconds.left_out(), seconds.in_turn()
+        self._confidence = rules.OF_ONE_RECORDING if seconds.recordings < 2 else rules.CONFIDENCE
 
     def difference(self, one: Sequence[int], other: Sequence[int]) -> Difference:
-        """How much better `other` predicts than `one`."""
-        found = [
-            self._difference(each.energies(one), each.energies(other)) for each in self._in_turn
-        ]
-        return max(found, key=lambda each: each.clearness)
-
-    def needed(self, chosen: Sequence[int]) -> dict[int, Difference]:
-        """How much better the chosen ones predict than without one, of each of them.
-
-        Of what acts on several joints, on those but the one that gains most: an effect of one joint
-        that has no name yet passes for a tilt of the base, or for friction of two joints.
-        """
-        found: dict[int, Difference] = {}
-        for each in self._in_turn:
-            after = each.energies(chosen)
-            for i, before in each.without_each(chosen).items():
-                own = self._difference(before, after)
-                rows = self._rows[i]
-                if len(rows) > 1:
-                    others = self._difference(*_without_the_best(before, after, rows))
-                    own = min(own, others, key=lambda each: each.clearness)
-                if i not in found or own.clearness > found[i].clearness:
-                    found[i] = own
-        return found
-
-    def as_new(self, one: Sequence[int], other: Sequence[int]) -> Difference:
-        """How much better `other` predicts the filtered torque of new recordings."""
-        return self._difference(*map(self._new.energies, (one, other)))
-
-    def _difference(self, before: Array, after: Array) -> Difference:
+        """How much better `other` predicts new recordings than `one`."""
+        before, after = (
+            np.concatenate([blocks.energies(some, joints) for joints, blocks in self._new])
+            for some in (one, other)
+        )
         return replace(_difference(before, after), confidence=self._confidence)
 
+    def missed(self, chosen: Sequence[int], rest: Sequence[int], rows: Sequence[int]) -> bool:
+        """Whether seconds left out of the same recordings surely miss what `rest` lacks.
 
-def _without_the_best(before: Array, after: Array, rows: Sequence[int]) -> tuple[Array, Array]:
-    """Of these joints without the one that gains most."""
-    gains = [_difference(before[[j]], after[[j]]).size for j in rows]
-    others = [j for j in rows if j != rows[int(np.argmax(gains))]]
-    return before[others], after[others]
+        Of what acts on several joints (`rows`), on those but the one that gains most: an effect of
+        one joint that has no name yet passes for a tilt of the base, or for friction of two joints.
+        """
+        before, after = map(self._same.energies, (rest, chosen))
+        if len(rows) > 1:
+            gains = [_difference(before[[j]], after[[j]]).size for j in rows]
+            others = [j for j in rows if j != rows[int(np.argmax(gains))]]
+            before, after = before[others], after[others]
+        return replace(_difference(before, after), confidence=rules.OF_A_NAME).better
 
 
 def _difference(before: Array, after: Array) -> Difference:
@@ -142,58 +103,49 @@ def _difference(before: Array, after: Array) -> Difference:
     return Difference(float(gained.sum()), error, blocks, joints)
 
 
+_Columns = Callable[[Sequence[int]], NDArray[np.intp]]
+_Given = tuple[
+    list[NDArray[np.intp]], list[Array], Array, _Columns, Callable[[int], NDArray[np.intp]]
+]
+
+
 @dataclass(frozen=True)
 class _Seconds:
-    """Gram matrices of every joint in blocks of a second, rows whitened, columns as they are.
+    """Gram matrices of every joint in blocks of a second, rows weighted, columns normalised.
 
-    `active[j]` (A_j,) of the columns of all, the torque last; `fixed` of them are the declared
-    model's and `own` each member's. `folds` (B,): runs, or groups of parts of one.
+    `given`: columns of the joints, these matrices, their sum with what is known without the data,
+    the columns of models and of members (`Blocks`). `folds` (B,): runs, or groups of parts of one.
+    `places` (B, n): where the joints are.
     """
 
-    active: list[NDArray[np.intp]]
-    grams: list[Array]
-    fixed: int
-    own: dict[int, NDArray[np.intp]]
+    given: _Given
     folds: NDArray[np.intp]
+    places: Array
     recordings: int
 
-    def in_turn(self, prior: Array | None) -> Blocks:
+    def in_turn(self) -> Blocks:
         """Fitted to the other blocks of all runs: what one run carries is known from these."""
         count = len(self.folds)
-        return self._left_out(prior, np.arange(count) % min(_GROUPS, max(count // 2, 2)))
+        return Blocks(*self.given, np.arange(count) % min(_GROUPS, max(count // 2, 2)))
 
-    def new(self, prior: Array | None) -> Blocks:
-        """Fitted to the other runs, as a new recording would be predicted, if there are enough."""
-        enough = self.recordings >= _FEWEST_RUNS
-        return self._left_out(prior, self.folds) if enough else self.in_turn(prior)
+    def left_out(self) -> list[tuple[list[int], Blocks]]:
+        """As a new recording would be predicted: some joints, and blocks to be left out of theirs.
 
-    def _left_out(self, prior: Array | None, groups: NDArray[np.intp]) -> Blocks:
-        size = int(self.active[0][-1])
-        total = np.zeros((size + 1, size + 1))
-        if prior is not None:
-            known = np.append(np.arange(self.fixed), size)
-            total[np.ix_(known, known)] += prior
-        for at, gram in zip(self.active, self.grams, strict=True):
-            total[np.ix_(at, at)] += gram.sum(axis=0)
-        norms = np.sqrt(np.diag(total))
-        norms[norms < 1e-100] = 1.0
-        norms[-1] = 1.0
-        grams = [
-            gram / np.outer(norms[at], norms[at])
-            for at, gram in zip(self.active, self.grams, strict=True)
-        ]
-        total /= np.outer(norms, norms)
-        return Blocks(self.active, grams, total, self._columns, self.own.__getitem__, groups)
-
-    def _columns(self, some: Sequence[int]) -> NDArray[np.intp]:
-        found = [np.arange(self.fixed), *(self.own[i] for i in some)]
-        return np.concatenate(found).astype(np.intp)
+        Whole runs if there are enough, else those in which a joint is in one part of its travel.
+        """
+        joints = list(range(self.places.shape[1]))
+        if self.recordings >= _FEWEST_RUNS:
+            return [(joints, Blocks(*self.given, self.folds))]
+        parts = min(_PARTS, len(self.folds))
+        ranks = self.places.argsort(axis=0).argsort(axis=0)
+        groups = ranks * parts // len(self.folds)
+        return [([j], Blocks(*self.given, groups[:, j])) for j in joints]
 
 
 def _seconds(
-    data: TrainingData, candidates: Sequence[Columns], members: Collection[int], noise: NoiseModel
+    data: TrainingData, candidates: Sequence[Columns], members: Collection[int], levels: Array
 ) -> _Seconds:
-    """Of models of the `members` of the candidates, rows whitened by `noise`."""
+    """Of models of the `members` of the candidates, rows of a joint over its level."""
     order = sorted(members)
     chosen = [candidates[i] for i in order]
     fixed = data.declared[0].shape[2]
@@ -205,14 +157,31 @@ def _seconds(
         rows = data.rows_of(chosen, joint)
         of_joint = np.zeros((len(folds), len(rows.active) + 1, len(rows.active) + 1))
         for blocks, usable, block in zip(rows.blocks, rows.usable, owner, strict=True):
-            white = noise.whitened(np.concatenate(blocks, axis=1), joint, usable)
+            weighted = np.concatenate(blocks, axis=1)[usable] / levels[joint]
             for b in np.unique(block[usable]):
-                part = white[block[usable] == b]
+                part = weighted[block[usable] == b]
                 of_joint[b] += part.T @ part
         active.append(np.append(rows.active, int(ends[-1])))
         grams.append(of_joint)
+    total = np.zeros((ends[-1] + 1, ends[-1] + 1))
+    if data.prior is not None:
+        known = np.append(np.arange(fixed), ends[-1])
+        total[np.ix_(known, known)] += data.prior
+    for at, gram in zip(active, grams, strict=True):
+        total[np.ix_(at, at)] += gram.sum(axis=0)
+    norms = np.sqrt(np.diag(total))
+    norms[norms < 1e-100] = 1.0
+    norms[-1] = 1.0
+    for at, gram in zip(active, grams, strict=True):
+        gram /= np.outer(norms[at], norms[at])
+    total /= np.outer(norms, norms)
+
+    def columns(some: Sequence[int]) -> NDArray[np.intp]:
+        return np.concatenate([np.arange(fixed), *(own[i] for i in some)]).astype(np.intp)
+
+    given = active, grams, total, columns, own.__getitem__
     recordings = len({part.run.name for part in data.runs})
-    return _Seconds(active, grams, fixed, own, folds, recordings)
+    return _Seconds(given, folds, _places(data, owner, len(folds)), recordings)
 
 
 def _cut(data: TrainingData) -> tuple[list[NDArray[np.intp]], NDArray[np.intp]]:
@@ -229,3 +198,12 @@ def _cut(data: TrainingData) -> tuple[list[NDArray[np.intp]], NDArray[np.intp]]:
         owner.append(len(folds) + own.astype(np.intp))
         folds += [fold] * count
     return owner, np.array(folds)
+
+
+def _places(data: TrainingData, owner: Sequence[NDArray[np.intp]], blocks: int) -> Array:
+    """Mean position (B, n) of every joint in every block."""
+    sums, counts = np.zeros((blocks, data.n)), np.zeros(blocks)
+    for run, block in zip(data.runs, owner, strict=True):
+        np.add.at(sums, block, run.averaged(run.q))
+        np.add.at(counts, block, 1.0)
+    return sums / np.maximum(counts, 1.0)[:, None]

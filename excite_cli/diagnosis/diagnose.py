@@ -12,11 +12,11 @@ from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import joint_aliases, other_name
 from excite_cli.diagnosis.before_after import Played, both_models, on_sealed, refitted
 from excite_cli.diagnosis.candidates import record_of
+from excite_cli.diagnosis.comparison import Comparison
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines, with_worth
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
-from excite_cli.diagnosis.elsewhere import needed_elsewhere
 from excite_cli.diagnosis.error_parts import error_parts
 from excite_cli.diagnosis.error_path import error_path
 from excite_cli.diagnosis.final_fit import final_fit, over_error, regression
@@ -139,7 +139,7 @@ def diagnose(
         kept = prepare_all(parts.sealed, processing)
     cut_short = _cut_short(over(), spec, time.monotonic() - started)
     progress("naming", 8)
-    traced, book = _needed(traced, bodies, spec)
+    traced, book, compared = _needed(traced, bodies, spec)
     del bodies
     model = traced.model
     final = final_fit(traced, regression(traced))
@@ -169,7 +169,14 @@ def diagnose(
     errors = sealed_errors(played, model, traced, models[1], begin, told[1], from_urdf)
     taken_off = error_parts(traced, errors)
     held = Played(robot, [*kept, *ends])
-    worth = worth_on_sealed(held, model, traced, models[1], over_error(traced, final))
+    worth = worth_on_sealed(
+        held,
+        model,
+        traced,
+        models[1],
+        over_error(traced, final),
+        compared.missed if compared else None,
+    )
     named, candidates, rivals = named_effects(
         model,
         traced,
@@ -311,17 +318,16 @@ def _traced(
 
 def _needed(
     traced: Traced, bodies: Sequence[ModelledRun], spec: Spec
-) -> tuple[Traced, list[int] | None]:
-    """What is needed of what was found, here or elsewhere, and the textbook's candidates.
+) -> tuple[Traced, list[int] | None, Comparison | None]:
+    """The answer of what was found, the textbook's candidates, and how models compare.
 
     Not where nothing is looked for, nor where something was weighed: then None.
     """
     if not spec.diagnosis.rounds or traced.model.is_weighed:
-        return traced, None
+        return traced, None, None
     models = comparison_of(traced)
-    chosen = sufficient(traced, models)
-    needed = replace(traced, chosen=(*chosen, *needed_elsewhere(traced, chosen)))
-    return at_its_own_torque(needed, bodies), textbook(traced.candidates, models)
+    needed = replace(traced, chosen=tuple(sufficient(traced, models)))
+    return at_its_own_torque(needed, bodies), textbook(traced.candidates, models), models
 
 
 def _cut_short(over: bool, spec: Spec, seconds: float) -> tuple[Finding, ...]:

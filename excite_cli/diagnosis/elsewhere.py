@@ -1,57 +1,108 @@
-"""What every robot has stays where it matters to other motions, if the data are sure of it.
+"""What every robot has stays in the model, unless the model says the same without it.
 
-Friction and the inertia of rotors leave a model where data left out do not miss them. Of a joint
-that crept these data miss nothing: a rotor of 2.9 ± 0.1 kg·m², next to nothing there, is 0.9 of all
-torque seen at the joint's range and speed. So what is beyond two standard deviations and
-a fiftieth of the torque along a usual motion is taken in again. Not so defects of the measurement,
-of which many robots have none: with offsets a UR10 of the battery was left with 14.8 % for 7.4.
+Friction and the inertia of rotors are in every robot. That data left out do not miss one of them
+says that these data cannot tell it: of a joint that crept a rotor of any size is next to nothing,
+and much along another motion. So all of them are fitted beside what was found. Each leaves only
+where the model without it, all others fitted anew, says the same along a usual motion:
+
+    u = max_j RMS_t(c_jᵀ d) (|θ| + 2 s) / RMS τ_j,    d = P e / (eᵀ P e),
+
+with P the covariance of all parameters, θ and s = √(eᵀ P e) size and deviation of this one (the
+unit vector e), and c_j the columns of joint j, is below a fiftieth; and, of what is surely there,
+also below a fifth of what the model leaves. Not so defects of the measurement, of which many robots
+have none: with offsets a UR10 of the battery was left with 14.8 % for 7.4.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.reach import torque_seen
 from excite_cli.diagnosis.search import weakest_apart
 from excite_cli.diagnosis.textbook import everyday
 from excite_cli.diagnosis.tracing import Traced
+from excite_cli.robot.model import Array
 
-_MATTERS = 0.02  # of the joint's torque
 _ITS_OWN = 1e-6  # of a column's energy: what the model leaves of less is rounding
 _DEVIATIONS = 2.0
 
 
-def needed_elsewhere(traced: Traced, chosen: Sequence[int]) -> list[int]:
-    """The textbook's candidates that are not chosen, are surely there and matter elsewhere.
+def with_everyday(traced: Traced, chosen: Sequence[int]) -> list[int]:
+    """The chosen ones with the friction and rotors of the textbook, those that do not matter away.
 
-    None that the chosen ones have among their columns, or exclude; none of an impossible size.
+    None that the chosen ones have among their columns, or exclude.
     """
     judge, candidates = traced.judge, traced.candidates
     taken = {candidates[i].place for i in chosen}
     taken |= {place for i in chosen for place in judge.excluded(i)}
     schur, white = judge.white.schur(chosen), judge.white
-    found = []
+    found = list(chosen)
     for i in everyday(candidates):
         (at,) = white.blocks[i]
         own = schur.diagonal[at - white.fixed] > _ITS_OWN * white.total[at, at]
         effect = candidates[i].effect
         if own and effect.place not in taken and not effect.data_defect:
             found.append(i)
-    torque = np.maximum(torque_seen(traced.data), 1e-12)
-    while found:
-        every = [*chosen, *found]
-        theta = judge.plain.solve(every)
-        last = np.eye(len(theta))[:, -len(found) :]
-        sd = np.sqrt(traced.inflation * np.diag(white.covariance(every, last)))
+    return those_that_matter(traced, found)
+
+
+def those_that_matter(traced: Traced, chosen: Sequence[int]) -> list[int]:
+    """Without those of the textbook's that surely do not matter, or whose size cannot be."""
+    judge, found = traced.judge, list(chosen)
+    elsewhere = _Elsewhere(traced, found)
+    common = set(everyday(traced.candidates))
+    while True:
+        theta, most = judge.plain.solve(found), elsewhere.most(found)
         leaving = {}
-        for i, size, own_sd in zip(found, np.abs(theta[-len(found) :]), sd, strict=True):
-            (joint,) = candidates[i].rows
-            most = size * np.sqrt(traced.usual.squares(candidates[i].effect).item())
-            sure, matters = size > _DEVIATIONS * own_sd, most > _MATTERS * torque[joint]
-            if not (sure and matters and judge.allowed(theta, every, [i])):
-                leaving[i] = float(size / max(own_sd, 1e-300))
+        for i in common.intersection(found):
+            of_torque, of_left = most[i]
+            there = judge.p_value(i, judge.white.gain_of(i, found)) <= judge.rules.significance
+            matters = of_torque > rules.MATTERS or (there and of_left > rules.OF_WHAT_IS_LEFT)
+            if not matters or not judge.allowed(theta, found, [i]):
+                leaving[i] = of_torque
         if not leaving:
-            break
-        gone = weakest_apart(leaving, lambda i: candidates[i].rows)
+            return found
+        gone = weakest_apart(leaving, lambda i: traced.candidates[i].rows)
         found = [i for i in found if i not in gone]
-    return found
+
+
+class _Elsewhere:
+    """What the model says along the usual motion: mean squares (n, K, K) of its columns."""
+
+    def __init__(self, traced: Traced, members: Sequence[int]) -> None:
+        self._traced, white = traced, traced.judge.white
+        effects = [traced.candidates[i].effect for i in members]
+        self._gram = traced.usual.gram(traced.model, effects)
+        self._place = {int(column): k for k, column in enumerate(white.columns(members))}
+        self._torque = np.maximum(torque_seen(traced.data), 1e-12)
+
+    def most(self, chosen: Sequence[int]) -> dict[int, tuple[float, float]]:
+        """By how much the model may say otherwise without each of the chosen ones.
+
+        A share of a joint's torque, and of what the model leaves of it.
+        """
+        traced, white = self._traced, self._traced.judge.white
+        theta = traced.judge.plain.solve(chosen)
+        covariance = traced.inflation * white.covariance(chosen)
+        at: NDArray[np.intp] = np.array([self._place[int(c)] for c in white.columns(chosen)])
+        gram, start, found = self._gram[:, at[:, None], at], white.fixed, {}
+        for i in chosen:
+            own = slice(start, start + traced.candidates[i].width)
+            start = own.stop
+            other = _otherwise(gram, covariance[:, own], covariance[own, own], theta[own])
+            found[i] = float((other / self._torque).max()), float((other / traced.levels).max())
+        return found
+
+
+def _otherwise(gram: Array, across: Array, own: Array, size: Array) -> Array:
+    """RMS (n,) [N·m] of what the model may say otherwise without parameters of this `size` (w,).
+
+    `across` (k, w) and `own` (w, w) are their parts of the covariance.
+    """
+    steps = np.linalg.solve(own.T, across.T).T
+    squares = steps.T @ gram @ steps
+    mean = np.sqrt(np.maximum(np.einsum("p,jpq,q->j", size, squares, size), 0.0))
+    spread = np.sqrt(np.maximum(np.einsum("jpq,qp->j", squares, own), 0.0))
+    return np.asarray(mean + _DEVIATIONS * spread)

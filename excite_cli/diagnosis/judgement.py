@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2
 
+from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.schur import Gain, Schur
@@ -22,13 +23,7 @@ from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.place import Place
 from excite_cli.robot.model import Array
 
-# It stays in beside its refinement unless it is useless there (χ² units).
-_PARENT_PRICE = 4.5
-# χ² that what acts on fewer rows must save beyond, where scales alone tell either: an offset of the
-# vertical force, or a gain of it, and one of the whole wrench differ by the noise.
-_ON_FEWER_ROWS = 25.0
 _KEPT = 4096  # verdicts that are kept: a step of the search asks for the last one's again
-_SMALLEST = 2e-3  # of the torque's RMS: what is smaller needs no name
 
 
 Spot = tuple[str, tuple[int, ...], tuple[str, ...]]  # kind, joints, runs
@@ -125,7 +120,7 @@ class Judgement:
         key = (max(dof, 1), c.tests)
         if key not in self._thresholds:
             self._thresholds[key] = float(chi2.isf(self.rules.significance / c.tests, key[0]))
-        surprise = c.effect.surprise + _ON_FEWER_ROWS * (candidate in self._on_fewer_rows)
+        surprise = c.effect.surprise + rules.ON_FEWER_ROWS * (candidate in self._on_fewer_rows)
         return self.rules.inflation * self._thresholds[key] + surprise
 
     @cached_property
@@ -143,7 +138,7 @@ class Judgement:
     def price_beside(self, candidate: int, refined: Collection[int], dof: int) -> float:
         """As `price`; first-order friction is cheap beside what refines it."""
         if candidate in refined:
-            return self.rules.inflation * _PARENT_PRICE
+            return self.rules.inflation * rules.PARENT_PRICE
         return self.price(candidate, dof)
 
     def prices(self, chosen: Sequence[int]) -> float:
@@ -238,7 +233,7 @@ class Judgement:
         """
         own = sorted({j for i in added for j in self.white.rows_of[i]})
         others = [j for j in range(len(self.plain.grams.joints)) if j not in own]
-        return all(self.size(chosen, added, joints) < _SMALLEST for joints in (own, others))
+        return all(self.size(chosen, added, joints) < rules.SMALLEST for joints in (own, others))
 
     def told_by_weight(self, candidate: int, others: Sequence[int]) -> bool:
         """Whether it is a gain that scales alone tell from the model with the others."""
@@ -251,7 +246,7 @@ class Judgement:
         own = self.plain.solve([*others, candidate])[-1] * self.plain.norms[column]
         rows = self.plain.rows_of[candidate]
         whole = sum(self.plain.grams.torque_energy(joint) for joint in rows)
-        return bool(abs(own) < _SMALLEST * np.sqrt(whole))
+        return bool(abs(own) < rules.SMALLEST * np.sqrt(whole))
 
     def verdict(self, chosen: Sequence[int], added: Sequence[int]) -> Verdict:
         """Accepted, or why `added` may not join the chosen ones."""
@@ -304,7 +299,7 @@ class Judgement:
             rows = list(self.white.rows_of[i])
             gain = max(self._gain(without[i][rows], now[rows], [i]) for without, now in both)
             explained = np.maximum(seen[i] - after, 0.0)[:, 0] / np.maximum(whole, 1e-300)
-            found[i] = gain, bool((np.sqrt(explained) >= _SMALLEST).any())
+            found[i] = gain, bool((np.sqrt(explained) >= rules.SMALLEST).any())
         return found
 
     def _fails(self, i: int, chosen: Sequence[int], gain: float, large: bool) -> bool:

@@ -1,21 +1,20 @@
 """How far the data reach: what would be large only where they do not is not known from them.
 
 An effect of size θ has the torque C(θ) in the data and C'(θ) along a usual motion. Where
-RMS C' > 3 RMS C and RMS C' is more than all torque that was seen of the joint, it stands for
-something else near by: cables of a wrist that crept over a twentieth of its range predicted every
-second of two recordings, and 40 times the torque of a third.
+RMS C' > 3 RMS C and RMS C' is more than half of all torque that was seen of the joint, it stands
+for something else near by: cables of a wrist that crept over a twentieth of its range predicted
+every second of two recordings, and 40 times the torque of a third.
 """
 
 from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.usual_motion import UsualMotion
 from excite_cli.robot.model import Array
-
-_FARTHER = 3.0  # times; no other was tried
 
 
 def torque_seen(data: TrainingData) -> Array:
@@ -57,7 +56,7 @@ class Reach:
             for each in found
         )
         torque = self._torque[list(self._candidates[i].rows)]
-        beyond = np.flatnonzero((usual > _FARTHER * seen) & (usual > torque))
+        beyond = np.flatnonzero((usual > rules.FARTHER * seen) & (usual > rules.MUCH * torque))
         if not len(beyond):
             return ""
         k = beyond[np.argmax(usual[beyond])]

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from math import isnan, nan
 from typing import Any
 
+from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.verdict import SealedVerdict, Verdict
@@ -267,7 +268,6 @@ class Information:
 
 CUT_SHORT = "cut_short"  # the kind of a finding: the search did not come to its end
 _UNCHANGED = 0.02  # of an error that no effect concerns
-AS_GOOD = 1.02  # times the textbook's error: what is above is said to be worse
 
 
 def _lower(before: Errors, after: Errors, least: float = 1.0) -> bool:
@@ -376,7 +376,7 @@ class Diagnosis(Shown):
         if self.textbook is None:
             return False
         least = self.textbook.error.mean_relative_moving
-        return self.after.mean_relative_moving > AS_GOOD * least
+        return self.after.mean_relative_moving > rules.AS_GOOD * least
 
     @property
     def harmful(self) -> tuple[NamedEffect, ...]:

@@ -10,14 +10,16 @@ tells from the inertias is not judged by this error, unless it rises on a joint:
 it up and predict as well. Nothing is chosen or fitted by this.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.before_after import Played, refitted
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.records import Removed
+from excite_cli.diagnosis.textbook import everyday
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.identification.errors_of_torque import Errors, block_sums, drawn_blocks
@@ -29,7 +31,9 @@ from excite_cli.robot.model import Array
 _SHORTEST, _LONGEST, _WANTED = 0.2, 0.5, 8
 _FEWEST = 5  # blocks: of fewer, all of them agree by chance too often
 _NIL = 1e-6  # of the torque
-_HIGHER = 1.1  # times the error without it, of one joint
+
+
+Missed = Callable[[Sequence[int], Sequence[int], Sequence[int]], bool]
 
 
 @dataclass(frozen=True)
@@ -46,12 +50,15 @@ def worth_on_sealed(
     traced: Traced,
     after: IdentifiedModel,
     sizes: Mapping[int, float],
+    missed: Missed | None = None,
 ) -> dict[int, Worth]:
     """Worth of every chosen candidate on the sealed runs `played`, beside all others.
 
-    `sizes` over two standard deviations: what may be zero is not confirmed.
+    `sizes` over two standard deviations: what may be zero is not confirmed. Nor is what not every
+    robot has, unless training data left out have `missed` it as well.
     """
     with_all = played.predictions(after)
+    common = set(everyday(traced.candidates))
     found = {}
     for i in traced.chosen:
         rest = traced.judge.without(i, traced.chosen)
@@ -61,8 +68,14 @@ def worth_on_sealed(
         verdict = worth.verdict
         if traced.judge.told_by_weight(i, rest) and not rises:
             verdict = SealedVerdict.WEIGHED
-        elif verdict is SealedVerdict.CONFIRMED and sizes[i] < 1.0:
-            verdict = SealedVerdict.NOT_CONFIRMED
+        elif verdict is SealedVerdict.CONFIRMED:
+            named = (
+                i in common
+                or missed is None
+                or missed(traced.chosen, rest, traced.candidates[i].rows)
+            )
+            if sizes[i] < 1.0 or not named:
+                verdict = SealedVerdict.NOT_CONFIRMED
         found[i] = replace(worth, verdict=verdict)
     return found
 
@@ -112,7 +125,7 @@ def _worth(
 
 def rises_on_one(joints: Sequence[str], without: Errors, with_it: Errors) -> bool:
     """Whether the error of one of the joints that an effect acts on is clearly higher with it."""
-    return any(with_it.relative[name] > _HIGHER * without.relative[name] for name in joints)
+    return any(with_it.relative[name] > rules.HIGHER * without.relative[name] for name in joints)
 
 
 def sealed_verdict(removed: Array, lower: float) -> SealedVerdict:

@@ -35,7 +35,7 @@ def textbook(candidates: Sequence[Candidate], models: Comparison) -> list[int]:
     for more in product((False, True), repeat=len(EVERYDAY)):
         kinds = [kind for kind, taken in zip(EVERYDAY, more, strict=True) if taken]
         chosen = _of(candidates, (*EVERYDAY_FRICTION, *kinds))
-        if best is None or models.as_new(best, chosen).better:
+        if best is None or models.difference(best, chosen).better:
             best = chosen
     assert best is not None
     return best

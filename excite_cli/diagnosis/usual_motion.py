@@ -9,8 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from excite_cli.diagnosis.declared_model import Model
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
+from excite_cli.identification.regression import effect_columns
 from excite_cli.robot.model import Array, Robot
 
 _SECONDS, _STEP, _PERIOD = 20.0, 0.02, 10.0  # s
@@ -44,6 +46,24 @@ class UsualMotion:
             a[:, j] = -scale * (np.sin(angle) @ (size * w**2))
         body = RigidBody(robot, phi, q, v, a)
         self.signals = Signals(t, q, v, a, body.load, body.load, body)
+
+    def gram(self, model: Model, effects: Sequence[Effect]) -> Array:
+        """Mean over time (n, k, k) of products of the columns of every joint.
+
+        [base parameters | declared effects | effects]; of what is in some runs only, or follows
+        time or a column of the log, these are zero.
+        """
+        own = [self.signals.body.regressor[:, :, model.base.selection]]
+        for effect in (*model.declared, *effects):
+            columns = effect_columns([effect] if self._is_steady(effect) else [], self.signals)
+            missing = len(effect.parameters) - columns.shape[2]
+            own.append(np.pad(np.nan_to_num(columns), ((0, 0), (0, 0), (0, missing))))
+        every = np.concatenate(own, axis=2).swapaxes(0, 1)
+        return np.stack([each.T @ each for each in every]) / every.shape[1]
+
+    @staticmethod
+    def _is_steady(effect: Effect) -> bool:
+        return not (effect.runs or effect.covariate or "time" in effect.function_of)
 
     def squares(self, effect: Effect) -> Array:
         """Mean over time (rows, p, p) of products of the columns: θᵀ S θ is the mean square."""

@@ -5,6 +5,8 @@ Nothing here uses Gram matrices: rows are whitened one at a time and stacked.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import toeplitz
@@ -40,6 +42,16 @@ def anything(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> 
 def effect(kind: str, *joints: int, **shape: float) -> Effect:
     """On joint 0 if none is named."""
     return catalogue()[kind](joints or (0,), shape)
+
+
+def usual_of_unit_columns(joints: int, fixed: int) -> Any:
+    """In place of a usual motion, one along which columns are as independent and large as these."""
+
+    def gram(model: object, effects: Sequence[Effect]) -> Array:
+        width = fixed + sum(len(each.parameters) for each in effects)
+        return np.tile(np.eye(width), (joints, 1, 1))
+
+    return SimpleNamespace(gram=gram)
 
 
 def prepared(

@@ -8,12 +8,8 @@ import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.diagnosis.candidates import Candidate, with_columns
-from excite_cli.diagnosis.elsewhere import needed_elsewhere
-from excite_cli.diagnosis.judgement import Judgement, Rules
-from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.diagnosis.reach import Reach, torque_seen
-from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.usual_motion import UsualMotion
 from excite_cli.dynamics.regressor import standard_parameters
@@ -22,7 +18,6 @@ from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.diagnosis.explicit_data import prepared
-from tests.diagnosis.test_doubt import NO_MODEL
 from tests.effects.motions import signals_at
 
 SAMPLES, STEP = 1000, 0.02
@@ -120,56 +115,3 @@ def test_it_is_a_reason_why_a_size_is_impossible(robot: Robot) -> None:
         candidates, lambda _, d: d.T @ d, large, (), Reach(candidates, data, usual(robot, seen))
     )
     assert "the joint's range and speed" in sizes.why_not(np.array([20.0, 0.0]), [0], [0])
-
-
-def found_with(
-    robot: Robot,
-    seen: Signals,
-    effects: Sequence[Effect],
-    tau: Array,
-    level: float,
-) -> Traced:
-    """The first of these was found, beside noise of this level [N·m]."""
-    data, candidates = made(robot, seen, effects, tau)
-    noise = NoiseModel.white(np.full(robot.n, level))
-    evidence = data.evidence(candidates, noise)
-    seen_sizes = Seen(np.full(robot.n, 9.0), np.ones(robot.n), 1.0)
-    sizes = PossibleSizes(candidates, evidence.covariance, seen_sizes)
-    judge = Judgement(evidence, evidence, candidates, Rules(0.01, 0.01), sizes)
-    return Traced(
-        data, tuple(candidates), noise, judge, (0,), np.zeros(0), (), noise.sigma, 1.0, sizes,
-        NO_MODEL, usual(robot, seen),
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("fastest", "inertia", "needed"), [(SLOW, 1.0, True), (SLOW, 0.0, False), (FAST, 0.01, False)]
-)
-def test_a_rotor_that_is_surely_there_stays_where_it_matters_to_other_motions(
-    robot: Robot, fastest: float, inertia: float, needed: bool
-) -> None:
-    """1 kg·m² of a joint that crept; not what may be zero, and not 0.01 kg·m² of a fast one."""
-    seen = crept(robot, fastest)
-    noise = 0.1 * np.random.default_rng(0).normal(size=seen.v.shape)
-    given = found_with(
-        robot, seen, [kind("coulomb_friction"), kind("armature")],
-        TORQUE * np.sign(seen.v) + inertia * seen.a + noise, 0.1,
-    )  # fmt: skip
-    assert needed_elsewhere(given, [0]) == ([1] if needed else [])
-    assert needed_elsewhere(given, [0, 1]) == []
-
-
-def test_what_the_chosen_ones_have_among_their_columns_does_not_stay(robot: Robot) -> None:
-    seen = crept(robot, SLOW)
-    effects = [kind("asymmetric_friction"), kind("coulomb_friction")]
-    given = found_with(robot, seen, effects, TORQUE * np.sign(seen.v), 1.0)
-    assert needed_elsewhere(given, [0]) == []
-
-
-def test_nor_what_would_be_negative(robot: Robot) -> None:
-    seen = crept(robot, SLOW)
-    effects = [kind("coulomb_friction"), kind("viscous_friction")]
-    tau = TORQUE * np.sign(seen.v) - 20.0 * seen.v
-    assert needed_elsewhere(found_with(robot, seen, effects, tau, 1e-3), [0]) == []
-    tau = TORQUE * np.sign(seen.v) + 20.0 * seen.v
-    assert needed_elsewhere(found_with(robot, seen, effects, tau, 1e-3), [0]) == [1]
