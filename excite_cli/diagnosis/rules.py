@@ -58,9 +58,9 @@ MATTERS, OF_WHAT_IS_LEFT = 0.02, 0.2
 # What is confirmed --------------------------------------------------------------------------------
 
 # What not every robot has, one name of hundreds, is missed by training data left out as surely as
-# this; of several joints, on another than the one that loses most. Of seven wrong names confirmed in
-# 43 robots of the battery without it one is surer (t of 3.6), three have t of 1.7 to 2.3, three
-# below 0.9.
+# this; of several joints, on another than the one that loses most. Of seven wrong names that were
+# confirmed in 43 robots of the battery without it one is surer (t of 3.6), three have t of 1.7 to
+# 2.3, three below 0.9.
 OF_A_NAME = 0.99
 
 # An effect does not make the held-out error of one of its joints larger by this factor.
