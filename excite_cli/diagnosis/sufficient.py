@@ -1,9 +1,9 @@
 """What was found, or the textbook's model: the answer.
 
-What the search named, and what of it is seen on more than one joint where it acts on several, each
-with the friction and rotors of the textbook beside it (`elsewhere`), and the textbook's model: of
-these the one with the fewest parameters is the answer, unless a larger one predicts new recordings
-better (`comparison`), by 2 % of the error.
+What the search named leaves, where it acts on several joints and is missed on one of them at most,
+unless the model with all of that predicts new recordings better (`comparison`). Of this, with the
+friction and rotors of the textbook beside it (`elsewhere`), and the textbook's model the one with
+fewer parameters is the answer, unless the other predicts better by 2 % of the error.
 """
 
 from collections.abc import Sequence
@@ -25,25 +25,34 @@ def comparison_of(traced: Traced) -> Comparison:
 
 def sufficient(traced: Traced, models: Comparison) -> list[int]:
     """The candidates found, with what every robot has, or the textbook's."""
-    plain = those_that_matter(traced, textbook(traced.candidates, models))
-    found = (traced.chosen, _seen_on_several(traced, models))
-    sets = [plain, *(with_everyday(traced, some) for some in found)]
-    best, *larger = sorted(sets, key=lambda some: _width(traced, some))
-    for some in larger:
-        gained = models.difference(best, some)
-        if gained.better and gained.of_error > np.log(rules.AS_GOOD):
-            best = some
-    return best
+    plain = [*textbook(traced.candidates, models), *_weighed(traced)]
+    every, found = (
+        with_everyday(traced, some) for some in (traced.chosen, _seen_on_several(traced, models))
+    )
+    if models.difference(found, every).better:
+        found = every
+    best, larger = sorted((plain, found), key=lambda some: _width(traced, some))
+    gained = models.difference(best, larger)
+    if gained.better and gained.of_error > np.log(rules.AS_GOOD):
+        best = larger
+    return those_that_matter(traced, best)
+
+
+def _weighed(traced: Traced) -> list[int]:
+    """What scales alone tell from the inertias: no data left out miss it."""
+    judge, found = traced.judge, traced.chosen
+    return [i for i in found if judge.told_by_weight(i, [k for k in found if k != i])]
 
 
 def _seen_on_several(traced: Traced, models: Comparison) -> list[int]:
     """What was found, but for what acts on several joints and is missed on one of them at most."""
-    judge, found = traced.judge, list(traced.chosen)
+    judge, found, weighed = traced.judge, list(traced.chosen), _weighed(traced)
     while True:
         doubtful = {
             i: judge.white.gain_of(i, found).chi2
             for i in found
-            if len(rows := traced.candidates[i].rows) > 1
+            if i not in weighed
+            and len(rows := traced.candidates[i].rows) > 1
             and not models.missed(found, judge.without(i, found), rows)
         }
         if not doubtful:

@@ -51,12 +51,13 @@ def test_a_study_of_logs(excite: Program) -> None:
     for name, seeds in (("first", (1, 2)), ("second", (3, 4))):
         data = measured(robot, phi, (), np.zeros(0), noise=0.1, seconds=6.0, seeds=seeds)
         write_dataset(excite.folder / f"{name}.h5", data, {})
-    few = ("--set", "diagnosis.kinds=[viscous_friction]", "--set", "identification.method=ols")
+    few = ("--set", "diagnosis.kinds=[spring]", "--set", "identification.method=ols")
     answer = excite.answer("study", SMOKE, "first.h5", "second.h5", *few)
     assert [case["name"] for case in answer["cases"]] == ["first", "second"]
     for case in answer["cases"]:
         assert 0 < case["identified_error"] < 0.2
-        assert case["before"] == case["after"] == pytest.approx(case["identified_error"], rel=0.2)
+        assert case["before"] == pytest.approx(case["identified_error"], rel=0.2)
+        assert case["after"] == pytest.approx(case["before"], rel=0.01)  # nothing is missing
         assert case["effects"] == ""
         assert [name.split(".")[-2] for name in case["files"]] == ["diagnosis", "fit"]
         assert all((excite.folder / name).is_file() for name in case["files"])
