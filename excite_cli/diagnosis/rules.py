@@ -51,9 +51,9 @@ AS_GOOD = 1.02
 # Friction and rotors stay on all joints unless the model says the same without them along a usual
 # motion, to this share of the joint's torque or this many times what it says in the data; and, what
 # is surely there, to this share of what the model leaves (an error of as much more is larger by
-# a fiftieth). Pruned by what data left out miss
-# instead, 46 of 57 robots of the battery were no worse than the textbook by 2 %, geometric mean
-# 0.71, for 51 and 0.65; with the first share alone clean robots were left with up to 2.6 times.
+# a fiftieth). Pruned by what data left out miss instead, 46 of 57 robots of the battery were no
+# worse than the textbook by 2 %, geometric mean 0.71, for 51 and 0.65; with the first alone clean
+# robots were left with up to 2.6 times. The second is a guess: no other was tried.
 MATTERS, BEYOND, OF_WHAT_IS_LEFT = 0.02, 1.5, 0.2
 
 # What is confirmed --------------------------------------------------------------------------------

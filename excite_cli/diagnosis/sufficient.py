@@ -25,7 +25,7 @@ def comparison_of(traced: Traced) -> Comparison:
 
 def sufficient(traced: Traced, models: Comparison) -> list[int]:
     """The candidates found, with what every robot has, or the textbook's."""
-    plain = [*textbook(traced.candidates, models), *_weighed(traced)]
+    plain = textbook(traced.candidates, models)
     every, found = (
         with_everyday(traced, some) for some in (traced.chosen, _seen_on_several(traced, models))
     )
@@ -38,21 +38,14 @@ def sufficient(traced: Traced, models: Comparison) -> list[int]:
     return those_that_matter(traced, best)
 
 
-def _weighed(traced: Traced) -> list[int]:
-    """What scales alone tell from the inertias: no data left out miss it."""
-    judge, found = traced.judge, traced.chosen
-    return [i for i in found if judge.told_by_weight(i, [k for k in found if k != i])]
-
-
 def _seen_on_several(traced: Traced, models: Comparison) -> list[int]:
     """What was found, but for what acts on several joints and is missed on one of them at most."""
-    judge, found, weighed = traced.judge, list(traced.chosen), _weighed(traced)
+    judge, found = traced.judge, list(traced.chosen)
     while True:
         doubtful = {
             i: judge.white.gain_of(i, found).chi2
             for i in found
-            if i not in weighed
-            and len(rows := traced.candidates[i].rows) > 1
+            if len(rows := traced.candidates[i].rows) > 1
             and not models.missed(found, judge.without(i, found), rows)
         }
         if not doubtful:
