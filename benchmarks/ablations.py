@@ -34,6 +34,7 @@ OFF: dict[str, dict[str, float]] = {
     "MATTERS": {"MATTERS": NO},
     "BEYOND": {"BEYOND": 0.0},
     "OF_WHAT_IS_LEFT": {"OF_WHAT_IS_LEFT": NO},
+    "IMAGINED": {"IMAGINED": 0.0},
     "OF_A_NAME": {"OF_A_NAME": 1e-9},
     "HIGHER": {"HIGHER": NO},
 }

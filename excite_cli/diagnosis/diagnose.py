@@ -326,8 +326,10 @@ def _needed(
     if not spec.diagnosis.rounds or traced.model.is_weighed:
         return traced, None, None
     models = comparison_of(traced)
+    plain = textbook(traced.candidates, models)
+    traced = replace(traced, plain=tuple(plain))
     needed = replace(traced, chosen=tuple(sufficient(traced, models)))
-    return at_its_own_torque(needed, bodies), textbook(traced.candidates, models), models
+    return at_its_own_torque(needed, bodies), plain, models
 
 
 def _cut_short(over: bool, spec: Spec, seconds: float) -> tuple[Finding, ...]:

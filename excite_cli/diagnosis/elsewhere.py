@@ -55,7 +55,7 @@ def those_that_matter(traced: Traced, chosen: Sequence[int]) -> list[int]:
     elsewhere = _Elsewhere(traced, found)
     common = set(everyday(traced.candidates))
     while True:
-        theta, most = judge.plain.solve(found), elsewhere.most(found)
+        theta, most = traced.fitted(found), elsewhere.most(found)
         leaving = {}
         for i in common.intersection(found):
             matters, of_left = most[i]

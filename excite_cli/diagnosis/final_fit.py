@@ -38,10 +38,12 @@ def regression(traced: Traced) -> LinearFit:
     """What was found beside the declared model, by the regression of `identify` (`wls`)."""
     known, effects = traced.model.known, (*traced.model.declared, *traced.effects)
     more = np.zeros((len(known), sum(len(effect.parameters) for effect in traced.effects)))
+    rows, said = traced.imagined()
+    prior = np.vstack([np.hstack([known[:, :-1], more]), rows]), np.append(known[:, -1], said)
     return fit_rows(
         traced.data.rows(traced.candidates, traced.chosen),
         "wls",
-        (np.hstack([known[:, :-1], more]), known[:, -1]) if len(known) else None,
+        prior if len(prior[0]) else None,
         usual_sizes(traced.model.robot, traced.model.base, effects),
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.comparison import Comparison
 from excite_cli.diagnosis.elsewhere import those_that_matter, with_everyday
-from excite_cli.diagnosis.textbook import everyday, textbook
+from excite_cli.diagnosis.textbook import everyday
 from excite_cli.diagnosis.tracing import Traced
 
 
@@ -25,7 +25,7 @@ def comparison_of(traced: Traced) -> Comparison:
 
 def sufficient(traced: Traced, models: Comparison) -> list[int]:
     """The candidates found, with what every robot has, or the textbook's."""
-    plain = textbook(traced.candidates, models)
+    plain = traced.plain
     every, found = (
         with_everyday(traced, some) for some in (traced.chosen, _seen_on_several(traced, models))
     )

@@ -57,7 +57,10 @@ Progress = Callable[[str, int], None]
 
 @dataclass(frozen=True)
 class Traced:
-    """The outcome: training data, candidates, noise, the judgement, the chosen candidates."""
+    """The outcome: training data, candidates, noise, the judgement, the chosen candidates.
+
+    `plain`: candidates of the textbook's model, near which others are where data do not reach.
+    """
 
     data: TrainingData
     candidates: tuple[Candidate, ...]
@@ -71,6 +74,7 @@ class Traced:
     sizes: PossibleSizes
     model: Model
     usual: UsualMotion
+    plain: tuple[int, ...] = ()
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -82,7 +86,11 @@ class Traced:
         """Of what was chosen and of the textbook's effects, and where each of them is in it."""
         members = sorted({*self.chosen, *everyday(self.candidates)})
         own = [self.candidates[i] for i in members]
-        return WeightedFit(self.data, own), {i: at for at, i in enumerate(members)}
+        at = {i: k for k, i in enumerate(members)}
+        if not self.plain:
+            return WeightedFit(self.data, own), at
+        usual = self.usual.gram(self.model, [each.effect for each in own])
+        return WeightedFit(self.data, own, usual, [at[i] for i in self.plain]), at
 
     def fitted(
         self, chosen: Sequence[int], held: Array | None = None, roughly: bool = False
@@ -95,6 +103,11 @@ class Traced:
         fit, at = self._least_squares
         near = self._weights if roughly else None
         return fit([at[i] for i in chosen], held, near)[0]
+
+    def imagined(self) -> tuple[Array, Array]:
+        """Rows A (m, k) and b (m,) of unit variance, A x = b, beside the data of what was found."""
+        fit, at = self._least_squares
+        return fit.imagined([at[i] for i in self.chosen])
 
     @cached_property
     def _weights(self) -> Array:

@@ -3,13 +3,22 @@
 As in `identify`: x minimises Σ_j ‖τ_j − C_j x‖² / σ_j² and what the prior says, and
 σ_j² = ‖τ_j − C_j x‖² / (N_j − p N_j / N), in turn until they settle. Of N_j rows of a joint and
 p parameters; from Gram matrices of the rows as they are.
+
+Where the data do not reach, the textbook's model has the word. What was found beyond it is seen in
+the states of the recordings alone, and a model with more parameters says the more of other states
+the less is known of them. So the fit has imagined samples beside the recorded ones,
+`rules.IMAGINED` N_j of each joint, along the usual motion, with the torque C' x_b that the
+textbook's model, fitted to the same data, says there, and as uncertain as what that leaves of the
+data, σ_bj: Σ_j IMAGINED N_j mean_t (c'_jᵀ (x − x_b))² / σ_bj² more to minimise. Where data say what
+x is, they outweigh these by far. Nothing is imagined for a part of the textbook's model.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.cholesky import RIDGE, Cholesky
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.training import Columns, TrainingData
@@ -17,12 +26,23 @@ from excite_cli.robot.model import Array
 
 _ROUNDS, _SETTLED = 30, 1e-6
 _EXACT = 1e-9  # of the torque: what is less is rounding
+_ROUNDING = 1e-14  # of the largest eigenvalue
 
 
 class WeightedFit:
-    """Fits models with some of the candidates."""
+    """Fits models with some of the candidates.
 
-    def __init__(self, data: TrainingData, candidates: Sequence[Columns]) -> None:
+    `usual` (n, k, k): mean products of all columns along the usual motion. The `plain` candidates
+    are the textbook's. Without them nothing is imagined.
+    """
+
+    def __init__(
+        self,
+        data: TrainingData,
+        candidates: Sequence[Columns],
+        usual: Array | None = None,
+        plain: Collection[int] = (),
+    ) -> None:
         self._counts = sum(run.usable.sum(axis=0) for run in data.runs)
         found = data.evidence(candidates, NoiseModel.white(np.ones(data.n)))
         self._evidence = found
@@ -33,6 +53,8 @@ class WeightedFit:
             self._prior[np.ix_(known, known)] = data.prior
         whole = np.array([gram[-1, -1] for _, gram in self._grams])
         self._floor = np.maximum(_EXACT * np.sqrt(whole / np.maximum(self._counts, 1)), 1e-12)
+        self._usual, self._plain = usual, frozenset(plain)
+        self._kept: dict[bytes, Array] = {}
 
     def __call__(
         self,
@@ -48,7 +70,8 @@ class WeightedFit:
         columns = self._evidence.columns(chosen)[len(held) :]
         count = len(columns)
         at = np.concatenate([columns, np.arange(len(held)), [self._evidence.torque]])
-        prior = _less(self._prior[np.ix_(at, at)], count, held)
+        known = self._prior + self._imagined(chosen, held)
+        prior = _less(known[np.ix_(at, at)], count, held)
         where = np.full(self._evidence.torque, -1)
         where[columns] = np.arange(count)
         own = []  # of each joint, where its columns are in the model, and their products
@@ -70,6 +93,40 @@ class WeightedFit:
             if settled:
                 break
         return np.concatenate([held, x]), sigma
+
+    def imagined(self, chosen: Sequence[int]) -> tuple[Array, Array]:
+        """Rows A (m, k) and b (m,) of unit variance: A x = b of what is imagined for a model."""
+        columns = self._evidence.columns(chosen)
+        at = np.append(columns, self._evidence.torque)
+        gram = self._imagined(chosen, np.zeros(0))[np.ix_(at, at)]
+        norms = np.sqrt(np.diag(gram)[:-1])
+        norms[norms == 0.0] = 1.0
+        values, vectors = np.linalg.eigh(gram[:-1, :-1] / np.outer(norms, norms))
+        there = values > _ROUNDING * values[-1]
+        halves = np.sqrt(values[there])
+        # of P x = h: rows are the half of P, and what they say is the rest of h
+        said = vectors[:, there].T @ (gram[:-1, -1] / norms) / halves
+        return halves[:, None] * vectors[:, there].T * norms, said
+
+    def _imagined(self, chosen: Sequence[int], held: Array) -> Array:
+        """Products (k + 1, k + 1) of what is imagined, all columns and the torque."""
+        size = self._evidence.torque
+        if self._usual is None or self._plain.issuperset(chosen):
+            return np.zeros((size + 1, size + 1))
+        key = held.tobytes()
+        if key not in self._kept:
+            plain = sorted(self._plain)
+            own, sigma = self(plain, held)
+            weights = rules.IMAGINED * self._counts / np.square(sigma)
+            x = np.zeros(size)
+            x[self._evidence.columns(plain)] = own
+            normal = np.einsum("j,jpq->pq", weights, self._usual)
+            side = normal @ x
+            found = np.zeros((size + 1, size + 1))
+            found[:-1, :-1], found[:-1, -1], found[-1, :-1] = normal, side, side
+            found[-1, -1] = x @ side
+            self._kept[key] = found
+        return self._kept[key]
 
 
 def _less(gram: Array, free: int, held: Array) -> Array:

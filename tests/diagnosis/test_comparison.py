@@ -132,7 +132,9 @@ def test_offset_and_armature_are_in_the_textbook_where_data_ask(
 
 
 def chosen(given: Traced, found: Sequence[int]) -> set[int]:
-    return set(sufficient(replace(given, chosen=tuple(found)), models_of(given)))
+    models = models_of(given)
+    plain = textbook(given.candidates, models)
+    return set(sufficient(replace(given, chosen=tuple(found), plain=tuple(plain)), models))
 
 
 def test_what_was_found_is_the_answer_with_what_every_robot_has() -> None:

@@ -84,7 +84,7 @@ def test_what_is_not_of_every_robot_is_left_alone(robot: Robot) -> None:
         robot, seen, [kind("coulomb_friction"), kind("spring")], noisy(seen, 0.0, 0.1), 0.1
     )
     assert with_everyday(given, [0]) == [0]
-    assert those_that_matter(given, [0, 1]) == [0, 1]
+    assert those_that_matter(replace(given, chosen=(0, 1)), [0, 1]) == [0, 1]
 
 
 def test_what_the_chosen_ones_have_among_their_columns_does_not_join(robot: Robot) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.weighted_fit import WeightedFit
 from excite_cli.identification.least_squares import fit_rows
@@ -43,6 +44,82 @@ def test_what_is_held_is_left_out() -> None:
     bare = _with(bare, left, tuple(each[:, :, :0] for each in bare.declared))
     assert found[:FIXED] == pytest.approx(held)
     assert found[FIXED:] == pytest.approx(WeightedFit(bare, candidates)([1, 2])[0], rel=1e-9)
+
+
+def usual_motion(seed: int, samples: int = 40) -> Array:
+    """Columns (T, 2, k) of all candidates along a motion."""
+    candidates = random_candidates(seed)
+    ends = FIXED + np.cumsum([0, *(each.width for each in candidates)])
+    found = np.zeros((samples, 2, ends[-1]))
+    rng = np.random.default_rng([seed, 11])
+    found[:, :, :FIXED] = rng.normal(size=(samples, 2, FIXED)) * [1, 5, 0.1, 2]
+    for each, start in zip(candidates, ends, strict=False):
+        own = rng.normal(size=(samples, len(each.rows), each.width))
+        found[:, each.rows, start : start + each.width] = own
+    return found
+
+
+def beside_imagined(seed: int, plain: tuple[int, ...]) -> WeightedFit:
+    columns = usual_motion(seed)
+    usual = np.einsum("tjp,tjq->jpq", columns, columns) / len(columns)
+    return WeightedFit(random_data(seed), random_candidates(seed), usual, plain)
+
+
+def test_imagined_samples_say_what_the_textbooks_model_says() -> None:
+    """Row by row: each of the usual motion's weighs a share of the data's, by the plain error."""
+    seed, chosen, plain = 1, [0, 1, 2, 3], (0, 1)
+    data, candidates = random_data(seed), random_candidates(seed)
+    fit = beside_imagined(seed, plain)
+    sigma = np.array([0.8, 1.3])
+    found = fit(chosen, near=sigma)[0]
+    x_plain, of_plain = WeightedFit(data, candidates)(plain)
+    rows, said = [], []
+    for run in data.rows(candidates, chosen):
+        for joint in range(2):
+            usable = run.usable[:, joint]
+            rows.append(run.columns[usable, joint] / sigma[joint])
+            said.append(run.tau[usable, joint] / sigma[joint])
+    counts = sum(run.usable.sum(axis=0) for run in data.runs)
+    every = usual_motion(seed)
+    at = np.arange(FIXED + sum(candidates[i].width for i in chosen))
+    x_plain = np.append(x_plain, np.zeros(len(at) - len(x_plain)))
+    for joint in range(2):
+        weight = np.sqrt(rules.IMAGINED * counts[joint] / len(every)) / of_plain[joint]
+        rows.append(weight * every[:, joint, at])
+        said.append(weight * every[:, joint, at] @ x_plain)
+    expected = np.linalg.lstsq(np.concatenate(rows), np.concatenate(said), rcond=None)[0]
+    assert found == pytest.approx(expected, rel=1e-8)
+    assert found != pytest.approx(WeightedFit(data, candidates)(chosen, near=sigma)[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("chosen", [[0, 1, 3], [2], [1, 4]])
+def test_rows_of_what_is_imagined_give_the_same(chosen: list[int]) -> None:
+    data, candidates = random_data(2), random_candidates(2)
+    fit = beside_imagined(2, (0, 1))
+    rows = data.rows(candidates, chosen)
+    found = fit_rows(rows, "wls", fit.imagined(chosen)).x
+    assert found == pytest.approx(fit(chosen)[0], rel=1e-8, abs=1e-12)
+
+
+@pytest.mark.parametrize("chosen", [(), (0,), (0, 1)])
+def test_nothing_is_imagined_for_the_textbooks_model(chosen: tuple[int, ...]) -> None:
+    fit = beside_imagined(3, (0, 1))
+    assert len(fit.imagined(chosen)[0]) == 0
+    bare = WeightedFit(random_data(3), random_candidates(3))
+    assert fit(chosen)[0] == pytest.approx(bare(chosen)[0], rel=1e-12)
+
+
+def test_what_the_data_hardly_show_is_the_textbooks() -> None:
+    """A column that is tiny in the data and large along the usual motion adds nothing there."""
+    data, candidates = random_data(4), random_candidates(4)
+    small = replace(candidates[2], columns=tuple(1e-3 * each for each in candidates[2].columns))
+    candidates[2] = small
+    columns = usual_motion(4)
+    usual = np.einsum("tjp,tjq->jpq", columns, columns) / len(columns)
+    free = WeightedFit(data, candidates)([0, 1, 2])[0][-2:]
+    near = WeightedFit(data, candidates, usual, [0, 1])([0, 1, 2])[0][-2:]
+    assert np.abs(free).max() > 10.0
+    assert np.abs(near).max() < 0.1
 
 
 def _with(
