@@ -108,11 +108,16 @@ def what_and_where(record: EffectRecord, everything: int) -> str:
 def approximation_parts(found: Diagnosis, verbose: bool) -> Parts:
     """Effects that lower the error but only come near what is there, and what that may be.
 
-    Not those of friction that is told as one.
+    Not those of friction that is told as one; what is not confirmed in one line.
     """
-    own = set() if verbose else friction_rows(found)[1]
-    shown = [each for each in found.approximations if not _is_part(each, own)]
-    return [_approximation_table(shown, len(found.joint_names))] if shown else []
+    own, everything = set() if verbose else friction_rows(found)[1], len(found.joint_names)
+    every = [each for each in found.approximations if not _is_part(each, own)]
+    shown = [each for each in every if verbose or each.verdict is SealedVerdict.CONFIRMED]
+    parts: Parts = [_approximation_table(shown, everything)] if shown else []
+    if others := [what_and_where(each.effect, everything) for each in every if each not in shown]:
+        listed = ", ".join(others)
+        parts.append(f"In the model, but not confirmed: {listed} (--verbose: sizes, and why not)")
+    return parts
 
 
 def _approximation_table(shown: Sequence[NamedEffect], everything: int) -> Table:

@@ -51,6 +51,16 @@ def test_an_approximation_has_a_table_of_its_own(doubted: Diagnosis) -> None:
     assert "0 effects, 1 approximation" in text
 
 
+def test_approximations_that_are_not_confirmed_are_one_line(doubted: Diagnosis) -> None:
+    first = replace(doubted.effects[0], verdict=SealedVerdict.NOT_CONFIRMED)
+    found = replace(doubted, effects=(first, *doubted.effects[1:]))
+    text = printed(found)
+    assert "In the model, but not confirmed: viscous_friction on elbow (--verbose" in text
+    assert "Approximations" not in text
+    tables = [p for p in diagnosis_answer(found, "", {}, True).parts if isinstance(p, Table)]
+    assert any(table.title.startswith("Approximations") for table in tables)
+
+
 def printed(found: Diagnosis) -> str:
     """Titles, columns and cells, a line each row, without a terminal."""
     lines: list[str] = []
