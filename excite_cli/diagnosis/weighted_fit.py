@@ -97,6 +97,8 @@ class WeightedFit:
     def imagined(self, chosen: Sequence[int]) -> tuple[Array, Array]:
         """Rows A (m, k) and b (m,) of unit variance: A x = b of what is imagined for a model."""
         columns = self._evidence.columns(chosen)
+        if self._usual is None or self._plain.issuperset(chosen):
+            return np.zeros((0, len(columns))), np.zeros(0)
         at = np.append(columns, self._evidence.torque)
         gram = self._imagined(chosen, np.zeros(0))[np.ix_(at, at)]
         norms = np.sqrt(np.diag(gram)[:-1])

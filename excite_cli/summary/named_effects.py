@@ -114,8 +114,12 @@ def approximation_parts(found: Diagnosis, verbose: bool) -> Parts:
     every = [each for each in found.approximations if not _is_part(each, own)]
     shown = [each for each in every if verbose or each.verdict is SealedVerdict.CONFIRMED]
     parts: Parts = [_approximation_table(shown, everything)] if shown else []
-    if others := [what_and_where(each.effect, everything) for each in every if each not in shown]:
-        listed = ", ".join(others)
+    if others := [each for each in every if each not in shown]:
+        listed = ", ".join(
+            what_and_where(each.effect, everything)
+            + f" ({each.verdict})" * (each.verdict is SealedVerdict.HARMFUL)
+            for each in others
+        )
         parts.append(f"In the model, but not confirmed: {listed} (--verbose: sizes, and why not)")
     return parts
 

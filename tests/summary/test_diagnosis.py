@@ -57,6 +57,9 @@ def test_approximations_that_are_not_confirmed_are_one_line(doubted: Diagnosis) 
     text = printed(found)
     assert "In the model, but not confirmed: viscous_friction on elbow (--verbose" in text
     assert "Approximations" not in text
+    harmful = replace(first, verdict=SealedVerdict.HARMFUL)
+    told = printed(replace(found, effects=(harmful, *found.effects[1:])))
+    assert "viscous_friction on elbow (harmful) (--verbose" in told
     tables = [p for p in diagnosis_answer(found, "", {}, True).parts if isinstance(p, Table)]
     assert any(table.title.startswith("Approximations") for table in tables)
 
