@@ -42,7 +42,7 @@ STAGES = (
     ("noise", "noise_model.py", "fit_noise"),
     ("placebos", "placebo.py", "inflation_of"),
     ("search over sets", "search.py", "run"),
-    ("what stays unexplained", "unexplained.py", "unexplained_structure"),
+    ("what is left", "large_rest.py", "large_rests"),
     ("rounds", "rounds.py", "rounds_of"),
 )
 

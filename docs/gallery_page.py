@@ -10,7 +10,7 @@ from excite_cli.diagnosis.words import approximation_in_words, ends_in_words, re
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.command import Command
 from excite_cli.shown.table import Part, Table
-from excite_cli.summary.diagnosis import absorbed_parts, unexplained_in_words
+from excite_cli.summary.diagnosis import absorbed_parts
 from excite_cli.summary.error_by_joint import error_tables
 from excite_cli.summary.error_path import path_parts
 from excite_cli.summary.friction_lines import friction_table
@@ -160,7 +160,6 @@ def left_of(found: Diagnosis) -> dict[str, str]:
     for joint in found.joint_names:
         only = replace(
             found,
-            unexplained=tuple(each for each in found.unexplained if each.joint == joint),
             large_rests=tuple(each for each in found.large_rests if each.joint == joint),
         )
         rests = [text for texts in rests_in_words(only) for text in texts]
@@ -170,7 +169,7 @@ def left_of(found: Diagnosis) -> dict[str, str]:
                 what = approximation_in_words(each.approximates)
                 stands.setdefault(what, []).append(each.effect.kind)
         near = [f"Only approximated, by {', '.join(k)}: {what}." for what, k in stands.items()]
-        words = " ".join([*unexplained_in_words(only), *rests, *near]) or (
+        words = " ".join([*rests, *near]) or (
             "No structure, and no more than noise, was found in what is left of the training data."
         )
         share = found.after.relative_moving[joint]

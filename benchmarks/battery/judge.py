@@ -208,7 +208,7 @@ def answer_of(found: Diagnosis, dataset: Dataset) -> Answer:
             for each in found.effects
         ),
         tuple(Name(each.kind, each.joints) for each in found.absorbed),
-        tuple(each.joint for each in found.unexplained),
+        found.joints_left,
         tuple(j for f in dataset.findings if f.kind == "saturated" for j in f.joints),
     )
 
@@ -260,8 +260,13 @@ def _fill(outcome: Outcome, found: Diagnosis, result: Score) -> None:
         for each, verdict in zip(found.effects, result.names, strict=True)
     ]
     outcome.unexplained = [
-        {**asdict(each), "depends_on": tuple(covariate.code for covariate in each.depends_on)}
-        for each in found.unexplained
+        {
+            "joint": each.joint,
+            "share": each.predictable,
+            "depends_on": tuple(covariate.code for covariate in each.depends_on),
+        }
+        for each in found.large_rests
+        if each.certain
     ]
     kinds = {(p["kind"], tuple(p["joints"])) for p in outcome.planted}
     outcome.absorbed = any((a.kind, a.joints) in kinds for a in found.absorbed)

@@ -165,7 +165,7 @@ def answer_of(found: Diagnosis) -> Answer:
     return Answer(
         tuple(_named(each, refined) for each in found.effects),
         tuple(Name(each.kind, each.joints) for each in found.absorbed),
-        frozenset((*(each.joint for each in found.unexplained), *_left(found))),
+        frozenset(_left(found)),
     )
 
 
@@ -188,14 +188,13 @@ def _called(record: EffectRecord) -> Called:
 
 def _left(found: Diagnosis) -> list[str]:
     """Joints of which it is certain that more than noise is left."""
-    return [each.joint for each in getattr(found, "large_rests", ()) if each.certain]
+    return [each.joint for each in found.large_rests if each.certain]
 
 
 def _told(found: Diagnosis) -> set[str]:
     """Joints of which anything is said that is left."""
     near = {joint for each in found.approximations for joint in each.effect.joints}
-    rests = (*found.unexplained, *getattr(found, "large_rests", ()))
-    return near | {each.joint for each in rests}
+    return near | {each.joint for each in found.large_rests}
 
 
 def rests(case: Case, data: Recorded, found: Diagnosis) -> dict[str, float]:
@@ -237,7 +236,7 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score) -> 
             "covariate": each.effect.covariate,
             "parameters": {n: [v.value, v.std] for n, v in each.parameters.items()},
             "p_value": each.p_value,
-            "share": each.share_of_residual,
+            "share": each.predictable,
             "judged": judged,
             "verdict": str(getattr(each, "verdict", None) or ""),
             "aliases": [
@@ -250,7 +249,7 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score) -> 
     outcome.unexplained = [
         {
             "joint": each.joint,
-            "share": each.share_of_residual,
+            "share": each.predictable,
             "depends_on": [covariate.code for covariate in each.depends_on],
         }
         for each in found.unexplained

@@ -14,8 +14,7 @@ from scipy.stats import chi2
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.tracing import Traced
-from excite_cli.diagnosis.training import Columns
-from excite_cli.diagnosis.unexplained import Feature
+from excite_cli.diagnosis.training import Columns, Shown
 
 _SURE = 1e-3  # chance that a curve as good as the effect leaves so much more, or less
 
@@ -35,7 +34,7 @@ def curves_in_place(traced: Traced, joint_names: Sequence[str]) -> dict[int, Cov
             for run, part in zip(traced.data.runs, parts, strict=True)
             if part is not None
         )
-        if _does_as_well(traced, like, Feature(of, own.rows, columns)):
+        if _does_as_well(traced, like, Shown(own.rows, columns, columns[0].shape[2])):
             found |= dict.fromkeys(like, of)
     return found
 
@@ -51,7 +50,7 @@ def functions_alike(traced: Traced, i: int) -> list[int]:
     ]
 
 
-def _does_as_well(traced: Traced, like: Sequence[int], curve: Feature) -> bool:
+def _does_as_well(traced: Traced, like: Sequence[int], curve: Shown) -> bool:
     pool: list[Columns] = [*(traced.candidates[i] for i in traced.chosen), curve]
     white = traced.data.evidence(pool, traced.noise)
     every = range(len(traced.chosen))
@@ -61,6 +60,6 @@ def _does_as_well(traced: Traced, like: Sequence[int], curve: Feature) -> bool:
     beaten = min(traced.candidates[i].effect.holds_until_beaten for i in like)
     if not beaten:
         return bool(more < traced.inflation * chi2.isf(_SURE, 1))
-    chance = traced.inflation * chi2.isf(_SURE, curve.columns[0].shape[2])
+    chance = traced.inflation * chi2.isf(_SURE, curve.width)
     left = white.energy_on(every, traced.candidates[like[0]].rows)
     return bool(-more > max(chance, beaten * left))

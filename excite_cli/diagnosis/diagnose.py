@@ -36,7 +36,6 @@ from excite_cli.diagnosis.records import (
     ErrorPath,
     JointAlias,
     Textbook,
-    Unexplained,
 )
 from excite_cli.diagnosis.rounds import order_of, rounds_of
 from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors, sealed_errors
@@ -49,9 +48,8 @@ from excite_cli.diagnosis.single_runs import (
 )
 from excite_cli.diagnosis.sufficient import comparison_of, sufficient
 from excite_cli.diagnosis.textbook import textbook
-from excite_cli.diagnosis.traces import Dependence, Traces
+from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.tracing import Traced, trace
-from excite_cli.diagnosis.unexplained import unexplained_structure
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
@@ -144,12 +142,11 @@ def diagnose(
     model = traced.model
     final = final_fit(traced, regression(traced))
     parameters, covariance = final.parameters, final.covariance
-    unexplained, dependence = _unexplained(traced, robot)
     floor = noise_floor(parts.training, processing)
     models = both_models(model, traced, parameters)
     trained = Played(robot, traced.data.runs)
     before, after = map(trained.predictions, models)
-    rests = large_rests(
+    rests, dependence = large_rests(
         traced.data,
         traced.signals,
         [each.torque for each in after],
@@ -159,7 +156,7 @@ def diagnose(
         floor,
         robot.joint_names,
     )
-    doubts = approximations(traced, unexplained, robot.joint_names, rests)
+    doubts = approximations(traced, robot.joint_names, rests)
     ends = prepare_all(parts.ends, processing)
     played = Played(robot, kept)
     told = played.predictions(models[0]), played.predictions(models[1])
@@ -199,7 +196,6 @@ def diagnose(
         declared=_declared(model, models[1], robot),
         effects=named,
         absorbed=_absorbed(model, traced),
-        unexplained=tuple(unexplained),
         sealed_run=parts.sealed_name,
         before=sealed_part.before,
         after=sealed_part.after,
@@ -374,19 +370,6 @@ def _filter_bias(
     known = Knowledge(after.effects, wide, rows[:, -1])
     behind = fitted_behind(model.robot, model.base, known, spec.identification, runs)
     return filter_findings(runs, processing, spec.measurement.filter, behind)
-
-
-def _unexplained(traced: Traced, robot: Robot) -> tuple[list[Unexplained], Dependence]:
-    rules = traced.judge.rules
-    return unexplained_structure(
-        traced.data,
-        traced.candidates,
-        traced.chosen,
-        traced.signals,
-        traced.noise,
-        (rules.significance, rules.gain, rules.inflation),
-        robot.joint_names,
-    )
 
 
 def _joint_aliases(

@@ -1,20 +1,20 @@
 """Names that do not hold: effects that only approximate something outside the catalogue.
 
 A line through a curve explains most of it, not its form. So for each effect that was found, E is
-the energy it explains on the joint where it matters most, and U what is left there with structure:
-the part that depends on some quantity (`unexplained`) or can be predicted from all (`rests`), or
-what an effect of an impossible sign or size would explain. The effect is an approximation
+the energy it explains on the joint where it matters most, and U what is surely left there beside
+the noise (`rests`): what can be predicted or, if that is more, what exceeds the noise; or what an
+effect of an impossible sign or size would explain. The effect is an approximation
 
-* if what is left is a function of the same quantity as the effect (friction: speed), and U > 0.1 E,
+* if what is left is a function of the effect's own quantity alone (friction: speed), and what is
+  predicted of it is more than 0.1 E; if it is one of two, and U > 0.5 E,
 * or if U > E, whatever it depends on, unless inertias nearly take the effect up,
 * or if a curve without a name does as well (`curves`), or more than noise is left for sure of a
   form that was not seen to repeat (a wave of less than three periods),
 * or if it is a change in some runs that explains less than is left in these, noise included,
 * or if it is the mean of a curve that is one (`_means_of_curves`).
 
-Of `rests`, U is what can be predicted or, if that is more, what exceeds the noise; they depend on
-two quantities mostly, so that U > 0.5 E is asked for where one of them is the effect's own. They
-say nothing of effects that inertias nearly take up, of which E is next to nothing. A change in some
+Rests say nothing of effects that inertias nearly take up, of which E is next to nothing, but by
+their own quantity. A change in some
 runs or over time, first-order friction and, where a good part can be predicted, a constant are
 means of a function of anything: U > 0.25 E is enough for changes, U > 0.3 E for friction and
 U > 0.5 E for constants. (Of maps of two quantities eleven of 416 campaigns were told such a mean or
@@ -28,7 +28,7 @@ import numpy as np
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.curves import curves_in_place, functions_alike
-from excite_cli.diagnosis.records import Approximation, LargeRest, Unexplained
+from excite_cli.diagnosis.records import Approximation, LargeRest
 from excite_cli.diagnosis.schur import SHARED
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect, Tier
@@ -45,12 +45,10 @@ _TRIED = 12  # of the strongest candidates of a joint
 
 def approximations(
     traced: Traced,
-    unexplained: Sequence[Unexplained],
     joint_names: Sequence[str],
-    rests: Sequence[LargeRest] = (),
+    rests: Sequence[LargeRest],
 ) -> dict[int, Approximation]:
     """Which chosen candidates are approximations, and of what."""
-    left = {each.joint: each for each in unexplained}
     more = {each.joint: each for each in rests if each.certain}
     impossible: dict[tuple[int, tuple[str, ...]], tuple[float, str]] = {}
     found = {
@@ -70,22 +68,9 @@ def approximations(
         if _weaker_than_its_runs(traced, i, joint, explained):
             found[i] = Approximation()
             continue
-        if name in left:
-            each = left[name]
-            structure = each.share_of_residual * rest
-            same = _same_quantity(traced, i, each.depends_on, joint_names)
-            says = same or not _taken_up(traced, i)
-            if says and structure > (_SAME_QUANTITY if same else 1.0) * explained:
-                found[i] = Approximation(covariates=each.depends_on)
-                continue
-        if name in more and _of_its_own(traced, i, more[name]):
-            limit = _limit_of_mean(traced, i, more[name])
-            if limit is None:
-                same = _same_quantity(traced, i, more[name].depends_on, joint_names)
-                limit = _ONE_OF_TWO if same else 1.0
-            if _surely_left(more[name]) * rest > limit * explained:
-                found[i] = Approximation(covariates=more[name].depends_on)
-                continue
+        if name in more and _is_outdone(traced, i, more[name], explained / rest, joint_names):
+            found[i] = Approximation(covariates=more[name].depends_on)
+            continue
         key = (joint, traced.candidates[i].effect.function_of)
         if key not in impossible:
             impossible[key] = _impossible(traced, *key, rest)
@@ -93,6 +78,19 @@ def approximations(
         if energy > explained:
             found[i] = Approximation(kind=what)
     return found | _means_of_curves(traced, found)
+
+
+def _is_outdone(
+    traced: Traced, i: int, rest: LargeRest, explained: float, joint_names: Sequence[str]
+) -> bool:
+    """Whether what is left says more than candidate i, whose E is given in units of the rest."""
+    same = _same_quantity(traced, i, rest.depends_on, joint_names)
+    if same and len(rest.depends_on) == 1 and rest.predictable > _SAME_QUANTITY * explained:
+        return True
+    if not _of_its_own(traced, i, rest):
+        return False
+    limit = _limit_of_mean(traced, i, rest) or (_ONE_OF_TWO if same else 1.0)
+    return _surely_left(rest) > limit * explained
 
 
 def _weaker_than_its_runs(traced: Traced, i: int, joint: int, explained: float) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from excite_cli.diagnosis.high_band import band_noise
 from excite_cli.diagnosis.records import LargeRest
 from excite_cli.diagnosis.structure import Quantities, Structure
+from excite_cli.diagnosis.traces import Dependence
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Signals
 from excite_cli.identification.noise_floor import NoiseFloor
@@ -25,6 +26,7 @@ _TIMES = 2.5
 _PERHAPS = 1.6  # a word, that noise with a memory may be as large
 _PREDICTABLE = 0.3  # share; of noise with a memory hardly anything is
 _SAID = 0.2  # a quantity that predicts less is no answer
+_SHOWN = 0.05  # share; of what is predicted less the map is left empty
 _UNKNOWN = 0.003  # of the torque's RMS: a word where noise is not known
 _SMALLEST = 1e-3  # of the torque's RMS: what is smaller needs no word
 
@@ -38,8 +40,8 @@ def large_rests(
     processing: Processing,
     repeated: NoiseFloor | None,
     joint_names: Sequence[str],
-) -> tuple[LargeRest, ...]:
-    """Joints of whose torque more is left than noise, in the training parts.
+) -> tuple[tuple[LargeRest, ...], Dependence]:
+    """Joints of whose torque more is left than noise in the training parts; on what it depends.
 
     predicted: torque (T, n) of the model at the working rate; residuals: (M, n) of what fits count;
     recorded: the parts as they were read; repeated: the floor from repeated periods.
@@ -51,6 +53,7 @@ def large_rests(
         for run, torque in zip(data.runs, predicted, strict=True)
     ]
     found = []
+    shares = np.zeros((len(joint_names), len(quantities.names)))
     for joint, name in enumerate(joint_names):
         rms, torque = (
             _rms([x[run.usable[:, joint], joint] for x, run in zip(series, data.runs, strict=True)])
@@ -68,6 +71,8 @@ def large_rests(
         known = np.isfinite(noise)
         enough = _PERHAPS * noise if known else _UNKNOWN * torque
         rest = quantities.rest(joint, residuals)
+        if rest is not None and rest.predictable > _SHOWN:
+            shares[joint] = np.clip(list(rest.shares.values()), 0.0, 1.0)
         predictable = rest is not None and rest.predictable > _PREDICTABLE
         if not max(rms, around) > enough and not predictable:
             continue
@@ -87,7 +92,7 @@ def large_rests(
                 at_reversals=at_reversals,
             )
         )
-    return tuple(found)
+    return tuple(found), Dependence(tuple(joint_names), quantities.names, shares)
 
 
 def _rms(parts: Sequence[Array]) -> float:

@@ -172,15 +172,6 @@ class Absorbed:
 
 
 @dataclass(frozen=True)
-class Unexplained:
-    """Structure in a joint's residual that fits no name, and what it depends on."""
-
-    joint: str
-    depends_on: tuple[Covariate, ...]
-    share_of_residual: float
-
-
-@dataclass(frozen=True)
 class LargeRest:
     """More than noise is left of the torque of `joint` once all effects are in (training data).
 
@@ -300,7 +291,6 @@ class Diagnosis(Shown):
     declared: tuple[EffectRecord, ...]
     effects: tuple[NamedEffect, ...]
     absorbed: tuple[Absorbed, ...]
-    unexplained: tuple[Unexplained, ...]
     sealed_run: str
     before: Errors
     after: Errors
@@ -389,10 +379,14 @@ class Diagnosis(Shown):
         return tuple(each for each in self.effects if not each.approximates)
 
     @property
+    def unexplained(self) -> tuple[LargeRest, ...]:
+        """What is left and depends on something, in a form that no effect has."""
+        return tuple(each for each in self.large_rests if each.depends_on)
+
+    @property
     def joints_left(self) -> tuple[str, ...]:
         """Joints of whose torque structure, or surely more than noise, is left."""
-        left = {each.joint for each in self.unexplained}
-        left |= {each.joint for each in self.large_rests if each.certain}
+        left = {each.joint for each in self.large_rests if each.certain}
         return tuple(joint for joint in self.joint_names if joint in left)
 
     @property

@@ -14,6 +14,7 @@ From what: the same with one k_i, or one product k_i k_j, in place of all.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -58,7 +59,7 @@ class Rest:
     direction: Array
     kernels: Mapping[Covariate, Array]
 
-    @property
+    @cached_property
     def predictable(self) -> float:
         """Share of the residual's energy that all quantities together predict."""
         every = np.array(list(self.kernels.values()))
@@ -67,20 +68,21 @@ class Rest:
         pairs = (total**2 - squares) / (count * (count - 1))
         return self._predicted(0.5 * (total / count + pairs), _RIDGES)
 
+    @cached_property
+    def shares(self) -> dict[Covariate, float]:
+        """Share of the residual's energy that each quantity alone predicts."""
+        return {of: self._predicted(kernel, _RIDGES[1:]) for of, kernel in self.kernels.items()}
+
     def structure(self) -> Structure:
         """How much is predictable, and the quantity or the pair of them that predicts most."""
-        everything = self.predictable
-        single = max(
-            (self._predicted(kernel, _RIDGES[1:]), covariate.code, (covariate,))
-            for covariate, kernel in self.kernels.items()
-        )
+        single = max((share, of.code, (of,)) for of, share in self.shares.items())
         pair = max(
             (self._predicted(one * other, _RIDGES[1:2]), (a.code, b.code), (a, b))
             for (a, one), (b, other) in combinations(self._paired(), 2)
             if not {a.quantity, b.quantity} <= _SLOW  # any series is a function of both
         )
         best = pair if pair[0] - single[0] > _CLEARER * (1.0 - single[0]) else single
-        return Structure(max(everything, best[0], 0.0), max(best[0], 0.0), best[2])
+        return Structure(max(self.predictable, best[0], 0.0), max(best[0], 0.0), best[2])
 
     def _paired(self) -> list[tuple[Covariate, Array]]:
         """Accelerations of other joints are left to the functions of one quantity."""
@@ -130,6 +132,11 @@ class Quantities:
         self._columns = {
             name: averaged([s.covariates[name] for s in signals]) for name in signals[0].covariates
         }
+
+    @property
+    def names(self) -> tuple[Covariate, ...]:
+        """What a residual is tried against; what is a joint's own has one name for all joints."""
+        return tuple(covariate.common for covariate, _ in self._all(0))
 
     def rest(self, joint: int, residuals: Sequence[Array]) -> Rest | None:
         """The residual of a joint and its kernels; None where too few samples are known.

@@ -145,7 +145,10 @@ def rests_in_words(
         text = f"More than noise: {left(rest)} of {rest.joint} are left{beside}; "
         share = f"{rest.predictable:.0%} of its energy can be predicted"
         if rest.depends_on:
-            text += f"{share}, best from {' and '.join(map(say, rest.depends_on))}."
+            text += (
+                f"{share}, best from {' and '.join(map(say, rest.depends_on))}; no effect of the "
+                "catalogue has this form."
+            )
         elif rest.predictable > _TELLING:
             text += f"{share}, but from no one or two quantities."
         else:

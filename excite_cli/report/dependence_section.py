@@ -1,11 +1,9 @@
 """What is still unexplained: on which quantities the rest depends, as a map and as pictures."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate
-from excite_cli.diagnosis.records import Diagnosis, Unexplained
+from excite_cli.diagnosis.records import Diagnosis, LargeRest
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.words import covariate_in_words, rests_in_words
 from excite_cli.report.chart import Colour, limits_about
@@ -25,16 +23,9 @@ _SERIES = {"position": "q", "speed": "v", "acceleration": "a", "load": "load", "
 
 def dependence_section(found: Diagnosis) -> Section:
     """Sentences, the map, and what is left over what it depends on most."""
-    sentences: list[Block] = [
-        Text(
-            f"The residual of {each.joint} still depends on {_joined(each.depends_on)} "
-            f"({each.share_of_residual:.1%} of it); no effect of the catalogue has this form.",
-            "bad",
-        )
-        for each in found.unexplained
-    ]
     more, perhaps = rests_in_words(found, covariate_in_words)
-    sentences += [*(Text(text, "bad") for text in more), *(Text(text) for text in perhaps)]
+    sentences: list[Block] = [Text(text, "bad") for text in more]
+    sentences += [Text(text) for text in perhaps]
     if not sentences:
         sentences.append(
             Text(
@@ -48,7 +39,7 @@ def dependence_section(found: Diagnosis) -> Section:
         pictures = [
             chart
             for each in found.unexplained
-            for covariate in each.depends_on[:2]
+            for covariate in each.depends_on
             for chart in _picture(found, found.traces, each, covariate)
         ]
         if pictures:
@@ -60,11 +51,6 @@ def dependence_section(found: Diagnosis) -> Section:
         "and its own load, direction and history."
     )
     return Section("diagnosis-unexplained", "What stays unexplained", tuple(blocks), lead)
-
-
-def _joined(covariates: Sequence[Covariate]) -> str:
-    words = [covariate_in_words(each) for each in covariates]
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _map(dependence: Dependence) -> Block:
@@ -94,15 +80,13 @@ def _map(dependence: Dependence) -> Block:
     )
 
 
-def _picture(
-    found: Diagnosis, traces: Traces, unexplained: Unexplained, covariate: Covariate
-) -> list[Plot]:
+def _picture(found: Diagnosis, traces: Traces, rest: LargeRest, covariate: Covariate) -> list[Plot]:
     """What is left of the joint over the covariate; nothing if too few samples are known."""
     if covariate.quantity not in _SERIES:
         return []  # of columns of the log no trace is kept
     timed = covariate.quantity == "time"
     names = list(found.joint_names)
-    j = names.index(unexplained.joint)
+    j = names.index(rest.joint)
     k = names.index(covariate.joint) if covariate.joint in names else j
     left = np.concatenate([run.measured[:, j] - run.predicted[:, j] for run in traces.runs])
     series = [getattr(run, _SERIES[covariate.quantity]) for run in traces.runs]
@@ -123,7 +107,7 @@ def _picture(
         return []
     largest = max(float(np.abs(middle).max()) for _, _, middle in means)
     words = (
-        f"What is left of the torque of {unexplained.joint}, over the {axis}: means reach "
+        f"What is left of the torque of {rest.joint}, over the {axis}: means reach "
         f"{largest:.3g} {unit}, the RMS of all is "
         f"{np.sqrt(np.mean(left[known] ** 2)):.3g} {unit}."
     )
@@ -147,7 +131,7 @@ def _picture(
         span=limits_about(factor * np.concatenate(shown)),
         height=210,
     )
-    title = f"{unexplained.joint}: left, over {covariate_in_words(covariate)}"
+    title = f"{rest.joint}: left, over {covariate_in_words(covariate)}"
     return [Plot(title, words, axis, at, (panel,))]
 
 

@@ -27,7 +27,6 @@ from excite_cli.diagnosis.records import (
     Round,
     SealedEnds,
     Textbook,
-    Unexplained,
 )
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Finding
@@ -58,7 +57,6 @@ _RECORDS: dict[str, Any] = {
     "declared": tuple[EffectRecord, ...],
     "effects": tuple[NamedEffect, ...],
     "absorbed": tuple[Absorbed, ...],
-    "unexplained": tuple[Unexplained, ...],
     "before": Errors,
     "after": Errors,
     "rounds": tuple[Round, ...],
@@ -203,7 +201,6 @@ def _named_joints(found: Diagnosis) -> set[str]:
         *(joint for each in records for joint in each.joints),
         *(joint for each in found.effects for joint in (*each.removes, *each.parts)),
         *found.inertia_parts,
-        *(each.joint for each in found.unexplained),
         *(each.joint for each in found.large_rests),
         *(each.joint for each in found.friction_lines),
         *(joint for each in found.rounds for joint in each.residual),
@@ -238,7 +235,7 @@ def _record(group: Any, name: str, kind: Any) -> Any:
 
 def _known(name: str, value: Any) -> Any:
     """What stands in the file as a text, as a record."""
-    if name in ("records/unexplained", "records/large_rests"):
+    if name == "records/large_rests":
         return [
             {**each, "depends_on": tuple(map(Covariate.of_code, each["depends_on"]))}
             for each in value

@@ -16,7 +16,6 @@ from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import (
     assumption_in_words,
     counted,
-    covariate_in_symbols,
     ends_in_words,
     joints_in_words,
     p_in_words,
@@ -75,7 +74,7 @@ def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
     parts += approximation_parts(found, verbose)
     parts += [friction_table(found.friction_lines)] if verbose and _has_curves(found) else []
     parts += changes_in_words(found)
-    parts += [*absorbed_parts(found), *unexplained_in_words(found)]
+    parts += absorbed_parts(found)
     parts += [text for texts in rests_in_words(found) for text in texts]
     parts += error_tables(found, verbose)
     above = above_the_floor(found.after, found.noise_floor)
@@ -145,16 +144,6 @@ def absorbed_parts(found: Diagnosis) -> Parts:
         words=("absorbed by",),
     )
     return [table, *settled_in_words(found)]
-
-
-def unexplained_in_words(found: Diagnosis) -> list[str]:
-    """A sentence for each joint whose residual has a form that no effect has."""
-    return [
-        f"Unexplained: the residual of {each.joint} still depends on "
-        f"{', '.join(map(covariate_in_symbols, each.depends_on))} "
-        f"({each.share_of_residual:.1%} of it); no effect of the catalogue has this form."
-        for each in found.unexplained
-    ]
 
 
 def _verdict(found: Diagnosis) -> str:

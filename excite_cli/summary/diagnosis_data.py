@@ -85,7 +85,11 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             for a in found.absorbed
         ],
         "unexplained": [
-            {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
+            {
+                "joint": each.joint,
+                "depends_on": [covariate.code for covariate in each.depends_on],
+                "share_of_residual": each.predictable,
+            }
             for each in found.unexplained
         ],
         "large_rests": [

@@ -23,9 +23,7 @@ def found() -> Diagnosis:
     diagnosis = make_diagnosis()
     good = errors(0.01, 0.1, diagnosis.joint_names)
     before = errors(0.05, 0.5, diagnosis.joint_names)
-    return replace(
-        diagnosis, trained=good, before=before, after=good, unexplained=(), large_rests=()
-    )
+    return replace(diagnosis, trained=good, before=before, after=good, large_rests=())
 
 
 def test_nothing_is_open_where_the_newest_motion_is_predicted(found: Diagnosis) -> None:
@@ -52,7 +50,7 @@ def test_what_is_missed_on_the_newest_motion(
 
 
 def test_structure_that_is_left_is_open(found: Diagnosis) -> None:
-    left = replace(found, unexplained=make_diagnosis().unexplained)
+    left = replace(found, large_rests=make_diagnosis().large_rests)
     assert still_open(left, ()) == ("elbow: more than noise is left of its torque",)
 
 

@@ -21,7 +21,6 @@ from excite_cli.diagnosis.records import (
     Removed,
     Round,
     Suspect,
-    Unexplained,
 )
 from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
 from excite_cli.diagnosis.verdict import SealedVerdict, Verdict
@@ -112,11 +111,6 @@ def make_diagnosis(
             ),
         ),
         absorbed=(Absorbed("armature", (names[0],), ("Izz[shoulder_yaw]",), 1e-5),),
-        unexplained=(
-            Unexplained(
-                "elbow", (Covariate("position", "elbow", Aspect.DIRECTION), Covariate("time")), 0.3
-            ),
-        ),
         sealed_run="run_3",
         before=replace(errors, mean_relative=0.2),
         after=errors,

@@ -13,7 +13,6 @@ from excite_cli.diagnosis.records import (
     EffectRecord,
     FrictionLine,
     NamedEffect,
-    Unexplained,
 )
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.effects.base import Value
@@ -49,9 +48,7 @@ def found(plain: Diagnosis, *effects: NamedEffect, left: tuple[float, float] = (
         relative_moving=dict.fromkeys(names, 0.5),
     )  # fmt: skip
     end = replace(plain.after, mean_relative=mean, mean_relative_moving=mean, relative_moving=after)
-    return replace(
-        plain, effects=effects, before=before, after=end, unexplained=(), large_rests=(), **changes
-    )
+    return replace(plain, effects=effects, before=before, after=end, large_rests=(), **changes)
 
 
 def everywhere(plain: Diagnosis, part: float) -> dict[str, float]:
@@ -102,12 +99,11 @@ def test_one_effect_is_told_by_its_name(plain: Diagnosis) -> None:
 
 
 def test_what_stays_is_told_with_what_it_depends_on(plain: Diagnosis) -> None:
-    rest = Unexplained(
-        "elbow", (Covariate("position", "elbow", Aspect.HISTORY), Covariate("time")), 0.3
-    )
+    of = (Covariate("position", "elbow", Aspect.HISTORY), Covariate("time"))
+    rest = replace(plain.large_rests[0], depends_on=of)
     answer = found(plain, effect("coulomb_friction", "elbow", RUBS, everywhere(plain, 0.4)),
                    left=(0.1, 0.1))  # fmt: skip
-    told = answer_in_words(replace(answer, unexplained=(rest,)))
+    told = answer_in_words(replace(answer, large_rests=(rest,)))
     assert (
         "10% of the torque stays. What stays on elbow depends on history of angle of elbow and "
         "time. Next: "
@@ -126,8 +122,7 @@ def test_a_fit_of_kept_inertias_has_its_share(plain: Diagnosis) -> None:
 
 def test_nothing_and_nothing_good(plain: Diagnosis) -> None:
     assert answer_in_words(found(plain)).startswith("Nothing is missing: ")
-    rest = Unexplained("elbow", (Covariate("time"),), 0.3)
-    some = replace(found(plain), unexplained=(rest,))
+    some = replace(found(plain), large_rests=plain.large_rests)
     assert answer_in_words(some).startswith("No effect of the catalogue explains what is left")
     worse = found(
         plain, effect("spring", "elbow", SPRING, everywhere(plain, -0.1)), left=(0.7, 0.7)

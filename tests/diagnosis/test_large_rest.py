@@ -65,7 +65,8 @@ def left(
     nothing = tuple(np.zeros((*r.shape, 1)) for r in residuals)
     data = TrainingData(tuple(prepared), (0, 1, 2), nothing, tuple(r.tau_fit for r in prepared))
     predicted = [5.0 * run.q for run in prepared]
-    return large_rests(data, signals, predicted, residuals, recorded, PROCESSING, floor, ("a", "b"))
+    names = ("a", "b")
+    return large_rests(data, signals, predicted, residuals, recorded, PROCESSING, floor, names)[0]
 
 
 def test_nothing_is_said_of_noise() -> None:

@@ -95,7 +95,7 @@ def test_the_map_of_dependences(found: Diagnosis) -> None:
     dependence = found.traces.dependence
     assert dependence.joints == found.joint_names
     n = len(found.joint_names)
-    assert len(dependence.quantities) == 1 + 3 * n + 4
+    assert len(dependence.quantities) == 2 + 3 * n + 3
     assert dependence.quantities[0] == Covariate("time")
     assert dependence.quantities[-1].code == "own history of load"
     assert dependence.shares.shape == (n, len(dependence.quantities))

@@ -15,7 +15,6 @@ from excite_cli.diagnosis.records import (
     EffectRecord,
     JointAlias,
     NamedEffect,
-    Unexplained,
 )
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words, title_of
@@ -56,8 +55,10 @@ def plain() -> Diagnosis:
 def diagnosis(plain: Diagnosis) -> Diagnosis:
     traces, sealed = make_traces(plain.joint_names)
     traces = replace(traces, runs=traces.runs[:1])
-    unexplained = (Unexplained("elbow", (Covariate("position", "elbow", Aspect.DIRECTION),), 0.3),)
-    return replace(plain, traces=traces, sealed_traces=sealed, unexplained=unexplained)
+    rest = replace(
+        plain.large_rests[0], depends_on=(Covariate("position", "elbow", Aspect.HISTORY),)
+    )
+    return replace(plain, traces=traces, sealed_traces=sealed, large_rests=(rest,))
 
 
 @pytest.fixture(scope="module")
@@ -215,7 +216,7 @@ def test_sealed_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
 def test_what_depends_is_told_drawn_and_mapped(sections: dict[str, Section]) -> None:
     section = sections["diagnosis-unexplained"]
     told = [b.text for b in section.blocks if isinstance(b, Text)]
-    assert any("angle of elbow and direction (30.0% of it)" in text for text in told)
+    assert any("60% of its energy can be predicted, best from history of angle" in x for x in told)
     picture, table = charts_of(section)
     assert "mean forwards" in drawn(picture)
     assert ">30<" in drawn(table).replace("\n", "")
@@ -230,7 +231,6 @@ def test_without_dependences_there_is_no_map(diagnosis: Diagnosis) -> None:
     )
     calm = replace(
         diagnosis,
-        unexplained=(),
         large_rests=(),
         traces=replace(diagnosis.traces, dependence=dependence),
     )
@@ -334,7 +334,7 @@ def test_a_sealed_error_that_did_not_fall_is_told_first(diagnosis: Diagnosis) ->
 
 def test_nothing_found(diagnosis: Diagnosis) -> None:
     unnamed = replace(diagnosis, effects=())
-    nothing = replace(unnamed, unexplained=(), large_rests=())
+    nothing = replace(unnamed, large_rests=())
     for each, begins in (
         (unnamed, "No effect of the catalogue explains"),
         (nothing, "Nothing is missing"),

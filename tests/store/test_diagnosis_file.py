@@ -77,8 +77,8 @@ def test_approximations_are_records_and_a_text_that_earlier_versions_wrote_alone
     with h5py.File(path, "a") as file:
         (record,) = json.loads(file["records/effects"][()])
         assert record["approximates"] == text
-        (left,) = json.loads(file["records/unexplained"][()])
-        assert left["depends_on"] == ["direction and q[elbow]", "time"]
+        (left,) = json.loads(file["records/large_rests"][()])
+        assert left["depends_on"] == ["q[elbow]", "load[elbow]"]
         del file["records/effects"]
         if earlier:
             del record["approximation"]
@@ -90,9 +90,9 @@ def test_approximations_are_records_and_a_text_that_earlier_versions_wrote_alone
 
 def test_a_dependence_on_nothing_known_is_damage(diagnosis: Diagnosis, path: Path) -> None:
     with h5py.File(path, "a") as file:
-        text = file["records/unexplained"][()].decode().replace("direction and q", "mood of q")
-        del file["records/unexplained"]
-        file["records/unexplained"] = text
+        text = file["records/large_rests"][()].decode().replace("load[", "mood of load[")
+        del file["records/large_rests"]
+        file["records/large_rests"] = text
     with pytest.raises(FileError, match="damaged"):
         read_diagnosis(path)
 

@@ -131,7 +131,7 @@ def test_another_name_of_the_same_torque_is_told_as_such() -> None:
 
 def test_nothing_is_missing_only_where_nothing_large_is_left(doubted: Diagnosis) -> None:
     (rest,) = doubted.large_rests
-    bare = replace(doubted, effects=(), unexplained=(), large_rests=())
+    bare = replace(doubted, effects=(), large_rests=())
     assert "Nothing is missing" in printed(bare)
     for left, whole in ((rest, False), (replace(rest, certain=False), True)):
         text = printed(replace(bare, large_rests=(left,)))
