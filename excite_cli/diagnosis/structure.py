@@ -19,6 +19,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.blas import dsymv
 from scipy.linalg.lapack import dpotrf, dpotri
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate
@@ -100,15 +101,22 @@ class Rest:
 
     def _left(self, kernel: Array, ridge: float) -> float:
         factor, _ = dpotrf(kernel + ridge * np.eye(len(kernel)), lower=1)
-        half = np.tril(dpotri(factor, lower=1)[0])
-        inverse = half + np.tril(half, -1).T
-        weights = inverse @ self.residual
-        edges = [0, *(np.flatnonzero(np.diff(self.block)) + 1), len(weights)]
-        left = 0.0
-        for block in map(slice, edges[:-1], edges[1:]):
-            error = np.linalg.solve(inverse[block, block], weights[block])
-            left += float(error @ error)
-        return left
+        inverse, _ = dpotri(factor, lower=1)  # its lower half
+        weights = dsymv(1.0, inverse, self.residual, lower=1)
+        at, there = self._seconds
+        rows, columns = at[:, :, None], at[:, None]
+        own = inverse[np.maximum(rows, columns), np.minimum(rows, columns)]
+        blocks = np.where(there[:, :, None] & there[:, None], own, np.eye(at.shape[1]))
+        errors = np.linalg.solve(blocks, np.where(there, weights[at], 0.0)[:, :, None])
+        return float(np.sum(errors**2))
+
+    @cached_property
+    def _seconds(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """Samples (B, w) of every second, those of fewer than w filled up; which ones are there."""
+        starts, counts = np.unique(self.block, return_index=True, return_counts=True)[1:]
+        order = np.arange(counts.max())
+        there = order < counts[:, None]
+        return starts[:, None] + np.where(there, order, 0), there
 
 
 class Quantities:
