@@ -8,10 +8,9 @@ where the model without it, all others fitted anew, says the same along a usual 
     u = max_j RMS_t(c_jᵀ d) (|θ| + 2 s) / RMS τ_j,    d = P e / (eᵀ P e),
 
 with P the covariance of all parameters, θ and s = √(eᵀ P e) size and deviation of this one (the
-unit vector e), and c_j the columns of joint j, is below a fiftieth, or at most one and a half times
-as much as in the data, which would miss it; and, of what is surely there, also below a fifth of
-what the model leaves. Not so defects of the measurement, of which many robots
-have none: with offsets a UR10 of the battery was left with 14.8 % for 7.4.
+unit vector e), and c_j the columns of joint j, is below a fiftieth and, of what is surely there, also below a fifth of
+what the model leaves. Not so defects of the measurement, of which many robots have none: with
+offsets a UR10 of the battery was left with 14.8 % for 7.4.
 """
 
 from collections.abc import Sequence
@@ -70,14 +69,13 @@ def those_that_matter(traced: Traced, chosen: Sequence[int]) -> list[int]:
 
 
 class _Elsewhere:
-    """What the model says along the usual motion and in the data: mean squares (n, K, K)."""
+    """What the model says along the usual motion: mean squares (n, K, K)."""
 
     def __init__(self, traced: Traced, members: Sequence[int]) -> None:
         self._traced, white = traced, traced.judge.white
         effects = [traced.candidates[i].effect for i in members]
         columns = white.columns(members)
         self._usual = traced.usual.gram(traced.model, effects)
-        self._seen = _seen(traced, columns)
         self._place = {int(column): k for k, column in enumerate(columns)}
         torque = torque_seen(traced.data)
         self._torque = np.where(torque > 0.0, torque, np.inf)  # nothing is known of other joints
@@ -92,29 +90,15 @@ class _Elsewhere:
         theta = traced.judge.plain.solve(chosen)
         covariance = traced.inflation * white.covariance(chosen)
         at: NDArray[np.intp] = np.array([self._place[int(c)] for c in white.columns(chosen)])
-        usual, seen = (gram[:, at[:, None], at] for gram in (self._usual, self._seen))
+        usual = self._usual[:, at[:, None], at]
         start, found = white.fixed, {}
         for i in chosen:
             own = slice(start, start + traced.candidates[i].width)
             start = own.stop
-            known = covariance[:, own], covariance[own, own], theta[own]
-            there, here = (_otherwise(gram, *known) for gram in (usual, seen))
-            matters = (there > rules.MATTERS * self._torque) & (there > rules.BEYOND * here)
-            found[i] = bool(matters.any()), float((there / self._left).max())
+            there = _otherwise(usual, covariance[:, own], covariance[own, own], theta[own])
+            matters = bool((there > rules.MATTERS * self._torque).any())
+            found[i] = matters, float((there / self._left).max())
         return found
-
-
-def _seen(traced: Traced, columns: NDArray[np.intp]) -> Array:
-    """Mean squares (n, K, K) in the training data of these columns."""
-    counts = sum(run.usable.sum(axis=0) for run in traced.data.runs)
-    found = np.zeros((traced.data.n, len(columns), len(columns)))
-    for j, joint in enumerate(traced.judge.plain.grams.joints):
-        place = {int(column): k for k, column in enumerate(joint.active)}
-        there = [k for k, column in enumerate(columns) if int(column) in place]
-        own = [place[int(columns[k])] for k in there]
-        gram = joint.whole.sum(axis=0)[np.ix_(own, own)]
-        found[j][np.ix_(there, there)] = traced.levels[j] ** 2 * gram / max(counts[j], 1)
-    return found
 
 
 def _otherwise(gram: Array, across: Array, own: Array, size: Array) -> Array:
