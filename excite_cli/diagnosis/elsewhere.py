@@ -8,9 +8,9 @@ where the model without it, all others fitted anew, says the same along a usual 
     u = max_j RMS_t(c_jᵀ d) (|θ| + 2 s) / RMS τ_j,    d = P e / (eᵀ P e),
 
 with P the covariance of all parameters, θ and s = √(eᵀ P e) size and deviation of this one (the
-unit vector e), and c_j the columns of joint j, is below a fiftieth and, of what is surely there,
-also below a fifth of what the model leaves. Not so defects of the measurement, of which many robots
-have none: with offsets a UR10 of the battery was left with 14.8 % for 7.4.
+unit vector e), and c_j the columns of joint j, is below a fiftieth and, of what is surely there, also below a fifth of
+what the model leaves. Not so defects of the measurement, of which many robots have none: with
+offsets a UR10 of the battery was left with 14.8 % for 7.4.
 """
 
 from collections.abc import Sequence
@@ -19,23 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.diagnosis import rules
+from excite_cli.diagnosis.reach import torque_seen
 from excite_cli.diagnosis.search import weakest_apart
 from excite_cli.diagnosis.textbook import everyday
 from excite_cli.diagnosis.tracing import Traced
-from excite_cli.diagnosis.training import TrainingData
 from excite_cli.robot.model import Array
 
 _ITS_OWN = 1e-6  # of a column's energy: what the model leaves of less is rounding
 _DEVIATIONS = 2.0
-
-
-def torque_seen(data: TrainingData) -> Array:
-    """RMS (n,) of the measured torque where it is fitted."""
-    squares = np.zeros(data.n)
-    for run in data.runs:
-        squares += np.where(run.usable, np.square(run.tau_fit), 0.0).sum(axis=0)
-    counts = sum(run.usable.sum(axis=0) for run in data.runs)
-    return np.sqrt(squares / np.maximum(counts, 1))
 
 
 def with_everyday(traced: Traced, chosen: Sequence[int]) -> list[int]:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.reach import Reach
 from excite_cli.effects.base import Effect
 from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array
@@ -28,8 +29,9 @@ class PossibleSizes:
         spread: Spread,
         seen: Seen,
         declared: Sequence[Effect] = (),
+        reach: Reach | None = None,
     ) -> None:
-        self._candidates, self._seen = candidates, seen
+        self._candidates, self._seen, self._reach = candidates, seen, reach
         self._spread, self._declared = spread, declared
 
     def __call__(self, parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
@@ -52,6 +54,8 @@ class PossibleSizes:
                 else:
                     directions = np.eye(len(parameters))[:, own]
                     reason = effect.why_impossible(values, self._spread(chosen, directions))
+            if not reason and self._reach is not None:
+                reason = self._reach.why_not(i, values)
             if effect.varied and not reason:
                 reason = self._too_much_taken(effect, own, parameters, chosen)
             if reason:

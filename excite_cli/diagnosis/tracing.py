@@ -29,6 +29,7 @@ from excite_cli.diagnosis.modelled_run import (
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import placebos_of
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
+from excite_cli.diagnosis.reach import Reach
 from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.textbook import everyday, textbook_effects
@@ -376,6 +377,7 @@ def _one_pass(
         spread_of(white.covariance, inflation),
         _seen(data, signals),
         model.declared,
+        Reach(candidates, data, motion, everyday(candidates)),
     )
     judge = Judgement(white, plain, candidates, rules, sizes, found)
     chosen = _searched(judge, spec.rounds, data, model, over)

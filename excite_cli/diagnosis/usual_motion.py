@@ -2,7 +2,7 @@
 
 Recordings show a part of what a robot can do. Where a joint crept, nothing is known of what it does
 at speed, however well every second of the recording is predicted. So sizes are judged along this
-motion as well (`weighted_fit`, `elsewhere`).
+motion as well (`reach`, `elsewhere`).
 """
 
 from collections.abc import Sequence
@@ -64,3 +64,8 @@ class UsualMotion:
     @staticmethod
     def _is_steady(effect: Effect) -> bool:
         return not (effect.runs or effect.covariate or "time" in effect.function_of)
+
+    def squares(self, effect: Effect) -> Array:
+        """Mean over time (rows, p, p) of products of the columns: θᵀ S θ is the mean square."""
+        columns = effect.columns(self.signals)
+        return np.asarray(np.einsum("trp,trq->rpq", columns, columns) / len(columns))

@@ -17,7 +17,7 @@ from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array, Robot, build_robot
-from tests.diagnosis.test_usual_motion import FAST, SLOW, TORQUE, crept, kind, made, usual
+from tests.diagnosis.test_reach import FAST, SLOW, TORQUE, crept, kind, made, usual
 
 WITHOUT_INERTIAS: Any = SimpleNamespace(base=SimpleNamespace(selection=[]), declared=())
 

@@ -8,11 +8,14 @@ import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.diagnosis.candidates import Candidate, with_columns
+from excite_cli.diagnosis.possible_sizes import PossibleSizes
+from excite_cli.diagnosis.reach import Reach, torque_seen
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.usual_motion import UsualMotion
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.diagnosis.explicit_data import prepared
 from tests.effects.motions import signals_at
@@ -70,3 +73,45 @@ def test_it_is_never_slower_than_what_was_seen(robot: Robot) -> None:
     fast = replace(fast, v=np.where(np.arange(robot.n) == 1, 40.0, fast.v))
     width = [np.abs(usual(robot, each).signals.v[:, 1]).max() for each in (fast, crept(robot, 0.1))]
     assert width[0] > width[1]
+
+
+def test_a_spring_of_a_joint_that_crept_is_not_known(robot: Robot) -> None:
+    """It is 0.15 N·m in the data and would be 20 at the ends; all torque is 3 N·m."""
+    seen = crept(robot, SLOW)
+    tau = np.full((SAMPLES, robot.n), TORQUE)
+    effects = [kind("spring"), kind("viscous_friction"), kind("torque_offset")]
+    data, candidates = made(robot, seen, effects, tau)
+    assert torque_seen(data) == pytest.approx(np.full(robot.n, TORQUE))
+    reach = Reach(candidates, data, usual(robot, seen), always=[1])
+    stiff = np.array([20.0, 0.0])
+    reason = reach.why_not(0, stiff)
+    assert "over the joint's range and speed" in reason
+    assert f"all torque {TORQUE:.3g}" in reason
+    assert not reach.why_not(0, stiff / 40)  # no more than there is of torque
+    assert not reach.why_not(1, np.array([1e3]))  # every robot has it
+    assert not reach.why_not(2, np.array([1e3]))  # as large in the data
+    assert reach.why_not(0, -stiff)
+
+
+def test_what_was_seen_over_the_range_may_be_any(robot: Robot) -> None:
+    seen = crept(robot, FAST)
+    data, candidates = made(robot, seen, [kind("spring")], np.full((SAMPLES, robot.n), TORQUE))
+    reach = Reach(candidates, data, usual(robot, seen))
+    assert not reach.why_not(0, np.array([20.0, 0.0]))
+
+
+def test_nothing_is_said_of_what_some_runs_have(robot: Robot) -> None:
+    seen = crept(robot, SLOW)
+    some = replace(kind("viscous_friction"), runs=("",))
+    data, candidates = made(robot, seen, [some], np.full((SAMPLES, robot.n), TORQUE))
+    assert not Reach(candidates, data, usual(robot, seen)).why_not(0, np.array([1e6]))
+
+
+def test_it_is_a_reason_why_a_size_is_impossible(robot: Robot) -> None:
+    seen = crept(robot, SLOW)
+    data, candidates = made(robot, seen, [kind("spring")], np.full((SAMPLES, robot.n), TORQUE))
+    large = Seen(np.full(robot.n, 1e9), np.ones(robot.n), 1.0)
+    sizes = PossibleSizes(
+        candidates, lambda _, d: d.T @ d, large, (), Reach(candidates, data, usual(robot, seen))
+    )
+    assert "the joint's range and speed" in sizes.why_not(np.array([20.0, 0.0]), [0], [0])
