@@ -45,7 +45,7 @@ def shares(found: Diagnosis) -> dict[str, float]:
         group = FRICTION if _rubs(each) else each.effect.kind
         parts[group] = parts.get(group, 0.0) + each.takes_off
     if found.inertia_parts:
-        parts[INERTIAS] = mean_of_known(found.inertia_parts)
+        parts[INERTIAS] = mean_of_known(found.inertia_parts.values())
     fall = sum(parts.values())
     if not fall > 0.0:  # nor where parts are not known
         return {}

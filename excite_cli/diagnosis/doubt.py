@@ -52,45 +52,44 @@ def approximations(
     """Which chosen candidates are approximations, and of what."""
     left = {each.joint: each for each in unexplained}
     more = {each.joint: each for each in rests if each.certain}
-    impossible: dict[tuple[int, tuple[str, ...]], tuple[float, str]] = {}
     found = {
         i: Approximation(covariates=(of,)) for i, of in curves_in_place(traced, joint_names).items()
     }
-    unproved = [each for each in traced.chosen if _may_not_repeat(traced, each, joint_names, more)]
-    for i in unproved:
-        of = more[joint_names[traced.candidates[i].effect.joints[0]]].depends_on
-        found |= {k: Approximation(covariates=of) for k in functions_alike(traced, i)}
-    plain = traced.judge.plain
+    for i in (each for each in traced.chosen if _may_not_repeat(traced, each)):
+        rest = more.get(joint_names[traced.candidates[i].effect.joints[0]])
+        if rest is not None:
+            doubt = Approximation(covariates=rest.depends_on)
+            found |= dict.fromkeys(functions_alike(traced, i), doubt)
+    impossible: dict[tuple[int, tuple[str, ...]], tuple[float, str]] = {}
     for i in (each for each in traced.chosen if each not in found):
         if traced.judge.told_by_weight(i, traced.judge.without(i, traced.chosen)):
             continue  # inertias could explain it all: how much it explains says nothing
-        joint, explained = _strongest(traced, i)
+        joint, energy = _strongest(traced, i)
         name = joint_names[joint]
-        rest = plain.energy_on(traced.chosen, [joint])
-        if _weaker_than_its_runs(traced, i, joint, explained):
+        if _weaker_than_its_runs(traced, i, joint, energy):
             found[i] = Approximation()
             continue
+        whole = traced.judge.plain.energy_on(traced.chosen, [joint])
         if name in left:
-            each = left[name]
-            structure = each.share_of_residual * rest
-            same = _same_quantity(traced, i, each.depends_on, joint_names)
+            of = left[name].depends_on
+            same = _same_quantity(traced, i, of, joint_names)
+            limit = _SAME_QUANTITY if same else 1.0
             says = same or not _taken_up(traced, i)
-            if says and structure > (_SAME_QUANTITY if same else 1.0) * explained:
-                found[i] = Approximation(covariates=each.depends_on)
+            if says and left[name].share_of_residual * whole > limit * energy:
+                found[i] = Approximation(covariates=of)
                 continue
         if name in more and _of_its_own(traced, i, more[name]):
-            limit = _limit_of_mean(traced, i, more[name])
-            if limit is None:
-                same = _same_quantity(traced, i, more[name].depends_on, joint_names)
-                limit = _ONE_OF_TWO if same else 1.0
-            if _surely_left(more[name]) * rest > limit * explained:
-                found[i] = Approximation(covariates=more[name].depends_on)
+            of = more[name].depends_on
+            same = _same_quantity(traced, i, of, joint_names)
+            limit = _limit_of_mean(traced, i, more[name]) or (_ONE_OF_TWO if same else 1.0)
+            if _surely_left(more[name]) * whole > limit * energy:
+                found[i] = Approximation(covariates=of)
                 continue
         key = (joint, traced.candidates[i].effect.function_of)
         if key not in impossible:
-            impossible[key] = _impossible(traced, *key, rest)
-        energy, what = impossible[key]
-        if energy > explained:
+            impossible[key] = _impossible(traced, *key, whole)
+        most, what = impossible[key]
+        if most > energy:
             found[i] = Approximation(kind=what)
     return found | _means_of_curves(traced, found)
 
@@ -112,15 +111,12 @@ def _weaker_than_its_runs(traced: Traced, i: int, joint: int, explained: float) 
     return bool(left[sorted(folds)].sum() > explained)
 
 
-def _may_not_repeat(
-    traced: Traced, i: int, joint_names: Sequence[str], rests: Mapping[str, LargeRest]
-) -> bool:
-    """Whether its form is a curve's as far as one sees, and more than noise is left for sure."""
+def _may_not_repeat(traced: Traced, i: int) -> bool:
+    """Whether it is on one joint, and its form is a curve's as far as one sees."""
     effect = traced.candidates[i].effect
     if effect.holds_until_beaten or len(effect.joints) != 1:
         return False
-    curves = [effect.curve(signals, traced.signals) for signals in traced.signals[:1]]
-    return any(curve is not None for curve in curves) and joint_names[effect.joints[0]] in rests
+    return any(effect.curve(each, traced.signals) is not None for each in traced.signals[:1])
 
 
 def _means_of_curves(
@@ -192,14 +188,16 @@ def _surely_left(rest: LargeRest) -> float:
 
 def _strongest(traced: Traced, i: int) -> tuple[int, float]:
     """The joint where candidate i explains most, in units of the noise, and that energy."""
-    judge = traced.judge
-    rest = judge.without(i, traced.chosen)
-    explained = {
-        j: judge.plain.energy_on(rest, [j]) - judge.plain.energy_on([*rest, i], [j])
-        for j in traced.candidates[i].rows
-    }
-    joint = max(explained, key=lambda j: explained[j])
-    return joint, max(explained[joint], 1e-300)
+    rest = traced.judge.without(i, traced.chosen)
+    energies = {j: explained(traced, i, rest, [j]) for j in traced.candidates[i].rows}
+    joint = max(energies, key=energies.__getitem__)
+    return joint, max(energies[joint], 1e-300)
+
+
+def explained(traced: Traced, i: int, rest: Sequence[int], joints: Sequence[int]) -> float:
+    """Energy on some joints that candidate i takes off beside the rest, in units of the noise."""
+    plain = traced.judge.plain
+    return plain.energy_on(rest, joints) - plain.energy_on([*rest, i], joints)
 
 
 def _same_quantity(

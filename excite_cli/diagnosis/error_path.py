@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.records import ErrorPath
+from excite_cli.diagnosis.records import ErrorPath, mean_of_known
 from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.robot.model import Array
@@ -32,7 +32,7 @@ def error_path(traced: Traced, order: Sequence[int], sealed: SealedErrors) -> Er
     error = float(left_out[best].std(ddof=1) / np.sqrt(folds)) if folds > 1 else 0.0
     smallest = int(np.flatnonzero(mean <= mean[best] + error)[0])
     kept = (INERTIAS,) if INERTIAS in sealed.who else ()
-    on_sealed = [_mean(sealed.of((*kept, *sorted(step)))) for step in steps]
+    on_sealed = [mean_of_known(sealed.of((*kept, *sorted(step)))) for step in steps]
     return ErrorPath(
         tuple(map(float, mean)), tuple(on_sealed), error, best, smallest, folds >= _FEWEST
     )
@@ -50,9 +50,3 @@ def _left_out(traced: Traced, steps: Sequence[tuple[int, ...]]) -> Array:
     shares = np.sqrt(np.where(seen, energies / np.where(seen, first, 1.0), 0.0)).sum(axis=1)
     known = seen.any(axis=0)
     return np.asarray(shares[:, known] / seen.sum(axis=0)[known])
-
-
-def _mean(errors: Array) -> float:
-    """Over the joints that move."""
-    known = errors[np.isfinite(errors)]
-    return float(known.mean()) if len(known) else float("nan")
