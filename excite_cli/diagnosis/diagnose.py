@@ -192,7 +192,7 @@ def diagnose(
         sealed_run=parts.sealed_name,
         before=played.errors(told[0]),
         after=played.errors(told[1]),
-        rounds=rounds_of(traced, robot.joint_names),
+        rounds=rounds_of(traced),
         findings=(
             *dataset.findings,
             *assumed_scale(spec.measurement, spec.identification),

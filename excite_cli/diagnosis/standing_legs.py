@@ -46,9 +46,8 @@ def refuse_standing(robot: Robot, samples: Samples) -> None:
             left = float(np.sum((rest.ravel() - carried[:, list(some)] @ found) ** 2))
             if left < 0.9 * best:  # one more end must be worth it
                 best, feet, held = left, some, found
-    if not whole or best > _LEFT * whole:
-        return
-    if not _WEIGHT[0] * mass < held.sum() < _WEIGHT[1] * mass:
+    explains = bool(whole) and best <= _LEFT * whole
+    if not (explains and _WEIGHT[0] * mass < held.sum() < _WEIGHT[1] * mass):
         return
     links = [own_link(robot, ends[k]).name for k in feet]
     gravity = float(np.linalg.norm(robot.model.gravity.linear))

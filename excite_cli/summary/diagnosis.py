@@ -16,7 +16,6 @@ from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import (
     assumption_in_words,
     counted,
-    covariate_in_symbols,
     ends_in_words,
     joints_in_words,
     p_in_words,
@@ -151,7 +150,7 @@ def unexplained_in_words(found: Diagnosis) -> list[str]:
     """A sentence for each joint whose residual has a form that no effect has."""
     return [
         f"Unexplained: the residual of {each.joint} still depends on "
-        f"{', '.join(map(covariate_in_symbols, each.depends_on))} "
+        f"{', '.join(covariate.code for covariate in each.depends_on)} "
         f"({each.share_of_residual:.1%} of it); no effect of the catalogue has this form."
         for each in found.unexplained
     ]
