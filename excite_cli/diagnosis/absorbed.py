@@ -17,7 +17,7 @@ _WORTH_NAMING = 0.15
 
 def absorbed_effects(
     evidence: Evidence, candidates: Sequence[Candidate], chosen: Sequence[int], model: Model
-) -> list[Absorbed]:
+) -> tuple[Absorbed, ...]:
     """Candidates of which the model leaves less than 0.1 % of their energy, and scales tell none.
 
     The model is the declared one with the chosen effects, which are named by their own parameters.
@@ -25,6 +25,8 @@ def absorbed_effects(
     counts (where a stiffness is absorbed, so is its effect, though the preload may show as an
     offset).
     """
+    if model.vague:
+        evidence = evidence.without_prior
     at, joint_names = evidence.columns(chosen), model.robot.joint_names
     factor, schur = evidence.factor(chosen), evidence.schur(chosen)
     found: dict[Place, Absorbed] = {}
@@ -51,4 +53,4 @@ def absorbed_effects(
         by = [names[k] for k in order[:_NAMED] if weight[k] > _WORTH_NAMING * weight.max()]
         joints = tuple(joint_names[j] for j in c.effect.joints)
         found[c.place] = Absorbed(c.effect.kind, joints, tuple(by), float(max(left, 0.0) / own))
-    return list(found.values())
+    return tuple(found.values())

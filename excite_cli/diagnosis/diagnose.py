@@ -17,7 +17,6 @@ from excite_cli.diagnosis.data_sheet_line import data_sheet_lines, with_worth
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
-from excite_cli.diagnosis.error_path import error_path
 from excite_cli.diagnosis.final_fit import final_fit, over_error, regression
 from excite_cli.diagnosis.large_rest import large_rests
 from excite_cli.diagnosis.modelled_run import ModelledRun
@@ -26,7 +25,6 @@ from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.plausibility import check_recorded
 from excite_cli.diagnosis.records import (
     CUT_SHORT,
-    Absorbed,
     Approximation,
     Assumption,
     Diagnosis,
@@ -42,6 +40,7 @@ from excite_cli.diagnosis.sealed_errors import (
     INERTIAS,
     SealedErrors,
     error_parts,
+    error_path,
     sealed_errors,
 )
 from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
@@ -187,7 +186,7 @@ def diagnose(
         base_names=base.in_words(),
         declared=_records(models[1], robot)[:declared],
         effects=tuple(named.values()),
-        absorbed=_absorbed(traced),
+        absorbed=absorbed_effects(traced.judge.white, traced.candidates, traced.chosen, model),
         unexplained=tuple(unexplained),
         sealed_run=parts.sealed_name,
         before=played.errors(told[0]),
@@ -256,11 +255,10 @@ def _path(
     weighed = {i for i, each in worth.items() if each.verdict is SealedVerdict.WEIGHED}
     order = sorted(order_of(traced), key=lambda i: i not in weighed)
     found = error_path(traced, order, errors)
-    return found and replace(
-        found,
-        smallest=max(found.smallest, len(weighed)),
-        effects=tuple(named.index(i) for i in order),
-    )
+    if found is None:
+        return None
+    smallest = max(found.smallest, len(weighed))
+    return replace(found, smallest=smallest, effects=tuple(map(named.index, order)))
 
 
 def _prepared(spec: Spec, parts: Split) -> tuple[Processing, list[PreparedRun]]:
@@ -386,13 +384,6 @@ def _joint_aliases(traced: Traced, doubts: Mapping[int, Approximation]) -> tuple
         JointAlias(*(tuple(record_of(each, names) for each in side) for side in both))
         for both in sides
     )
-
-
-def _absorbed(traced: Traced) -> tuple[Absorbed, ...]:
-    white = traced.judge.white
-    if traced.model.vague:
-        white = white.without_prior
-    return tuple(absorbed_effects(white, traced.candidates, traced.chosen, traced.model))
 
 
 def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:

@@ -17,7 +17,7 @@ from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Signals
 from excite_cli.identification.noise_floor import NoiseFloor
 from excite_cli.identification.processing import Processing
-from excite_cli.measurement.dataset import Run
+from excite_cli.measurement.dataset import Mask, Run
 from excite_cli.robot.model import Array
 
 # 42 simulated robots without any defect stay below 1.42, and none of those above 2.5 is without.
@@ -46,22 +46,20 @@ def large_rests(
     """
     quantities = Quantities(data, signals, joint_names)
     band = band_noise(recorded, data.runs, predicted, processing)
-    shown = [
-        run.tau - run.averaged_torque(torque)
-        for run, torque in zip(data.runs, predicted, strict=True)
+    usable = np.concatenate([run.usable for run in data.runs])
+    valid = np.concatenate([run.valid for run in data.runs])
+    left = [
+        run.tau - run.averaged_torque(each) for run, each in zip(data.runs, predicted, strict=True)
     ]
+    fitted = _rms(residuals, usable)
+    torques = _rms([run.tau_fit for run in data.runs], usable)
+    in_motion = _rms(left, usable & valid)
     found = []
     for joint, name in enumerate(joint_names):
-        rms, torque = (
-            _rms([x[run.usable[:, joint], joint] for x, run in zip(series, data.runs, strict=True)])
-            for series in (residuals, [run.tau_fit for run in data.runs])
-        )
-        counted = [run.usable[:, joint] & run.valid[:, joint] for run in data.runs]
-        around = _rms([x[at, joint] for x, at in zip(shown, counted, strict=True)])
+        rms, torque, around = fitted[joint], torques[joint], in_motion[joint]
         if not max(rms, around) > _SMALLEST * torque:
             continue
-        noise, most = float(band.white[joint]), float(band.coloured[joint])
-        basis = "band"
+        noise, most, basis = float(band.white[joint]), float(band.coloured[joint]), "band"
         if repeated is not None and np.isfinite(repeated.rms[joint]):
             noise = most = float(repeated.rms[joint])
             basis = "periods"
@@ -73,15 +71,15 @@ def large_rests(
             continue
         at_reversals = not rms > enough and not predictable
         structure = Structure(0.0) if rest is None or at_reversals else rest.structure()
-        certain = rms > _TIMES * most or structure.predictable > _PREDICTABLE
+        size = around if at_reversals else rms
         found.append(
             LargeRest(
                 joint=name,
-                rms=around if at_reversals else rms,
-                share_of_torque=(around if at_reversals else rms) / torque,
+                rms=size,
+                share_of_torque=size / torque,
                 noise=noise if known else None,
                 basis=basis if known else "",
-                certain=certain,
+                certain=rms > _TIMES * most or structure.predictable > _PREDICTABLE,
                 predictable=structure.predictable,
                 depends_on=structure.depends_on if structure.named > _SAID else (),
                 at_reversals=at_reversals,
@@ -90,6 +88,9 @@ def large_rests(
     return tuple(found)
 
 
-def _rms(parts: Sequence[Array]) -> float:
-    every = np.concatenate(parts)
-    return float(np.sqrt(np.mean(every**2))) if len(every) else float("nan")
+def _rms(parts: Sequence[Array], counted: Mask) -> list[float]:
+    """Of every joint over the samples that count; NaN where there are none."""
+    columns = zip(np.concatenate(parts).T, counted.T, strict=True)
+    return [
+        float(np.sqrt(np.mean(np.square(x[at])))) if at.any() else float("nan") for x, at in columns
+    ]
