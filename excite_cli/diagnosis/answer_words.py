@@ -171,8 +171,8 @@ def _left(found: Diagnosis) -> list[str]:
         text += f", most on {worst} ({relative_in_words(known[worst])})"
     said = [text + "."]
     for each in found.unexplained[:1]:
-        *others, last = map(covariate_in_words, each.depends_on)
-        listed = f"{', '.join(others)} and {last}" if others else last
+        words = [covariate_in_words(covariate) for covariate in each.depends_on]
+        listed = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
         said.append(f"What stays on {each.joint} depends on {listed}.")
     return said
 

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,6 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.filter_bias import filter_findings, fitted_behind
 from excite_cli.identification.identified_model import IdentifiedModel
-from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import (
     PreparedRun,
@@ -151,16 +151,9 @@ def diagnose(
     models = both_models(traced, final.parameters)
     trained = Played(robot, traced.data.runs)
     before, after = map(trained.predictions, models)
-    rests = large_rests(
-        traced.data,
-        traced.signals,
-        [each.torque for each in after],
-        traced.data.residuals(traced.candidates, traced.chosen, final.parameters),
-        parts.training,
-        processing,
-        floor,
-        robot.joint_names,
-    )
+    torques = [each.torque for each in after]
+    left = traced.data.residuals(traced.candidates, traced.chosen, final.parameters)
+    rests = large_rests(traced, torques, left, parts.training, processing, floor)
     doubts = approximations(traced, unexplained, robot.joint_names, rests)
     played = Played(robot, kept)
     told, by_urdf = [played.predictions(each) for each in models], played.by_urdf
@@ -283,10 +276,7 @@ def _traced(
     The effects `start` were found in more of them.
     """
     progress("filtering", 0)
-
-    def prepared(left_out: LeftOut) -> list[PreparedRun]:
-        return prepare_all(parts.training, processing, left_out)
-
+    prepared = partial(prepare_all, parts.training, processing)
     traced, bodies = trace(
         model, spec.diagnosis, prepared, parts.folds, parts.units, progress, start, over
     )

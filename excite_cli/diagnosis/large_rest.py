@@ -13,8 +13,7 @@ import numpy as np
 from excite_cli.diagnosis.high_band import band_noise
 from excite_cli.diagnosis.records import LargeRest
 from excite_cli.diagnosis.structure import Quantities, Structure
-from excite_cli.diagnosis.training import TrainingData
-from excite_cli.effects.base import Signals
+from excite_cli.diagnosis.tracing import Traced
 from excite_cli.identification.noise_floor import NoiseFloor
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Mask, Run
@@ -30,21 +29,20 @@ _SMALLEST = 1e-3  # of the torque's RMS: what is smaller needs no word
 
 
 def large_rests(
-    data: TrainingData,
-    signals: Sequence[Signals],
+    traced: Traced,
     predicted: Sequence[Array],
     residuals: Sequence[Array],
     recorded: Sequence[Run],
     processing: Processing,
     repeated: NoiseFloor | None,
-    joint_names: Sequence[str],
 ) -> tuple[LargeRest, ...]:
     """Joints of whose torque more is left than noise, in the training parts.
 
     predicted: torque (T, n) of the model at the working rate; residuals: (M, n) of what fits count;
     recorded: the parts as they were read; repeated: the floor from repeated periods.
     """
-    quantities = Quantities(data, signals, joint_names)
+    data, joint_names = traced.data, traced.model.robot.joint_names
+    quantities = Quantities(data, traced.signals, joint_names)
     band = band_noise(recorded, data.runs, predicted, processing)
     usable = np.concatenate([run.usable for run in data.runs])
     valid = np.concatenate([run.valid for run in data.runs])

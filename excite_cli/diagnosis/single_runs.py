@@ -79,19 +79,14 @@ def assumptions(effects: Sequence[Effect], parts: Split, model: Model) -> tuple[
     """
     names = model.robot.joint_names
     sealed = tuple(dict.fromkeys(run.id.key for run in parts.sealed))
-    return tuple(
-        Assumption(effect.kind, effect.runs, sealed, False, tuple(names[j] for j in effect.joints))
-        for effect in effects
-        if effect.runs
-        and not _declared(effect, parts.sealed, model)
-        and not all(effect.active(run.id) for run in parts.sealed)
-    )
-
-
-def _declared(effect: Effect, sealed: Sequence[Run], model: Model) -> bool:
-    """Whether the sealed runs have declared states of the effect's kind."""
-    known = [run for run, states in model.states.items() if effect.kind in states]
-    return all(run.id.is_among(known) for run in sealed)
+    found = []
+    for effect in effects:
+        stated = [run for run, states in model.states.items() if effect.kind in states]
+        declared = all(run.id.is_among(stated) for run in parts.sealed)
+        if effect.runs and not declared and not all(effect.active(run.id) for run in parts.sealed):
+            joints = tuple(names[j] for j in effect.joints)
+            found.append(Assumption(effect.kind, effect.runs, sealed, False, joints))
+    return tuple(found)
 
 
 def on_sealed_ends(
