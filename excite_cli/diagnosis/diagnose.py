@@ -121,12 +121,8 @@ def diagnose(
     check_left_to_fit(spec, parts)
     refuse_sealed_copies(parts)
     processing, training = _prepared(spec, parts)
-    require_motion(
-        training,
-        processing,
-        robot.joint_names,
-        (*spec.measurement.without_torque, *robot.unmeasured),
-    )
+    unmeasured = (*spec.measurement.without_torque, *robot.unmeasured)
+    require_motion(training, processing, robot.joint_names, unmeasured)
     standing = standing_still(training, robot.joint_names)
     model = _model(robot, base, spec)
     kept = prepare_all(parts.sealed, processing)  # refused early where too short

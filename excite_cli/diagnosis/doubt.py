@@ -17,12 +17,11 @@ two quantities mostly, so that U > 0.5 E is asked for where one of them is the e
 say nothing of effects that inertias nearly take up, of which E is next to nothing. A change in some
 runs or over time, first-order friction and, where a good part can be predicted, a constant are
 means of a function of anything: U > 0.25 E is enough for changes, U > 0.3 E for friction and
-U > 0.5 E for constants. (Of maps of two quantities eleven of 416 campaigns were told such a mean or
-wave, beside the word that 3 to 71 times the noise is left; U / E of friction on three real robots,
-not taken up by inertias, is at most 0.09, and 0.14 of true friction beside a map.)
+U > 0.5 E for constants (docs/decisions.md).
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cache, partial
 
 import numpy as np
 
@@ -60,7 +59,7 @@ def approximations(
         if rest is not None:
             doubt = Approximation(covariates=rest.depends_on)
             found |= dict.fromkeys(functions_alike(traced, i), doubt)
-    impossible: dict[tuple[int, tuple[str, ...]], tuple[float, str]] = {}
+    impossible = cache(partial(_impossible, traced))
     for i in (each for each in traced.chosen if each not in found):
         if traced.judge.told_by_weight(i, traced.judge.without(i, traced.chosen)):
             continue  # inertias could explain it all: how much it explains says nothing
@@ -74,8 +73,8 @@ def approximations(
             of = left[name].depends_on
             same = _same_quantity(traced, i, of, joint_names)
             limit = _SAME_QUANTITY if same else 1.0
-            says = same or not _taken_up(traced, i)
-            if says and left[name].share_of_residual * whole > limit * energy:
+            much = left[name].share_of_residual * whole > limit * energy
+            if much and (same or not _taken_up(traced, i)):
                 found[i] = Approximation(covariates=of)
                 continue
         if name in more and _of_its_own(traced, i, more[name]):
@@ -85,10 +84,7 @@ def approximations(
             if _surely_left(more[name]) * whole > limit * energy:
                 found[i] = Approximation(covariates=of)
                 continue
-        key = (joint, traced.candidates[i].effect.function_of)
-        if key not in impossible:
-            impossible[key] = _impossible(traced, *key, whole)
-        most, what = impossible[key]
+        most, what = impossible(joint, traced.candidates[i].effect.function_of)
         if most > energy:
             found[i] = Approximation(kind=what)
     return found | _means_of_curves(traced, found)
@@ -102,9 +98,9 @@ def _weaker_than_its_runs(traced: Traced, i: int, joint: int, explained: float) 
     own = traced.candidates[i]
     if not own.effect.is_change:
         return False
-    there = [bool(np.any(part)) for part in own.columns]
-    folds = {fold for fold, here in zip(traced.data.folds, there, strict=True) if here}
-    others = {fold for fold, here in zip(traced.data.folds, there, strict=True) if not here}
+    folds, others = set[int](), set[int]()
+    for fold, part in zip(traced.data.folds, own.columns, strict=True):
+        (folds if np.any(part) else others).add(fold)
     if folds & others:  # of many runs several are one fold, and what is left is known by fold
         return False
     left = traced.judge.plain.in_turn.energies(traced.chosen, [joint]).reshape(-1, 2).sum(axis=1)
@@ -209,9 +205,7 @@ def _same_quantity(
     return any(each.like in effect.function_of and each.joint in own for each in depends_on)
 
 
-def _impossible(
-    traced: Traced, joint: int, quantities: Sequence[str], rest: float
-) -> tuple[float, str]:
+def _impossible(traced: Traced, joint: int, quantities: tuple[str, ...]) -> tuple[float, str]:
     """The most that a candidate which cannot be so would explain, and its kind.
 
     Of those that depend on one of the `quantities`: what others explain is something else's.
@@ -225,7 +219,7 @@ def _impossible(
         if joint in c.rows and c.place not in taken and singles[k].dof
         if not quantities or not c.effect.function_of or {*quantities} & {*c.effect.function_of}
     ]
-    best = (0.0, "")
+    best, rest = (0.0, ""), judge.plain.energy_on(chosen, [joint])
     for k in sorted(near, key=lambda k: -singles[k].chi2)[:_TRIED]:
         together = [*chosen, k]
         energy = rest - judge.plain.energy_on(together, [joint])

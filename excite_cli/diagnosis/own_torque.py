@@ -2,9 +2,9 @@
 
 Some effects look at the model's own torque: a gain is a share of it, a delay its slope, friction
 grows with it. A pass has their columns at the fit of the pass before, which had other effects; what
-is fitted with them need not be what the model then predicts: on a Go2 gains fitted to 7 % left 39 %
-of a joint's torque. So the fit is repeated with the columns C(θ) of its own torque until the energy
-that is really left, ‖τ − C(θ) θ‖², is that of the fit, ‖τ − C θ‖²; where it grows, by half a step.
+is fitted with them need not be what the model then predicts. So the fit is repeated with the
+columns C(θ) of its own torque until the energy that is really left, ‖τ − C(θ) θ‖², is that of the
+fit, ‖τ − C θ‖²; where it grows, by half a step.
 """
 
 from collections.abc import Sequence
