@@ -5,10 +5,9 @@ of the effects (`error_parts`) add up to it.
 """
 
 from collections.abc import Sequence
-from math import isnan
+from math import inf, isnan
 
-from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.records import Diagnosis, FrictionLine, NamedEffect, mean_of_known
+from excite_cli.diagnosis.records import Diagnosis, NamedEffect, mean_of_known
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.diagnosis.words import (
     counted,
@@ -45,7 +44,7 @@ def shares(found: Diagnosis) -> dict[str, float]:
         group = FRICTION if _rubs(each) else each.effect.kind
         parts[group] = parts.get(group, 0.0) + each.takes_off
     if found.inertia_parts:
-        parts[INERTIAS] = mean_of_known(found.inertia_parts)
+        parts[INERTIAS] = mean_of_known(found.inertia_parts.values())
     fall = sum(parts.values())
     if not fall > 0.0:  # nor where parts are not known
         return {}
@@ -73,10 +72,12 @@ def _missing(found: Diagnosis) -> str:
         )
     of_all = shares(found)
     said = []
-    if of_all.get(FRICTION, 0.0) >= _WORTH_SAYING:
-        whole = of_all[FRICTION] > _NEARLY_ALL
-        what = "nearly all" if whole else f"{of_all[FRICTION]:.0%} of what"
-        said.append(f"{_friction(found)} is {what} your model misses{_most_friction(found)}.")
+    friction = of_all.get(FRICTION, 0.0)
+    if friction >= _WORTH_SAYING:
+        what = "nearly all" if friction > _NEARLY_ALL else f"{friction:.0%} of what"
+        rubbing = [each for each in found.effects if _rubs(each)]
+        which, most = _friction(rubbing, found), _most_friction(rubbing, found)
+        said.append(f"{which} is {what} your model misses{most}.")
     said += [
         f"On {_place(each, found)}: {title_of(each.effect.kind)} ({_first(each)}), by what was "
         "weighed."
@@ -85,16 +86,16 @@ def _missing(found: Diagnosis) -> str:
     ]
     doubtful = (SealedVerdict.NOT_CONFIRMED, SealedVerdict.HARMFUL, SealedVerdict.WEIGHED)
     others = [each for each in found.named if not _rubs(each) and each.verdict not in doubtful]
-    fall = found.fall if found.fall > 0.0 else float("inf")
+    fall = found.fall if found.fall > 0.0 else inf
     worth = [each for each in others if each.takes_off >= _WORTH_SAYING * fall]
-    worth.sort(key=lambda each: -each.takes_off)
-    for each in worth[:_MOST]:
-        share = each.takes_off / fall
-        what = f"{title_of(each.effect.kind)} ({_first(each)}, {share:.0%} of what it misses)"
+    for each in sorted(worth, key=lambda each: -each.takes_off)[:_MOST]:
+        share = f"{each.takes_off / fall:.0%} of what it misses"
+        what = f"{title_of(each.effect.kind)} ({_first(each)}, {share})"
         said.append(f"On {_place(each, found)}: {what}.")
     if not said:
-        listed = counted(len(found.effects), "effect")
-        said.append(f"Your model misses {listed}, none of them large.")
+        said.append(
+            f"Your model misses {counted(len(found.effects), 'effect')}, none of them large."
+        )
     elif of_all.get(INERTIAS, 0.0) >= _WORTH_SAYING:
         said.append(f"Inertias off the URDF's are {of_all[INERTIAS]:.0%}.")
     return " ".join(said)
@@ -115,32 +116,24 @@ def _percent(found: Diagnosis) -> str:
     return relative_in_words(found.after.mean_relative_moving)
 
 
-def _friction(found: Diagnosis) -> str:
+def _friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
     """`Friction`, or the one effect that it is."""
-    rubbing = [each for each in found.effects if _rubs(each)]
     if len(rubbing) > 1:
         return "Friction"
     title = title_of(rubbing[0].effect.kind)
     return f"{title[:1].upper()}{title[1:]} of {_place(rubbing[0], found)} ({_first(rubbing[0])})"
 
 
-def _most_friction(found: Diagnosis) -> str:
+def _most_friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
     """`, most on joint_1 (48 N·m at 1 rad/s)`, by the line of the joint with most of it."""
-    lines = [line for line in found.friction_lines if line.joint in _joints_of(found)]
-    if not lines or sum(map(_rubs, found.effects)) < 2:
+    joints = {joint for each in rubbing for joint in each.effect.joints}
+    lines = [line for line in found.friction_lines if line.joint in joints]
+    if not lines or len(rubbing) < 2:
         return ""
-    most = max(lines, key=lambda line: abs(_at_one(line)))
+    most = max(lines, key=lambda line: abs(line.viscous.value + line.coulomb.value))
     speed = "1 m/s" if "/m" in most.viscous.unit else "1 rad/s"
-    size = short_number(_at_one(most), 2)
+    size = short_number(most.viscous.value + most.coulomb.value, 2)
     return f", most on {most.joint} ({size} {most.coulomb.unit} at {speed})"
-
-
-def _joints_of(found: Diagnosis) -> set[str]:
-    return {joint for each in found.effects if _rubs(each) for joint in each.effect.joints}
-
-
-def _at_one(line: FrictionLine) -> float:
-    return line.viscous.value + line.coulomb.value
 
 
 def _place(named: NamedEffect, found: Diagnosis) -> str:
@@ -178,7 +171,9 @@ def _left(found: Diagnosis) -> list[str]:
         text += f", most on {worst} ({relative_in_words(known[worst])})"
     said = [text + "."]
     for each in found.unexplained[:1]:
-        said.append(f"What stays on {each.joint} depends on {_listed(each.depends_on)}.")
+        words = [covariate_in_words(covariate) for covariate in each.depends_on]
+        listed = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+        said.append(f"What stays on {each.joint} depends on {listed}.")
     return said
 
 
@@ -206,8 +201,3 @@ def _next(found: Diagnosis) -> str:
             f"Next: a run with a weighed load ({KNOWN_LOAD}), which tells {names}; no motion does."
         )
     return f"Next: a motion that tells {names} (excite optimize … --after)."
-
-
-def _listed(quantities: Sequence[Covariate]) -> str:
-    words = [covariate_in_words(each) for each in quantities]
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

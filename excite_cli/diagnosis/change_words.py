@@ -48,22 +48,16 @@ def _by_column(slope: Value, there: float | None, reference: float | None) -> st
     """` falls by 0.021 N·m per unit of temp_j1; it is 1.3 at 35.2.`"""
     how = "falls" if slope.value < 0.0 else "rises"
     told = f" {how} by {abs(slope.value):.3g} {slope.unit}"
-    return told + (
-        "." if there is None or reference is None else f"; it is {there:.3g} at {reference:.4g}."
-    )
+    known = there is not None and reference is not None
+    return told + (f"; it is {there:.3g} at {reference:.4g}." if known else ".")
 
 
 def _shared(found: Diagnosis, kind: str, joints: tuple[str, ...]) -> float | None:
     """What all runs have of a kind, found or declared."""
-    known = [*(each.effect for each in found.effects), *found.information.model]
-    return next(
-        (
-            record.values[0]
-            for record in known
-            if (record.kind, record.joints, record.runs) == (kind, joints, ()) and record.values
-        ),
-        None,
-    )
+    for record in (*(each.effect for each in found.effects), *found.information.model):
+        if (record.kind, record.joints, record.runs) == (kind, joints, ()) and record.values:
+            return record.values[0]
+    return None
 
 
 def _duration(seconds: float) -> str:

@@ -15,29 +15,23 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.diagnosis.before_after import Played
-from excite_cli.diagnosis.declared_model import Model
-from excite_cli.diagnosis.records import FrictionLine
-from excite_cli.diagnosis.sealed_verdict import worth_of_friction
+from excite_cli.diagnosis.declared_model import places_of
+from excite_cli.diagnosis.final_fit import FinalFit
+from excite_cli.diagnosis.records import FrictionLine, by_joint
+from excite_cli.diagnosis.sealed_verdict import worth_beside
 from excite_cli.diagnosis.tracing import Traced
-from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import straight_friction
 from excite_cli.effects.parameter import Value, deviation
-from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.identified_model import Prediction
 from excite_cli.identification.regression import effect_columns
 from excite_cli.robot.model import Array
 
 _ROUNDING = 1e-9  # of a line of friction that has no such part
 
 
-def data_sheet_lines(
-    model: Model, traced: Traced, parameters: Array, covariance: Array
-) -> tuple[FrictionLine, ...]:
-    """The line of every joint that has friction, in the robot's order.
-
-    `parameters` (k,) and their `covariance` end with those of the declared effects and of those
-    that were found.
-    """
-    lines = (_line(j, model, traced, parameters, covariance) for j in range(model.robot.n))
+def data_sheet_lines(traced: Traced, final: FinalFit) -> tuple[FrictionLine, ...]:
+    """The line of every joint that has friction, in the robot's order."""
+    lines = (_line(joint, traced, final) for joint in range(traced.model.robot.n))
     return tuple(line for line in lines if line is not None)
 
 
@@ -45,60 +39,62 @@ def with_worth(
     lines: Sequence[FrictionLine],
     held: Played,
     traced: Traced,
-    after: IdentifiedModel,
+    with_all: Sequence[Prediction],
     taken_off: Mapping[int, Array],
 ) -> tuple[FrictionLine, ...]:
-    """The lines with what all friction of each joint is worth on held-out data.
+    """The lines with what all friction of each joint alone is worth on held-out data.
 
-    `taken_off`: what each effect takes off the joints' errors.
+    `with_all`: what the whole model predicts there; `taken_off`: what each effect takes off the
+    joints' errors.
     """
     names, found = traced.model.robot.joint_names, []
     for line in lines:
-        own, worth = worth_of_friction(held, traced.model, traced, after, names.index(line.joint))
-        told = replace(line, kinds=tuple(traced.candidates[i].effect.kind for i in own))
-        if worth is not None:
-            parts = np.sum([taken_off[i] for i in own], axis=0)
-            told = replace(
-                told,
-                verdict=worth.verdict,
-                removes=worth.removes,
-                parts=dict(zip(names, map(float, parts), strict=True)),
-            )
-        found.append(told)
+        joint = names.index(line.joint)
+        own = {
+            i: effect.kind
+            for i, effect in zip(traced.chosen, traced.effects, strict=True)
+            if effect.friction and effect.joints == (joint,)
+            if not (effect.runs or effect.is_change)
+        }
+        line = replace(line, kinds=tuple(own.values()))
+        if len(own) > 1:  # the worth of one is known
+            rest = [i for i in traced.chosen if i not in own]
+            worth, _ = worth_beside(held, traced, with_all, rest, (joint,))
+            parts = by_joint(names, np.sum([taken_off[i] for i in own], axis=0))
+            line = replace(line, verdict=worth.verdict, removes=worth.removes, parts=parts)
+        found.append(line)
     return tuple(found)
 
 
-def _line(
-    joint: int, model: Model, traced: Traced, parameters: Array, covariance: Array
-) -> FrictionLine | None:
-    effects = (*model.declared, *traced.effects)
-    at = len(parameters) - sum(len(each.parameters) for each in effects)
-    own: list[int] = []
-    kinds: list[Effect] = []
-    for effect in effects:
-        width = len(effect.parameters)
-        if effect.friction and effect.joints == (joint,):
-            own += range(at, at + width)
-            kinds.append(effect)
-        at += width
-    if not kinds:
+def _line(joint: int, traced: Traced, final: FinalFit) -> FrictionLine | None:
+    robot, effects = traced.model.robot, (*traced.model.declared, *traced.effects)
+    places = places_of(effects, len(final.parameters))
+    rubbing = [
+        (effect, own)
+        for effect, own in zip(effects, places, strict=True)
+        if effect.friction and effect.joints == (joint,)
+    ]
+    if not rubbing:
         return None
+    kinds = [effect for effect, _ in rubbing]
     straight = straight_friction(joint)
-    lines, friction = [], []
+    columns = []
     for run, signals in zip(traced.data.runs, traced.signals, strict=True):
-        columns = run.averaged_for_fit(
-            effect_columns([*straight, *kinds], signals)[:, [joint]], [joint]
-        )[run.usable[:, joint], 0]
-        lines.append(columns[:, : len(straight)])
-        friction.append(columns[:, len(straight) :])
-    slopes = np.linalg.lstsq(np.concatenate(lines), np.concatenate(friction), rcond=1e-9)[0]
+        raw = effect_columns([*straight, *kinds], signals)[:, [joint]]
+        columns.append(run.averaged_for_fit(raw, [joint])[run.usable[:, joint], 0])
+    lines, friction = np.split(np.concatenate(columns), [len(straight)], axis=1)
+    slopes = np.linalg.lstsq(lines, friction, rcond=1e-9)[0]
     slopes[np.abs(slopes) < _ROUNDING] = 0.0
-    spread = covariance[np.ix_(own, own)]
-    units = [each.unit_on(each.parameters[0].unit, model.robot.sliding) for each in straight]
-    f_v, f_c = (
-        Value(float(slope @ parameters[own]), deviation(slope, spread), unit)
-        for slope, unit in zip(slopes, units, strict=True)
+    own = np.r_[tuple(own for _, own in rubbing)]
+    values, spread = final.parameters[own], final.covariance[np.ix_(own, own)]
+    viscous, coulomb = (
+        Value(
+            float(slope @ values),
+            deviation(slope, spread),
+            each.unit_on(each.parameters[0].unit, robot.sliding),
+        )
+        for slope, each in zip(slopes, straight, strict=True)
     )
-    places = {each.place for each in straight}
-    curved = any(effect.place not in places for effect in kinds)
-    return FrictionLine(model.robot.joint_names[joint], f_v, f_c, curved)
+    plain = {each.place for each in straight}
+    curved = any(effect.place not in plain for effect in kinds)
+    return FrictionLine(robot.joint_names[joint], viscous, coulomb, curved)

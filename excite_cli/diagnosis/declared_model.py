@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -67,3 +68,10 @@ class Model:
 def width_of(effects: Sequence[Effect]) -> int:
     """Number of linear parameters of effects."""
     return sum(len(effect.parameters) for effect in effects)
+
+
+def places_of(effects: Sequence[Effect], count: int) -> list[slice]:
+    """Where the linear parameters of each effect are: together they are the last of `count`."""
+    widths = [len(effect.parameters) for effect in effects]
+    edges = (count - sum(widths) + np.cumsum([0, *widths])).tolist()
+    return [slice(start, end) for start, end in pairwise(edges)]

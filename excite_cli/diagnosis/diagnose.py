@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,25 +11,21 @@ import numpy as np
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import joint_aliases, other_name
-from excite_cli.diagnosis.before_after import Played, both_models, on_sealed, refitted
+from excite_cli.diagnosis.before_after import Played, both_models, refitted
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.comparison import Comparison
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines, with_worth
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
-from excite_cli.diagnosis.error_parts import error_parts
-from excite_cli.diagnosis.error_path import error_path
 from excite_cli.diagnosis.final_fit import final_fit, over_error, regression
-from excite_cli.diagnosis.information import information_of
 from excite_cli.diagnosis.large_rest import large_rests
 from excite_cli.diagnosis.modelled_run import ModelledRun
-from excite_cli.diagnosis.naming import named_effects
+from excite_cli.diagnosis.naming import information_of, named_effects
 from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.plausibility import check_recorded
 from excite_cli.diagnosis.records import (
     CUT_SHORT,
-    Absorbed,
     Approximation,
     Assumption,
     Diagnosis,
@@ -36,9 +33,16 @@ from excite_cli.diagnosis.records import (
     ErrorPath,
     JointAlias,
     Textbook,
+    by_joint,
 )
 from excite_cli.diagnosis.rounds import order_of, rounds_of
-from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors, sealed_errors
+from excite_cli.diagnosis.sealed_errors import (
+    INERTIAS,
+    SealedErrors,
+    error_parts,
+    error_path,
+    sealed_errors,
+)
 from excite_cli.diagnosis.sealed_verdict import Worth, worth_on_sealed
 from excite_cli.diagnosis.single_runs import (
     assumptions,
@@ -59,7 +63,6 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.filter_bias import filter_findings, fitted_behind
 from excite_cli.identification.identified_model import IdentifiedModel
-from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
 from excite_cli.identification.prepare import (
     PreparedRun,
@@ -75,7 +78,7 @@ from excite_cli.identification.torque_scale import Knowledge, assumed_scale, wei
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.recorded import recorded
-from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.model import Robot
 from excite_cli.robot.skeleton import skeleton_of
 
 Progress = Callable[[str, int], None]
@@ -116,12 +119,8 @@ def diagnose(
     check_left_to_fit(spec, parts)
     refuse_sealed_copies(parts)
     processing, training = _prepared(spec, parts)
-    require_motion(
-        training,
-        processing,
-        robot.joint_names,
-        (*spec.measurement.without_torque, *robot.unmeasured),
-    )
+    unmeasured = (*spec.measurement.without_torque, *robot.unmeasured)
+    require_motion(training, processing, robot.joint_names, unmeasured)
     standing = standing_still(training, robot.joint_names)
     model = _model(robot, base, spec)
     kept = prepare_all(parts.sealed, processing)  # refused early where too short
@@ -141,51 +140,29 @@ def diagnose(
     del bodies
     model = traced.model
     final = final_fit(traced, regression(traced))
-    parameters, covariance = final.parameters, final.covariance
     floor = noise_floor(parts.training, processing)
-    models = both_models(model, traced, parameters)
+    models = both_models(traced, final.parameters)
     trained = Played(robot, traced.data.runs)
     before, after = map(trained.predictions, models)
-    rests, dependence = large_rests(
-        traced.data,
-        traced.signals,
-        [each.torque for each in after],
-        traced.data.residuals(traced.candidates, traced.chosen, parameters),
-        parts.training,
-        processing,
-        floor,
-        robot.joint_names,
-    )
+    torques = [each.torque for each in after]
+    left = traced.data.residuals(traced.candidates, traced.chosen, final.parameters)
+    rests, dependence = large_rests(traced, torques, left, parts.training, processing, floor)
     doubts = approximations(traced, robot.joint_names, rests)
-    ends = prepare_all(parts.ends, processing)
     played = Played(robot, kept)
-    told = played.predictions(models[0]), played.predictions(models[1])
-    sealed_part = on_sealed(played, *told)
-    from_urdf = spec.identification.inertias == "cad" and bool(sealed_part.by_urdf)
-    begin = sealed_part.by_urdf if from_urdf else told[0]
-    errors = sealed_errors(played, model, traced, models[1], begin, told[1], from_urdf)
+    told, by_urdf = [played.predictions(each) for each in models], played.by_urdf
+    from_urdf = spec.identification.inertias == "cad" and bool(by_urdf)
+    begin = by_urdf if from_urdf else told[0]
+    errors = sealed_errors(played, traced, models[1], begin, told[1], from_urdf)
     taken_off = error_parts(traced, errors)
-    held = Played(robot, [*kept, *ends])
-    worth = worth_on_sealed(
-        held,
-        model,
-        traced,
-        models[1],
-        over_error(traced, final),
-        compared.missed if compared else None,
-    )
-    named, candidates, rivals = named_effects(
-        model,
-        traced,
-        (parameters, covariance),
-        doubts,
-        worth,
-        taken_off,
-        spec.diagnosis.carrying_links,
-    )
-    rank = base.rank
-    lines = data_sheet_lines(model, traced, parameters, covariance)
-    base_std = np.where(final.seen, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)[:rank]
+    held = Played(robot, [*kept, *prepare_all(parts.ends, processing)])
+    with_all = held.predictions(models[1])
+    missed = compared.missed if compared else None
+    worth = worth_on_sealed(held, traced, with_all, over_error(traced, final), missed)
+    links = spec.diagnosis.carrying_links
+    named, rivals = named_effects(traced, final, doubts, worth, taken_off, links)
+    lines = data_sheet_lines(traced, final)
+    rank, declared = base.rank, len(model.declared)
+    variances = np.diag(final.covariance)[:rank]
     assumed = assumptions(traced.effects, parts, model)
     return Diagnosis(
         config="",
@@ -193,13 +170,13 @@ def diagnose(
         fingerprint=robot.fingerprint(),
         joint_names=robot.joint_names,
         base_names=base.in_words(),
-        declared=_declared(model, models[1], robot),
-        effects=named,
-        absorbed=_absorbed(model, traced),
+        declared=_records(models[1], robot)[:declared],
+        effects=tuple(named.values()),
+        absorbed=absorbed_effects(traced.judge.white, traced.candidates, traced.chosen, model),
         sealed_run=parts.sealed_name,
-        before=sealed_part.before,
-        after=sealed_part.after,
-        rounds=rounds_of(traced, robot.joint_names),
+        before=played.errors(told[0]),
+        after=played.errors(told[1]),
+        rounds=rounds_of(traced),
         findings=(
             *dataset.findings,
             *assumed_scale(spec.measurement, spec.identification),
@@ -211,73 +188,62 @@ def diagnose(
             *_noticed(assumed, floor, robot, parts.training),
         ),
         processing=_choices(processing, traced, parts, training),
-        phi=model.full_inertias(parameters),
-        base_values=parameters[:rank],
-        base_std=base_std,
-        information=information_of(model, traced, rivals),
+        phi=model.full_inertias(final.parameters),
+        base_values=final.parameters[:rank],
+        base_std=np.where(final.seen[:rank], np.sqrt(np.maximum(variances, 0.0)), np.inf),
+        information=information_of(traced, rivals),
         versions={},
         seconds=time.monotonic() - started,
         noise_floor=floor.named(robot.joint_names) if floor else None,
         traces=Traces(
             torque_units(robot),
             trained.traces(before, after, sealed=False),
-            effect_traces(traced, parameters, robot.joint_names),
+            effect_traces(traced, final.parameters),
             dependence,
         ),
-        sealed_traces=sealed_part.traces,
+        sealed_traces=played.traces(told[0], told[1], sealed=True),
         assumed=assumed,
-        parts=on_sealed_ends(model, models, parts.ends, processing),
-        untouched=sealed_part.untouched,
-        textbook=_textbook(book, model, traced, played) if book is not None else None,
+        parts=on_sealed_ends(robot, models, parts.ends, processing),
+        untouched=played.errors(by_urdf) if by_urdf else None,
+        textbook=_textbook(book, traced, played) if book is not None else None,
         skeleton=skeleton_of(robot),
         recorded=recorded(dataset),
         large_rests=rests,
-        joint_aliases=_joint_aliases(traced, doubts, model),
+        joint_aliases=_joint_aliases(traced, doubts),
         trained=trained.errors(after),
         inertia_names=standard_parameter_names(robot),
-        path=_path(traced, candidates, errors, worth),
-        inertia_parts=_by_joint(robot, taken_off[INERTIAS]) if from_urdf else {},
-        friction_lines=with_worth(lines, held, traced, models[1], taken_off),
+        path=_path(traced, list(named), errors, worth),
+        inertia_parts=by_joint(robot.joint_names, taken_off[INERTIAS]) if from_urdf else {},
+        friction_lines=with_worth(lines, held, traced, with_all, taken_off),
     )
 
 
-def _textbook(book: Sequence[int], model: Model, traced: Traced, played: Played) -> Textbook:
+def _records(fitted: IdentifiedModel, robot: Robot) -> tuple[EffectRecord, ...]:
+    """The effects of a model, with their values."""
+    return tuple(record_of(each, robot.joint_names, values) for each, values in fitted.by_effect)
+
+
+def _textbook(book: Sequence[int], traced: Traced, played: Played) -> Textbook:
     """Its effects beside the declared ones, and its error on the sealed data."""
-    fitted = refitted(model, traced, book)
-    added = list(fitted.by_effect)[len(model.declared) :]
-    names = model.robot.joint_names
-    return Textbook(
-        tuple(record_of(effect, names, values) for effect, values in added),
-        played.errors(played.predictions(fitted)),
-    )
+    fitted = refitted(traced, book)
+    added = _records(fitted, played.robot)[len(traced.model.declared) :]
+    return Textbook(added, played.errors(played.predictions(fitted)))
 
 
 def _path(
-    traced: Traced, candidates: Sequence[int], errors: SealedErrors, worth: Mapping[int, Worth]
+    traced: Traced, named: Sequence[int], errors: SealedErrors, worth: Mapping[int, Worth]
 ) -> ErrorPath | None:
-    """The error against the number of effects; `candidates` in the order in which they are told.
+    """The error against the number of effects; `named` are candidates in the order of the effects.
 
     What was weighed tells comes first and is in the smallest model, whatever the error says.
     """
     weighed = {i for i, each in worth.items() if each.verdict is SealedVerdict.WEIGHED}
     order = sorted(order_of(traced), key=lambda i: i not in weighed)
     found = error_path(traced, order, errors)
-    return found and replace(
-        found,
-        smallest=max(found.smallest, len(weighed)),
-        effects=tuple(candidates.index(i) for i in order),
-    )
-
-
-def _declared(model: Model, after: IdentifiedModel, robot: Robot) -> tuple[EffectRecord, ...]:
-    """The declared effects, with the values that they have beside those that were found."""
-    count = len(model.declared)
-    told = list(after.by_effect)[:count]
-    return tuple(record_of(effect, robot.joint_names, values) for effect, values in told)
-
-
-def _by_joint(robot: Robot, values: Array) -> dict[str, float]:
-    return dict(zip(robot.joint_names, map(float, values), strict=True))
+    if found is None:
+        return None
+    smallest = max(found.smallest, len(weighed))
+    return replace(found, smallest=smallest, effects=tuple(map(named.index, order)))
 
 
 def _prepared(spec: Spec, parts: Split) -> tuple[Processing, list[PreparedRun]]:
@@ -302,10 +268,7 @@ def _traced(
     The effects `start` were found in more of them.
     """
     progress("filtering", 0)
-
-    def prepared(left_out: LeftOut) -> list[PreparedRun]:
-        return prepare_all(parts.training, processing, left_out)
-
+    prepared = partial(prepare_all, parts.training, processing)
     traced, bodies = trace(
         model, spec.diagnosis, prepared, parts.folds, parts.units, progress, start, over
     )
@@ -364,17 +327,15 @@ def _filter_bias(
     model: Model, after: IdentifiedModel, spec: Spec, runs: Sequence[Run], processing: Processing
 ) -> tuple[Finding, ...]:
     """Whether the filter that was set biases the model that was found."""
-    rows = model.weighed if model.weighed is not None else np.zeros((0, 1))
-    wide = np.zeros((len(rows), model.base.rank + sum(len(e.parameters) for e in after.effects)))
-    wide[:, : rows.shape[1] - 1] = rows[:, :-1]
+    rows, more = model.scales, len(after.values) - model.declared_width
+    wide = np.pad(rows[:, :-1], ((0, 0), (0, more)))
     known = Knowledge(after.effects, wide, rows[:, -1])
     behind = fitted_behind(model.robot, model.base, known, spec.identification, runs)
     return filter_findings(runs, processing, spec.measurement.filter, behind)
 
 
-def _joint_aliases(
-    traced: Traced, doubts: Mapping[int, Approximation], model: Model
-) -> tuple[JointAlias, ...]:
+def _joint_aliases(traced: Traced, doubts: Mapping[int, Approximation]) -> tuple[JointAlias, ...]:
+    model = traced.model
     shown = [i for i in traced.chosen if i not in doubts]
     sides = [
         [[traced.candidates[i].effect for i in side] for side in both]
@@ -394,13 +355,6 @@ def _joint_aliases(
     )
 
 
-def _absorbed(model: Model, traced: Traced) -> tuple[Absorbed, ...]:
-    names = _column_names(model), model.robot.joint_names
-    white = traced.judge.white.without_prior if model.vague else traced.judge.white
-    found = absorbed_effects(white, traced.candidates, *names, traced.chosen)
-    return tuple(found)
-
-
 def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:
     declared = declared_effects(spec.effects, robot)
     known = weighed(spec.identification, declared, robot, base)
@@ -408,16 +362,6 @@ def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:
     prior = prior_of(spec.identification, robot, len(rows) > 0)
     vague = prior is not None and spec.identification.inertias != "cad"
     return Model(robot, base, known.effects, prior, spec.runs, rows, vague)
-
-
-def _column_names(model: Model) -> list[str]:
-    """Names of the inertial columns that the search saw, then of the declared effects'."""
-    base = model.base
-    names = [base.names[k] for k in base.selection]
-    for effect in model.declared:
-        where = "+".join(model.robot.joint_names[j] for j in effect.joints)
-        names += [f"{parameter.name}[{where}]" for parameter in effect.parameters]
-    return names
 
 
 def _choices(

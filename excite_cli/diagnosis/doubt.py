@@ -17,12 +17,11 @@ Rests say nothing of effects that inertias nearly take up, of which E is next to
 their own quantity. A change in some
 runs or over time, first-order friction and, where a good part can be predicted, a constant are
 means of a function of anything: U > 0.25 E is enough for changes, U > 0.3 E for friction and
-U > 0.5 E for constants. (Of maps of two quantities eleven of 416 campaigns were told such a mean or
-wave, beside the word that 3 to 71 times the noise is left; U / E of friction on three real robots,
-not taken up by inertias, is at most 0.09, and 0.14 of true friction beside a map.)
+U > 0.5 E for constants (docs/decisions.md).
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cache, partial
 
 import numpy as np
 
@@ -50,32 +49,29 @@ def approximations(
 ) -> dict[int, Approximation]:
     """Which chosen candidates are approximations, and of what."""
     more = {each.joint: each for each in rests if each.certain}
-    impossible: dict[tuple[int, tuple[str, ...]], tuple[float, str]] = {}
     found = {
         i: Approximation(covariates=(of,)) for i, of in curves_in_place(traced, joint_names).items()
     }
-    unproved = [each for each in traced.chosen if _may_not_repeat(traced, each, joint_names, more)]
-    for i in unproved:
-        of = more[joint_names[traced.candidates[i].effect.joints[0]]].depends_on
-        found |= {k: Approximation(covariates=of) for k in functions_alike(traced, i)}
-    plain = traced.judge.plain
+    for i in (each for each in traced.chosen if _may_not_repeat(traced, each)):
+        rest = more.get(joint_names[traced.candidates[i].effect.joints[0]])
+        if rest is not None:
+            doubt = Approximation(covariates=rest.depends_on)
+            found |= dict.fromkeys(functions_alike(traced, i), doubt)
+    impossible = cache(partial(_impossible, traced))
     for i in (each for each in traced.chosen if each not in found):
         if traced.judge.told_by_weight(i, traced.judge.without(i, traced.chosen)):
             continue  # inertias could explain it all: how much it explains says nothing
-        joint, explained = _strongest(traced, i)
+        joint, energy = _strongest(traced, i)
         name = joint_names[joint]
-        rest = plain.energy_on(traced.chosen, [joint])
-        if _weaker_than_its_runs(traced, i, joint, explained):
+        if _weaker_than_its_runs(traced, i, joint, energy):
             found[i] = Approximation()
             continue
-        if name in more and _is_outdone(traced, i, more[name], explained / rest, joint_names):
+        whole = traced.judge.plain.energy_on(traced.chosen, [joint])
+        if name in more and _is_outdone(traced, i, more[name], energy / whole, joint_names):
             found[i] = Approximation(covariates=more[name].depends_on)
             continue
-        key = (joint, traced.candidates[i].effect.function_of)
-        if key not in impossible:
-            impossible[key] = _impossible(traced, *key, rest)
-        energy, what = impossible[key]
-        if energy > explained:
+        most, what = impossible(joint, traced.candidates[i].effect.function_of)
+        if most > energy:
             found[i] = Approximation(kind=what)
     return found | _means_of_curves(traced, found)
 
@@ -101,24 +97,21 @@ def _weaker_than_its_runs(traced: Traced, i: int, joint: int, explained: float) 
     own = traced.candidates[i]
     if not own.effect.is_change:
         return False
-    there = [bool(np.any(part)) for part in own.columns]
-    folds = {fold for fold, here in zip(traced.data.folds, there, strict=True) if here}
-    others = {fold for fold, here in zip(traced.data.folds, there, strict=True) if not here}
+    folds, others = set[int](), set[int]()
+    for fold, part in zip(traced.data.folds, own.columns, strict=True):
+        (folds if np.any(part) else others).add(fold)
     if folds & others:  # of many runs several are one fold, and what is left is known by fold
         return False
     left = traced.judge.plain.in_turn.energies(traced.chosen, [joint]).reshape(-1, 2).sum(axis=1)
     return bool(left[sorted(folds)].sum() > explained)
 
 
-def _may_not_repeat(
-    traced: Traced, i: int, joint_names: Sequence[str], rests: Mapping[str, LargeRest]
-) -> bool:
-    """Whether its form is a curve's as far as one sees, and more than noise is left for sure."""
+def _may_not_repeat(traced: Traced, i: int) -> bool:
+    """Whether it is on one joint, and its form is a curve's as far as one sees."""
     effect = traced.candidates[i].effect
     if effect.holds_until_beaten or len(effect.joints) != 1:
         return False
-    curves = [effect.curve(signals, traced.signals) for signals in traced.signals[:1]]
-    return any(curve is not None for curve in curves) and joint_names[effect.joints[0]] in rests
+    return any(effect.curve(each, traced.signals) is not None for each in traced.signals[:1])
 
 
 def _means_of_curves(
@@ -190,14 +183,16 @@ def _surely_left(rest: LargeRest) -> float:
 
 def _strongest(traced: Traced, i: int) -> tuple[int, float]:
     """The joint where candidate i explains most, in units of the noise, and that energy."""
-    judge = traced.judge
-    rest = judge.without(i, traced.chosen)
-    explained = {
-        j: judge.plain.energy_on(rest, [j]) - judge.plain.energy_on([*rest, i], [j])
-        for j in traced.candidates[i].rows
-    }
-    joint = max(explained, key=lambda j: explained[j])
-    return joint, max(explained[joint], 1e-300)
+    rest = traced.judge.without(i, traced.chosen)
+    energies = {j: explained(traced, i, rest, [j]) for j in traced.candidates[i].rows}
+    joint = max(energies, key=energies.__getitem__)
+    return joint, max(energies[joint], 1e-300)
+
+
+def explained(traced: Traced, i: int, rest: Sequence[int], joints: Sequence[int]) -> float:
+    """Energy on some joints that candidate i takes off beside the rest, in units of the noise."""
+    plain = traced.judge.plain
+    return plain.energy_on(rest, joints) - plain.energy_on([*rest, i], joints)
 
 
 def _same_quantity(
@@ -209,9 +204,7 @@ def _same_quantity(
     return any(each.like in effect.function_of and each.joint in own for each in depends_on)
 
 
-def _impossible(
-    traced: Traced, joint: int, quantities: Sequence[str], rest: float
-) -> tuple[float, str]:
+def _impossible(traced: Traced, joint: int, quantities: tuple[str, ...]) -> tuple[float, str]:
     """The most that a candidate which cannot be so would explain, and its kind.
 
     Of those that depend on one of the `quantities`: what others explain is something else's.
@@ -225,7 +218,7 @@ def _impossible(
         if joint in c.rows and c.place not in taken and singles[k].dof
         if not quantities or not c.effect.function_of or {*quantities} & {*c.effect.function_of}
     ]
-    best = (0.0, "")
+    best, rest = (0.0, ""), judge.plain.energy_on(chosen, [joint])
     for k in sorted(near, key=lambda k: -singles[k].chi2)[:_TRIED]:
         together = [*chosen, k]
         energy = rest - judge.plain.energy_on(together, [joint])

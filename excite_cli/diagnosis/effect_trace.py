@@ -5,10 +5,12 @@ training torque, the partial residual is p = r + C_e θ_e. If the effect is ther
 over the quantity that the effect is a function of; if it is not, p is noise about zero.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.declared_model import places_of
 from excite_cli.diagnosis.traces import EffectTrace
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect
@@ -20,33 +22,23 @@ _MOST_ROWS = 3
 _WORTH_A_LOOK = 0.05  # of what the effect explains, in units of the noise
 
 
-def effect_traces(
-    traced: Traced, parameters: Array, joint_names: Sequence[str]
-) -> tuple[EffectTrace, ...]:
+def effect_traces(traced: Traced, parameters: Array) -> tuple[EffectTrace, ...]:
     """The traces of all effects that were found, with fitted `parameters` of the whole model."""
     left = traced.data.residuals(traced.candidates, traced.chosen, parameters)
-    start = len(parameters) - sum(traced.candidates[i].width for i in traced.chosen)
-    own = _own_torque(traced, parameters, start)
-    return tuple(_trace(traced, i, own[i], left, joint_names) for i in traced.chosen)
-
-
-def _own_torque(traced: Traced, parameters: Array, start: int) -> dict[int, list[Array]]:
-    """Torque (M, rows) of every effect and part: its columns times its own parameters."""
-    own, at = {}, start
-    for i in traced.chosen:
-        values = parameters[at : at + traced.candidates[i].width]
-        own[i] = [block @ values for block in traced.candidates[i].columns]
-        at += len(values)
-    return own
+    places = places_of(traced.effects, len(parameters))
+    return tuple(
+        _trace(traced, traced.candidates[i], parameters[own], left)
+        for i, own in zip(traced.chosen, places, strict=True)
+    )
 
 
 def _trace(
-    traced: Traced, i: int, torque: Sequence[Array], left: Sequence[Array], names: Sequence[str]
+    traced: Traced, candidate: Candidate, values: Array, left: Sequence[Array]
 ) -> EffectTrace:
-    candidate = traced.candidates[i]
-    effect = candidate.effect
+    effect, names = candidate.effect, traced.model.robot.joint_names
     parts = [k for k, s in enumerate(traced.signals) if effect.active(s.run)]
-    rows = _strongest_rows(traced, i, torque, parts)
+    torque = {k: candidate.columns[k] @ values for k in parts}
+    rows = _strongest_rows(traced, candidate, torque)
     joints = [candidate.rows[row] for row in rows]
     runs = traced.data.runs
     usable = [runs[k].usable[:, joints] for k in parts]
@@ -89,32 +81,23 @@ def _abscissae(
     traced: Traced, effect: Effect, parts: Sequence[int], joints: Sequence[int]
 ) -> tuple[str, str, float | None, list[Array]]:
     """Name, unit, period and values (M, rows) of each part; no values for the torque itself."""
-    found = [effect.abscissa(traced.signals[k]) for k in parts]
-    if not found or any(each is None for each in found):
-        return "", "", None, []
-    first = found[0]
-    assert first is not None
-    values = [
-        traced.data.runs[k].averaged_for_fit(
-            np.repeat(each.values[:, None], len(joints), axis=1), joints
-        )
-        for k, each in zip(parts, found, strict=True)
-        if each is not None
-    ]
-    return first.name, first.unit, first.period, values
-
-
-def _strongest_rows(
-    traced: Traced, i: int, torque: Sequence[Array], parts: Sequence[int]
-) -> list[int]:
-    """Rows of candidate i with most of its torque in units of the noise, the strongest first."""
-    candidate = traced.candidates[i]
-    energy = np.zeros(len(candidate.rows))
+    first, values = None, []
     for k in parts:
-        usable = traced.data.runs[k].usable[:, list(candidate.rows)]
-        own = np.where(usable, torque[k], 0.0)
-        energy += np.sum(own**2, axis=0)
-    energy /= np.square(traced.levels[list(candidate.rows)])
+        first = effect.abscissa(traced.signals[k])
+        if first is None:
+            return "", "", None, []
+        repeated = np.repeat(first.values[:, None], len(joints), axis=1)
+        values.append(traced.data.runs[k].averaged_for_fit(repeated, joints))
+    return (first.name, first.unit, first.period, values) if first else ("", "", None, [])
+
+
+def _strongest_rows(traced: Traced, candidate: Candidate, torque: Mapping[int, Array]) -> list[int]:
+    """Its rows with most of its `torque` per part, in units of the noise, the strongest first."""
+    joints = list(candidate.rows)
+    energy = np.zeros(len(joints))
+    for k, own in torque.items():
+        energy += np.square(np.where(traced.data.runs[k].usable[:, joints], own, 0.0)).sum(axis=0)
+    energy /= np.square(traced.levels[joints])
     order = np.argsort(-energy, kind="stable")[:_MOST_ROWS]
     worth = [int(row) for row in order if energy[row] >= _WORTH_A_LOOK * energy.sum()]
     return worth or [int(order[0])]

@@ -8,9 +8,9 @@ where the model without it, all others fitted anew, says the same along a usual 
     u = max_j RMS_t(c_jᵀ d) (|θ| + 2 s) / RMS τ_j,    d = P e / (eᵀ P e),
 
 with P the covariance of all parameters, θ and s = √(eᵀ P e) size and deviation of this one (the
-unit vector e), and c_j the columns of joint j, is below a fiftieth and, of what is surely there, also below a fifth of
-what the model leaves. Not so defects of the measurement, of which many robots have none: with
-offsets a UR10 of the battery was left with 14.8 % for 7.4.
+unit vector e), and c_j the columns of joint j, is below a fiftieth and, of what is surely there,
+also below a fifth of what the model leaves. Not so defects of the measurement, of which many robots
+have none: with offsets a UR10 of the battery was left with 14.8 % for 7.4.
 """
 
 from collections.abc import Sequence

@@ -4,14 +4,19 @@ What a search has named is fitted by weighted least squares, with standard devia
 serial correlation, what the columns of first-order effects leave, and shapes that fit as well.
 Sizes that no effect can have are moved to the nearest possible ones, all other parameters with them
 as the covariance says.
+
+With f_v v + f_c sgn v + c sgn v·|v|^p in a model (or a part that grows with load or time), both
+f_v and f_c are what that term leaves: for a concave curve even negative, or nothing. Whether there
+is viscous and Coulomb friction is a question of the straight line through all of it: with the line
+α v + β sgn v nearest to the curve over the speeds in the data, of f_v + c α and f_c + c β.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.diagnosis.friction_line import friction_lines
+from excite_cli.diagnosis.declared_model import places_of, width_of
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.identification.factors import Mask
@@ -37,9 +42,9 @@ class FinalFit:
 def regression(traced: Traced) -> LinearFit:
     """What was found beside the declared model, by the regression of `identify` (`wls`)."""
     known, effects = traced.model.known, (*traced.model.declared, *traced.effects)
-    more = np.zeros((len(known), sum(len(effect.parameters) for effect in traced.effects)))
+    wide = np.pad(known[:, :-1], ((0, 0), (0, width_of(traced.effects))))
     rows, said = traced.imagined()
-    prior = np.vstack([np.hstack([known[:, :-1], more]), rows]), np.append(known[:, -1], said)
+    prior = np.vstack([wide, rows]), np.append(known[:, -1], said)
     return fit_rows(
         traced.data.rows(traced.candidates, traced.chosen),
         "wls",
@@ -52,13 +57,13 @@ def final_fit(traced: Traced, linear: LinearFit) -> FinalFit:
     """What is told of a regression of what was found."""
     parameters = linear.x
     covariance = np.where(np.isfinite(linear.covariance), linear.covariance, 0.0)
-    for i, own in _places(traced, len(parameters)):
-        error = traced.candidates[i].effect.model_error(parameters[own])
-        error = np.hypot(error, _SYSTEMATIC * parameters[own])
-        covariance[own, own] += np.diag(error**2 + _by_shape(traced, i) ** 2)
-    lines = _lines(traced, len(parameters))
-    for i, own in _places(traced, len(parameters)):
-        effect, values = traced.candidates[i].effect, parameters[own]
+    places = places_of(traced.effects, len(parameters))
+    for k, (effect, own) in enumerate(zip(traced.effects, places, strict=True)):
+        error = np.hypot(effect.model_error(parameters[own]), _SYSTEMATIC * parameters[own])
+        covariance[own, own] += np.diag(error**2 + _by_shape(traced, k) ** 2)
+    lines = friction_lines(traced, len(parameters))
+    for effect, own in zip(traced.effects, places, strict=True):
+        values = parameters[own]
         beside = np.delete(lines[own], own, axis=1).any()  # it is judged with what refines it
         if not beside and not effect.possible(values):
             whiten = np.linalg.inv(half_of(covariance[own, own]))
@@ -67,57 +72,73 @@ def final_fit(traced: Traced, linear: LinearFit) -> FinalFit:
     return FinalFit(parameters, covariance, linear.seen)
 
 
-def _by_shape(traced: Traced, i: int) -> Array:
-    """Standard deviation (w,) of the sizes of candidate i that its uncertain shape brings.
+def _by_shape(traced: Traced, member: int) -> Array:
+    """Standard deviation (w,) of the sizes of a chosen effect that its uncertain shape brings.
 
     The sizes that it has in other shapes, weighted by exp(−Δχ²/2): so likely are these shapes, if
     physics allows the sizes, and they mean the same.
     """
-    judge, own = traced.judge, traced.candidates[i]
-    sets = {
-        k: [k if c == i else c for c in traced.chosen]
-        for k, c in enumerate(traced.candidates)
-        if c.place == own.place
-        and c.width == own.width
-        and (k == i or own.effect.compares_with(c.effect))
-    }
-    sets = {
-        k: each
-        for k, each in sets.items()
-        if k == i or judge.allowed(judge.plain.solve(each), each, [k])
-    }
+    judge, chosen = traced.judge, traced.chosen
+    own = traced.candidates[chosen[member]]
+    sets, sizes = [chosen], [_size(traced, chosen, member)]
+    for k, c in enumerate(traced.candidates):
+        alike = c.place == own.place and c.width == own.width and k != chosen[member]
+        if alike and own.effect.compares_with(c.effect):
+            some = (*chosen[:member], k, *chosen[member + 1 :])
+            if judge.allowed(judge.plain.solve(some), some, [k]):
+                sets.append(some)
+                sizes.append(_size(traced, some, member))
     if len(sets) < 2:
         return np.zeros(own.width)
-    energies = np.array([judge.white.energy(each) for each in sets.values()]) / traced.inflation
+    energies = np.array([judge.white.energy(each) for each in sets]) / traced.inflation
     weights = np.exp(-0.5 * (energies - energies.min()))
-    sizes = []
-    for k, each in sets.items():
-        parameters = judge.plain.solve(each)
-        at = dict(_places(replace(traced, chosen=tuple(each)), len(parameters)))[k]
-        sizes.append(parameters[at])
-    from_own = np.square(np.array(sizes) - sizes[list(sets).index(i)])
-    return np.sqrt(weights @ from_own / weights.sum())
+    return np.sqrt(weights @ np.square(np.array(sizes) - sizes[0]) / weights.sum())
+
+
+def _size(traced: Traced, some: Sequence[int], member: int) -> Array:
+    """Parameters of a member of a set of candidates, fitted with the others."""
+    parameters = traced.judge.plain.solve(some)
+    effects = [traced.candidates[i].effect for i in some]
+    return np.asarray(parameters[places_of(effects, len(parameters))[member]])
 
 
 def over_error(traced: Traced, found: FinalFit) -> dict[int, float]:
     """Size over two standard deviations of every effect; of plain friction, that of the line."""
     count = len(found.parameters)
-    lines = _lines(traced, count)
+    lines = friction_lines(traced, count)
     shown, spread = lines @ found.parameters, lines @ found.covariance @ lines.T
+    places = places_of(traced.effects, count)
     return {
         i: traced.candidates[i].effect.over_error(shown[own], spread[own, own])
-        for i, own in _places(traced, count)
+        for i, own in zip(traced.chosen, places, strict=True)
     }
 
 
-def _lines(traced: Traced, count: int) -> Array:
-    """Parameters as they are judged, times all `count` of them."""
-    return friction_lines(traced, count - sum(traced.candidates[i].width for i in traced.chosen))
-
-
-def _places(traced: Traced, count: int) -> Iterator[tuple[int, slice]]:
-    """Chosen candidates, and where among all parameters theirs are."""
-    at = count - sum(traced.candidates[i].width for i in traced.chosen)
+def friction_lines(traced: Traced, count: int) -> Array:
+    """T (k, k): all `count` parameters as they are judged = T @ parameters as fitted."""
+    places = dict(zip(traced.chosen, places_of(traced.effects, count), strict=True))
+    of_all_runs = {
+        traced.candidates[i].place[:2]: i
+        for i in traced.chosen
+        if not traced.candidates[i].effect.runs
+    }
+    transform = np.eye(count)
     for i in traced.chosen:
-        yield i, slice(at, at + traced.candidates[i].width)
-        at += traced.candidates[i].width
+        effect = traced.candidates[i].effect
+        lines = [of_all_runs.get((kind, effect.joints)) for kind in effect.deviates_from]
+        present = [k for k in lines if k is not None]
+        if present:
+            slopes = np.linalg.lstsq(
+                np.concatenate([_first_row(traced, k) for k in present], axis=1),
+                _first_row(traced, i),
+                rcond=1e-9,
+            )[0]
+            transform[[places[k].start for k in present], places[i]] = slopes
+    return transform
+
+
+def _first_row(traced: Traced, i: int) -> Array:
+    """Columns (M, w) of candidate i in its first row, where that is usable."""
+    own = traced.candidates[i]
+    masks = [run.usable[:, own.rows[0]] for run in traced.data.runs]
+    return np.concatenate([c[mask, 0] for c, mask in zip(own.columns, masks, strict=True)])

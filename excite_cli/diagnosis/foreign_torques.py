@@ -27,10 +27,9 @@ def check_runs(model: RoughModel, runs: Sequence[PreparedRun]) -> tuple[Finding,
     left = {name: _left(model, each) for name, each in samples.items() if len(each.q)}
     found = []
     for name, share in left.items():
-        others = [x for other, x in left.items() if other != name]
-        if not others or share < _FOREIGN or share < _TIMES * min(others):
+        usual = min((x for other, x in left.items() if other != name), default=np.inf)
+        if share < _FOREIGN or share < _TIMES * usual:
             continue
-        usual = float(min(others))
         text = (
             f"torques of {name} do not belong to its motion: {share:.0%} of them do not fit the "
             f"URDF with any friction or stiffness, of other runs {usual:.0%}"

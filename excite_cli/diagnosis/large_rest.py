@@ -14,11 +14,10 @@ from excite_cli.diagnosis.high_band import band_noise
 from excite_cli.diagnosis.records import LargeRest
 from excite_cli.diagnosis.structure import Quantities, Structure
 from excite_cli.diagnosis.traces import Dependence
-from excite_cli.diagnosis.training import TrainingData
-from excite_cli.effects.base import Signals
+from excite_cli.diagnosis.tracing import Traced
 from excite_cli.identification.noise_floor import NoiseFloor
 from excite_cli.identification.processing import Processing
-from excite_cli.measurement.dataset import Run
+from excite_cli.measurement.dataset import Mask, Run
 from excite_cli.robot.model import Array
 
 # 42 simulated robots without any defect stay below 1.42, and none of those above 2.5 is without.
@@ -32,39 +31,36 @@ _SMALLEST = 1e-3  # of the torque's RMS: what is smaller needs no word
 
 
 def large_rests(
-    data: TrainingData,
-    signals: Sequence[Signals],
+    traced: Traced,
     predicted: Sequence[Array],
     residuals: Sequence[Array],
     recorded: Sequence[Run],
     processing: Processing,
     repeated: NoiseFloor | None,
-    joint_names: Sequence[str],
 ) -> tuple[tuple[LargeRest, ...], Dependence]:
     """Joints of whose torque more is left than noise in the training parts; on what it depends.
 
     predicted: torque (T, n) of the model at the working rate; residuals: (M, n) of what fits count;
     recorded: the parts as they were read; repeated: the floor from repeated periods.
     """
-    quantities = Quantities(data, signals, joint_names)
+    data, joint_names = traced.data, traced.model.robot.joint_names
+    quantities = Quantities(data, traced.signals, joint_names)
     band = band_noise(recorded, data.runs, predicted, processing)
-    shown = [
-        run.tau - run.averaged_torque(torque)
-        for run, torque in zip(data.runs, predicted, strict=True)
+    usable = np.concatenate([run.usable for run in data.runs])
+    valid = np.concatenate([run.valid for run in data.runs])
+    left = [
+        run.tau - run.averaged_torque(each) for run, each in zip(data.runs, predicted, strict=True)
     ]
+    fitted = _rms(residuals, usable)
+    torques = _rms([run.tau_fit for run in data.runs], usable)
+    in_motion = _rms(left, usable & valid)
     found = []
     shares = np.zeros((len(joint_names), len(quantities.names)))
     for joint, name in enumerate(joint_names):
-        rms, torque = (
-            _rms([x[run.usable[:, joint], joint] for x, run in zip(series, data.runs, strict=True)])
-            for series in (residuals, [run.tau_fit for run in data.runs])
-        )
-        counted = [run.usable[:, joint] & run.valid[:, joint] for run in data.runs]
-        around = _rms([x[at, joint] for x, at in zip(shown, counted, strict=True)])
+        rms, torque, around = fitted[joint], torques[joint], in_motion[joint]
         if not max(rms, around) > _SMALLEST * torque:
             continue
-        noise, most = float(band.white[joint]), float(band.coloured[joint])
-        basis = "band"
+        noise, most, basis = float(band.white[joint]), float(band.coloured[joint]), "band"
         if repeated is not None and np.isfinite(repeated.rms[joint]):
             noise = most = float(repeated.rms[joint])
             basis = "periods"
@@ -78,15 +74,15 @@ def large_rests(
             continue
         at_reversals = not rms > enough and not predictable
         structure = Structure(0.0) if rest is None or at_reversals else rest.structure()
-        certain = rms > _TIMES * most or structure.predictable > _PREDICTABLE
+        size = around if at_reversals else rms
         found.append(
             LargeRest(
                 joint=name,
-                rms=around if at_reversals else rms,
-                share_of_torque=(around if at_reversals else rms) / torque,
+                rms=size,
+                share_of_torque=size / torque,
                 noise=noise if known else None,
                 basis=basis if known else "",
-                certain=certain,
+                certain=rms > _TIMES * most or structure.predictable > _PREDICTABLE,
                 predictable=structure.predictable,
                 depends_on=structure.depends_on if structure.named > _SAID else (),
                 at_reversals=at_reversals,
@@ -95,6 +91,9 @@ def large_rests(
     return tuple(found), Dependence(tuple(joint_names), quantities.names, shares)
 
 
-def _rms(parts: Sequence[Array]) -> float:
-    every = np.concatenate(parts)
-    return float(np.sqrt(np.mean(every**2))) if len(every) else float("nan")
+def _rms(parts: Sequence[Array], counted: Mask) -> list[float]:
+    """Of every joint over the samples that count; NaN where there are none."""
+    columns = zip(np.concatenate(parts).T, counted.T, strict=True)
+    return [
+        float(np.sqrt(np.mean(np.square(x[at])))) if at.any() else float("nan") for x, at in columns
+    ]

@@ -19,13 +19,8 @@ from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.diagnosis.separation import DataColumns, separated
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.dynamics.uncertain_inertias import FitKnowledge
-from excite_cli.effects.base import Effect
 from excite_cli.errors import FileError
-from excite_cli.excitation.discrimination import (
-    SEPARATED,
-    divergences,
-    motions_needed,
-)
+from excite_cli.excitation.discrimination import SEPARATED, divergences, motions_needed
 from excite_cli.excitation.extension import in_words, why_not_planned
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.stack import Stack
@@ -72,14 +67,12 @@ class NextMotion(Shown):
         grams = [block.T @ block for block in blocks]
         before = separation.prior.factor.T @ separation.prior.factor
         after = before + np.sum(grams, axis=0)
-        for first, second in zip(
-            separation.directions[::2], separation.directions[1::2], strict=True
-        ):
-            both = (first, second)
+        ways = separation.directions
+        for both in zip(ways[::2], ways[1::2], strict=True):
             found["pairs"].append(
                 {
-                    "effect": first.pair[0],
-                    "alias": first.pair[1],
+                    "effect": both[0].pair[0],
+                    "alias": both[0].pair[1],
                     "kl_so_far": float(divergences(before, both).min()),
                     "expected_kl": float(divergences(after, both).min()),
                     "motions_needed": motions_needed(before, grams[0], both),
@@ -99,11 +92,7 @@ def next_experiment(
         for named, alias in _alias_pairs(diagnosis)
     ]
     purpose = "separate" if pairs else "excite"
-    return {
-        "purpose": purpose,
-        "pairs": pairs,
-        "command": next_command(config, file).line,
-    }
+    return {"purpose": purpose, "pairs": pairs, "command": next_command(config, file).line}
 
 
 def next_command(config: str, file: str) -> Command:
@@ -122,38 +111,19 @@ def plan_after(
         The diagnosis belongs to another robot, or its numbers do not fit together.
     """
     robot = build_measured_robot(spec.robot, folder)
-    _check_robot(diagnosis, robot)
-    noise = np.asarray(diagnosis.information.noise, dtype=float)
-    known = [name not in robot.unmeasured for name in diagnosis.joint_names]
-    if not (np.all(np.isfinite(noise[known])) and np.all(noise[known] > 0)):
-        raise FileError("--after: the diagnosis has no noise level for every joint; make it anew.")
-    rows = [*BASE_ROWS, *diagnosis.joint_names[len(BASE_ROWS) :]]
-    told = zip(rows if robot.base_joints else diagnosis.joint_names, noise, known, strict=True)
-    weights = {name: float(1.0 / x) for name, x, measured in told if measured}
-    weighting: dict[str, Any] = {"row_weights": weights}
-    if spec.criterion.column_scaling == "none":
-        # Rows in units of their noise differ by powers of ten; columns must not.
-        weighting["column_scaling"] = "unit_norm"
+    spec = _weighted(diagnosis, spec, robot)
     if robot.base_joints:
-        return _on_a_base(diagnosis, spec, folder, weighting, fit)
-    model = [effect_of(record, robot.joint_names) for record in diagnosis.information.model]
-    planned = [effect for effect in model if not why_not_planned(effect, robot)]
-    problem = build_problem(
-        spec.model_copy(
-            update={
-                "effects": tuple(_spec_of(effect, robot) for effect in planned),
-                "criterion": spec.criterion.model_copy(update=weighting),
-            }
-        ),
-        folder,
-        fit,
-    )
+        return _on_a_base(diagnosis, build_problem(spec, folder, fit))
+    planned, said = [], []
+    for record in diagnosis.information.model:
+        effect = effect_of(record, robot.joint_names)
+        if why := why_not_planned(effect, robot):
+            said.append(f"left out of the next motion: {in_words(effect, robot)}: {why}")
+        else:
+            shape = dict(effect.shape)
+            planned.append(EffectSpec(kind=effect.kind, joints=record.joints, shape=shape))
+    problem = build_problem(spec.model_copy(update={"effects": tuple(planned)}), folder, fit)
     columns = DataColumns(diagnosis, problem)
-    said = [
-        f"left out of the next motion: {in_words(effect, robot)}: {why_not_planned(effect, robot)}"
-        for effect in model
-        if effect not in planned
-    ]
     prior = columns.factor(problem)
     pairs = _alias_pairs(diagnosis)
     wide, reasons = separated(problem, columns, pairs)
@@ -166,23 +136,35 @@ def plan_after(
     why = "no effect has an alias" if not pairs else "no alias can be separated by a motion"
     count = len(problem.extension.effects)
     beside = f" with its {count} effect{'s' if count > 1 else ''}" if count else ""
-    said.insert(
-        0,
-        f"{why}: the next motion excites the model{beside}, on top of the measured data",
-    )
+    said.insert(0, f"{why}: the next motion excites the model{beside}, on top of the measured data")
     return NextMotion(problem, problem, prior, "excite", tuple(said))
 
 
-def _on_a_base(
-    diagnosis: Diagnosis,
-    spec: Spec,
-    folder: Path,
-    weighting: dict[str, Any],
-    fit: FitKnowledge | None,
-) -> NextMotion:
+def _weighted(diagnosis: Diagnosis, spec: Spec, robot: Robot) -> Spec:
+    """The problem without effects, its rows weighted by 1/noise."""
+    if diagnosis.fingerprint != robot.fingerprint():
+        raise FileError(
+            "--after: the diagnosis was made for another robot, other moved joints, posture or "
+            "rows. Give the config that it was made with."
+        )
+    names = diagnosis.joint_names
+    rows = [*BASE_ROWS, *names[len(BASE_ROWS) :]] if robot.base_joints else names
+    known = [name not in robot.unmeasured for name in names]
+    noise = np.asarray(diagnosis.information.noise, dtype=float)
+    if not (np.all(np.isfinite(noise[known])) and np.all(noise[known] > 0)):
+        raise FileError("--after: the diagnosis has no noise level for every joint; make it anew.")
+    told = zip(rows, noise, known, strict=True)
+    weights = {row: float(1.0 / level) for row, level, measured in told if measured}
+    weighting: dict[str, Any] = {"row_weights": weights}
+    if spec.criterion.column_scaling == "none":
+        # Rows in units of their noise differ by powers of ten; columns must not.
+        weighting["column_scaling"] = "unit_norm"
+    criterion = spec.criterion.model_copy(update=weighting)
+    return spec.model_copy(update={"effects": (), "criterion": criterion})
+
+
+def _on_a_base(diagnosis: Diagnosis, problem: Problem) -> NextMotion:
     """The inertias alone, of data with a wrench at the base: effects are not planned there."""
-    wanted = {"effects": (), "criterion": spec.criterion.model_copy(update=weighting)}
-    problem = build_problem(spec.model_copy(update=wanted), folder, fit)
     triangle, rank = np.asarray(diagnosis.information.factor, dtype=float), problem.base.rank
     others = triangle.shape[1] - rank
     # What the effects take up of the data is not known of the inertias: their columns come first.
@@ -198,14 +180,6 @@ def _on_a_base(
     return NextMotion(problem, problem, prior, "excite", tuple(said))
 
 
-def _check_robot(diagnosis: Diagnosis, robot: Robot) -> None:
-    if diagnosis.fingerprint != robot.fingerprint():
-        raise FileError(
-            "--after: the diagnosis was made for another robot, other moved joints, posture or "
-            "rows. Give the config that it was made with."
-        )
-
-
 def _alias_pairs(diagnosis: Diagnosis) -> list[tuple[EffectRecord, EffectRecord]]:
     """Named effects and what stands for them, but for what takes a scale and no motion to tell."""
     return [
@@ -214,14 +188,6 @@ def _alias_pairs(diagnosis: Diagnosis) -> list[tuple[EffectRecord, EffectRecord]
         if named.verdict is not SealedVerdict.WEIGHED
         for alias in named.aliases
     ]
-
-
-def _spec_of(effect: Effect, robot: Robot) -> EffectSpec:
-    return EffectSpec(
-        kind=effect.kind,
-        joints=tuple(robot.joint_names[j] for j in effect.joints),
-        shape=dict(effect.shape),
-    )
 
 
 def _as_data(record: EffectRecord) -> dict[str, Any]:

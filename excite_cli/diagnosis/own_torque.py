@@ -2,9 +2,9 @@
 
 Some effects look at the model's own torque: a gain is a share of it, a delay its slope, friction
 grows with it. A pass has their columns at the fit of the pass before, which had other effects; what
-is fitted with them need not be what the model then predicts: on a Go2 gains fitted to 7 % left 39 %
-of a joint's torque. So the fit is repeated with the columns C(θ) of its own torque until the energy
-that is really left, ‖τ − C(θ) θ‖², is that of the fit, ‖τ − C θ‖²; where it grows, by half a step.
+is fitted with them need not be what the model then predicts. So the fit is repeated with the
+columns C(θ) of its own torque until the energy that is really left, ‖τ − C(θ) θ‖², is that of the
+fit, ‖τ − C θ‖²; where it grows, by half a step.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,6 @@ import numpy as np
 from excite_cli.diagnosis.candidates import with_columns
 from excite_cli.diagnosis.modelled_run import ModelledRun, signals_of_all, training_data
 from excite_cli.diagnosis.tracing import Traced, values_of
-from excite_cli.effects.base import Effect
 from excite_cli.robot.model import Array
 
 _ROUNDS = 8
@@ -27,11 +26,10 @@ def at_its_own_torque(traced: Traced, bodies: Sequence[ModelledRun]) -> Traced:
     chosen = traced.chosen
     if not chosen:
         return traced
-    theta = traced.fitted(chosen)
+    theta = before = traced.fitted(chosen)
     best, least = traced, np.inf
-    before: Array | None = None
     for _ in range(_ROUNDS):
-        now = _with_columns(traced, bodies, theta, values_of(traced.model, traced.data, theta))
+        now = _with_columns(traced, bodies, theta)
         left = _energy(now, theta)
         if left < least:
             best, least, before = now, left, theta
@@ -39,7 +37,6 @@ def at_its_own_torque(traced: Traced, bodies: Sequence[ModelledRun]) -> Traced:
             if left <= _SETTLED * _energy(now, theta):
                 break
         else:
-            assert before is not None
             theta = (theta + before) / 2.0
     return best
 
@@ -47,23 +44,19 @@ def at_its_own_torque(traced: Traced, bodies: Sequence[ModelledRun]) -> Traced:
 def _energy(traced: Traced, theta: Array) -> float:
     """What is left of the training data, in units of each joint's noise."""
     left = traced.data.residuals(traced.candidates, traced.chosen, theta)
+    runs = traced.data.runs
     return float(
         sum(
-            np.square(
-                each[run.usable] / np.broadcast_to(traced.levels, each.shape)[run.usable]
-            ).sum()
-            for each, run in zip(left, traced.data.runs, strict=True)
+            np.square((each / traced.levels)[run.usable]).sum()
+            for each, run in zip(left, runs, strict=True)
         )
     )
 
 
-def _with_columns(
-    traced: Traced, bodies: Sequence[ModelledRun], theta: Array, values: Array
-) -> Traced:
+def _with_columns(traced: Traced, bodies: Sequence[ModelledRun], theta: Array) -> Traced:
     model, effects = traced.model, traced.effects
-    phi = model.full_inertias(theta)
-    every: Sequence[Effect] = (*model.declared, *effects)
-    signals = signals_of_all(bodies, phi, every, values)
+    phi, values = model.full_inertias(theta), values_of(model, traced.data, theta)
+    signals = signals_of_all(bodies, phi, (*model.declared, *effects), values)
     data = training_data(model, traced.data.folds, bodies, signals)
     tests = [traced.candidates[i].tests for i in traced.chosen]
     made = with_columns(list(zip(effects, tests, strict=True)), signals, data.runs)

@@ -11,7 +11,6 @@ and the person decides. Whatever no such mistake explains is left to the diagnos
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.spec import Spec
@@ -31,14 +30,14 @@ from excite_cli.diagnosis.rearranged import (
 )
 from excite_cli.diagnosis.standing_legs import refuse_standing
 from excite_cli.diagnosis.torque_scale import check_scale
-from excite_cli.diagnosis.torque_shares import RoughModel, Samples, samples_of
+from excite_cli.diagnosis.torque_shares import RoughModel, Samples, samples_of, those
 from excite_cli.errors import FileError
 from excite_cli.identification.motion_errors import check_motion
 from excite_cli.identification.prepare import PreparedRun, prepare_all
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.split import split
 from excite_cli.measurement.dataset import Dataset, Finding, Run
-from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.model import Robot
 
 _SAMPLES, _FEW = 600, 200
 _GOOD = 0.03  # data that leave less than this on every joint are what they say they are
@@ -50,67 +49,6 @@ _FOREIGN = 0.85  # torques of which this is left have nothing to do with the mot
 # Shares left as the data are, from which a mistake is certain (inertias would have to be 5 standard
 # deviations off), and most that may be left without it.
 _CERTAIN, _EXPLAINED = 0.15, 0.1
-
-
-def check_plausibility(
-    robot: Robot, runs: Sequence[PreparedRun], declared: MeasurementSpec
-) -> tuple[Finding, ...]:
-    """What order of columns or signs seem to contradict the robot: findings of severity `warning`.
-
-    Signs that are `declared` for a joint, as they are or not, are taken as they are.
-
-    Raises
-    ------
-    FileError
-        The robot stands and is declared to hang; columns are in another order, or torques or
-        positions of joints have the opposite sign, whatever the inertias.
-    """
-    if declared.trust:
-        return ()
-    names, samples, model = robot.joint_names, samples_of(runs, _SAMPLES), RoughModel(robot)
-    if not len(samples.q):
-        return ()  # nobody moves: there is nothing to judge
-    scale = check_scale(robot, samples, declared, names)
-    if any(found.kind == "no_gravity" for found in scale):
-        return scale  # order and signs are judged by the whole torque
-    refuse_standing(robot, samples.thinned(_FEW))
-    foreign = check_runs(model, runs)
-    if foreign:
-        return (*scale, *foreign)
-    return (*scale, *_check_arrangement(names, samples, model, declared))
-
-
-def _check_arrangement(
-    names: Sequence[str], samples: Samples, model: RoughModel, declared: MeasurementSpec
-) -> tuple[Finding, ...]:
-    """Order of columns, and signs, of all joints with a torque."""
-    n = len(names)
-    table = model.shares_left(samples)
-    here = np.arange(n)
-    without = np.asarray(~samples.known.any(axis=0))
-    table[without] = table[:, without] = 1.0
-    table[without, without] = 0.0
-    straight = Verdict(Change.none(n), table[here, here, 0])
-    if straight.left.max() < _GOOD:
-        return ()
-    settled = _settled(names, declared)
-    tried = [*torques_changed(table), *positions_changed(model, samples, without)]
-    found = [
-        v for v in tried if _clearly_better(v, straight) and not (v.change.signs & settled).any()
-    ]
-    best = min(found, key=lambda verdict: verdict.cost, default=None)
-    if best is None or np.median(best.left[best.change.touched]) > _FITS:
-        if np.mean(straight.left > _FOREIGN) >= 0.5:
-            raise FileError(_foreign(names, straight))
-        return ()
-    found += mirrored(model, samples, best.change) if best.change.mistakes == 1 else []
-    rivals = [v for v in found if v.cost < best.cost + PRICE and v is not best]
-    text = _message(names, straight, best, rivals)
-    if _certain(best, straight):
-        raise FileError(f"the measured data contradict the robot: {text}")
-    joints = tuple(names[j] for j in np.flatnonzero(best.change.touched).tolist())
-    text = f"the measured data may contradict the robot: {text}"
-    return (Finding("implausible", "warning", text.removesuffix("."), "", joints),)
 
 
 def check_dataset(
@@ -139,7 +77,7 @@ def check_recorded(
 ) -> tuple[Finding, ...]:
     """What is to be known of the runs that are fitted: motion, clock, and `check_plausibility`.
 
-    A cut-off of the positions that is `declared` is taken as it is.
+    A cut-off of the positions that is `declared` is taken as it is; so is all else with `trust`.
 
     Raises
     ------
@@ -151,14 +89,66 @@ def check_recorded(
         motion = check_motion(runs, processing, robot.joint_names)
     if declared.trust:
         return motion
-    clock = check_clock(robot, runs, samples_of(prepared, _SAMPLES))
-    return (*motion, *clock, *check_plausibility(robot, prepared, declared))
+    samples = samples_of(prepared, _SAMPLES)
+    if not len(samples.q):  # nobody moves: there is nothing to judge
+        return motion
+    clock = check_clock(robot, runs, samples)
+    return (*motion, *clock, *check_plausibility(robot, prepared, samples, declared))
 
 
-def _settled(names: Sequence[str], declared: MeasurementSpec) -> NDArray[np.bool_]:
-    """Whose sign of torque, and of position, is declared: (2, n)."""
+def check_plausibility(
+    robot: Robot, runs: Sequence[PreparedRun], samples: Samples, declared: MeasurementSpec
+) -> tuple[Finding, ...]:
+    """What order of columns or signs seem to contradict the robot: findings of severity `warning`.
+
+    `samples` of all runs. Signs that are `declared` for a joint, as they are or not, are taken as
+    they are.
+
+    Raises
+    ------
+    FileError
+        The robot stands and is declared to hang; columns are in another order, or torques or
+        positions of joints have the opposite sign, whatever the inertias.
+    """
+    model = RoughModel(robot)
+    scale = check_scale(model, samples, declared)
+    if any(found.kind == "no_gravity" for found in scale):
+        return scale  # order and signs are judged by the whole torque
+    refuse_standing(robot, samples.thinned(_FEW))
+    foreign = check_runs(model, runs)
+    return (*scale, *(foreign or _check_arrangement(samples, model, declared)))
+
+
+def _check_arrangement(
+    samples: Samples, model: RoughModel, declared: MeasurementSpec
+) -> tuple[Finding, ...]:
+    """Order of columns, and signs, of all joints with a torque."""
+    names, n = model.robot.joint_names, model.robot.n
+    table, here = model.shares_left(samples), np.arange(n)
+    without = np.asarray(~samples.known.any(axis=0))
+    table[without] = table[:, without] = 1.0
+    table[without, without] = 0.0
+    straight = Verdict(Change.none(n), table[here, here, 0])
+    if straight.left.max() < _GOOD:
+        return ()
     signs = (declared.sign, declared.position_sign)
-    return np.array([[name in given for name in names] for given in signs])
+    settled = np.array([[name in given for name in names] for given in signs])
+    tried = [*torques_changed(table), *positions_changed(model, samples, without)]
+    found = [
+        v for v in tried if _clearly_better(v, straight) and not (v.change.signs & settled).any()
+    ]
+    best = min(found, key=lambda verdict: verdict.cost, default=None)
+    if best is None or np.median(best.left[best.change.touched]) > _FITS:
+        if np.mean(straight.left > _FOREIGN) >= 0.5:
+            raise FileError(_foreign(names, straight))
+        return ()
+    found += mirrored(model, samples, best.change) if best.change.mistakes == 1 else []
+    rivals = [v for v in found if v.cost < best.cost + PRICE and v is not best]
+    text = _message(names, straight, best, rivals)
+    if _certain(best, straight):
+        raise FileError(f"the measured data contradict the robot: {text}")
+    text = f"the measured data may contradict the robot: {text.removesuffix('.')}"
+    return (Finding("implausible", "warning", text, "", those(names, best.change.touched)),)
 
 
 def _clearly_better(verdict: Verdict, straight: Verdict) -> bool:
@@ -166,13 +156,11 @@ def _clearly_better(verdict: Verdict, straight: Verdict) -> bool:
     change = verdict.change
     if not change.mistakes:
         return False
-    here = np.arange(len(change.q_sign))
-    ordered = (change.q_order == here).all() and (change.tau_order == here).all()
     gain = logs(straight.left) - logs(verdict.left)
     touched = change.touched
     left = verdict.left[touched]
     fits = bool(np.median(left) < _FITS)
-    if not ordered:
+    if change.exchanges:
         foreign = np.median(straight.left[touched]) > _FOREIGN
         fits = bool(left.max() < _ORDER_FITS or (foreign and np.median(left) < 1.4 * _ORDER_FITS))
     turned = (change.tau_sign < 0) & (change.q_sign > 0)
@@ -195,16 +183,16 @@ def _certain(best: Verdict, straight: Verdict) -> bool:
 
 def _message(names: Sequence[str], straight: Verdict, best: Verdict, rivals: list[Verdict]) -> str:
     """One sentence on what is wrong, how sure that is, and what to write in the YAML."""
-    parts = _sentences(names, best.change)
+    what = _sentences(names, best.change)
     gain = np.abs(logs(straight.left) - logs(best.left)) > 0.1
     shown = gain if gain.any() else best.change.touched
-    before, after = _rms(straight.left[shown]), _rms(best.left[shown])
+    before, after = (np.sqrt(np.mean(each.left[shown] ** 2)) for each in (straight, best))
     text = (
-        f"{'; and '.join(parts)}. As they are, {before:.0%} of these torques do not fit the URDF "
+        f"{what}. As they are, {before:.0%} of these torques do not fit the URDF "
         f"with any friction or stiffness; that way {after:.0%}."
     )
-    others = dict.fromkeys("; and ".join(_sentences(names, rival.change)) for rival in rivals)
-    others.pop("; and ".join(parts), None)
+    others = dict.fromkeys(_sentences(names, rival.change) for rival in rivals)
+    others.pop(what, None)
     if others:
         text += f" As likely: {'. Or: '.join(others)}."
     return f"{text} {_settling(names, best.change)}"
@@ -215,7 +203,7 @@ def _settling(names: Sequence[str], change: Change) -> str:
     keys = []
     for key, wrong in zip(("sign", "position_sign"), change.signs, strict=True):
         if wrong.any():
-            joints = ", ".join(f"{names[j]}: 1" for j in np.flatnonzero(wrong).tolist())
+            joints = ", ".join(f"{name}: 1" for name in those(names, wrong))
             keys.append(f"measurement.{key}: {{{joints}}}")
     said = "measurement.trust: true" if change.exchanges else " and ".join(keys)
     return f"If the data are right as they are, say so: {said}."
@@ -223,7 +211,7 @@ def _settling(names: Sequence[str], change: Change) -> str:
 
 def _foreign(names: Sequence[str], straight: Verdict) -> str:
     """Torques that do not belong to the motion, for a reason that cannot be named."""
-    wrong = ", ".join(names[j] for j in np.flatnonzero(straight.left > _FITS).tolist())
+    wrong = ", ".join(those(names, straight.left > _FITS))
     return (
         f"the measured data contradict the robot: the torques of {wrong} do not fit their motion "
         "with any friction or stiffness, and no single exchange or sign explains it. Check the "
@@ -233,13 +221,9 @@ def _foreign(names: Sequence[str], straight: Verdict) -> str:
     )
 
 
-def _rms(x: Array) -> float:
-    return float(np.sqrt(np.mean(x**2)))
-
-
-def _sentences(names: Sequence[str], change: Change) -> list[str]:
-    n = len(names)
-    here = np.arange(n)
+def _sentences(names: Sequence[str], change: Change) -> str:
+    """All that went wrong, by a change that undoes it."""
+    here = np.arange(len(names))
     found = []
     if (change.q_order != here).any():
         together = bool((change.q_order == change.tau_order).all())
@@ -247,19 +231,17 @@ def _sentences(names: Sequence[str], change: Change) -> list[str]:
         found.append(_order(names, change.q_order, what, together))
     elif (change.tau_order != here).any():
         found.append(_order(names, change.tau_order, "torques", False))
-    for sign, word, key in (
-        (change.tau_sign, "torque", "sign"),
-        (change.q_sign, "position", "position_sign"),
+    for word, key, turned in zip(
+        ("torque", "position"), ("sign", "position_sign"), change.signs, strict=True
     ):
-        wrong = np.flatnonzero(sign < 0).tolist()
-        if len(wrong):
-            whose = "every joint" if len(wrong) == n > 1 else ", ".join(names[j] for j in wrong)
-            setting = ", ".join(f"{names[j]}: -1" for j in wrong)
+        if wrong := those(names, turned):
+            whose = "every joint" if len(wrong) == len(names) > 1 else ", ".join(wrong)
+            setting = ", ".join(f"{name}: -1" for name in wrong)
             found.append(
                 f"the {word} of {whose} has the opposite sign "
                 f"(set measurement.{key}: {{{setting}}})"
             )
-    return found
+    return "; and ".join(found)
 
 
 def _order(names: Sequence[str], columns: Order, what: str, nameable: bool) -> str:

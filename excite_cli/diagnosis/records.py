@@ -1,6 +1,6 @@
 """What a diagnosis found, as frozen records."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import isnan, nan
 from typing import Any
@@ -45,9 +45,14 @@ class Approximation:
     kind: str = ""
 
 
-def mean_of_known(by_joint: Mapping[str, float]) -> float:
+def by_joint(names: Sequence[str], values: Iterable[float]) -> dict[str, float]:
+    """Values by the names of the joints."""
+    return dict(zip(names, map(float, values), strict=True))
+
+
+def mean_of_known(values: Iterable[float]) -> float:
     """Mean over the joints of which it is known; NaN if of none."""
-    known = [each for each in by_joint.values() if not isnan(each)]
+    known = [float(each) for each in values if not isnan(each)]
     return sum(known) / len(known) if known else nan
 
 
@@ -90,7 +95,7 @@ class NamedEffect(Shown):
     @property
     def takes_off(self) -> float:
         """Its part of the fall of the mean relative error on sealed data; NaN if not known."""
-        return mean_of_known(self.parts)
+        return mean_of_known(self.parts.values())
 
 
 @dataclass(frozen=True)

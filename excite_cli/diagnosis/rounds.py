@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.records import Round, Suspect
+from excite_cli.diagnosis.records import Round, Suspect, by_joint
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import joints_in_words
@@ -14,24 +14,15 @@ from excite_cli.robot.model import Array
 _SUSPECTS = 5
 
 
-def rounds_of(traced: Traced, joint_names: Sequence[str]) -> tuple[Round, ...]:
+def rounds_of(traced: Traced) -> tuple[Round, ...]:
     """Rounds in the order of what each effect saves; the last one finds nothing more."""
-    order = order_of(traced)
+    names, order = traced.model.robot.joint_names, order_of(traced)
     found: list[Round] = []
-    for count in range(len(order) + 1):
-        chosen = order[:count]
-        best = order[count] if count < len(order) else None
-        residual = _residual(traced, chosen)
-        suspects = _suspects(traced, chosen, best, joint_names)
-        verdict = "nothing more" if best is None else _words(traced, best, joint_names)
-        found.append(
-            Round(
-                len(found) + 1,
-                dict(zip(joint_names, map(float, residual), strict=True)),
-                suspects,
-                verdict,
-            )
-        )
+    for count, best in enumerate([*order, None]):
+        residual = by_joint(names, _residual(traced, order[:count]))
+        suspects = _suspects(traced, order[:count], best)
+        verdict = "nothing more" if best is None else _words(traced, best)
+        found.append(Round(count + 1, residual, suspects, verdict))
     return tuple(found)
 
 
@@ -46,8 +37,8 @@ def order_of(traced: Traced) -> list[int]:
     return order
 
 
-def _words(traced: Traced, i: int, joint_names: Sequence[str]) -> str:
-    effect = traced.candidates[i].effect
+def _words(traced: Traced, i: int) -> str:
+    effect, joint_names = traced.candidates[i].effect, traced.model.robot.joint_names
     where = joints_in_words([joint_names[j] for j in effect.joints], len(joint_names))
     return f"{effect.kind} on {where}" + (f", by {effect.covariate}" if effect.covariate else "")
 
@@ -61,11 +52,9 @@ def _residual(traced: Traced, chosen: Sequence[int]) -> Array:
     return np.asarray(np.sqrt(squares / np.maximum(usable.sum(axis=0), 1)))
 
 
-def _suspects(
-    traced: Traced, chosen: list[int], accepted: int | None, joint_names: Sequence[str]
-) -> tuple[Suspect, ...]:
+def _suspects(traced: Traced, chosen: list[int], accepted: int | None) -> tuple[Suspect, ...]:
     """The strongest candidates of a round, one per kind and place, the accepted one first."""
-    judge = traced.judge
+    judge, joint_names = traced.judge, traced.model.robot.joint_names
     schur = judge.white.schur(chosen)
     taken = {traced.candidates[i].place for i in chosen}
     ranked = sorted(
@@ -80,10 +69,7 @@ def _suspects(
         if candidate.place in places:
             continue
         places.add(candidate.place)
-        gain = schur.singles[i]
-        p = judge.p_value(i, gain)
-        left_out = judge.left_out_gain(chosen, [i])
-        joints = list(candidate.rows)
+        p, joints = judge.p_value(i, schur.singles[i]), list(candidate.rows)
         before = judge.plain.energy_on(chosen, joints)
         share = 1.0 - judge.plain.energy_on([*chosen, i], joints) / max(before, 1e-300)
         if i == accepted:
@@ -103,7 +89,7 @@ def _suspects(
                 record_of(candidate.effect, joint_names),
                 max(p, judge.rules.least_p),
                 share,
-                left_out,
+                judge.left_out_gain(chosen, [i]),
                 verdict,
                 judge.rules.least_p,
                 why,

@@ -17,13 +17,12 @@ import numpy as np
 
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.before_after import Played, refitted
-from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.records import Removed
 from excite_cli.diagnosis.textbook import everyday
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.identification.errors_of_torque import Errors, block_sums, drawn_blocks
-from excite_cli.identification.identified_model import IdentifiedModel, Prediction
+from excite_cli.identification.identified_model import Prediction
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
@@ -31,7 +30,6 @@ from excite_cli.robot.model import Array
 _SHORTEST, _LONGEST, _WANTED = 0.2, 0.5, 8
 _FEWEST = 5  # blocks: of fewer, all of them agree by chance too often
 _NIL = 1e-6  # of the torque
-
 
 Missed = Callable[[Sequence[int], Sequence[int], Sequence[int]], bool]
 
@@ -45,26 +43,24 @@ class Worth:
 
 
 def worth_on_sealed(
-    played: Played,
-    model: Model,
+    held: Played,
     traced: Traced,
-    after: IdentifiedModel,
+    with_all: Sequence[Prediction],
     sizes: Mapping[int, float],
     missed: Missed | None = None,
 ) -> dict[int, Worth]:
-    """Worth of every chosen candidate on the sealed runs `played`, beside all others.
+    """Worth of every chosen candidate on the sealed runs `held`, beside all others.
 
-    `sizes` over two standard deviations: what may be zero is not confirmed. Nor is what not every
-    robot has, unless training data left out have `missed` it as well.
+    `with_all`: what the model with all of them predicts there. `sizes` over two standard
+    deviations: what may be zero is not confirmed. Nor is what not every robot has, unless training
+    data left out have `missed` it as well.
     """
-    with_all = played.predictions(after)
     common = set(everyday(traced.candidates))
     found = {}
     for i in traced.chosen:
         rest = traced.judge.without(i, traced.chosen)
-        without = played.predictions(refitted(model, traced, rest))
         joints = traced.candidates[i].effect.joints
-        worth, rises = _worth(played, without, with_all, joints)
+        worth, rises = worth_beside(held, traced, with_all, rest, joints)
         verdict = worth.verdict
         if traced.judge.told_by_weight(i, rest) and not rises:
             verdict = SealedVerdict.WEIGHED
@@ -80,43 +76,27 @@ def worth_on_sealed(
     return found
 
 
-def worth_of_friction(
-    played: Played, model: Model, traced: Traced, after: IdentifiedModel, joint: int
-) -> tuple[tuple[int, ...], Worth | None]:
-    """The chosen candidates that are friction of one joint alone, and their worth together.
-
-    None of less than two: that of one is known.
-    """
-    own = tuple(
-        i
-        for i in traced.chosen
-        if (effect := traced.candidates[i].effect).friction
-        and effect.joints == (joint,)
-        and not (effect.runs or effect.is_change)
-    )
-    if len(own) < 2:
-        return own, None
-    rest = [i for i in traced.chosen if i not in own]
-    without = played.predictions(refitted(model, traced, rest))
-    return own, _worth(played, without, played.predictions(after), (joint,))[0]
-
-
-def _worth(
-    played: Played,
-    without: Sequence[Prediction],
-    with_it: Sequence[Prediction],
+def worth_beside(
+    held: Played,
+    traced: Traced,
+    with_all: Sequence[Prediction],
+    rest: Sequence[int],
     joints: Sequence[int],
 ) -> tuple[Worth, bool]:
-    """What acts on some joints, by predictions; and whether the error of one of these rises."""
-    errors_without, errors = played.errors(without), played.errors(with_it)
+    """What all candidates but the `rest` are worth, which act on some joints.
+
+    And whether they raise the error of one of these.
+    """
+    without = held.predictions(refitted(traced, rest))
+    errors_without, errors = held.errors(without), held.errors(with_all)
     lower = errors_without.mean_relative - errors.mean_relative
-    verdict = sealed_verdict(removed_in_draws(played.runs, without, with_it), lower)
-    on = [played.robot.joint_names[j] for j in joints]
+    verdict = sealed_verdict(removed_in_draws(held.runs, without, with_all), lower)
+    on = [held.robot.joint_names[j] for j in joints]
     rises = rises_on_one(on, errors_without, errors)
     if verdict is SealedVerdict.CONFIRMED and len(joints) > 1:
         gains = [errors_without.relative[name] - errors.relative[name] for name in on]
         best = joints[int(np.argmax(np.nan_to_num(gains)))]
-        others = removed_in_draws(played.runs, without, with_it, beside=best)
+        others = removed_in_draws(held.runs, without, with_all, beside=best)
         verdict = sealed_verdict(others, lower)
     if verdict is SealedVerdict.CONFIRMED and rises:
         verdict = SealedVerdict.NOT_CONFIRMED

@@ -10,9 +10,9 @@ measured.
 
 from collections.abc import Sequence
 
-from excite_cli.diagnosis.before_after import Played, on_sealed
+from excite_cli.diagnosis.before_after import Played
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.declared_model import Model
+from excite_cli.diagnosis.declared_model import Model, places_of
 from excite_cli.diagnosis.records import Assumption, SealedEnds
 from excite_cli.diagnosis.tracing import Traced, differences
 from excite_cli.diagnosis.verdict import Verdict
@@ -22,6 +22,7 @@ from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import Processing
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Finding, Run
+from excite_cli.robot.model import Robot
 
 _MOST_TOLD = 4
 
@@ -42,27 +43,22 @@ def differences_told(traced: Traced) -> tuple[Finding, ...]:
         best = max(saved, key=saved.__getitem__, default=None)
         if best is None or saved[best] <= 0.0:
             break
+        open_.remove(best)
         if judge.verdict(chosen, [best]) is Verdict.ACCEPTED:
             chosen.append(best)
             found.append(best)
-        taken = traced.candidates[best].effect
-        open_ = [
-            i
-            for i in open_
-            if i != best
-            and (best not in found or not _of_one_place(taken, traced.candidates[i].effect))
-        ]
+            there = traced.candidates[best].place[:2]  # in whichever run
+            open_ = [i for i in open_ if traced.candidates[i].place[:2] != there]
     if not found:
         return ()
     effects = [traced.candidates[i].effect for i in found]
-    sizes = judge.plain.solve(chosen)[-sum(len(each.parameters) for each in effects) :]
-    joints, parts, at = model.robot.joint_names, [], 0
-    for each in effects:
+    sizes = judge.plain.solve(chosen)
+    joints, parts = model.robot.joint_names, []
+    for each, own in zip(effects, places_of(effects, len(sizes)), strict=True):
         on = " and ".join(joints[j] for j in each.joints)
         unit = each.unit_on(each.parameters[0].unit, model.robot.sliding)
-        size = f"{sizes[at]:+.3g}{'' if unit == '1' else f' {unit}'}"
+        size = f"{sizes[own][0]:+.3g}{'' if unit == '1' else f' {unit}'}"
         parts.append(f"{each.kind} of {on} by {size} in {', '.join(each.runs)}")
-        at += len(each.parameters)
     one, other = sorted({run.run.name for run in traced.data.runs})
     states = ", ".join(dict.fromkeys(f"{each.kind}: %s" for each in effects))
     declared = ", ".join(
@@ -76,11 +72,6 @@ def differences_told(traced: Traced) -> tuple[Finding, ...]:
     return (Finding("runs_differ", "warning", text),)
 
 
-def _of_one_place(one: Effect, other: Effect) -> bool:
-    """Whether the one is the other in the other run."""
-    return one.kind == other.kind and one.joints == other.joints
-
-
 def assumptions(effects: Sequence[Effect], parts: Split, model: Model) -> tuple[Assumption, ...]:
     """What was assumed of the sealed run, where the states of runs do not say it.
 
@@ -88,23 +79,18 @@ def assumptions(effects: Sequence[Effect], parts: Split, model: Model) -> tuple[
     """
     names = model.robot.joint_names
     sealed = tuple(dict.fromkeys(run.id.key for run in parts.sealed))
-    return tuple(
-        Assumption(effect.kind, effect.runs, sealed, False, tuple(names[j] for j in effect.joints))
-        for effect in effects
-        if effect.runs
-        and not _declared(effect, parts.sealed, model)
-        and not all(effect.active(run.id) for run in parts.sealed)
-    )
-
-
-def _declared(effect: Effect, sealed: Sequence[Run], model: Model) -> bool:
-    """Whether the sealed runs have declared states of the effect's kind."""
-    known = [run for run, states in model.states.items() if effect.kind in states]
-    return all(run.id.is_among(known) for run in sealed)
+    found = []
+    for effect in effects:
+        stated = [run for run, states in model.states.items() if effect.kind in states]
+        declared = all(run.id.is_among(stated) for run in parts.sealed)
+        if effect.runs and not declared and not all(effect.active(run.id) for run in parts.sealed):
+            joints = tuple(names[j] for j in effect.joints)
+            found.append(Assumption(effect.kind, effect.runs, sealed, False, joints))
+    return tuple(found)
 
 
 def on_sealed_ends(
-    model: Model,
+    robot: Robot,
     models: tuple[IdentifiedModel, IdentifiedModel],
     ends: Sequence[Run],
     processing: Processing,
@@ -117,14 +103,14 @@ def on_sealed_ends(
     found = []
     for active, runs in alike.items():
         own = [effect for effect, here in zip(single, active, strict=True) if here]
-        played = Played(model.robot, prepare_all(runs, processing))
-        errors = on_sealed(played, *map(played.predictions, models))
+        played = Played(robot, prepare_all(runs, processing))
+        before, after = (played.errors(played.predictions(model)) for model in models)
         found.append(
             SealedEnds(
                 tuple(dict.fromkeys(run.id.key for run in runs)),
-                tuple(record_of(effect, model.robot.joint_names) for effect in own),
-                errors.before,
-                errors.after,
+                tuple(record_of(effect, robot.joint_names) for effect in own),
+                before,
+                after,
             )
         )
     return tuple(found)

@@ -42,13 +42,11 @@ def refuse_standing(robot: Robot, samples: Samples) -> None:
     feet: tuple[int, ...] = ()
     for count in range(1, min(_MOST_FEET, len(ends)) + 1):
         for some in combinations(range(len(ends)), count):
-            found, _ = nnls(carried[:, list(some)], rest.ravel())
-            left = float(np.sum((rest.ravel() - carried[:, list(some)] @ found) ** 2))
-            if left < 0.9 * best:  # one more end must be worth it
-                best, feet, held = left, some, found
-    if not whole or best > _LEFT * whole:
-        return
-    if not _WEIGHT[0] * mass < held.sum() < _WEIGHT[1] * mass:
+            found, left = nnls(carried[:, list(some)], rest.ravel())
+            if left**2 < 0.9 * best:  # one more end must be worth it
+                best, feet, held = float(left**2), some, found
+    explains = bool(whole) and best <= _LEFT * whole
+    if not (explains and _WEIGHT[0] * mass < held.sum() < _WEIGHT[1] * mass):
         return
     links = [own_link(robot, ends[k]).name for k in feet]
     gravity = float(np.linalg.norm(robot.model.gravity.linear))

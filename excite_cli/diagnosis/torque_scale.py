@@ -14,15 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from excite_cli.config.data_spec import MeasurementSpec
-from excite_cli.diagnosis.torque_shares import RoughModel, Samples, spread_of
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.diagnosis.torque_shares import RoughModel, Samples, those
 from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.measurement.dataset import Finding
-from excite_cli.robot.model import Array, Robot
+from excite_cli.measurement.dataset import Finding, Mask
+from excite_cli.robot.model import Array
 
 _FACTOR = 4.0
 _KNOWN = 2.0  # weight over its standard deviation from which a joint is judged
@@ -45,19 +42,19 @@ class _Weight:
 
     k: Array
     m: Array
-    judged: NDArray[np.bool_]
+    judged: Mask
     heavy: Array
 
 
 def check_scale(
-    robot: Robot, samples: Samples, declared: MeasurementSpec, names: Sequence[str]
+    model: RoughModel, samples: Samples, declared: MeasurementSpec
 ) -> tuple[Finding, ...]:
     """At most one warning: torques of another unit, or without gravity."""
-    found = _weights(robot, samples)
+    names, found = model.robot.joint_names, _weights(model, samples)
     here = found.judged & (found.heavy > _HEAVY)
     gone = here & (found.k > _GONE[0]) & (found.k < _GONE[1]) & (found.m > _INERTIA)
     if gone.sum() > 1 and gone.sum() >= 0.5 * here.sum():
-        left, whole = _left(robot, samples, gone)
+        left, whole = _left(model, samples, gone)
         if whole < min(_FITS, left):
             return (_without_gravity(found, whole, gone, names),)
     shown = np.abs(found.k) * found.heavy
@@ -69,13 +66,11 @@ def check_scale(
     return (_another_unit(found, off, declared, names),)
 
 
-def _weights(robot: Robot, samples: Samples) -> _Weight:
-    q, n = samples.q, robot.n
-    rest, phi = np.zeros_like(q), standard_parameters(robot)
-    dynamics = InverseDynamics(robot)
-    gravity = dynamics.torques(q, rest, rest)
-    inertial = dynamics.torques(q, samples.v, samples.a) - gravity
-    unsure = RigidBody(robot, phi, q, rest, rest).regressor * spread_of(robot, phi)
+def _weights(model: RoughModel, samples: Samples) -> _Weight:
+    q, n, rest = samples.q, model.robot.n, np.zeros_like(samples.q)
+    gravity = model.gravity(q)
+    inertial = model.dynamics.torques(q, samples.v, samples.a) - gravity
+    unsure = RigidBody(model.robot, model.phi, q, rest, rest).regressor * model.spread
     deviation = np.sqrt(np.square(unsure).sum(axis=-1))
     k, m, heavy = np.ones(n), np.ones(n), np.zeros(n)
     judged = np.zeros(n, bool)
@@ -97,21 +92,17 @@ def _weights(robot: Robot, samples: Samples) -> _Weight:
     return _Weight(k, m, judged, heavy)
 
 
-def _left(robot: Robot, samples: Samples, joints: NDArray[np.bool_]) -> tuple[float, float]:
+def _left(model: RoughModel, samples: Samples, joints: Mask) -> tuple[float, float]:
     """Share of the joints' torques that does not fit, as they are and with gravity added."""
-    rest = np.zeros_like(samples.q)
-    gravity = InverseDynamics(robot).torques(samples.q, rest, rest)
-    both = [samples, replace(samples, tau=samples.tau + gravity)]
-    left = RoughModel(robot).own_shares_left(both)[:, joints, 0]
+    both = [samples, replace(samples, tau=samples.tau + model.gravity(samples.q))]
+    left = model.own_shares_left(both)[:, joints, 0]
     before, after = np.sqrt(np.mean(np.square(left), axis=1))
     return float(before), float(after)
 
 
-def _without_gravity(
-    found: _Weight, left: float, gone: NDArray[np.bool_], names: Sequence[str]
-) -> Finding:
-    joints = tuple(names[j] for j in np.flatnonzero(gone).tolist())
-    shares = ", ".join(f"{found.k[j]:.2f}" for j in np.flatnonzero(gone))
+def _without_gravity(found: _Weight, left: float, gone: Mask, names: Sequence[str]) -> Finding:
+    joints = those(names, gone)
+    shares = ", ".join(f"{k:.2f}" for k in found.k[gone])
     text = (
         f"gravity seems to be subtracted from torques: those of {', '.join(joints)} hold {shares} "
         "times the weight that these joints carry by the URDF; with it added, all but "
@@ -123,17 +114,17 @@ def _without_gravity(
 
 
 def _another_unit(
-    found: _Weight, off: NDArray[np.bool_], declared: MeasurementSpec, names: Sequence[str]
+    found: _Weight, off: Mask, declared: MeasurementSpec, names: Sequence[str]
 ) -> Finding:
-    joints = tuple(names[j] for j in np.flatnonzero(off).tolist())
-    shares = ", ".join(f"{found.k[j]:.3g}" for j in np.flatnonzero(off))
-    k = np.log(np.maximum(np.abs(found.k), 1e-9))
-    every = bool(1 < off.sum() > 0.5 * found.judged.sum() and np.ptp(k[off]) < 1.0)
-    unit = {name: _unit(found.k[j]) if off[j] else 1.0 for j, name in enumerate(names)}
+    joints = those(names, off)
+    shares = ", ".join(f"{k:.3g}" for k in found.k[off])
+    k = np.log(np.maximum(np.abs(found.k[off]), 1e-9))
+    every = bool(1 < off.sum() > 0.5 * found.judged.sum() and np.ptp(k) < 1.0)
     if every:
-        value = f"{_unit(float(np.exp(np.median(k[off])))):.3g}"
+        value = f"{_unit(float(np.exp(np.median(k)))):.3g}"
     else:
-        value = "{" + ", ".join(f"{name}: {x:.3g}" for name, x in unit.items()) + "}"
+        units = [_unit(each) if wrong else 1.0 for each, wrong in zip(found.k, off, strict=True)]
+        value = "{" + ", ".join(f"{n}: {x:.3g}" for n, x in zip(names, units, strict=True)) + "}"
     text = (
         f"torques of {', '.join(joints)} are {shares} times what the URDF's masses weigh: are they "
         "in another unit (mN·m, per cent), of the motor before its gear, or held by a "

@@ -76,13 +76,28 @@ def samples_of(runs: Sequence[PreparedRun], most: int) -> Samples:
     return replace(whole, moves=whole.moves & judged).thinned(most)
 
 
+def those(names: Sequence[str], chosen: Mask) -> tuple[str, ...]:
+    """The names that are chosen (n,)."""
+    return tuple(names[j] for j in np.flatnonzero(chosen).tolist())
+
+
 class RoughModel:
-    """What a torque may be made of: the URDF's dynamics, passive joints, uncertain inertias."""
+    """What a torque may be made of: the URDF's dynamics, passive joints, uncertain inertias.
+
+    `spread` (P,): standard deviations of the standard parameters `phi`.
+    """
 
     def __init__(self, robot: Robot) -> None:
-        self._robot, self._dynamics = robot, InverseDynamics(robot)
-        self._phi = standard_parameters(robot)
-        self._spread = spread_of(robot, self._phi)
+        self.robot, self.dynamics = robot, InverseDynamics(robot)
+        self.phi = standard_parameters(robot)
+        spread = inertial_prior(robot, self.phi, _UNCERTAIN).std.reshape(-1, 10).copy()
+        own = _UNCERTAIN * self.phi.reshape(-1, 10)[:, 1:4]
+        spread[:, 1:4] = np.hypot(own, _CENTER * spread[:, :1] / _UNCERTAIN)
+        self.spread: Array = spread.ravel()
+
+    def gravity(self, q: Array) -> Array:
+        """Torques (T, n) of the URDF's weight."""
+        return self.dynamics.torques(q, np.zeros_like(q), np.zeros_like(q))
 
     def shares_left(self, samples: Samples) -> Array:
         """Share (n, n, 2) of the deviation of torque k that the motion of joint j leaves.
@@ -103,22 +118,12 @@ class RoughModel:
     def _columns(self, samples: Samples) -> tuple[Array, Array]:
         """Columns (T, n, 7) with coefficients ≥ 0, and Y D (T, n, P)."""
         q, v, a = samples.q, samples.v, samples.a
-        rest = np.zeros_like(q)
-        gravity = self._dynamics.torques(q, rest, rest)
-        regressor = RigidBody(self._robot, self._phi, q, v, a).regressor
-        load = regressor @ self._phi
+        gravity = self.gravity(q)
+        regressor = RigidBody(self.robot, self.phi, q, v, a).regressor
+        load = regressor @ self.phi
         way = np.sign(v)
         passive = np.stack([gravity, load - gravity, v, way, np.abs(load) * way, a, q], axis=-1)
-        return passive, regressor * self._spread
-
-
-def spread_of(robot: Robot, phi: Array) -> Array:
-    """Standard deviations (P,) of the standard parameters: masses 30 %, centres of mass 3 cm."""
-    spread = inertial_prior(robot, phi, _UNCERTAIN).std.reshape(-1, 10).copy()
-    mass = spread[:, :1] / _UNCERTAIN
-    own = _UNCERTAIN * phi.reshape(-1, 10)[:, 1:4]
-    spread[:, 1:4] = np.hypot(own, _CENTER * mass)
-    return np.asarray(spread.ravel())
+        return passive, regressor * self.spread
 
 
 def _products(samples: Samples, motion: tuple[Array, Array], j: int, k: int) -> Array:

@@ -1,6 +1,7 @@
 """A diagnosis in words, the same ones wherever it is reported."""
 
 from collections.abc import Callable, Iterable, Sequence
+from operator import attrgetter
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate, Source
 from excite_cli.diagnosis.records import (
@@ -23,6 +24,19 @@ from excite_cli.robot.base_joints import BASE_JOINTS
 SMALL_PART = 0.01
 # A smaller predictable share of what is left is not worth a word.
 _TELLING = 0.2
+# What may be left, and why that is not sure: noise known, unknown, around reversals.
+_PERHAPS = (
+    (
+        "Left, and predicted by nothing",
+        "more than white noise, but noise with a memory could be as large",
+    ),
+    (
+        "Left, and predicted by nothing",
+        "the noise is not known: the torque was filtered, or recorded below 50 Hz",
+    ),
+    ("Left around reversals", "there joints stick, and fits leave it out"),
+)
+in_symbols = attrgetter("code")  # what a residual depends on, briefly: `q[elbow]`
 _QUANTITIES: dict[Source, str] = {
     "time": "time",
     "run": "run",
@@ -47,13 +61,12 @@ def by_worth(
         key=lambda each: (-each.takes_off if each.parts else 0.0, -each.share_of_residual),
     )
     least = SMALL_PART * max(found.fall, 0.0)
-    small = [
-        each
-        for each in ranked
-        if each.verdict not in (SealedVerdict.HARMFUL, SealedVerdict.WEIGHED)
-        and abs(each.takes_off) < least
-    ]
-    return [each for each in ranked if not any(each is other for other in small)], small
+
+    def is_small(named: NamedEffect) -> bool:
+        told = named.verdict in (SealedVerdict.HARMFUL, SealedVerdict.WEIGHED)
+        return not told and abs(named.takes_off) < least
+
+    return [each for each in ranked if not is_small(each)], list(filter(is_small, ranked))
 
 
 def title_of(kind: str) -> str:
@@ -98,11 +111,6 @@ def value_in_words(name: str, value: Value) -> str:
     return f"{name} {with_deviation(value.value, value.std)}{unit}"
 
 
-def covariate_in_symbols(covariate: Covariate) -> str:
-    """What a residual depends on, briefly: `q[elbow]`."""
-    return covariate.code
-
-
 def covariate_in_words(covariate: Covariate) -> str:
     """What a residual depends on: `angle of elbow`."""
     words = _QUANTITIES[covariate.quantity]
@@ -118,7 +126,7 @@ def covariate_in_words(covariate: Covariate) -> str:
 
 
 def approximation_in_words(
-    found: Approximation, say: Callable[[Covariate], str] = covariate_in_symbols
+    found: Approximation, say: Callable[[Covariate], str] = in_symbols
 ) -> str:
     """What an effect only comes near; covariates as `say` puts them."""
     if found.covariates:
@@ -129,54 +137,37 @@ def approximation_in_words(
 
 
 def rests_in_words(
-    found: Diagnosis, say: Callable[[Covariate], str] = covariate_in_symbols
+    found: Diagnosis, say: Callable[[Covariate], str] = in_symbols
 ) -> tuple[list[str], list[str]]:
     """What is left beside the noise: sentences on what surely is more, and on what may be."""
     # Files of earlier versions do not say whether joints slide, nor what is left.
     known = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
     units = dict(zip(found.joint_names, known, strict=True))
-
-    def left(rest: LargeRest) -> str:
-        return f"{rest.rms:.3g} {units[rest.joint]} ({rest.share_of_torque:.1%} of its torque)"
-
-    more = []
-    for rest in (each for each in found.large_rests if each.certain):
-        beside = "" if rest.noise is None else f" beside noise of {rest.noise:.3g}"
-        text = f"More than noise: {left(rest)} of {rest.joint} are left{beside}; "
-        share = f"{rest.predictable:.0%} of its energy can be predicted"
-        if rest.depends_on:
-            text += (
-                f"{share}, best from {' and '.join(map(say, rest.depends_on))}; no effect of the "
-                "catalogue has this form."
-            )
-        elif rest.predictable > _TELLING:
-            text += f"{share}, but from no one or two quantities."
+    more: list[str] = []
+    perhaps: dict[tuple[str, str], list[str]] = {each: [] for each in _PERHAPS}
+    for rest in found.large_rests:
+        left = (
+            f"{rest.rms:.3g} {units[rest.joint]} ({rest.share_of_torque:.1%} of its torque) of "
+            f"{rest.joint}"
+        )
+        if rest.certain:
+            beside = "" if rest.noise is None else f" beside noise of {rest.noise:.3g}"
+            more.append(f"More than noise: {left} are left{beside}; {_predicted(rest, say)}.")
         else:
-            text += "no quantity that was tried predicts it."
-        more.append(text)
-    perhaps = []
-    inside = [each for each in found.large_rests if not each.certain and not each.at_reversals]
-    for rests, what, why in (
-        (
-            [each for each in inside if each.noise is not None],
-            "Left, and predicted by nothing",
-            "more than white noise, but noise with a memory could be as large",
-        ),
-        (
-            [each for each in inside if each.noise is None],
-            "Left, and predicted by nothing",
-            "the noise is not known: the torque was filtered, or recorded below 50 Hz",
-        ),
-        (
-            [each for each in found.large_rests if each.at_reversals],
-            "Left around reversals",
-            "there joints stick, and fits leave it out",
-        ),
-    ):
-        if rests:
-            told = ", ".join(f"{left(each)} of {each.joint}" for each in rests)
-            perhaps.append(f"{what}: {told}; {why}.")
-    return more, perhaps
+            why = 2 if rest.at_reversals else int(rest.noise is None)
+            perhaps[_PERHAPS[why]].append(left)
+    said = [f"{what}: {', '.join(left)}; {why}." for (what, why), left in perhaps.items() if left]
+    return more, said
+
+
+def _predicted(rest: LargeRest, say: Callable[[Covariate], str]) -> str:
+    share = f"{rest.predictable:.0%} of its energy can be predicted"
+    if rest.depends_on:
+        best = " and ".join(map(say, rest.depends_on))
+        return f"{share}, best from {best}; no effect of the catalogue has this form"
+    if rest.predictable > _TELLING:
+        return f"{share}, but from no one or two quantities"
+    return "no quantity that was tried predicts it"
 
 
 def assumption_in_words(assumed: Assumption) -> str:
@@ -223,7 +214,7 @@ def sealed_in_words(named: NamedEffect) -> str:
 
 def settled_in_words(found: Diagnosis) -> list[str]:
     """What a person may declare that tells sizes which inertias take up."""
-    if any(each.verdict is SealedVerdict.WEIGHED for each in found.effects):
+    if weighed_in_words(found):
         return []  # and beside it, no other gain is told
     kinds = dict.fromkeys(each.kind for each in found.absorbed)
     known = [catalogue()[kind] for kind in kinds if kind in catalogue()]
@@ -250,21 +241,19 @@ def no_gain_in_words(found: Diagnosis) -> str:
         return ""
     if found.fell:
         return _textbook_is_better(found)
-    joints = len(found.joint_names)
-    guilty = found.harmful or tuple(
-        each for each in found.effects if each.verdict is SealedVerdict.NOT_CONFIRMED
-    )
-    what = "Harmful" if found.harmful else "None is harmful beyond doubt; not confirmed"
-    listed = ", ".join(
-        f"{each.effect.kind} on {place_in_words(each.effect, joints)}" for each in guilty
-    )
-    return (
+    text = (
         f"The sealed error did not fall: {found.before.mean_relative:.2%} before, "
         f"{found.after.mean_relative:.2%} after (mean over joints, all samples of "
         f"{found.sealed_run})."
-        + f" {what}: {listed}." * bool(listed)
-        + (f" {_textbook_is_better(found)}" if found.worse_than_textbook else "")
     )
+    verdict = SealedVerdict.HARMFUL if found.harmful else SealedVerdict.NOT_CONFIRMED
+    what = "Harmful" if found.harmful else "None is harmful beyond doubt; not confirmed"
+    guilty = [each.effect for each in found.effects if each.verdict is verdict]
+    if guilty:
+        joints = len(found.joint_names)
+        listed = (f"{each.kind} on {place_in_words(each, joints)}" for each in guilty)
+        text += f" {what}: {', '.join(listed)}."
+    return f"{text} {_textbook_is_better(found)}" if found.worse_than_textbook else text
 
 
 def _textbook_is_better(found: Diagnosis) -> str:

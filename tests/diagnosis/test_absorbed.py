@@ -6,6 +6,7 @@ import pytest
 from excite_cli.config.load import load_spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.records import Absorbed
 from excite_cli.diagnosis.schur import ABSORBED
@@ -36,7 +37,6 @@ def absorbed(
     """By kind and joint, for a lively motion."""
     dataset = measured(robot, standard_parameters(robot), noise=0.1, seconds=8.0)
     found = regression_of(robot, dataset)
-    base = found.base
     candidates = []
     for effect in effects:
         blocks = []
@@ -53,8 +53,7 @@ def absorbed(
         tuple(run.tau for run in found.runs),
     )
     evidence = data.evidence(candidates, NoiseModel.white(np.ones(robot.n)))
-    names = [base.names[k] for k in base.selection]
-    records = absorbed_effects(evidence, candidates, names, robot.joint_names, chosen)
+    records = absorbed_effects(evidence, candidates, chosen, Model(robot, found.base, (), None))
     return {(each.kind, each.joints[0]): each for each in records}
 
 

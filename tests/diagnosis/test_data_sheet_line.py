@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines
+from excite_cli.diagnosis.final_fit import FinalFit
 from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.load_dependent_friction import LoadDependentFriction
@@ -39,14 +40,14 @@ def lines(robot: Robot, declared: list[Effect], found: list[Effect], values: lis
     signals = signals_of(robot, SAMPLES)
     usable = np.abs(signals.v) > 0.1
     traced: Any = SimpleNamespace(
+        model=SimpleNamespace(robot=robot, declared=tuple(declared)),
         effects=tuple(found),
         signals=(signals,),
         data=SimpleNamespace(runs=(Run(usable=usable),)),
     )
-    model: Any = SimpleNamespace(robot=robot, declared=tuple(declared))
     parameters = np.array([*np.ones(BEFORE), *values])
     spread = np.diag(np.arange(1.0, len(parameters) + 1)) * 1e-4
-    told = data_sheet_lines(model, traced, parameters, spread)
+    told = data_sheet_lines(traced, FinalFit(parameters, spread, np.ones(len(parameters), bool)))
     return told, signals.v[usable[:, 1], 1], signals.load[usable[:, 1], 1], spread
 
 

@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.error_parts import error_parts
-from excite_cli.diagnosis.error_path import error_path
-from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors
+from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors, error_parts, error_path
 from excite_cli.robot.model import Array
 
 JOINTS = 2

@@ -1,6 +1,8 @@
 """What is left beside the noise is said: never of noise alone, always of more."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,8 +67,9 @@ def left(
     nothing = tuple(np.zeros((*r.shape, 1)) for r in residuals)
     data = TrainingData(tuple(prepared), (0, 1, 2), nothing, tuple(r.tau_fit for r in prepared))
     predicted = [5.0 * run.q for run in prepared]
-    names = ("a", "b")
-    return large_rests(data, signals, predicted, residuals, recorded, PROCESSING, floor, names)[0]
+    model = SimpleNamespace(robot=SimpleNamespace(joint_names=("a", "b")))
+    traced: Any = SimpleNamespace(data=data, signals=signals, model=model)
+    return large_rests(traced, predicted, residuals, recorded, PROCESSING, floor)[0]
 
 
 def test_nothing_is_said_of_noise() -> None:

@@ -1,6 +1,5 @@
 """Columns that look at the model's own torque, until what is fitted is what is predicted."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -38,11 +37,10 @@ def test_a_gain_of_what_is_found_beside_it_is_fitted_as_it_predicts(
         own = tuple(n + each for n, each in zip(now, load, strict=True))
         return [*candidates[:2], replace(candidates[2], columns=own)]
 
-    def with_columns(given: Traced, bodies: Any, theta: Array, values: Sequence[float]) -> Traced:
+    def with_columns(given: Traced, bodies: Any, theta: Array) -> Traced:
         return replace(given, candidates=tuple(at(theta)))
 
     monkeypatch.setattr(own_torque, "_with_columns", with_columns)
-    monkeypatch.setattr(own_torque, "values_of", lambda *given: given[-1])
     start = traced(data, at(np.zeros(9)), (0, 1, 2))
     found = at_its_own_torque(start, [])
     theta = found.fitted(found.chosen)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.friction_line import friction_lines
+from excite_cli.diagnosis.final_fit import friction_lines
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
@@ -26,6 +26,10 @@ class Outcome:
     data: TrainingData
     candidates: tuple[Candidate, ...]
     chosen: tuple[int, ...]
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        return tuple(self.candidates[i].effect for i in self.chosen)
 
 
 def outcome(effects: Sequence[Effect], seed: int = 0) -> tuple[Outcome, np.ndarray]:
@@ -60,7 +64,7 @@ def test_the_line_is_the_fit_of_a_line_to_all_friction() -> None:
     traced, speeds = outcome(effects)
     v = speeds[:, 0]
     fitted = np.concatenate([np.ones(FIXED), [-0.4, 3.0, -0.5]])  # concave: both are negative
-    shown = friction_lines(traced, FIXED) @ fitted  # type: ignore[arg-type]
+    shown = friction_lines(traced, FIXED + 3) @ fitted  # type: ignore[arg-type]
     friction = -0.4 * v + 3.0 * np.sign(v) * np.sqrt(np.abs(v)) - 0.5 * np.sign(v)
     line = np.linalg.lstsq(np.stack([v, np.sign(v)], axis=1), friction, rcond=None)[0]
     assert shown[FIXED] == pytest.approx(line[0])
@@ -72,7 +76,7 @@ def test_the_line_is_the_fit_of_a_line_to_all_friction() -> None:
 def test_beside_coulomb_friction_alone_its_share_is_added() -> None:
     traced, speeds = outcome([CoulombFriction((1,)), NonlinearViscousFriction((1,), ROOT)])
     v = speeds[:, 1]
-    shown = friction_lines(traced, 0) @ np.array([1.0, 2.0])  # type: ignore[arg-type]
+    shown = friction_lines(traced, 2) @ np.array([1.0, 2.0])  # type: ignore[arg-type]
     assert shown == pytest.approx([1.0 + 2.0 * np.mean(np.sqrt(np.abs(v))), 2.0])
 
 
@@ -95,7 +99,7 @@ def test_a_line_takes_in_what_curves_beside_it_and_nothing_else(kind: str, curve
     width = len(other.parameters)
     columns = tuple(np.repeat((3.0 * x + np.sign(x))[:, None, None], width, axis=2) for x in v)
     traced = Outcome(traced.data, (*traced.candidates, Candidate(other, (0,), columns)), (0, 1, 2))
-    shown = friction_lines(traced, FIXED)  # type: ignore[arg-type]
+    shown = friction_lines(traced, FIXED + 2 + width)  # type: ignore[arg-type]
     expected = np.eye(FIXED + 2 + width)
     if curved:
         expected[FIXED, FIXED + 2 :], expected[FIXED + 1, FIXED + 2 :] = 3.0, 1.0
@@ -105,4 +109,4 @@ def test_a_line_takes_in_what_curves_beside_it_and_nothing_else(kind: str, curve
 def test_friction_of_other_joints_and_curves_alone_stay_as_they_are() -> None:
     effects = [ViscousFriction((0,)), CoulombFriction((0,)), NonlinearViscousFriction((1,), ROOT)]
     traced, _ = outcome(effects)
-    assert np.array_equal(friction_lines(traced, FIXED), np.eye(FIXED + 3))  # type: ignore[arg-type]
+    assert np.array_equal(friction_lines(traced, FIXED + 3), np.eye(FIXED + 3))  # type: ignore[arg-type]
