@@ -10,7 +10,6 @@ by P G_Ac β.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -54,7 +53,6 @@ class Blocks:
         groups: NDArray[np.intp],
         seen: bool = False,
     ) -> None:
-        self._given = active, grams, total, columns, own
         self._grams, self._columns, self._own = grams, columns, own
         self.groups = groups
         size = len(total)
@@ -68,11 +66,6 @@ class Blocks:
         self._fitted: dict[tuple[int, ...], _Fits] = {}
         self._whole: tuple[frozenset[int], _Fits] | None = None
         self._energies: dict[tuple, Array] = {}
-
-    @cached_property
-    def in_pairs(self) -> "Blocks":
-        """The same, two successive blocks at a time predicted by models fitted to all others."""
-        return Blocks(*self._given, np.arange(len(self.groups)) // 2)
 
     def energies(self, chosen: Sequence[int], joints: Sequence[int] | None = None) -> Array:
         """Energy (n, B) of each joint, or of some, that is left in each block."""

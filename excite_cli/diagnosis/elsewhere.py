@@ -112,7 +112,7 @@ def _seen(traced: Traced, columns: NDArray[np.intp]) -> Array:
         place = {int(column): k for k, column in enumerate(joint.active)}
         there = [k for k, column in enumerate(columns) if int(column) in place]
         own = [place[int(columns[k])] for k in there]
-        gram = joint.whole.sum(axis=0)[np.ix_(own, own)]
+        gram = joint.blocks.sum(axis=0)[np.ix_(own, own)]
         found[j][np.ix_(there, there)] = traced.levels[j] ** 2 * gram / max(counts[j], 1)
     return found
 

@@ -68,8 +68,6 @@ class Evidence:
         self._schurs: dict[tuple[int, ...], Schur] = {}
         self._whole: tuple[int, ...] = ()
         self._candidates = CandidateBases(self.total, fixed, self.blocks)
-        energies = grams.seen()[:, :-1]
-        self._seen = energies > _THERE * energies.sum(axis=0)
         self._weighed = prior is not None and weighed is not None and bool(weighed.any())
         self._weight = weighed
         self._by_data = None if prior is None or weighed is None else prior - weighed
@@ -226,36 +224,48 @@ class Evidence:
     def folds_of(self, candidates: Sequence[int]) -> NDArray[np.bool_]:
         """Folds (F,) in which one of some candidates is there."""
         columns = np.concatenate([self.blocks[i] for i in candidates])
-        return np.asarray(self._seen[:, columns].any(axis=1))
+        return np.asarray(self._there[:, columns].any(axis=1))
+
+    @cached_property
+    def _there(self) -> NDArray[np.bool_]:
+        """Which columns (F, K) are there in which fold."""
+        sides = self.grams.seen()
+        energies = sides[::2] + sides[1::2]
+        return np.asarray(energies > _THERE * energies.sum(axis=0))
 
     @cached_property
     def in_turn(self) -> Blocks:
         """Both sides of each fold (2F), blocks of time in turn, fitted to all other sides."""
-        sides = np.arange(2 * self.grams.folds) % 2
-        both = (np.stack([j.first, j.whole - j.first], axis=1) for j in self.grams.joints)
-        return self._in_blocks([each.reshape(-1, *each.shape[2:]) for each in both], sides)
+        return self.in_groups(np.arange(len(self.grams.joints[0].blocks)) % 2)
 
-    @property
+    @cached_property
     def by_fold(self) -> Blocks:
         """The same sides, those of a fold fitted to all other folds."""
-        return self.in_turn.in_pairs
+        return self.in_groups(np.arange(len(self.grams.joints[0].blocks)) // 2)
 
     @cached_property
     def seen(self) -> Blocks:
         """All rows at once, of the model that is fitted to them."""
-        every = [j.whole.sum(axis=0)[None] for j in self.grams.joints]
-        return self._in_blocks(every, np.zeros(1, dtype=np.intp), seen=True)
+        every = [each.sum(axis=0)[None] for each in self._normalised]
+        return self._blocks(every, np.zeros(1, dtype=np.intp), seen=True)
 
-    def _in_blocks(
+    def in_groups(self, groups: NDArray[np.intp]) -> Blocks:
+        """All blocks, those of one of the `groups` (B,) fitted to the others."""
+        return self._blocks(self._normalised, groups)
+
+    def _blocks(
         self, grams: Sequence[Array], groups: NDArray[np.intp], seen: bool = False
     ) -> Blocks:
-        active = [np.append(joint.active, self.torque) for joint in self.grams.joints]
-        normal = [
-            each / np.outer(self.norms[at], self.norms[at])
-            for each, at in zip(grams, active, strict=True)
-        ]
         own = self.blocks.__getitem__
-        return Blocks(active, normal, self.total, self.columns, own, groups, seen)
+        return Blocks(self.grams.active, grams, self.total, self.columns, own, groups, seen)
+
+    @cached_property
+    def _normalised(self) -> list[Array]:
+        """Gram matrices (B, A + 1, A + 1) of the normalised columns of every joint."""
+        return [
+            joint.blocks / np.outer(self.norms[at], self.norms[at])
+            for joint, at in zip(self.grams.joints, self.grams.active, strict=True)
+        ]
 
     def energy_on(self, chosen: Sequence[int], joints: Sequence[int] | None) -> float:
         """Residual energy on the rows of `joints`, of the model fitted to everything."""
