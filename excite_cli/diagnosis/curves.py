@@ -35,7 +35,7 @@ def curves_in_place(traced: Traced, joint_names: Sequence[str]) -> dict[int, Cov
             for run, part in zip(traced.data.runs, parts, strict=True)
             if part is not None
         )
-        if _does_as_well(traced, like, Feature(of, own.rows, columns)):
+        if _does_as_well(traced, like, Feature(own.rows, columns, of)):
             found |= dict.fromkeys(like, of)
     return found
 
@@ -61,6 +61,6 @@ def _does_as_well(traced: Traced, like: Sequence[int], curve: Feature) -> bool:
     beaten = min(traced.candidates[i].effect.holds_until_beaten for i in like)
     if not beaten:
         return bool(more < traced.inflation * chi2.isf(_SURE, 1))
-    chance = traced.inflation * chi2.isf(_SURE, curve.columns[0].shape[2])
+    chance = traced.inflation * chi2.isf(_SURE, curve.width)
     left = white.energy_on(every, traced.candidates[like[0]].rows)
     return bool(-more > max(chance, beaten * left))

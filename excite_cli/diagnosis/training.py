@@ -240,7 +240,11 @@ class Shown:
 
     rows: tuple[int, ...]
     columns: tuple[Array, ...]
-    width: int
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return int(self.columns[0].shape[2])
 
 
 def _sides(t: Array) -> NDArray[np.intp]:

@@ -5,9 +5,8 @@ acceleration of every joint, the joint's own direction and load, where its posit
 came from (hysteresis), and declared columns of the log, in each direction of motion.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from scipy.stats import chi2
@@ -54,26 +53,26 @@ def unexplained_structure(
     inertias that all rows share, it bends their residuals too.
     """
     kept: list[Columns] = [candidates[i] for i in chosen]
-    past = _Past.of(signals)
+    histories_of = [histories([getattr(s, name) for s in signals]) for name in ("q", "load")]
     spool = Spool()
-    shown = (data, signals, past, joint_names)
-    features = [_kept(spool, own) for own in each(_features, shown, range(data.n))]
+    features = [
+        [replace(one, columns=tuple(map(spool.keep, one.columns))) for one in own]
+        for own in each(_features, (data, signals, histories_of, joint_names), range(data.n))
+    ]
     found: dict[int, Unexplained] = {}
     shares: Array | None = None
-    plain_noise = NoiseModel.white(noise.sigma)
     while len(found) < data.n:
-        known = _Known(
-            data.grams(kept, plain_noise, range(data.n)), data.grams(kept, noise, range(data.n))
-        )
-        open_ = [features[joint] for joint in range(data.n) if joint not in found]
-        of_model = (data, [Shown(c.rows, c.columns, c.width) for c in kept], noise, known, rules)
+        both = NoiseModel.white(noise.sigma), noise
+        known = [data.grams(kept, some, range(data.n)) for some in both]
+        of_model = data, [Shown(c.rows, c.columns) for c in kept], noise, known, rules
+        open_ = [own for joint, own in enumerate(features) if joint not in found]
         structures = list(each(_structure, of_model, open_))
         if shares is None:  # nothing but the effects that were found is in the model yet
-            shares = np.stack([each.shares for each in structures])
-        told = [each for each in structures if _is_told(each)]
+            shares = np.stack([own.shares for own in structures])
+        told = [own for own in structures if own.is_told]
         if not told:
             break
-        strongest = max(each.score for each in told)
+        strongest = max(own.score for own in told)
         for own in told:
             if own.score < _AS_STRONG * strongest:
                 continue
@@ -82,23 +81,16 @@ def unexplained_structure(
             found[joint] = Unexplained(joint_names[joint], covariates, own.share)
             kept += own.named
     assert shares is not None
-    quantities = tuple(each.covariate.common for each in features[0])
+    quantities = tuple(feature.covariate.common for feature in features[0])
     dependence = Dependence(tuple(joint_names), quantities, shares)
     return [found[joint] for joint in sorted(found)], dependence
 
 
 @dataclass(frozen=True)
-class Feature:
+class Feature(Shown):
     """Smooth functions of one quantity, with free coefficients; not an effect with a name."""
 
     covariate: Covariate
-    rows: tuple[int, ...]
-    columns: tuple[Array, ...]
-
-    @property
-    def width(self) -> int:
-        """Number of functions."""
-        return int(self.columns[0].shape[2])
 
 
 @dataclass(frozen=True)
@@ -115,89 +107,50 @@ class _Structure:
     size: float
     shares: Array
 
-
-@dataclass(frozen=True)
-class _Known:
-    """Gram matrices of every joint's rows without features, plain and whitened.
-
-    Features of one joint leave those of all others as they are.
-    """
-
-    plain: dict[int, JointGram]
-    white: dict[int, JointGram]
-
-
-@dataclass(frozen=True)
-class _Past:
-    """Histories (T, n, 3) of the positions and of the loads of every part."""
-
-    q: list[Array]
-    load: list[Array]
-
-    @classmethod
-    def of(cls, signals: Sequence[Signals]) -> "_Past":
-        return cls(histories([s.q for s in signals]), histories([s.load for s in signals]))
-
-
-def _features(
-    shared: tuple[TrainingData, Sequence[Signals], _Past, Sequence[str]], joint: int, tell: Tell
-) -> list[Feature]:
-    data, signals, past, joint_names = shared
-    covariates, columns = _quantities(data, signals, joint, joint_names)
-    own = joint_names[joint]
-    for covariate, series in (
-        (Covariate("position", own, Aspect.HISTORY), past.q),
-        (Covariate("load", own, Aspect.HISTORY), past.load),
-    ):
-        covariates.append(covariate)
-        columns.append(
-            tuple(
-                run.averaged_for_fit(x[:, None, joint], [joint])
-                for x, run in zip(series, data.runs, strict=True)
-            )
-        )
-    return [
-        Feature(covariate, (joint,), tuple(blocks))
-        for covariate, blocks in zip(covariates, columns, strict=True)
-    ]
-
-
-def _kept(spool: Spool, features: Sequence[Feature]) -> list[Feature]:
-    return [replace(each, columns=tuple(map(spool.keep, each.columns))) for each in features]
+    @property
+    def is_told(self) -> bool:
+        return bool(self.named) and self.share >= _LEAST_SHARE and self.size >= _SMALLEST
 
 
 def _structure(
-    shared: tuple[TrainingData, Sequence[Columns], NoiseModel, _Known, tuple[float, float, float]],
+    shared: tuple[
+        TrainingData,
+        Sequence[Columns],
+        NoiseModel,
+        Sequence[dict[int, JointGram]],
+        tuple[float, float, float],
+    ],
     features: list[Feature],
     tell: Tell,
 ) -> _Structure:
-    """Add the features of one joint to the model with those `kept`, while they pass."""
-    data, kept, noise, known, rules = shared
+    """Add the features of one joint to the model with those `kept`, while they pass.
+
+    They leave the rows of all other joints, whose Gram matrices are known, as they are.
+    """
+    data, kept, noise, known, (significance, least_gain, inflation) = shared
     joint = features[0].rows[0]
     pool: list[Columns] = [*kept, *features]
-    plain_others, others = _without(known.plain, joint), _without(known.white, joint)
+    plain_others, others = ({j: gram for j, gram in grams.items() if j != joint} for grams in known)
     plain = data.evidence(pool, NoiseModel.white(noise.sigma), plain_others)
     base = list(range(len(kept)))
     obvious = _obvious(plain, base, joint)
-    if obvious:
-        with_them = [*base, *obvious]
-        left = data.residuals(pool, with_them, plain.solve(with_them))
+    if obvious != base:
+        left = data.residuals(pool, obvious, plain.solve(obvious))
         noise, others = fit_noise(left, [run.usable for run in data.runs]), {}
     white = data.evidence(pool, noise, others)
-    named: list[int] = []
-    score = -np.inf
-    tests = len(features) * data.n
-    while len(named) < _MOST_NAMED:
-        best = _best(white, plain, [*base, *named], len(kept), joint, tests, *rules)
+    sure = significance / (len(features) * data.n)
+    chosen, score = list(base), -np.inf
+    while len(chosen) < len(base) + _MOST_NAMED:
+        best = _best(white, plain, chosen, joint, (sure, least_gain, inflation))
         if best is None:
             break
         score = max(score, best[0])
-        named.append(best[1])
+        chosen.append(best[1])
     before = plain.energy_on(base, [joint])
-    share = 1.0 - plain.energy_on([*base, *named], [joint]) / max(before, 1e-300)
+    share = 1.0 - plain.energy_on(chosen, [joint]) / max(before, 1e-300)
     whole = plain.grams.torque_energy(joint)
     return _Structure(
-        [features[i - len(kept)] for i in named],
+        [features[i - len(base)] for i in chosen[len(base) :]],
         score,
         float(share),
         float(np.sqrt(max(share, 0.0) * before / max(whole, 1e-300))),
@@ -205,119 +158,105 @@ def _structure(
     )
 
 
-def _is_told(found: _Structure) -> bool:
-    return bool(found.named) and found.share >= _LEAST_SHARE and found.size >= _SMALLEST
-
-
-def _without(grams: dict[int, JointGram], joint: int) -> dict[int, JointGram]:
-    return {j: gram for j, gram in grams.items() if j != joint}
+def _left_out(plain: Evidence, chosen: list[int], joint: int) -> tuple[float, dict[int, float]]:
+    """Energy on runs left out: of the model, and of it with each feature that it lacks."""
+    others = [i for i in range(len(plain.blocks)) if i not in chosen]
+    after = plain.by_fold.with_each(chosen, others, [joint])
+    before = float(plain.by_fold.energies(chosen, [joint]).sum())
+    return before, {i: float(energy.sum()) for i, energy in after.items()}
 
 
 def _obvious(plain: Evidence, base: list[int], joint: int) -> list[int]:
-    """Features that lower the error on runs left out by a tenth or more, whatever the noise.
+    """The `base` with features that lower the error on runs left out by a tenth, in any noise.
 
     A residual with strong structure passes for noise with a long memory, which would hide it.
     """
-    found: list[int] = []
-    while len(found) < _MOST_NAMED:
-        model = [*base, *found]
-        before = plain.by_fold.energies(model, [joint]).sum()
-        others = [i for i in range(len(base), len(plain.blocks)) if i not in found]
-        after = plain.by_fold.with_each(model, others, [joint])
-        best = min(after, key=lambda i: after[i].sum())
-        if after[best].sum() > (1.0 - _PLAIN_TO_SEE) ** 2 * before:
+    chosen = list(base)
+    while len(chosen) < len(base) + _MOST_NAMED:
+        before, after = _left_out(plain, chosen, joint)
+        best = min(after, key=after.__getitem__)
+        if after[best] > (1.0 - _PLAIN_TO_SEE) ** 2 * before:
             break
-        found.append(best)
-    return found
+        chosen.append(best)
+    return chosen
 
 
 def _best(
     white: Evidence,
     plain: Evidence,
     chosen: list[int],
-    first: int,
     joint: int,
-    tests: int,
-    significance: float,
-    least_gain: float,
-    inflation: float,
+    rules: tuple[float, float, float],
 ) -> tuple[float, int] | None:
+    """The feature whose χ² is farthest above that of chance, and by how much; None: none is."""
+    sure, least_gain, inflation = rules
     schur = white.schur(chosen)
+    before, after = _left_out(plain, chosen, joint)
     best: tuple[float, int] | None = None
-    others = [i for i in range(first, len(white.blocks)) if i not in chosen]
-    before = plain.by_fold.energies(chosen, [joint]).sum()
-    after = plain.by_fold.with_each(chosen, others, [joint])
-    for i in others:
+    for i, energy in after.items():
         gain = schur.gain(i)
-        if gain.dof == 0:
+        if gain.dof == 0 or 1.0 - np.sqrt(energy / max(before, 1e-300)) < least_gain:
             continue
-        p = float(tests * chi2.sf(gain.chi2 / inflation, gain.dof))
-        if p > significance:
-            continue
-        if 1.0 - np.sqrt(after[i].sum() / max(before, 1e-300)) < least_gain:
-            continue
-        score = gain.chi2 / inflation - float(chi2.isf(significance / tests, gain.dof))
-        if best is None or score > best[0]:
+        score = gain.chi2 / inflation - float(chi2.isf(sure, gain.dof))
+        if score >= 0.0 and (best is None or score > best[0]):
             best = (score, i)
     return best
 
 
-def _quantities(
-    data: TrainingData, signals: Sequence[Signals], joint: int, joint_names: Sequence[str]
-) -> tuple[list[Covariate], list[tuple[Array, ...]]]:
-    """Covariates and their columns (M, 1, p) per part."""
-    covariates = [Covariate("time")]
-    longest = float(max(x.t[-1] for x in signals))
-    made: list[Callable[[Signals], Array]] = [lambda s: _powers(s.t, longest)]
-    first = data.runs[0].base_rows  # how a base sways is known hardly beyond its noise
-    for k, name in enumerate(joint_names[first:], first):
-        fastest = max(float(np.abs(s.v[:, k]).max()) for s in signals) + 1e-12
-        strongest = max(float(np.abs(s.a[:, k]).max()) for s in signals) + 1e-12
-        made.append(partial(_of_position, k))
-        covariates.append(Covariate("position", name))
-        made.append(partial(_of_speed, k, fastest))
-        covariates.append(Covariate("speed", name))
-        made.append(partial(_of_acceleration, k, strongest))
-        covariates.append(Covariate("acceleration", name))
-    made.append(partial(_of_direction_and_position, joint))
-    covariates.append(Covariate("position", joint_names[joint], Aspect.DIRECTION))
-    heaviest = max(float(np.abs(s.load[:, joint]).max()) for s in signals) + 1e-12
-    made.append(lambda s: _odd_even(s.load[:, joint] / heaviest)[:, :3])
-    covariates.append(Covariate("load", joint_names[joint]))
-    for name in signals[0].covariates:
-        seen = np.concatenate([s.covariates[name] for s in signals])
-        made.append(partial(_of_column, name, joint, float(seen.mean()), float(np.ptp(seen))))
-        covariates.append(Covariate("covariate", name))
-    columns = [
-        tuple(
-            run.averaged_for_fit(make(s)[:, None], [joint])
-            for s, run in zip(signals, data.runs, strict=True)
+def _features(
+    shared: tuple[TrainingData, Sequence[Signals], list[list[Array]], Sequence[str]],
+    joint: int,
+    tell: Tell,
+) -> list[Feature]:
+    data, signals, histories_of, joint_names = shared
+    own = joint_names[joint]
+    functions = list(_functions(signals, joint, joint_names, data.runs[0].base_rows))
+    of_position = Covariate("position", own, Aspect.HISTORY)
+    of_load = Covariate("load", own, Aspect.HISTORY)
+    for covariate, series in zip((of_position, of_load), histories_of, strict=True):
+        functions.append((covariate, [x[:, joint] for x in series]))
+    return [
+        Feature(
+            (joint,),
+            tuple(
+                run.averaged_for_fit(x[:, None], [joint])
+                for x, run in zip(series, data.runs, strict=True)
+            ),
+            covariate,
         )
-        for make in made
+        for covariate, series in functions
     ]
-    return covariates, columns
 
 
-def _of_position(k: int, s: Signals) -> Array:
-    return _waves(s.q[:, k])
+def _functions(
+    signals: Sequence[Signals], joint: int, joint_names: Sequence[str], base_rows: int
+) -> Iterator[tuple[Covariate, list[Array]]]:
+    """Smooth functions (T, p) of one quantity per part, for one joint's residual.
 
-
-def _of_speed(k: int, scale: float, s: Signals) -> Array:
-    return _odd_even(s.v[:, k] / scale)
-
-
-def _of_direction_and_position(k: int, s: Signals) -> Array:
-    return np.tanh(1e3 * s.v[:, k, None]) * _waves(s.q[:, k])
-
-
-def _of_acceleration(k: int, scale: float, s: Signals) -> Array:
-    return _odd_even(s.a[:, k] / scale)[:, :3]
-
-
-def _of_column(name: str, joint: int, middle: float, width: float, s: Signals) -> Array:
-    """Even and odd in the direction of motion: friction may follow a column."""
-    powers = _powers(s.covariates[name] - middle, width)
-    return np.concatenate([powers, np.tanh(1e3 * s.v[:, joint, None]) * powers], axis=1)
+    How a base sways (the first rows) is known hardly beyond its noise.
+    """
+    own = joint_names[joint]
+    longest = float(max(s.t[-1] for s in signals))
+    yield Covariate("time"), [_powers(s.t, longest) for s in signals]
+    for k, name in enumerate(joint_names[base_rows:], base_rows):
+        yield Covariate("position", name), [_waves(s.q[:, k]) for s in signals]
+        yield Covariate("speed", name), _odd_even([s.v[:, k] for s in signals], 5)
+        yield Covariate("acceleration", name), _odd_even([s.a[:, k] for s in signals], 3)
+    ways = [np.tanh(1e3 * s.v[:, joint, None]) for s in signals]
+    yield (
+        Covariate("position", own, Aspect.DIRECTION),
+        [way * _waves(s.q[:, joint]) for way, s in zip(ways, signals, strict=True)],
+    )
+    yield Covariate("load", own), _odd_even([s.load[:, joint] for s in signals], 3)
+    for name in signals[0].covariates:
+        series = [s.covariates[name] for s in signals]
+        every = np.concatenate(series)
+        powers = [_powers(x - every.mean(), float(np.ptp(every))) for x in series]
+        # Even and odd in the direction of motion: friction may follow a column.
+        yield (
+            Covariate("covariate", name),
+            [np.concatenate([x, way * x], axis=1) for x, way in zip(powers, ways, strict=True)],
+        )
 
 
 def _powers(t: Array, longest: float) -> Array:
@@ -329,5 +268,11 @@ def _waves(q: Array) -> Array:
     return np.stack([f(k * q) for k in (1, 2, 3) for f in (np.sin, np.cos)], axis=1)
 
 
-def _odd_even(x: Array) -> Array:
-    return np.stack([x, np.abs(x), x * np.abs(x), np.tanh(20 * x), x**3], axis=1)
+def _odd_even(series: Sequence[Array], count: int) -> list[Array]:
+    """The first `count` functions of a quantity over its largest value."""
+    largest = max(float(np.abs(x).max()) for x in series) + 1e-12
+    scaled = [x / largest for x in series]
+    return [
+        np.stack([x, np.abs(x), x * np.abs(x), np.tanh(20 * x), x**3], axis=1)[:, :count]
+        for x in scaled
+    ]
