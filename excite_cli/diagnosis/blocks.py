@@ -74,7 +74,7 @@ class Blocks:
         if key not in self._energies:
             fits = self._fits(key[0])
             (found,) = self._left(fits.at, fits.parameters[:, None], rows)
-            _keep(self._energies, key, found)
+            keep(self._energies, key, found)
         return self._energies[key]
 
     def without_each(self, chosen: Sequence[int]) -> dict[int, Array]:
@@ -121,7 +121,7 @@ class Blocks:
 
     def _fits(self, chosen: tuple[int, ...]) -> _Fits:
         if chosen not in self._fitted:
-            _keep(self._fitted, chosen, self._without_one(chosen) or self._anew(chosen))
+            keep(self._fitted, chosen, self._without_one(chosen) or self._anew(chosen))
         return self._fitted[chosen]
 
     def _anew(self, chosen: tuple[int, ...]) -> _Fits:
@@ -166,7 +166,8 @@ class Blocks:
         return np.maximum(found, 0.0)
 
 
-def _keep(kept: dict, key: tuple, value: object) -> None:
-    if len(kept) >= _KEPT:
+def keep(kept: dict, key: tuple, value: object, most: int = _KEPT) -> None:
+    """Keep a value, and forget the first where there would be more than `most`."""
+    if len(kept) >= most:
         kept.pop(next(iter(kept)))
     kept[key] = value

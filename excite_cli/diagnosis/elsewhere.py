@@ -107,14 +107,13 @@ class _Elsewhere:
 def _seen(traced: Traced, columns: NDArray[np.intp]) -> Array:
     """Mean squares (n, K, K) in the training data of these columns."""
     counts = sum(run.usable.sum(axis=0) for run in traced.data.runs)
-    found = np.zeros((traced.data.n, len(columns), len(columns)))
-    for j, joint in enumerate(traced.judge.plain.grams.joints):
-        place = {int(column): k for k, column in enumerate(joint.active)}
-        there = [k for k, column in enumerate(columns) if int(column) in place]
-        own = [place[int(columns[k])] for k in there]
-        gram = joint.blocks.sum(axis=0)[np.ix_(own, own)]
-        found[j][np.ix_(there, there)] = traced.levels[j] ** 2 * gram / max(counts[j], 1)
-    return found
+    plain, found = traced.judge.plain, []
+    for joint, active in zip(plain.grams.joints, plain.grams.active, strict=True):
+        every = np.zeros(plain.total.shape)
+        every[np.ix_(active, active)] = joint.blocks.sum(axis=0)
+        found.append(every[np.ix_(columns, columns)])
+    scale = np.square(traced.levels) / np.maximum(counts, 1)
+    return np.asarray(scale[:, None, None] * np.stack(found))
 
 
 def _otherwise(gram: Array, across: Array, own: Array, size: Array) -> Array:

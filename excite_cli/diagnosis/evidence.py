@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.diagnosis.blocks import Blocks
+from excite_cli.diagnosis.blocks import Blocks, keep
 from excite_cli.diagnosis.cholesky import RIDGE, Cholesky
 from excite_cli.diagnosis.grams import Grams
 from excite_cli.diagnosis.schur import (
@@ -96,19 +96,14 @@ class Evidence:
             np.intp
         )
 
-    def _normal(self, gram: Array, at: NDArray[np.intp]) -> Array:
-        """With a trace of diagonal for columns that say nothing."""
-        normal = np.asarray(gram[at[:, None], at])
-        normal[np.diag_indices(len(at))] += RIDGE
-        return normal
-
     def factor(self, chosen: Sequence[int]) -> Cholesky:
         """Cholesky factor of the normal matrix (normalised columns) of a model."""
         key = tuple(chosen)
         if key not in self._factors:
-            if len(self._factors) == _KEPT:
-                self._factors.pop(next(iter(self._factors)))
-            self._factors[key] = Cholesky(self._normal(self.total, self.columns(key)))
+            at = self.columns(key)
+            normal = self.total[at[:, None], at]
+            normal[np.diag_indices(len(at))] += RIDGE  # for columns that say nothing
+            keep(self._factors, key, Cholesky(normal), _KEPT)
         return self._factors[key]
 
     def solve(self, chosen: Sequence[int]) -> Array:
@@ -146,9 +141,7 @@ class Evidence:
                 found, self._whole = self._schur(key), key
             else:
                 found = self._projected(key, more)
-            if len(self._schurs) == _KEPT:
-                self._schurs.pop(next(iter(self._schurs)))
-            self._schurs[key] = found
+            keep(self._schurs, key, found, _KEPT)
         return self._schurs[key]
 
     def _with_one_more(self, chosen: tuple[int, ...]) -> tuple[int, ...] | None:
@@ -184,7 +177,8 @@ class Evidence:
         own = self._own_columns(member, key)
         left = np.asarray(np.linalg.inv(self._inverse(key)[own, own]))
         values = (self.solve(key) * self.norms[self.columns(key)])[own]
-        return gain_of_columns(self._candidates, left, left @ values, (member,), SHARED)
+        basis = self._candidates.basis((member,))
+        return gain_of_columns(left, left @ values, basis, SHARED)
 
     def _own_columns(self, member: int, chosen: tuple[int, ...]) -> slice:
         """Where a member's parameters are among those of a model."""
