@@ -15,7 +15,7 @@ at the one confidence, which is higher for one recording alone.
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ class Difference:
     error: float
     blocks: int
     joints: int
-    confidence: float = 0.5
+    confidence: float
 
     @property
     def better(self) -> bool:
@@ -95,7 +95,7 @@ class Comparison:
             )
             for some in (one, other)
         )
-        return replace(_difference(before, after), confidence=self._confidence)
+        return _difference(before, after, self._confidence)
 
     def missed(self, chosen: Sequence[int], rest: Sequence[int], rows: Sequence[int]) -> bool:
         """Whether seconds left out of the same recordings surely miss what `rest` lacks.
@@ -105,22 +105,22 @@ class Comparison:
         """
         before, after = (self._same.energies(self._at(some)) for some in (rest, chosen))
         if len(rows) > 1:
-            gains = [_difference(before[[j]], after[[j]]).size for j in rows]
+            gains = [_difference(before[[j]], after[[j]], rules.OF_A_NAME).size for j in rows]
             others = [j for j in rows if j != rows[int(np.argmax(gains))]]
             before, after = before[others], after[others]
-        return replace(_difference(before, after), confidence=rules.OF_A_NAME).better
+        return _difference(before, after, rules.OF_A_NAME).better
 
     def _at(self, some: Sequence[int]) -> list[int]:
         """Where candidates are among the members."""
         return [self._place[i] for i in some]
 
 
-def _difference(before: Array, after: Array) -> Difference:
+def _difference(before: Array, after: Array, confidence: float) -> Difference:
     joints, blocks = before.shape
     least = _LEAST * ((before + after) / 2.0).mean(axis=1, keepdims=True) + 1e-300
     gained: Array = np.log((before + least) / (after + least)).sum(axis=0)
     error = float(np.sqrt(blocks) * gained.std(ddof=1)) if blocks > 1 else np.inf
-    return Difference(float(gained.sum()), error, blocks, joints)
+    return Difference(float(gained.sum()), error, blocks, joints, confidence)
 
 
 def _cut(data: TrainingData) -> tuple[BlocksOfTime, NDArray[np.intp]]:

@@ -117,7 +117,9 @@ def _of_run(
     of_base = np.arange(v.shape[1]) < run.base_rows
     good = run.usable() & np.isfinite(run.tau) & (of_base | ~_near_reversal(v, run.step))
     sliding = good & (of_base | (np.abs(v) > moving_speed))
-    left = run.tau - _at_recorded_rate(torque, run, fit)
+    # Between samples of the working rate; at the borders, that of the nearest.
+    predicted = CubicSpline(fit.t, torque, axis=0)(np.clip(run.t, fit.t[0], fit.t[-1]))
+    left = run.tau - predicted
     series = _bridged((run.tau, left), good, run.step)
     counted, energies, stretches = [], [], []
     for k, band in enumerate(bands):
@@ -194,12 +196,6 @@ def _usual(power: Array) -> Array:
     return np.where(known, median * freedom / chi2.median(freedom), np.nan)
 
 
-def _at_recorded_rate(predicted: Array, run: Run, fit: PreparedRun) -> Array:
-    """Torque (T, n) between samples of the working rate; at the borders, that of the nearest."""
-    between = CubicSpline(fit.t, predicted, axis=0)
-    return np.asarray(between(np.clip(run.t, fit.t[0], fit.t[-1])))
-
-
 def _passed(x: Array, step: float, band: tuple[float, float]) -> Array:
     sections = butter(4, band, "bandpass", fs=1.0 / step, output="sos")
     return np.asarray(sosfiltfilt(sections, x, axis=0, padlen=min(len(x) - 2, 100)))
@@ -210,17 +206,14 @@ def _lowest_corner(
 ) -> tuple[float, float]:
     """S₀ and f₀ of the lowest corner that explains the power of the bands."""
     weights = 1.0 / (2.0 / freedom + _MODEL_ERROR**2)
-    found = []
-    for corner in _CORNERS:
-        shape = [
-            corner * (np.arctan(high / corner) - np.arctan(low / corner)) / (high - low)
-            for low, high in bands
-        ]
-        levels = np.log(power) - np.log(shape)
-        mean = float(np.average(levels, weights=weights))
-        found.append((float(weights @ (levels - mean) ** 2), float(np.exp(mean)), float(corner)))
-    best = min(misfit for misfit, _, _ in found)
-    return next((level, corner) for misfit, level, corner in found if misfit <= best + _TWO_SD)
+    low, high = np.array(bands).T
+    corners = _CORNERS[:, None]
+    shapes = corners * (np.arctan(high / corners) - np.arctan(low / corners)) / (high - low)
+    levels = np.log(power) - np.log(shapes)  # (corners, bands)
+    means = np.average(levels, axis=1, weights=weights)
+    misfits = np.square(levels - means[:, None]) @ weights
+    first = int(np.argmax(misfits <= misfits.min() + _TWO_SD))
+    return float(np.exp(means[first])), float(_CORNERS[first])
 
 
 def _left(level: float, corner: float, processing: Processing) -> float:

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.grams import Grams, JointGram
 from excite_cli.diagnosis.noise_model import NoiseModel
@@ -24,20 +24,20 @@ _BLOCK = 1.0  # s
 _FEWEST_BLOCKS = 4
 
 
-class Columns(Protocol):
-    """What may be added to the model: the joints it acts on, columns (M, rows, width) per part."""
+@dataclass(frozen=True)
+class Shown:
+    """Columns (M, rows, width) per part on the rows of some joints, whoever made them."""
 
-    @property
-    def rows(self) -> tuple[int, ...]:
-        """Joints."""
-
-    @property
-    def columns(self) -> tuple[Array, ...]:
-        """Per part, filtered and decimated."""
+    rows: tuple[int, ...]
+    columns: tuple[Array, ...]
 
     @property
     def width(self) -> int:
         """Number of columns."""
+        return int(self.columns[0].shape[2])
+
+
+Columns = Candidate | Shown  # what may be added to the model
 
 
 @dataclass(frozen=True)
@@ -232,19 +232,6 @@ def _residual(
     for rows, columns, values in zip(rows_of, blocks, others, strict=True):
         residual[:, list(rows)] -= columns @ values
     return np.asarray(residual)
-
-
-@dataclass(frozen=True)
-class Shown:
-    """Columns as they are, whoever made them."""
-
-    rows: tuple[int, ...]
-    columns: tuple[Array, ...]
-
-    @property
-    def width(self) -> int:
-        """Number of columns."""
-        return int(self.columns[0].shape[2])
 
 
 def _sides(t: Array) -> NDArray[np.intp]:
