@@ -25,9 +25,7 @@ from excite_cli.diagnosis.schur import (
 )
 from excite_cli.robot.model import Array
 
-# A column of which a fold has less of the energy is not there in it: one run passes the speeds of
-# Stribeck friction and another hardly does (5e-10).
-_THERE = 1e-5
+_THERE = 1e-5  # of a column's energy: of less in a fold, it is not there
 _BY_WEIGHT = 4.0  # times what the data leave: the deviation is half of theirs, or less
 _NEXT_TO_NOTHING = 1e-6  # of a prior's precision
 _KEPT = 6  # projections that are kept: a step of a search asks for the same few again
@@ -46,15 +44,14 @@ class Evidence:
         fixed: int,
         blocks: Sequence[NDArray[np.intp]],
         rows_of: Sequence[tuple[int, ...]],
-        prior: Array | None = None,
-        weighed: Array | None = None,
+        prior: Array,
+        weighed: Array,
     ) -> None:
         self.grams, self.fixed, self.blocks = grams, fixed, list(blocks)
         self.rows_of = list(rows_of)
         total = grams.total()
-        if prior is not None:
-            known = np.append(np.arange(fixed), len(total) - 1)
-            total[np.ix_(known, known)] += prior
+        known = np.append(np.arange(fixed), len(total) - 1)
+        total[np.ix_(known, known)] += prior
         norms = np.sqrt(np.diag(total))
         norms[norms < 1e-100] = 1.0
         norms[-1] = 1.0
@@ -68,22 +65,23 @@ class Evidence:
         self._schurs: dict[tuple[int, ...], Schur] = {}
         self._whole: tuple[int, ...] = ()
         self._candidates = CandidateBases(self.total, fixed, self.blocks)
-        self._weighed = prior is not None and weighed is not None and bool(weighed.any())
-        self._weight = weighed
-        self._by_data = None if prior is None or weighed is None else prior - weighed
+        self._weighed, self._otherwise_known = weighed, prior - weighed
 
     @cached_property
     def _unweighed(self) -> "Evidence":
         """The same without what was weighed."""
-        return Evidence(self.grams, self.fixed, self.blocks, self.rows_of, self._by_data)
+        return self._with(self._otherwise_known, np.zeros_like(self._weighed))
 
     @cached_property
     def without_prior(self) -> "Evidence":
         """The same with so wide a prior that data and what was weighed say all; itself if none."""
-        if self._by_data is None or self._weight is None or not self._by_data.any():
+        if not self._otherwise_known.any():
             return self
-        prior = _NEXT_TO_NOTHING * self._by_data + self._weight
-        return Evidence(self.grams, self.fixed, self.blocks, self.rows_of, prior, self._weight)
+        wide = _NEXT_TO_NOTHING * self._otherwise_known
+        return self._with(wide + self._weighed, self._weighed)
+
+    def _with(self, prior: Array, weighed: Array) -> "Evidence":
+        return Evidence(self.grams, self.fixed, self.blocks, self.rows_of, prior, weighed)
 
     @property
     def torque(self) -> int:
@@ -136,7 +134,7 @@ class Evidence:
         """
         key = tuple(chosen)
         if key not in self._schurs:
-            more = None if self._weighed else self._with_one_more(key)
+            more = None if self._weighed.any() else self._with_one_more(key)
             if more is None:
                 found, self._whole = self._schur(key), key
             else:
@@ -208,7 +206,7 @@ class Evidence:
 
         `left` is of each with it. Candidates have the same norms without it.
         """
-        if not self._weighed:
+        if not self._weighed.any():
             return np.zeros(len(left), bool)
         by_data = self._unweighed.schur(chosen).diagonal
         own = np.diag(self.total)[self.fixed : self.torque]

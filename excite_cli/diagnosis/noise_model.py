@@ -15,8 +15,7 @@ from excite_cli.robot.model import Array
 
 HIGHEST_ORDER = 12
 _SHRINK = 0.995  # roots are kept within this circle
-# Averages there are of fewer samples, and of noise with a memory one thinks too well: with 1, three
-# wrong names more in 145 campaigns.
+# Averages there are of fewer samples, and of noise with a memory one thinks too well.
 _AFTER_GAPS = 2.0
 # White noise added to the residual, as a share of its variance. Torque that somebody low-passed
 # before holds nothing at high frequency; whitening must not trust that band a million times more.

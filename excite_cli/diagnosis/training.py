@@ -100,13 +100,14 @@ class TrainingData:
         joints = dict(known or {})
         missing = [joint for joint in range(self.n) if joint not in joints]
         joints |= self.grams(candidates, noise, missing, blocks)
+        nothing = np.zeros((starts[0] + 1, starts[0] + 1))
         return Evidence(
             Grams([joints[joint] for joint in range(self.n)], int(starts[-1]) + 1),
             int(starts[0]),
             [np.arange(*ends) for ends in pairwise(starts)],
             [c.rows for c in candidates],
-            self.prior,
-            self.weighed,
+            nothing if self.prior is None else self.prior,
+            nothing if self.weighed is None else self.weighed,
         )
 
     def grams(
