@@ -145,10 +145,8 @@ class Evidence:
     def _with_one_more(self, chosen: tuple[int, ...]) -> tuple[int, ...] | None:
         """The last model that was solved, if it has one member more."""
         key = self._whole
-        if key not in self._schurs or len(key) != len(chosen) + 1:
-            return None
-        member = next((a for a, b in zip(key, chosen, strict=False) if a != b), key[-1])
-        return key if chosen == tuple(i for i in key if i != member) else None
+        has_it = any(chosen == key[:k] + key[k + 1 :] for k in range(len(key)))
+        return key if has_it and key in self._schurs else None
 
     def _projected(self, rest: tuple[int, ...], key: tuple[int, ...]) -> Schur:
         """That of the model `key` without the one member that is not in `rest`.

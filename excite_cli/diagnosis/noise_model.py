@@ -206,11 +206,9 @@ def _not_quiet_at_zero(gram: Array, cross: Array) -> Array:
 
 
 def _stable(coefficients: Array) -> Array:
-    if not len(coefficients):
-        return coefficients
-    roots = np.asarray(np.roots(np.concatenate([[1.0], -coefficients])), dtype=complex)
+    roots = np.roots([1.0, *-coefficients])
     sizes = np.abs(roots)
     if sizes.max(initial=0.0) <= _SHRINK:
         return coefficients
-    shrunk = roots * np.where(sizes > _SHRINK, _SHRINK / np.maximum(sizes, 1e-300), 1.0)
+    shrunk = roots * np.minimum(_SHRINK / np.maximum(sizes, 1e-300), 1.0)
     return np.asarray(-np.real(np.poly(shrunk))[1:])

@@ -1,6 +1,6 @@
 """The training data of a diagnosis: motion, inertial columns and torque of every part."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -122,7 +122,7 @@ class TrainingData:
         # Two tasks a joint: an odd number of joints would leave the last of two workers alone.
         parts = [half for half in np.array_split(np.arange(len(self.runs)), 2) if len(half)]
         tasks = (
-            (self._rows_of(candidates, joint, half), [blocks.owners[part] for part in half])
+            (joint, [(*self._rows_of(candidates, joint, k), blocks.owners[k]) for k in half])
             for joint in joints
             for half in parts
         )
@@ -147,19 +147,16 @@ class TrainingData:
         ).astype(np.intp)
 
     def _rows_of(
-        self, candidates: Sequence[Columns], joint: int, parts: Iterable[int]
-    ) -> "_JointRows":
-        """What shows in the rows of one joint of the declared model and the candidates."""
+        self, candidates: Sequence[Columns], joint: int, part: int
+    ) -> tuple[list[Array], NDArray[np.bool_]]:
+        """Columns (M, …) of one joint's rows in a part, torque last; which rows are usable (M,)."""
         touching = [c for c in candidates if joint in c.rows]
         columns = [
-            [
-                self.declared[part][:, joint],
-                *(c.columns[part][:, c.rows.index(joint)] for c in touching),
-                self.tau[part][:, joint, None],
-            ]
-            for part in parts
+            self.declared[part][:, joint],
+            *(c.columns[part][:, c.rows.index(joint)] for c in touching),
+            self.tau[part][:, joint, None],
         ]
-        return _JointRows(joint, columns, [self.runs[part].usable[:, joint] for part in parts])
+        return columns, self.runs[part].usable[:, joint]
 
     def rows(self, candidates: Sequence[Columns], chosen: Sequence[int]) -> list[Rows]:
         """Rows of every run for the regression of `identify`."""
@@ -193,27 +190,18 @@ class BlocksOfTime:
     owners: tuple[NDArray[np.intp], ...]
 
 
-@dataclass(frozen=True)
-class _JointRows:
-    """Rows of one joint in some parts: columns (M, k), the torque last, and which are usable."""
-
-    joint: int
-    columns: Sequence[Sequence[Array]]
-    usable: Sequence[NDArray[np.bool_]]
-
-
 def _blocks_of(
     shared: tuple[int, NoiseModel],
-    task: tuple[_JointRows, Sequence[NDArray[np.intp]]],
+    task: tuple[int, Sequence[tuple[list[Array], NDArray[np.bool_], NDArray[np.intp]]]],
     tell: Tell,
 ) -> Array:
     """Gram matrices (B, A + 1, A + 1) of the whitened rows of one joint in some parts."""
     count, noise = shared
-    rows, owners = task
-    size = sum(own.shape[1] for own in rows.columns[0])
+    joint, parts = task
+    size = sum(own.shape[1] for own in parts[0][0])
     found = np.zeros((count, size, size))
-    for columns, usable, owner in zip(rows.columns, rows.usable, owners, strict=True):
-        white = noise.whitened(np.concatenate(columns, axis=1), rows.joint, usable)
+    for columns, usable, owner in parts:
+        white = noise.whitened(np.concatenate(columns, axis=1), joint, usable)
         for block in np.unique(owner[usable]):
             own = white[owner[usable] == block]
             found[block] += own.T @ own
