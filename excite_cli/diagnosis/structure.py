@@ -23,7 +23,7 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.history import histories
 from excite_cli.diagnosis.training import TrainingData
-from excite_cli.effects.base import Quantity, Signals
+from excite_cli.effects.base import Signals
 from excite_cli.robot.model import Array
 
 _BLOCK = 1.0  # s
@@ -32,10 +32,6 @@ _WINDOW = 5.0  # s: long data are represented by stretches of this length
 _FEWEST_ROWS = 60
 _LENGTH = 1.5  # ℓ, in standard deviations of a quantity
 _RIDGES = (1.0, 0.1, 0.01)  # λ; k is one on its diagonal
-_OF_JOINTS: dict[Quantity, str] = {
-    "position": "q", "speed": "v", "acceleration": "a", "load": "load",
-}  # fmt: skip
-_OF_EVERY_JOINT: tuple[Quantity, ...] = ("position", "speed", "acceleration")
 _SLOW = {"time", "run", "covariate"}
 _CLEARER = 0.15  # of what one quantity leaves, a second one must explain
 
@@ -125,10 +121,9 @@ class Quantities:
         def averaged(series: Sequence[Array]) -> list[Array]:
             return [run.averaged(x) for run, x in zip(data.runs, series, strict=True)]
 
-        self._of = {
-            quantity: averaged([getattr(s, name) for s in signals])
-            for quantity, name in _OF_JOINTS.items()
-        }
+        self._q, self._v, self._a, self._load = (
+            averaged([getattr(s, name) for s in signals]) for name in ("q", "v", "a", "load")
+        )
         self._past_q = averaged(histories([s.q for s in signals]))
         self._past_load = averaged(histories([s.load for s in signals]))
         self._t = averaged([s.t for s in signals])
@@ -148,7 +143,7 @@ class Quantities:
         def taken(series: Sequence[Array]) -> Array:
             return np.concatenate([x[at] for x, at in zip(series, rows, strict=True)])
 
-        direction = _kernel(taken([np.sign(v[:, joint, None]) for v in self._of["speed"]]))
+        direction = _kernel(taken([np.sign(v[:, joint, None]) for v in self._v]))
         return Rest(
             self._names[joint],
             taken([r[:, joint] for r in residuals]),
@@ -171,9 +166,10 @@ class Quantities:
         for name, series in self._columns.items():
             yield Covariate("covariate", name), [x[:, None] for x in series]
         for k, name in enumerate(self._names[self._base :], self._base):
-            for quantity in _OF_EVERY_JOINT:
-                yield Covariate(quantity, name), [x[:, k, None] for x in self._of[quantity]]
-        yield Covariate("load", own), [x[:, joint, None] for x in self._of["load"]]
+            yield Covariate("position", name), [x[:, k, None] for x in self._q]
+            yield Covariate("speed", name), [x[:, k, None] for x in self._v]
+            yield Covariate("acceleration", name), [x[:, k, None] for x in self._a]
+        yield Covariate("load", own), [x[:, joint, None] for x in self._load]
         yield Covariate("position", own, Aspect.HISTORY), [x[:, joint] for x in self._past_q]
         yield Covariate("load", own, Aspect.HISTORY), [x[:, joint] for x in self._past_load]
 
