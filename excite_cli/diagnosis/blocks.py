@@ -10,7 +10,6 @@ by P G_Ac β.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -54,7 +53,6 @@ class Blocks:
         groups: NDArray[np.intp],
         seen: bool = False,
     ) -> None:
-        self._given = active, grams, total, columns, own
         self._grams, self._columns, self._own = grams, columns, own
         self.groups = groups
         size = len(total)
@@ -69,11 +67,6 @@ class Blocks:
         self._whole: tuple[frozenset[int], _Fits] | None = None
         self._energies: dict[tuple, Array] = {}
 
-    @cached_property
-    def in_pairs(self) -> "Blocks":
-        """The same, two successive blocks at a time predicted by models fitted to all others."""
-        return Blocks(*self._given, np.arange(len(self.groups)) // 2)
-
     def energies(self, chosen: Sequence[int], joints: Sequence[int] | None = None) -> Array:
         """Energy (n, B) of each joint, or of some, that is left in each block."""
         rows = tuple(range(len(self._grams)) if joints is None else joints)
@@ -81,7 +74,7 @@ class Blocks:
         if key not in self._energies:
             fits = self._fits(key[0])
             (found,) = self._left(fits.at, fits.parameters[:, None], rows)
-            _keep(self._energies, key, found)
+            keep(self._energies, key, found)
         return self._energies[key]
 
     def without_each(self, chosen: Sequence[int]) -> dict[int, Array]:
@@ -128,7 +121,7 @@ class Blocks:
 
     def _fits(self, chosen: tuple[int, ...]) -> _Fits:
         if chosen not in self._fitted:
-            _keep(self._fitted, chosen, self._without_one(chosen) or self._anew(chosen))
+            keep(self._fitted, chosen, self._without_one(chosen) or self._anew(chosen))
         return self._fitted[chosen]
 
     def _anew(self, chosen: tuple[int, ...]) -> _Fits:
@@ -173,7 +166,8 @@ class Blocks:
         return np.maximum(found, 0.0)
 
 
-def _keep(kept: dict, key: tuple, value: object) -> None:
-    if len(kept) >= _KEPT:
+def keep(kept: dict, key: tuple, value: object, most: int = _KEPT) -> None:
+    """Keep a value, and forget the first where there would be more than `most`."""
+    if len(kept) >= most:
         kept.pop(next(iter(kept)))
     kept[key] = value

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis import rules
@@ -25,7 +24,7 @@ from excite_cli.robot.model import Array, Robot
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 
-_TOGETHER = 16  # effects that are filtered at once
+_TOGETHER = 16  # effects that are filtered at once: their columns take little memory
 
 
 @dataclass(frozen=True)
@@ -76,20 +75,13 @@ def possible_effects(
     for name in (*([] if spec.kinds == "all" else spec.kinds), *spec.exclude):
         kind_named(name, "diagnosis")
     names = list(catalogue()) if spec.kinds == "all" else list(spec.kinds)
-    if not seen.covariates:
-        names = [name for name in names if not catalogue()[name].follows_covariate]
-    if spec.kinds == "all" and len(seen.trained) < rules.RUNS_OF_A_DRIFT:
-        names = [name for name in names if "time" not in catalogue()[name].function_of]
-    if not seen.robot.base_joints:
-        names = [name for name in names if catalogue()[name].scope != "base"]
+    names = [name for name in names if _can_show(catalogue()[name], spec, seen)]
+    kinds = {name: catalogue()[name] for name in names if name not in spec.exclude}
     known = {effect.place._replace(runs=()) for effect in declared}
-    searched = _searched([name for name in names if name not in spec.exclude], known, spec, seen)
+    searched = _searched(kinds.values(), known, spec, seen)
     known_in_runs = {effect.place for effect in declared}
     found: list[tuple[Effect, int]] = []
-    for name in names:
-        if name in spec.exclude:
-            continue
-        kind = catalogue()[name]
+    for name, kind in kinds.items():
         try:
             places = _places(kind, seen.robot, spec)
             effects, tests = _of_kind(kind, places, known, seen, searched)
@@ -126,6 +118,18 @@ def possible_effects(
     return found
 
 
+def _can_show(kind: type[Effect], spec: DiagnosisSpec, seen: SeenRuns) -> bool:
+    return (
+        (bool(seen.covariates) or not kind.follows_covariate)
+        and (bool(seen.robot.base_joints) or kind.scope != "base")
+        and (
+            spec.kinds != "all"
+            or len(seen.trained) >= rules.RUNS_OF_A_DRIFT
+            or "time" not in kind.function_of
+        )
+    )
+
+
 def _with(changed: list[tuple[Effect, int]], found: Effect) -> list[tuple[Effect, int]]:
     """The changes, one that was found before among them."""
     there = any((e.joints, e.runs) == (found.joints, found.runs) for e, _ in changed)
@@ -140,14 +144,14 @@ def _places(kind: type[Effect], robot: Robot, spec: DiagnosisSpec) -> list[tuple
 
 
 def _searched(
-    names: Sequence[str], known: Container[Place], spec: DiagnosisSpec, seen: SeenRuns
+    kinds: Iterable[type[Effect]], known: Container[Place], spec: DiagnosisSpec, seen: SeenRuns
 ) -> dict[Place, list[dict]]:
     """Shapes of our own kinds that are searched in all runs, by place."""
-    kinds = [catalogue()[name] for name in names if not is_of_a_package(catalogue()[name])]
     tasks = [
         place
         for kind in kinds
         if kind.is_searched() and not (kind.per_run or kind.follows_covariate)
+        if not is_of_a_package(kind)
         for joints in _places(kind, seen.robot, spec)
         if (place := Place(kind.kind, joints)) not in known
     ]
@@ -220,19 +224,20 @@ def with_columns(
     for i, (effect, _) in enumerate(effects):
         alike.setdefault(effect.rows(n), []).append(i)
     columns: list[list[Array]] = [[] for _ in effects]
-    spool, shows, finite = Spool(), np.zeros(len(effects), bool), np.ones(len(effects), bool)
+    spool, sizes = Spool(), np.zeros(len(effects))
     shared = [effect for effect, _ in effects], alike
     of_runs = each(_of_run, shared, zip(signals, runs, strict=True))
-    for run, (blocks, there, sound) in zip(runs, of_runs, strict=True):
-        for i, block in enumerate(blocks):
-            columns[i].append(_nothing(effects[i][0], run, n) if block is None else block)
-            columns[i][-1] = spool.keep(columns[i][-1])
-        shows |= there
-        finite &= sound
+    for run, (blocks, largest) in zip(runs, of_runs, strict=True):
+        sizes += largest
+        for (effect, _), own, block in zip(effects, columns, blocks, strict=True):
+            if block is None:
+                shape = run.averages.shape[0], len(effect.rows(n)), len(effect.parameters)
+                block = np.broadcast_to(0.0, shape)
+            own.append(spool.keep(block))
     return [
         Candidate(effect, effect.rows(n), tuple(blocks), tests)
-        for (effect, tests), blocks, there in zip(effects, columns, shows & finite, strict=True)
-        if there
+        for (effect, tests), blocks, size in zip(effects, columns, sizes, strict=True)
+        if 0.0 < size < np.inf
     ]
 
 
@@ -240,46 +245,48 @@ def _of_run(
     shared: tuple[Sequence[Effect], dict[tuple[int, ...], list[int]]],
     task: tuple[Signals, PreparedRun],
     tell: Tell,
-) -> tuple[list[Array | None], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Columns of all effects in one run, None of those that are not in it; not zero, finite."""
+) -> tuple[list[Array | None], Array]:
+    """Columns of all effects in one run, None of those that are not in it, and the largest value.
+
+    Effects on the same rows are filtered together: `alike` are their indices, by rows.
+    """
     effects, alike = shared
     signals, run = task
     columns: list[Array | None] = [None for _ in effects]
-    shows, finite = np.zeros(len(effects), bool), np.ones(len(effects), bool)
+    largest = np.zeros(len(effects))
     for rows, members in alike.items():
-        blocks = _filtered([effects[i] for i in members], rows, signals, run)
-        for i, block in zip(members, blocks, strict=True):
-            columns[i] = block
-            if block is not None:
-                shows[i] = np.abs(block).max(initial=0.0) > 0
-                finite[i] = np.isfinite(block).all()
+        present = [i for i in members if effects[i].active(signals.run)]
+        for start in range(0, len(present), _TOGETHER):
+            some = present[start : start + _TOGETHER]
+            blocks = [effects[i].columns(signals) for i in some]
+            ends = np.cumsum([block.shape[2] for block in blocks])
+            filtered = run.averaged_for_fit(np.concatenate(blocks, axis=2), rows)
+            for i, block in zip(some, np.split(filtered, ends[:-1], axis=2), strict=True):
+                columns[i] = block.copy()
+                largest[i] = np.abs(block).max(initial=0.0)
     signals.body.forget()
-    return columns, shows, finite
+    return columns, largest
 
 
-def _nothing(effect: Effect, run: PreparedRun, n: int) -> Array:
-    shape = run.averages.shape[0], len(effect.rows(n)), len(effect.parameters)
-    return np.broadcast_to(0.0, shape)
+def shapes_around(effect: Effect, signals: Sequence[Signals]) -> list[dict]:
+    """The effect's shape and neighbours of it, far and near, one parameter changed at a time.
 
-
-def _filtered(
-    effects: Sequence[Effect], rows: tuple[int, ...], signals: Signals, run: PreparedRun
-) -> list[Array | None]:
-    """Columns (M, len(rows), p) in one run of effects on the same rows, filtered together."""
-    present = [i for i, effect in enumerate(effects) if effect.active(signals.run)]
-    found: list[Array | None] = [None for _ in effects]
-    for some in _portions(present):
-        columns = [effects[i].columns(signals) for i in some]
-        ends = np.cumsum([block.shape[2] for block in columns])
-        filtered = run.averaged_for_fit(np.concatenate(columns, axis=2), rows)
-        for i, block in zip(some, np.split(filtered, ends[:-1], axis=2), strict=True):
-            found[i] = block.copy()
-    return found
-
-
-def _portions(members: list[int]) -> list[list[int]]:
-    """So few at once that their columns at the working rate take little memory."""
-    return [members[at : at + _TOGETHER] for at in range(0, len(members), _TOGETHER)]
+    A grid names an effect, it does not measure it. Of a shape that is one of few (a power, a
+    direction) all others: what was found first may have stood for something that is in by now.
+    """
+    found = [dict(effect.shape)]
+    for name, value in effect.shape.items():
+        found += [
+            {**effect.shape, name: float(value + sign * change)}
+            for change in effect.finer_steps(name, signals)
+            for sign in (-1.0, 1.0)
+        ]
+    if len(found) > 1:
+        return found
+    if effect.covariate:
+        signals = [each.with_covariate(effect.covariate) for each in signals]
+    grid = effect.grid(signals[0].body.robot, effect.joints, signals)
+    return found + [shape for shape in grid if shape != found[0]]
 
 
 def record_of(

@@ -9,10 +9,8 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 from excite_cli.robot.model import Array
 
 # On the diagonal of a normal matrix of normalised columns, so that what data do not show stays
-# where it is. A hundred times what rounding makes of such a matrix, and no more: where a flange of
-# some grams rests beside an arm, base parameters that data do show have 1e-10 of their columns'
-# energy to themselves, and with 1e-11 here they were off by a tenth (a clean arm missed 2.5 % of
-# the torque of a joint instead of 0.2 %, and a gain of 14 % was named).
+# where it is. No more than this: parameters that data do show may have 1e-10 of their columns'
+# energy to themselves.
 RIDGE = 1e-13
 
 

@@ -34,7 +34,7 @@ def curves_in_place(traced: Traced, joint_names: Sequence[str]) -> dict[int, Cov
             for run, part in zip(traced.data.runs, parts, strict=True)
             if part is not None
         )
-        if _does_as_well(traced, like, Shown(own.rows, columns, columns[0].shape[2])):
+        if _does_as_well(traced, like, Shown(own.rows, columns)):
             found |= dict.fromkeys(like, of)
     return found
 

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.diagnosis.blocks import Blocks
+from excite_cli.diagnosis.blocks import Blocks, keep
 from excite_cli.diagnosis.cholesky import RIDGE, Cholesky
 from excite_cli.diagnosis.grams import Grams
 from excite_cli.diagnosis.schur import (
@@ -25,9 +25,7 @@ from excite_cli.diagnosis.schur import (
 )
 from excite_cli.robot.model import Array
 
-# A column of which a fold has less of the energy is not there in it: one run passes the speeds of
-# Stribeck friction and another hardly does (5e-10).
-_THERE = 1e-5
+_THERE = 1e-5  # of a column's energy: of less in a fold, it is not there
 _BY_WEIGHT = 4.0  # times what the data leave: the deviation is half of theirs, or less
 _NEXT_TO_NOTHING = 1e-6  # of a prior's precision
 _KEPT = 6  # projections that are kept: a step of a search asks for the same few again
@@ -46,15 +44,14 @@ class Evidence:
         fixed: int,
         blocks: Sequence[NDArray[np.intp]],
         rows_of: Sequence[tuple[int, ...]],
-        prior: Array | None = None,
-        weighed: Array | None = None,
+        prior: Array,
+        weighed: Array,
     ) -> None:
         self.grams, self.fixed, self.blocks = grams, fixed, list(blocks)
         self.rows_of = list(rows_of)
         total = grams.total()
-        if prior is not None:
-            known = np.append(np.arange(fixed), len(total) - 1)
-            total[np.ix_(known, known)] += prior
+        known = np.append(np.arange(fixed), len(total) - 1)
+        total[np.ix_(known, known)] += prior
         norms = np.sqrt(np.diag(total))
         norms[norms < 1e-100] = 1.0
         norms[-1] = 1.0
@@ -68,24 +65,23 @@ class Evidence:
         self._schurs: dict[tuple[int, ...], Schur] = {}
         self._whole: tuple[int, ...] = ()
         self._candidates = CandidateBases(self.total, fixed, self.blocks)
-        energies = grams.seen()[:, :-1]
-        self._seen = energies > _THERE * energies.sum(axis=0)
-        self._weighed = prior is not None and weighed is not None and bool(weighed.any())
-        self._weight = weighed
-        self._by_data = None if prior is None or weighed is None else prior - weighed
+        self._weighed, self._otherwise_known = weighed, prior - weighed
 
     @cached_property
     def _unweighed(self) -> "Evidence":
         """The same without what was weighed."""
-        return Evidence(self.grams, self.fixed, self.blocks, self.rows_of, self._by_data)
+        return self._with(self._otherwise_known, np.zeros_like(self._weighed))
 
     @cached_property
     def without_prior(self) -> "Evidence":
         """The same with so wide a prior that data and what was weighed say all; itself if none."""
-        if self._by_data is None or self._weight is None or not self._by_data.any():
+        if not self._otherwise_known.any():
             return self
-        prior = _NEXT_TO_NOTHING * self._by_data + self._weight
-        return Evidence(self.grams, self.fixed, self.blocks, self.rows_of, prior, self._weight)
+        wide = _NEXT_TO_NOTHING * self._otherwise_known
+        return self._with(wide + self._weighed, self._weighed)
+
+    def _with(self, prior: Array, weighed: Array) -> "Evidence":
+        return Evidence(self.grams, self.fixed, self.blocks, self.rows_of, prior, weighed)
 
     @property
     def torque(self) -> int:
@@ -98,19 +94,14 @@ class Evidence:
             np.intp
         )
 
-    def _normal(self, gram: Array, at: NDArray[np.intp]) -> Array:
-        """With a trace of diagonal for columns that say nothing."""
-        normal = np.asarray(gram[at[:, None], at])
-        normal[np.diag_indices(len(at))] += RIDGE
-        return normal
-
     def factor(self, chosen: Sequence[int]) -> Cholesky:
         """Cholesky factor of the normal matrix (normalised columns) of a model."""
         key = tuple(chosen)
         if key not in self._factors:
-            if len(self._factors) == _KEPT:
-                self._factors.pop(next(iter(self._factors)))
-            self._factors[key] = Cholesky(self._normal(self.total, self.columns(key)))
+            at = self.columns(key)
+            normal = self.total[at[:, None], at]
+            normal[np.diag_indices(len(at))] += RIDGE  # for columns that say nothing
+            keep(self._factors, key, Cholesky(normal), _KEPT)
         return self._factors[key]
 
     def solve(self, chosen: Sequence[int]) -> Array:
@@ -143,23 +134,19 @@ class Evidence:
         """
         key = tuple(chosen)
         if key not in self._schurs:
-            more = None if self._weighed else self._with_one_more(key)
+            more = None if self._weighed.any() else self._with_one_more(key)
             if more is None:
                 found, self._whole = self._schur(key), key
             else:
                 found = self._projected(key, more)
-            if len(self._schurs) == _KEPT:
-                self._schurs.pop(next(iter(self._schurs)))
-            self._schurs[key] = found
+            keep(self._schurs, key, found, _KEPT)
         return self._schurs[key]
 
     def _with_one_more(self, chosen: tuple[int, ...]) -> tuple[int, ...] | None:
         """The last model that was solved, if it has one member more."""
         key = self._whole
-        if key not in self._schurs or len(key) != len(chosen) + 1:
-            return None
-        member = next((a for a, b in zip(key, chosen, strict=False) if a != b), key[-1])
-        return key if chosen == tuple(i for i in key if i != member) else None
+        has_it = any(chosen == key[:k] + key[k + 1 :] for k in range(len(key)))
+        return key if has_it and key in self._schurs else None
 
     def _projected(self, rest: tuple[int, ...], key: tuple[int, ...]) -> Schur:
         """That of the model `key` without the one member that is not in `rest`.
@@ -186,7 +173,8 @@ class Evidence:
         own = self._own_columns(member, key)
         left = np.asarray(np.linalg.inv(self._inverse(key)[own, own]))
         values = (self.solve(key) * self.norms[self.columns(key)])[own]
-        return gain_of_columns(self._candidates, left, left @ values, (member,), SHARED)
+        basis = self._candidates.basis((member,))
+        return gain_of_columns(left, left @ values, basis, SHARED)
 
     def _own_columns(self, member: int, chosen: tuple[int, ...]) -> slice:
         """Where a member's parameters are among those of a model."""
@@ -216,7 +204,7 @@ class Evidence:
 
         `left` is of each with it. Candidates have the same norms without it.
         """
-        if not self._weighed:
+        if not self._weighed.any():
             return np.zeros(len(left), bool)
         by_data = self._unweighed.schur(chosen).diagonal
         own = np.diag(self.total)[self.fixed : self.torque]
@@ -226,36 +214,48 @@ class Evidence:
     def folds_of(self, candidates: Sequence[int]) -> NDArray[np.bool_]:
         """Folds (F,) in which one of some candidates is there."""
         columns = np.concatenate([self.blocks[i] for i in candidates])
-        return np.asarray(self._seen[:, columns].any(axis=1))
+        return np.asarray(self._there[:, columns].any(axis=1))
+
+    @cached_property
+    def _there(self) -> NDArray[np.bool_]:
+        """Which columns (F, K) are there in which fold."""
+        sides = self.grams.seen()
+        energies = sides[::2] + sides[1::2]
+        return np.asarray(energies > _THERE * energies.sum(axis=0))
 
     @cached_property
     def in_turn(self) -> Blocks:
         """Both sides of each fold (2F), blocks of time in turn, fitted to all other sides."""
-        sides = np.arange(2 * self.grams.folds) % 2
-        both = (np.stack([j.first, j.whole - j.first], axis=1) for j in self.grams.joints)
-        return self._in_blocks([each.reshape(-1, *each.shape[2:]) for each in both], sides)
+        return self.in_groups(np.arange(len(self.grams.joints[0].blocks)) % 2)
 
-    @property
+    @cached_property
     def by_fold(self) -> Blocks:
         """The same sides, those of a fold fitted to all other folds."""
-        return self.in_turn.in_pairs
+        return self.in_groups(np.arange(len(self.grams.joints[0].blocks)) // 2)
 
     @cached_property
     def seen(self) -> Blocks:
         """All rows at once, of the model that is fitted to them."""
-        every = [j.whole.sum(axis=0)[None] for j in self.grams.joints]
-        return self._in_blocks(every, np.zeros(1, dtype=np.intp), seen=True)
+        every = [each.sum(axis=0)[None] for each in self._normalised]
+        return self._blocks(every, np.zeros(1, dtype=np.intp), seen=True)
 
-    def _in_blocks(
+    def in_groups(self, groups: NDArray[np.intp]) -> Blocks:
+        """All blocks, those of one of the `groups` (B,) fitted to the others."""
+        return self._blocks(self._normalised, groups)
+
+    def _blocks(
         self, grams: Sequence[Array], groups: NDArray[np.intp], seen: bool = False
     ) -> Blocks:
-        active = [np.append(joint.active, self.torque) for joint in self.grams.joints]
-        normal = [
-            each / np.outer(self.norms[at], self.norms[at])
-            for each, at in zip(grams, active, strict=True)
-        ]
         own = self.blocks.__getitem__
-        return Blocks(active, normal, self.total, self.columns, own, groups, seen)
+        return Blocks(self.grams.active, grams, self.total, self.columns, own, groups, seen)
+
+    @cached_property
+    def _normalised(self) -> list[Array]:
+        """Gram matrices (B, A + 1, A + 1) of the normalised columns of every joint."""
+        return [
+            joint.blocks / np.outer(self.norms[at], self.norms[at])
+            for joint, at in zip(self.grams.joints, self.grams.active, strict=True)
+        ]
 
     def energy_on(self, chosen: Sequence[int], joints: Sequence[int] | None) -> float:
         """Residual energy on the rows of `joints`, of the model fitted to everything."""

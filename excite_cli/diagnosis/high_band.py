@@ -17,6 +17,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, fftconvolve, oaconvolve, sosfiltfilt
+from scipy.stats import chi2
 
 from excite_cli.identification.averages import average_rows
 from excite_cli.identification.prepare import PreparedRun
@@ -66,37 +69,28 @@ def band_noise(
     """
     n = recorded[0].tau.shape[1]
     bands = [band for band in _BANDS if band[1] <= _HIGHEST * processing.recorded_rate]
+    white, coloured = np.full(n, np.nan), np.full(n, np.nan)
     if len(bands) < _WHITE:
-        return BandNoise(np.full(n, np.nan), np.full(n, np.nan))
-    energies, counted = np.zeros((2, len(bands), n)), np.zeros((len(bands), n))
-    seconds = np.zeros(n)
-    stretches: list[list[Array]] = [[] for _ in bands[:_WHITE]]
-    runs = zip(recorded, prepared, predicted, strict=True)
-    for own in each(_of_run, (bands, processing.moving_speed), runs):
-        seconds += own.seconds
-        counted += own.counted
-        energies += own.energies
-        for series, some in zip(stretches, own.stretches, strict=True):
-            series.append(some)
-    energy = energies.min(axis=0)
+        return BandNoise(white, coloured)
+    tasks = zip(recorded, prepared, predicted, strict=True)
+    runs = list(each(_of_run, (bands, processing.moving_speed), tasks))
+    seconds, counted, energies = (
+        np.sum([getattr(run, name) for run in runs], axis=0)
+        for name in ("seconds", "counted", "energies")
+    )
+    stretches = zip(*(run.stretches for run in runs), strict=True)
     usual = np.stack([_usual(np.concatenate(own)) for own in stretches])
     known = seconds > _LEAST_SECONDS
-    widths = np.array([high - low for low, high in bands])
-    power = energy / np.where(known & (counted > 0.0), counted, np.nan) / widths[:, None]
-    white, coloured = np.full(n, np.nan), np.full(n, np.nan)
+    widths = np.array([high - low for low, high in bands])[:, None]
+    power = energies.min(axis=0) / np.where(known & (counted > 0.0), counted, np.nan) / widths
+    # Of the bands that give the level of white noise: all of them, and most stretches.
+    shares = widths[:_WHITE] / widths[:_WHITE].sum()
+    flat = np.fmin(*((shares * x[:_WHITE]).sum(axis=0) for x in (power, usual / widths[:_WHITE])))
     known &= np.nan_to_num(power[1]) > _FILTERED * np.nan_to_num(power[0])
     for j in np.flatnonzero(known & (power > 0).all(axis=0)):
         gain = _gain(prepared, processing, int(j))
-        flat = float(
-            np.nanmin(
-                [
-                    np.average(x[:_WHITE, j], weights=widths[:_WHITE])
-                    for x in (power, usual / widths[:_WHITE, None])
-                ]
-            )
-        )
-        level, corner = _lowest_corner(power[:, j], 2 * widths * seconds[j], bands)
-        white[j] = np.sqrt(gain * _left(flat, _CORNERS[-1], processing))
+        level, corner = _lowest_corner(power[:, j], 2 * widths[:, 0] * seconds[j], bands)
+        white[j] = np.sqrt(gain * _left(float(flat[j]), _CORNERS[-1], processing))
         coloured[j] = max(white[j], np.sqrt(gain * _left(level, corner, processing)))
     return BandNoise(white, coloured)
 
@@ -123,7 +117,9 @@ def _of_run(
     of_base = np.arange(v.shape[1]) < run.base_rows
     good = run.usable() & np.isfinite(run.tau) & (of_base | ~_near_reversal(v, run.step))
     sliding = good & (of_base | (np.abs(v) > moving_speed))
-    left = run.tau - _at_recorded_rate(torque, run, fit)
+    # Between samples of the working rate; at the borders, that of the nearest.
+    predicted = CubicSpline(fit.t, torque, axis=0)(np.clip(run.t, fit.t[0], fit.t[-1]))
+    left = run.tau - predicted
     series = _bridged((run.tau, left), good, run.step)
     counted, energies, stretches = [], [], []
     for k, band in enumerate(bands):
@@ -155,8 +151,6 @@ def _bridged(series: Sequence[Array], good: Mask, step: float) -> list[Array]:
 
     A jump there would ring in every band, and a line from one noisy sample to another adds noise.
     """
-    from scipy.signal import oaconvolve  # takes a second to import
-
     width = _AVERAGED / step
     half = round(_FAR * width)
     window = np.exp(-0.5 * np.square(np.arange(-half, half + 1) / width))
@@ -178,8 +172,6 @@ def _kept(good: Mask, step: float, band: tuple[float, float]) -> Array:
 
     Σ h² over what is good, h the filter's response to an impulse.
     """
-    from scipy.signal import fftconvolve  # takes a second to import
-
     impulse = np.zeros((2 * round(_RESPONSE / step) + 1, 1))
     impulse[len(impulse) // 2] = 1.0
     squares = np.square(_passed(impulse, step, band))
@@ -198,25 +190,13 @@ def _stretches(square: Array, kept: Array, step: float) -> Array:
 
 def _usual(power: Array) -> Array:
     """The median (n,) of stretches (S, n) of noise, as the mean that it has with this median."""
-    from scipy.stats import chi2  # takes a second to import
-
     freedom = 2.0 * (_BANDS[0][1] - _BANDS[0][0]) * _STRETCH
     known = np.isfinite(power).sum(axis=0) >= _FEWEST_STRETCHES
     median = np.nanmedian(np.where(known, power, 0.0), axis=0)
     return np.where(known, median * freedom / chi2.median(freedom), np.nan)
 
 
-def _at_recorded_rate(predicted: Array, run: Run, fit: PreparedRun) -> Array:
-    """Torque (T, n) between samples of the working rate; at the borders, that of the nearest."""
-    from scipy.interpolate import CubicSpline  # takes a second to import
-
-    between = CubicSpline(fit.t, predicted, axis=0)
-    return np.asarray(between(np.clip(run.t, fit.t[0], fit.t[-1])))
-
-
 def _passed(x: Array, step: float, band: tuple[float, float]) -> Array:
-    from scipy.signal import butter, sosfiltfilt  # takes a second to import
-
     sections = butter(4, band, "bandpass", fs=1.0 / step, output="sos")
     return np.asarray(sosfiltfilt(sections, x, axis=0, padlen=min(len(x) - 2, 100)))
 
@@ -226,17 +206,14 @@ def _lowest_corner(
 ) -> tuple[float, float]:
     """S₀ and f₀ of the lowest corner that explains the power of the bands."""
     weights = 1.0 / (2.0 / freedom + _MODEL_ERROR**2)
-    found = []
-    for corner in _CORNERS:
-        shape = [
-            corner * (np.arctan(high / corner) - np.arctan(low / corner)) / (high - low)
-            for low, high in bands
-        ]
-        levels = np.log(power) - np.log(shape)
-        mean = float(np.average(levels, weights=weights))
-        found.append((float(weights @ (levels - mean) ** 2), float(np.exp(mean)), float(corner)))
-    best = min(misfit for misfit, _, _ in found)
-    return next((level, corner) for misfit, level, corner in found if misfit <= best + _TWO_SD)
+    low, high = np.array(bands).T
+    corners = _CORNERS[:, None]
+    shapes = corners * (np.arctan(high / corners) - np.arctan(low / corners)) / (high - low)
+    levels = np.log(power) - np.log(shapes)  # (corners, bands)
+    means = np.average(levels, axis=1, weights=weights)
+    misfits = np.square(levels - means[:, None]) @ weights
+    first = int(np.argmax(misfits <= misfits.min() + _TWO_SD))
+    return float(np.exp(means[first])), float(_CORNERS[first])
 
 
 def _left(level: float, corner: float, processing: Processing) -> float:

@@ -1,7 +1,5 @@
 """Measured data as earlier data C_0 of a planned motion."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from excite_cli.errors import ConfigError, FileError
@@ -31,11 +29,6 @@ def measured_stack(problem: Problem, data: Dataset) -> tuple[Stack, str]:
         data.runs, problem.spec.measurement.filter, problem.spec.diagnosis.moving_speed
     )
     runs = prepare_all(data.runs, processing)
-    return stack_of_runs(problem, runs)
-
-
-def stack_of_runs(problem: Problem, runs: Sequence[PreparedRun]) -> tuple[Stack, str]:
-    """The same for runs that are prepared already."""
     wanted = float(np.diff(problem.cost_basis.times[:2])[0])
     stack, objective = Stack.empty(problem.columns), problem.objective()
     samples = 0

@@ -36,17 +36,9 @@ class ModelledRun:
 
     def signals(self, phi: Array, effects: Sequence[Effect], values: Array) -> Signals:
         """What effects see of the run at inertias φ, with the torque of `effects` of `values`."""
-        return with_effects(seen_of(self.run, self._at(phi)), effects, values)
+        return with_effects(seen_of(self.run, self.body(phi)), effects, values)
 
-    def lacks_load(self, phi: Array) -> bool:
-        """Whether the rigid body's torque at φ is still to be computed."""
-        return "load" not in self._at(phi).__dict__
-
-    def take_load(self, phi: Array, load: Array) -> None:
-        """The rigid body's torque (T, n) at φ, from who computed it."""
-        self._at(phi).load = load
-
-    def _at(self, phi: Array) -> RigidBody:
+    def body(self, phi: Array) -> RigidBody:
         """The rigid body at φ; the last one is kept, with all that was computed of it."""
         if not np.array_equal(phi, self._body.phi):
             run = self.run
@@ -55,15 +47,16 @@ class ModelledRun:
 
 
 def signals_of_all(
-    bodies: Sequence[ModelledRun], phi: Array, effects: Sequence[Effect], values: Array
+    modelled: Sequence[ModelledRun], phi: Array, effects: Sequence[Effect], values: Array
 ) -> list[Signals]:
     """As `ModelledRun.signals` of every run."""
-    lacking, spool = [body for body in bodies if body.lacks_load(phi)], Spool()
+    lacking = [own for own in modelled if "load" not in own.body(phi).__dict__]
     if lacking:
-        loads = each(_load, (lacking[0].model.robot, phi), (body.run for body in lacking))
-        for body, load in zip(lacking, loads, strict=True):
-            body.take_load(phi, spool.keep(load))
-    return [body.signals(phi, effects, values) for body in bodies]
+        spool = Spool()
+        loads = each(_load, (lacking[0].model.robot, phi), (own.run for own in lacking))
+        for own, load in zip(lacking, loads, strict=True):
+            own.body(phi).load = spool.keep(load)
+    return [own.signals(phi, effects, values) for own in modelled]
 
 
 def _load(shared: tuple[Robot, Array], run: PreparedRun, tell: Tell) -> Array:

@@ -10,15 +10,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from excite_cli.robot.model import Array
 
 HIGHEST_ORDER = 12
-_RESPONSE = 2000  # samples after which an impulse has died away
 _SHRINK = 0.995  # roots are kept within this circle
-# Averages there are of fewer samples, and of noise with a memory one thinks too well: with 1, three
-# wrong names more in 145 campaigns.
+# Averages there are of fewer samples, and of noise with a memory one thinks too well.
 _AFTER_GAPS = 2.0
 # White noise added to the residual, as a share of its variance. Torque that somebody low-passed
 # before holds nothing at high frequency; whitening must not trust that band a million times more.
@@ -80,27 +77,21 @@ class NoiseModel:
         touched[:order] = True
         return touched[usable]
 
-    def _predictor(self, joint: int, lags: NDArray[np.intp]) -> tuple[Array, float]:
-        """Coefficients of the samples at these lags, and the standard deviation of what is left."""
-        key = joint, lags.tobytes()
-        if key not in self._predictors:
-            self._predictors[key] = self._predictor_of(joint, lags)
-        return self._predictors[key]
-
     @cached_property
     def _predictors(self) -> dict[tuple[int, bytes], tuple[Array, float]]:
         """Many runs have the same gaps."""
         return {}
 
-    def _predictor_of(self, joint: int, lags: NDArray[np.intp]) -> tuple[Array, float]:
-        covariances = self._autocovariances[joint]
-        if not len(lags):
-            return np.zeros(0), float(np.sqrt(covariances[0]))
-        among = covariances[np.abs(lags[:, None] - lags)]
-        cross = covariances[lags]
-        coefficients = np.linalg.lstsq(among, cross, rcond=1e-12)[0]
-        left = max(float(covariances[0] - coefficients @ cross), float(self.sigma[joint]) ** 2)
-        return np.asarray(coefficients), float(np.sqrt(left))
+    def _predictor(self, joint: int, lags: NDArray[np.intp]) -> tuple[Array, float]:
+        """Coefficients of the samples at these lags, and the standard deviation of what is left."""
+        key = joint, lags.tobytes()
+        if key not in self._predictors:
+            covariances = self._autocovariances[joint]
+            among, cross = covariances[np.abs(lags[:, None] - lags)], covariances[lags]
+            by = np.asarray(np.linalg.lstsq(among, cross, rcond=1e-12)[0])
+            left = max(float(covariances[0] - by @ cross), float(self.sigma[joint]) ** 2)
+            self._predictors[key] = by, float(np.sqrt(left))
+        return self._predictors[key]
 
     @cached_property
     def _autocovariances(self) -> tuple[Array, ...]:
@@ -116,13 +107,8 @@ class NoiseModel:
         return tuple(found)
 
     def levels(self) -> Array:
-        """Standard deviation (n,) of the noise itself, from its response to an impulse."""
-        impulse = np.zeros(_RESPONSE)
-        impulse[0] = 1.0
-        responses = [
-            lfilter([1.0], np.concatenate([[1.0], -c]), impulse) for c in self.coefficients
-        ]
-        return self.sigma * np.sqrt(np.sum(np.square(responses), axis=1))
+        """Standard deviation (n,) of the noise itself."""
+        return np.sqrt([covariances[0] for covariances in self._autocovariances])
 
 
 @dataclass(frozen=True)
@@ -220,11 +206,9 @@ def _not_quiet_at_zero(gram: Array, cross: Array) -> Array:
 
 
 def _stable(coefficients: Array) -> Array:
-    if not len(coefficients):
-        return coefficients
-    roots = np.asarray(np.roots(np.concatenate([[1.0], -coefficients])), dtype=complex)
+    roots = np.roots([1.0, *-coefficients])
     sizes = np.abs(roots)
     if sizes.max(initial=0.0) <= _SHRINK:
         return coefficients
-    shrunk = roots * np.where(sizes > _SHRINK, _SHRINK / np.maximum(sizes, 1e-300), 1.0)
+    shrunk = roots * np.minimum(_SHRINK / np.maximum(sizes, 1e-300), 1.0)
     return np.asarray(-np.real(np.poly(shrunk))[1:])

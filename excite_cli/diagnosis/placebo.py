@@ -15,7 +15,6 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.training import Columns, Shown, TrainingData
-from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
@@ -62,41 +61,28 @@ def placebo_gains(
 ) -> Array:
     """χ² of every shifted column of a local candidate, given the model with those `chosen`."""
     rng = np.random.default_rng(_SEED)
-    at = white.columns(chosen)
-    factor = white.factor(chosen)
-    gains = []
+    sizes = [len(tau) for tau in data.tau]
+    tasks = []
+    for joint in range(data.n):
+        local = [c.columns for c in candidates if c.rows == (joint,) and c.width == 1]
+        if local:
+            shifts = [
+                [int(rng.integers(size // 4, max(3 * size // 4, 2))) for size in sizes]
+                for _ in range(_SHIFTS)
+            ]
+            tasks += [
+                (joint, part, [columns[part] for columns in local], moves)
+                for part, moves in enumerate(zip(*shifts, strict=True))
+            ]
+    at, factor = white.columns(chosen), white.factor(chosen)
     residuals = data.residuals(candidates, chosen, white.solve(chosen))
-    local = [[c for c in candidates if c.rows == (j,) and c.width == 1] for j in range(data.n)]
-    joints = [joint for joint in range(data.n) if local[joint]]
-    sizes = [len(each) for each in data.tau]
-    shifts = {
-        joint: [
-            [int(rng.integers(size // 4, max(3 * size // 4, 2))) for size in sizes]
-            for _ in range(_SHIFTS)
-        ]
-        for joint in joints
-    }
-    # Two tasks a joint, as for the Gram matrices.
-    halves = [half for half in np.array_split(np.arange(len(sizes)), 2) if len(half)]
-    tasks = [
-        (
-            joint,
-            [Shown(c.rows, c.columns, c.width) for c in local[joint]],
-            half,
-            [[of_parts[part] for part in half] for of_parts in shifts[joint]],
-        )
-        for joint in joints
-        for half in halves
-    ]
-    taken = [candidates[i] for i in chosen]
-    shared = data, [Shown(c.rows, c.columns, c.width) for c in taken], noise, residuals
-    made = each(_products, shared, tasks)
-    for _ in joints:
-        for of_halves in zip(*(next(made) for _ in halves), strict=True):
-            cross, square, product = (
-                np.add.reduce(terms) for terms in zip(*of_halves, strict=True)
-            )
-            cross /= white.norms[at][:, None]
+    taken = [Shown(candidates[i].rows, candidates[i].columns) for i in chosen]
+    made = each(_products, (data, taken, noise, residuals), tasks)
+    gains: list[float] = []
+    for _ in range(len(tasks) // len(sizes)):
+        for products in np.asarray(sum(next(made) for _ in sizes)):
+            cross = products[:-2] / white.norms[at][:, None]
+            product, square = products[-2], products[-1]
             left = square - np.einsum("ik,ik->k", cross, factor.solve(cross))
             good = left > 1e-2 * square
             gains += list(product[good] ** 2 / left[good])
@@ -105,31 +91,23 @@ def placebo_gains(
 
 def _products(
     shared: tuple[TrainingData, Sequence[Columns], NoiseModel, Sequence[Array]],
-    task: tuple[int, Sequence[Columns], Sequence[int], Sequence[Sequence[int]]],
+    task: tuple[int, int, Sequence[Array], Sequence[int]],
     tell: Tell,
-) -> list[tuple[Array, Array, Array]]:
-    """Of the columns of one joint, shifted: products with the model (k, L), with themselves (L,),
-    and with the residual (L,), for every set of `shifts` of some parts."""
+) -> Array:
+    """Products (shifts, k + 2, L) of L shifted columns of one joint's rows in one part.
+
+    With the k columns of the model, with the residual, and with themselves.
+    """
     data, taken, noise, residuals = shared
-    joint, local, of_parts, shifts = task
-    parts, spool = [], Spool()
-    for part in of_parts:
-        run = data.runs[part]
-        columns = data.columns(taken, range(len(taken)), part, joint)
-        whiten = noise.whitening(joint, run.usable[:, joint])
-        own, rest = whiten(columns), whiten(residuals[part][:, joint])
-        columns = np.stack([c.columns[part][:, 0, 0] for c in local], axis=1)
-        parts.append((spool.keep(columns), spool.keep(own), rest, whiten))
-        forget()
-    found = []
-    for moves in shifts:
-        cross = np.zeros((parts[0][1].shape[1], len(local)))
-        square, product = np.zeros(len(local)), np.zeros(len(local))
-        for shift, (columns, own, rest, whiten) in zip(moves, parts, strict=True):
-            moved = whiten(np.roll(columns, shift, axis=0))
-            cross += own.T @ moved
-            square += np.sum(moved**2, axis=0)
-            product += rest @ moved
-            forget()
-        found.append((cross, square, product))
+    joint, part, local, moves = task
+    whiten = noise.whitening(joint, data.runs[part].usable[:, joint])
+    model = whiten(data.columns(taken, range(len(taken)), part, joint))
+    rest = whiten(residuals[part][:, joint])
+    columns = np.concatenate([column[:, 0] for column in local], axis=1)
+    found = np.empty((len(moves), model.shape[1] + 2, len(local)))
+    for products, shift in zip(found, moves, strict=True):
+        moved = whiten(np.roll(columns, shift, axis=0))
+        products[:-2] = model.T @ moved
+        products[-2] = rest @ moved
+        products[-1] = np.sum(moved**2, axis=0)
     return found

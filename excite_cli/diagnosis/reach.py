@@ -13,7 +13,7 @@ import numpy as np
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.training import TrainingData
-from excite_cli.diagnosis.usual_motion import UsualMotion
+from excite_cli.diagnosis.usual_motion import UsualMotion, is_steady
 from excite_cli.robot.model import Array
 
 
@@ -69,9 +69,9 @@ class Reach:
         """Mean squares along the usual motion and in the data; None: nothing is said of it."""
         effect = c.effect
         of_joints = effect.scope in ("joint", "pair") and not effect.carried
-        if effect.runs or effect.covariate or "time" in effect.function_of or not of_joints:
+        if not (of_joints and is_steady(effect)):
             return None
-        usual = self._usual.squares(c.effect)
+        usual = self._usual.squares(effect)
         if not np.isfinite(usual).all():
             return None
         seen, counts = np.zeros_like(usual), np.zeros(len(c.rows))

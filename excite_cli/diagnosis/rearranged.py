@@ -200,13 +200,11 @@ def _judged(
     if signs:
         changes = [replace(change, tau_sign=np.abs(change.tau_sign)) for change in changes]
     left = model.own_shares_left([change.applied(samples) for change in changes])
-    if not signs:
-        return [Verdict(c, each[:, 0]) for c, each in zip(changes, left, strict=True)]
-    chosen, shares = _signed(left)
-    return [
-        Verdict(replace(change, tau_sign=sign), share)
-        for change, sign, share in zip(changes, chosen, shares, strict=True)
-    ]
+    shares = left[..., 0]
+    if signs:
+        chosen, shares = _signed(left)
+        changes = [replace(c, tau_sign=sign) for c, sign in zip(changes, chosen, strict=True)]
+    return [Verdict(c, share) for c, share in zip(changes, shares, strict=True)]
 
 
 def _signed(left: Array) -> tuple[Array, Array]:

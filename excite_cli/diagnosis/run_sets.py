@@ -48,38 +48,38 @@ class RunEvidence:
 
     def values(self, sets: Mask) -> Array:
         """Values (S, p) fitted to sets (S, R) of runs."""
-        gram, cross = self._sums(sets)
-        return np.asarray(np.linalg.solve(gram, cross[:, :, None])[:, :, 0])
+        return self._fitted(*self._sums(sets))
 
     def energy(self, sets: Mask) -> Array:
         """What values fitted to sets (S, R) of runs explain in them, (S,)."""
-        return np.einsum("sp,sp->s", self.values(sets), self._sums(sets)[1])
+        return self._energy(*self._sums(sets))
 
     def explained(self, sets: Mask) -> Array:
         """E(S) of sets (S, R), (S,)."""
-        whole = np.ones((1, self.runs), bool)
-        return self.energy(sets) + self.energy(~sets) - self.energy(whole)
+        return self._explained(*self._sums(sets))
 
     def toggled(self, chosen: Mask) -> Array:
         """E(S) of all sets that differ from `chosen` (R,) in one run, by that run (R,)."""
-        sign = np.where(chosen, -1.0, 1.0)
-        gram, cross = self._sums(np.array([chosen, ~chosen]))
-        steps = sign[:, None, None] * self.grams, sign[:, None] * self.cross
-        with_ = gram[0] + steps[0], cross[0] + steps[1]
-        without = gram[1] - steps[0], cross[1] - steps[1]
-        whole = self.energy(np.ones((1, self.runs), bool))
-        return _energy(*with_) + _energy(*without) - whole
+        sign = np.where(chosen, -1.0, 1.0)[:, None]
+        gram, cross = self._sums(chosen[None])
+        return self._explained(gram + sign[:, None] * self.grams, cross + sign * self.cross)
 
     def _sums(self, sets: Mask) -> tuple[Array, Array]:
         member = sets.astype(float)
-        gram = np.tensordot(member, self.grams, axes=1)
-        at = np.arange(gram.shape[1])
-        gram[:, at, at] += _RIDGE * np.diag(self.grams.sum(axis=0)) + 1e-300
-        return gram, member @ self.cross
+        return np.tensordot(member, self.grams, axes=1), member @ self.cross
 
+    def _explained(self, gram: Array, cross: Array) -> Array:
+        """From sums (S, p, p) and (S, p) over the sets."""
+        whole = self._sums(np.ones((1, self.runs), bool))
+        others = self._energy(whole[0] - gram, whole[1] - cross)
+        return self._energy(gram, cross) + others - self._energy(*whole)
 
-def _energy(gram: Array, cross: Array) -> Array:
-    return np.einsum("sp,sp->s", np.linalg.solve(gram, cross[:, :, None])[:, :, 0], cross)
+    def _energy(self, gram: Array, cross: Array) -> Array:
+        return np.einsum("sp,sp->s", self._fitted(gram, cross), cross)
+
+    def _fitted(self, gram: Array, cross: Array) -> Array:
+        ridge = np.diag(_RIDGE * np.diag(self.grams.sum(axis=0)) + 1e-300)
+        return np.asarray(np.linalg.solve(gram + ridge, cross[:, :, None])[:, :, 0])
 
 
 def evidence_by_run(

@@ -61,11 +61,10 @@ class CandidateBases:
 
     @cached_property
     def of_one_shape(self) -> list[OneShape]:
-        """Candidates of several columns."""
+        """All candidates."""
         shapes: dict[tuple[int, ...], list[int]] = {}
-        for i, block in enumerate(self.blocks):
-            if len(block) > 1:
-                shapes.setdefault(self.basis([i]).shape, []).append(i)
+        for i in range(len(self.blocks)):
+            shapes.setdefault(self.basis([i]).shape, []).append(i)
         found = []
         for several in shapes.values():
             at = np.stack([self.blocks[i] for i in several])
@@ -135,41 +134,21 @@ class Schur:
             absorbed = SHARED
         e = self._candidates
         at = np.concatenate([e.blocks[i] for i in candidates]) - e.fixed
-        return gain_of_columns(e, self.block(at, at), self.cross[at], candidates, absorbed)
+        return gain_of_columns(self.block(at, at), self.cross[at], e.basis(candidates), absorbed)
 
     @cached_property
     def singles(self) -> list[Gain]:
         """Gain of every candidate alone."""
-        e = self._candidates
-        first = np.array([b[0] for b in e.blocks], dtype=int) - e.fixed
-        left = self.diagonal[first]
-        share = left / np.maximum(np.diag(e.total)[e.fixed : -1][first], 1e-300)
-        alive = share > np.where(self._told[first], SHARED, ABSORBED)
-        chi2 = np.where(alive, self.cross[first] ** 2 / np.where(alive, left, 1.0), 0.0)
-        found = [
-            Gain(*each)
-            for each in zip(chi2.tolist(), alive.astype(int).tolist(), share.tolist(), strict=True)
-        ]
-        for several in e.of_one_shape:
-            for i, gain in zip(several.candidates, self._together(several), strict=True):
-                found[i] = gain
-        return found
-
-    def _together(self, several: OneShape) -> list[Gain]:
-        """As `gain_of_columns`, of candidates of one shape at once."""
-        e = self._candidates
-        at = several.columns - e.fixed
-        shared, solved = (np.moveaxis(each[:, at], 0, 2) for each in (self._shared, self._solved))
-        left = several.grams - shared @ np.swapaxes(solved, 1, 2)
-        turned = np.swapaxes(several.bases, 1, 2)
-        shares, axes = np.linalg.eigh(turned @ left @ several.bases)
-        alive = shares > ABSORBED
-        z = (np.swapaxes(axes, 1, 2) @ (turned @ self.cross[at][:, :, None]))[:, :, 0]
-        chi2 = np.sum(np.where(alive, z**2 / np.where(alive, shares, 1.0), 0.0), axis=1)
-        # Columns of nothing, of an effect that these data do not show, have no direction at all.
-        most = shares.max(axis=1, initial=0.0)
-        each = zip(chi2.tolist(), alive.sum(axis=1).tolist(), most.tolist(), strict=True)
-        return [Gain(*values) for values in each]
+        found: dict[int, Gain] = {}
+        for alike in self._candidates.of_one_shape:
+            at = alike.columns - self._candidates.fixed
+            shared, solved = (np.moveaxis(x[:, at], 0, 2) for x in (self._shared, self._solved))
+            left = alike.grams - shared @ np.swapaxes(solved, 1, 2)
+            told = self._told[at[:, :1]] & (at.shape[1] == 1)
+            absorbed = np.where(told, SHARED, ABSORBED)
+            gains = _gains(left, self.cross[at], alike.bases, absorbed)
+            found |= dict(zip(alike.candidates, gains, strict=True))
+        return [found[i] for i in range(len(found))]
 
     def pair_chi2(self, first: Array, second: Array) -> Array:
         """χ² of pairs of candidates of one column each, without those that are collinear."""
@@ -184,21 +163,19 @@ class Schur:
         return np.where(determinant > 1e-3 * ii * jj, found, 0.0)
 
 
-def gain_of_columns(
-    e: CandidateBases, left: Array, cross: Array, candidates: Sequence[int], absorbed: float
-) -> Gain:
-    """Of candidates of which (p, p) is `left`, with the products (p,) with the residual."""
-    if len(cross) == 1:
-        column = int(e.blocks[candidates[0]][0])
-        own, product = float(left[0, 0]), float(cross[0])
-        share = own / max(float(e.total[column, column]), 1e-300)
-        if share < absorbed:
-            return Gain(0.0, 0, share)
-        return Gain(product * product / own, 1, share)
-    basis = e.basis(candidates)
-    shares, turned = np.linalg.eigh(basis.T @ left @ basis)
+def gain_of_columns(left: Array, cross: Array, basis: Array, absorbed: float) -> Gain:
+    """Of w columns of which (w, w) is `left`, with products (w,) with the residual and a basis."""
+    return _gains(left[None], cross[None], basis[None], np.full((1, 1), absorbed))[0]
+
+
+def _gains(left: Array, cross: Array, bases: Array, absorbed: Array) -> list[Gain]:
+    """Of candidates of one shape: (m, w, w), (m, w), (m, w, d) and (m, 1)."""
+    turned = np.swapaxes(bases, 1, 2)
+    shares, axes = np.linalg.eigh(turned @ left @ bases)
     alive = shares > absorbed
-    if not alive.any():
-        return Gain(0.0, 0, float(shares.max(initial=0.0)))
-    z = turned[:, alive].T @ (basis.T @ cross)
-    return Gain(float(np.sum(z**2 / shares[alive])), int(alive.sum()), float(shares[-1]))
+    z = (np.swapaxes(axes, 1, 2) @ (turned @ cross[:, :, None]))[:, :, 0]
+    chi2 = np.sum(np.where(alive, z**2 / np.where(alive, shares, 1.0), 0.0), axis=1)
+    # Columns of nothing, of an effect that these data do not show, have no direction at all.
+    most = shares.max(axis=1, initial=0.0)
+    each = zip(chi2.tolist(), alive.sum(axis=1).tolist(), most.tolist(), strict=True)
+    return [Gain(*values) for values in each]

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from excite_cli.config.data_spec import DiagnosisSpec
-from excite_cli.diagnosis.candidates import Candidate, possible_effects, with_columns
+from excite_cli.diagnosis.candidates import Candidate, possible_effects, shapes_around, with_columns
 from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.in_runs import SeenRuns
@@ -30,7 +30,6 @@ from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import placebos_of
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
 from excite_cli.diagnosis.reach import Reach
-from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.textbook import everyday, textbook_effects
 from excite_cli.diagnosis.training import TrainingData

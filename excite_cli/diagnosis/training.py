@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
-from excite_cli.diagnosis.grams import Grams, JointGram, joined
+from excite_cli.diagnosis.grams import Grams, JointGram
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.identification.covariance import Rows
 from excite_cli.identification.prepare import PreparedRun
@@ -24,20 +24,20 @@ _BLOCK = 1.0  # s
 _FEWEST_BLOCKS = 4
 
 
-class Columns(Protocol):
-    """What may be added to the model: the joints it acts on, columns (M, rows, width) per part."""
+@dataclass(frozen=True)
+class Shown:
+    """Columns (M, rows, width) per part on the rows of some joints, whoever made them."""
 
-    @property
-    def rows(self) -> tuple[int, ...]:
-        """Joints."""
-
-    @property
-    def columns(self) -> tuple[Array, ...]:
-        """Per part, filtered and decimated."""
+    rows: tuple[int, ...]
+    columns: tuple[Array, ...]
 
     @property
     def width(self) -> int:
         """Number of columns."""
+        return int(self.columns[0].shape[2])
+
+
+Columns = Candidate | Shown  # what may be added to the model
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,11 @@ class TrainingData:
         return int(self.tau[0].shape[1])
 
     @cached_property
-    def sides(self) -> tuple[NDArray[np.bool_], ...]:
-        """Which side (M,) of its fold every sample is on: blocks of time in turn."""
-        return tuple(_sides(run.averaged(run.t)) for run in self.runs)
+    def sides(self) -> "BlocksOfTime":
+        """Two sides of every fold, blocks of a second in turn: 2f and 2f + 1 of fold f."""
+        sides = (_sides(run.averaged(run.t)) for run in self.runs)
+        owners = tuple(2 * fold + own for fold, own in zip(self.folds, sides, strict=True))
+        return BlocksOfTime(2 * (max(self.folds) + 1), owners)
 
     def columns(
         self, candidates: Sequence[Columns], chosen: Sequence[int], part: int, joint: int
@@ -87,69 +89,74 @@ class TrainingData:
         candidates: Sequence[Columns],
         noise: NoiseModel,
         known: Mapping[int, JointGram] | None = None,
+        blocks: "BlocksOfTime | None" = None,
     ) -> Evidence:
         """Gram matrices of all columns, whitened by `noise`; linear in the number of samples.
 
         `known`: Gram matrices, with this noise, of joints whose rows hold no candidate but those
-        they were made with, which come first here too.
+        they were made with, which come first here too. `blocks`: `sides` if none are given.
         """
-        known = known or {}
         starts = self._starts(candidates)
-        made = self.grams(candidates, noise, [j for j in range(self.n) if j not in known])
-        grams = [known[joint] if joint in known else made[joint] for joint in range(self.n)]
+        joints = dict(known or {})
+        missing = [joint for joint in range(self.n) if joint not in joints]
+        joints |= self.grams(candidates, noise, missing, blocks)
+        nothing = np.zeros((starts[0] + 1, starts[0] + 1))
         return Evidence(
-            Grams(grams, int(starts[-1]) + 1),
+            Grams([joints[joint] for joint in range(self.n)], int(starts[-1]) + 1),
             int(starts[0]),
             [np.arange(*ends) for ends in pairwise(starts)],
             [c.rows for c in candidates],
-            self.prior,
-            self.weighed,
+            nothing if self.prior is None else self.prior,
+            nothing if self.weighed is None else self.weighed,
         )
 
     def grams(
-        self, candidates: Sequence[Columns], noise: NoiseModel, joints: Sequence[int]
+        self,
+        candidates: Sequence[Columns],
+        noise: NoiseModel,
+        joints: Sequence[int],
+        blocks: "BlocksOfTime | None" = None,
     ) -> dict[int, JointGram]:
-        """Gram matrices of the whitened rows of some joints."""
+        """Gram matrices of the whitened rows of some joints, in the `blocks` or the `sides`."""
+        blocks = self.sides if blocks is None else blocks
         # Two tasks a joint: an odd number of joints would leave the last of two workers alone.
-        halves = _halves(self.folds)
+        parts = [half for half in np.array_split(np.arange(len(self.runs)), 2) if len(half)]
         tasks = (
-            (self.rows_of(candidates, joint, parts), [self.folds[part] for part in parts])
+            (joint, [(*self._rows_of(candidates, joint, k), blocks.owners[k]) for k in half])
             for joint in joints
-            for parts in halves
+            for half in parts
         )
-        found = each(_gram, (max(self.folds) + 1, noise), tasks)
-        return {joint: joined([next(found) for _ in halves]) for joint in joints}
+        made = each(_blocks_of, (blocks.count, noise), tasks)
+        return {
+            joint: JointGram(
+                self._active(candidates, joint), np.asarray(sum(next(made) for _ in parts))
+            )
+            for joint in joints
+        }
 
     def _starts(self, candidates: Sequence[Columns]) -> NDArray[np.intp]:
         """Where the columns of every candidate begin among all, and where the last ones end."""
         return self.declared[0].shape[2] + np.cumsum([0, *(c.width for c in candidates)])
 
-    def rows_of(
-        self, candidates: Sequence[Columns], joint: int, parts: Sequence[int] | None = None
-    ) -> "JointRows":
-        """What shows in the rows of one joint of the declared model and the candidates.
-
-        Of all parts, or those given.
-        """
-        parts = range(len(self.runs)) if parts is None else parts
+    def _active(self, candidates: Sequence[Columns], joint: int) -> NDArray[np.intp]:
+        """Columns (A,) of the declared model and of the candidates in the rows of a joint."""
         starts = self._starts(candidates)
         there = [i for i, c in enumerate(candidates) if joint in c.rows]
-        touching = [candidates[i] for i in there]
-        active = [np.arange(starts[0]), *(np.arange(*starts[i : i + 2]) for i in there)]
-        return JointRows(
-            joint,
-            np.concatenate(active).astype(np.intp),
-            [
-                [
-                    self.declared[part][:, joint],
-                    *(c.columns[part][:, c.rows.index(joint)] for c in touching),
-                    self.tau[part][:, joint, None],
-                ]
-                for part in parts
-            ],
-            [self.runs[part].usable[:, joint] for part in parts],
-            [self.sides[part] for part in parts],
-        )
+        return np.concatenate(
+            [np.arange(starts[0]), *(np.arange(*starts[i : i + 2]) for i in there)]
+        ).astype(np.intp)
+
+    def _rows_of(
+        self, candidates: Sequence[Columns], joint: int, part: int
+    ) -> tuple[list[Array], NDArray[np.bool_]]:
+        """Columns (M, …) of one joint's rows in a part, torque last; which rows are usable (M,)."""
+        touching = [c for c in candidates if joint in c.rows]
+        columns = [
+            self.declared[part][:, joint],
+            *(c.columns[part][:, c.rows.index(joint)] for c in touching),
+            self.tau[part][:, joint, None],
+        ]
+        return columns, self.runs[part].usable[:, joint]
 
     def rows(self, candidates: Sequence[Columns], chosen: Sequence[int]) -> list[Rows]:
         """Rows of every run for the regression of `identify`."""
@@ -176,42 +183,30 @@ class TrainingData:
 
 
 @dataclass(frozen=True)
-class JointRows:
-    """Rows of one joint: `active` (A,) says which columns, and of every part there are blocks of
-    them (M, k), the torque last; which samples are usable, and on which side of their fold."""
+class BlocksOfTime:
+    """Which of `count` blocks every sample (M,) of every part is in."""
 
-    joint: int
-    active: NDArray[np.intp]
-    blocks: Sequence[Sequence[Array]]
-    usable: Sequence[NDArray[np.bool_]]
-    sides: Sequence[NDArray[np.bool_]]
+    count: int
+    owners: tuple[NDArray[np.intp], ...]
 
 
-def _gram(
-    shared: tuple[int, NoiseModel], task: tuple[JointRows, Sequence[int]], tell: Tell
-) -> JointGram:
-    """Gram matrices of the whitened rows of one joint, of parts of the folds that are told."""
-    folds, noise = shared
-    rows, of_parts = task
-    size = len(rows.active) + 1
-    whole = np.zeros((folds, size, size))
-    first = np.zeros_like(whole)
-    for fold, blocks, usable, side in zip(
-        of_parts, rows.blocks, rows.usable, rows.sides, strict=True
-    ):
-        white = noise.whitened(np.concatenate(blocks, axis=1), rows.joint, usable)
-        whole[fold] += white.T @ white
-        own = white[~side[usable]]
-        first[fold] += own.T @ own
+def _blocks_of(
+    shared: tuple[int, NoiseModel],
+    task: tuple[int, Sequence[tuple[list[Array], NDArray[np.bool_], NDArray[np.intp]]]],
+    tell: Tell,
+) -> Array:
+    """Gram matrices (B, A + 1, A + 1) of the whitened rows of one joint in some parts."""
+    count, noise = shared
+    joint, parts = task
+    size = sum(own.shape[1] for own in parts[0][0])
+    found = np.zeros((count, size, size))
+    for columns, usable, owner in parts:
+        white = noise.whitened(np.concatenate(columns, axis=1), joint, usable)
+        for block in np.unique(owner[usable]):
+            own = white[owner[usable] == block]
+            found[block] += own.T @ own
         forget()
-    return JointGram(rows.active, whole, first)
-
-
-def _halves(folds: Sequence[int]) -> list[list[int]]:
-    """Parts of the lower and of the upper half of the folds; one list where there is one fold."""
-    half = (max(folds) + 1) // 2
-    sides = [[part for part, fold in enumerate(folds) if (fold < half) == low] for low in (1, 0)]
-    return [side for side in sides if side]
+    return found
 
 
 def _residual(
@@ -228,16 +223,8 @@ def _residual(
     return np.asarray(residual)
 
 
-@dataclass(frozen=True)
-class Shown:
-    """Columns as they are, whoever made them."""
-
-    rows: tuple[int, ...]
-    columns: tuple[Array, ...]
-    width: int
-
-
-def _sides(t: Array) -> NDArray[np.bool_]:
+def _sides(t: Array) -> NDArray[np.intp]:
+    """Side 0 or 1 (M,) of every sample."""
     span = float(t[-1] - t[0])
     block = max(min(_BLOCK, span / _FEWEST_BLOCKS), 1e-12)
-    return np.asarray(np.floor((t - t[0]) / block) % 2 > 0.5)
+    return np.asarray(np.floor((t - t[0]) / block) % 2).astype(np.intp)

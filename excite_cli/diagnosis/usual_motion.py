@@ -23,6 +23,11 @@ _PACE = 0.5  # of the fastest speed
 _FARTHEST, _FASTEST = 2.5, 2.5
 
 
+def is_steady(effect: Effect) -> bool:
+    """Whether it is in all runs, and follows neither time nor a column of the log."""
+    return not (effect.runs or effect.covariate or "time" in effect.function_of)
+
+
 class UsualMotion:
     """A sum of harmonics per joint, over most of its range or to half of its fastest speed."""
 
@@ -55,15 +60,11 @@ class UsualMotion:
         """
         own = [self.signals.body.regressor[:, :, model.base.selection]]
         for effect in (*model.declared, *effects):
-            columns = effect_columns([effect] if self._is_steady(effect) else [], self.signals)
+            columns = effect_columns([effect] if is_steady(effect) else [], self.signals)
             missing = len(effect.parameters) - columns.shape[2]
             own.append(np.pad(np.nan_to_num(columns), ((0, 0), (0, 0), (0, missing))))
         every = np.concatenate(own, axis=2).swapaxes(0, 1)
         return np.stack([each.T @ each for each in every]) / every.shape[1]
-
-    @staticmethod
-    def _is_steady(effect: Effect) -> bool:
-        return not (effect.runs or effect.covariate or "time" in effect.function_of)
 
     def squares(self, effect: Effect) -> Array:
         """Mean over time (rows, p, p) of products of the columns: θᵀ S θ is the mean square."""

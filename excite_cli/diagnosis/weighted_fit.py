@@ -46,7 +46,7 @@ class WeightedFit:
         self._counts = sum(run.usable.sum(axis=0) for run in data.runs)
         found = data.evidence(candidates, NoiseModel.white(np.ones(data.n)))
         self._evidence = found
-        self._grams = [(joint.active, joint.whole.sum(axis=0)) for joint in found.grams.joints]
+        self._grams = [(joint.active, joint.blocks.sum(axis=0)) for joint in found.grams.joints]
         self._prior = np.zeros((found.torque + 1,) * 2)
         if data.prior is not None:
             known = np.append(np.arange(found.fixed), found.torque)

@@ -243,7 +243,7 @@ def rows_of(
                 y.append((data.tau[part][t, joint] - by @ data.tau[part][past, joint]) / left)
                 folds.append(fold)
                 joints.append(joint)
-                sides.append(data.sides[part][t])
+                sides.append(data.sides.owners[part][t] % 2)
     return Rows(
         np.array(x), np.array(y), np.array(folds), np.array(joints), blocks, known, np.array(sides)
     )  # fmt: skip

@@ -20,14 +20,14 @@ def both() -> tuple[Grams, np.ndarray]:
         own = rng.normal(size=(FOLDS, 2, len(active) + 1, len(active) + 1))
         at = np.array([*active, SIZE - 1])
         full[:, :, j, at[:, None], at] = own
-        joints.append(JointGram(np.array(active), own.sum(axis=1), own[:, 0]))
+        joints.append(JointGram(np.array(active), own.reshape(-1, *own.shape[2:])))
     return Grams(joints, SIZE), full
 
 
 def test_sums_over_folds_and_joints(both: tuple[Grams, np.ndarray]) -> None:
     grams, full = both
     assert grams.total() == pytest.approx(full.sum(axis=(0, 1, 2)))
-    assert grams.seen() == pytest.approx(np.einsum("fsjkk->fk", full))
+    assert grams.seen() == pytest.approx(np.einsum("fsjkk->fsk", full).reshape(-1, SIZE))
     assert grams.torque_energy(1) == pytest.approx(full[:, :, 1, -1, -1].sum())
 
 

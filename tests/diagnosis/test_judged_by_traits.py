@@ -11,11 +11,10 @@ import pytest
 from scipy.stats import chi2
 
 from excite_cli.config.data_spec import DiagnosisSpec
-from excite_cli.diagnosis.candidates import Candidate, possible_effects
+from excite_cli.diagnosis.candidates import Candidate, possible_effects, shapes_around
 from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.refinement import shapes_around
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.tracing import _usual
 from excite_cli.effects.base import Effect, Signals, Tier

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import EffectSpec
-from excite_cli.diagnosis.refinement import shapes_around
+from excite_cli.diagnosis.candidates import shapes_around
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.effects.covariate_friction import CovariateFriction
 from excite_cli.effects.covariate_offset import CovariateOffset
