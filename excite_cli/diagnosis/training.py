@@ -1,6 +1,6 @@
 """The training data of a diagnosis: motion, inertial columns and torque of every part."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -88,21 +88,16 @@ class TrainingData:
         self,
         candidates: Sequence[Columns],
         noise: NoiseModel,
-        known: Mapping[int, JointGram] | None = None,
         blocks: "BlocksOfTime | None" = None,
     ) -> Evidence:
         """Gram matrices of all columns, whitened by `noise`; linear in the number of samples.
 
-        `known`: Gram matrices, with this noise, of joints whose rows hold no candidate but those
-        they were made with, which come first here too. `blocks`: `sides` if none are given.
+        In the `blocks` of time, or the `sides` if none are given.
         """
         starts = self._starts(candidates)
-        joints = dict(known or {})
-        missing = [joint for joint in range(self.n) if joint not in joints]
-        joints |= self.grams(candidates, noise, missing, blocks)
         nothing = np.zeros((starts[0] + 1, starts[0] + 1))
         return Evidence(
-            Grams([joints[joint] for joint in range(self.n)], int(starts[-1]) + 1),
+            Grams(self._grams(candidates, noise, blocks or self.sides), int(starts[-1]) + 1),
             int(starts[0]),
             [np.arange(*ends) for ends in pairwise(starts)],
             [c.rows for c in candidates],
@@ -110,29 +105,22 @@ class TrainingData:
             nothing if self.weighed is None else self.weighed,
         )
 
-    def grams(
-        self,
-        candidates: Sequence[Columns],
-        noise: NoiseModel,
-        joints: Sequence[int],
-        blocks: "BlocksOfTime | None" = None,
-    ) -> dict[int, JointGram]:
-        """Gram matrices of the whitened rows of some joints, in the `blocks` or the `sides`."""
-        blocks = self.sides if blocks is None else blocks
+    def _grams(
+        self, candidates: Sequence[Columns], noise: NoiseModel, blocks: "BlocksOfTime"
+    ) -> list[JointGram]:
+        """Gram matrices of the whitened rows of every joint."""
         # Two tasks a joint: an odd number of joints would leave the last of two workers alone.
         parts = [half for half in np.array_split(np.arange(len(self.runs)), 2) if len(half)]
         tasks = (
             (joint, [(*self._rows_of(candidates, joint, k), blocks.owners[k]) for k in half])
-            for joint in joints
+            for joint in range(self.n)
             for half in parts
         )
         made = each(_blocks_of, (blocks.count, noise), tasks)
-        return {
-            joint: JointGram(
-                self._active(candidates, joint), np.asarray(sum(next(made) for _ in parts))
-            )
-            for joint in joints
-        }
+        return [
+            JointGram(self._active(candidates, joint), np.asarray(sum(next(made) for _ in parts)))
+            for joint in range(self.n)
+        ]
 
     def _starts(self, candidates: Sequence[Columns]) -> NDArray[np.intp]:
         """Where the columns of every candidate begin among all, and where the last ones end."""

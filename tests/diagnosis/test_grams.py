@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.grams import Grams, JointGram
-from excite_cli.diagnosis.noise_model import NoiseModel
-from tests.diagnosis.explicit_data import random_candidates, random_data
 
 FOLDS, SIZE = 3, 7
 
@@ -29,17 +27,3 @@ def test_sums_over_folds_and_joints(both: tuple[Grams, np.ndarray]) -> None:
     assert grams.total() == pytest.approx(full.sum(axis=(0, 1, 2)))
     assert grams.seen() == pytest.approx(np.einsum("fsjkk->fsk", full).reshape(-1, SIZE))
     assert grams.torque_energy(1) == pytest.approx(full[:, :, 1, -1, -1].sum())
-
-
-def test_joints_that_are_known_need_not_be_summed_again() -> None:
-    """Candidates of one joint beside others: the rows of all other joints stay as they are."""
-    data, candidates = random_data(3), random_candidates(3)
-    noise = NoiseModel.white(np.array([0.5, 3.0]))
-    own = [c for c in candidates if c.rows == (0,)]
-    first = [c for c in candidates if c.rows != (0,)]
-    assert own
-    assert first
-    known = data.grams(first, noise, [1])
-    found = data.evidence([*first, *own], noise, known)
-    anew = data.evidence([*first, *own], noise)
-    assert np.array_equal(found.grams.total(), anew.grams.total())
