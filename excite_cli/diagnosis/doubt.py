@@ -14,10 +14,9 @@ effect of an impossible sign or size would explain. The effect is an approximati
 * or if it is the mean of a curve that is one (`_means_of_curves`).
 
 Rests say nothing of effects that inertias nearly take up, of which E is next to nothing, but by
-their own quantity. A change in some
-runs or over time, first-order friction and, where a good part can be predicted, a constant are
-means of a function of anything: U > 0.25 E is enough for changes, U > 0.3 E for friction and
-U > 0.5 E for constants (docs/decisions.md).
+their own quantity. A change in some runs or over time, first-order friction and, where a good part
+can be predicted, a constant are means of a function of anything: U > 0.25 E is enough for changes,
+U > 0.3 E for friction and U > 0.5 E for constants (docs/decisions.md).
 """
 
 from collections.abc import Mapping, Sequence
