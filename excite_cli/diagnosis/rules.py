@@ -23,8 +23,8 @@ ON_FEWER_ROWS = 25.0
 # than `MUCH` of all torque seen of its joint, is not known from these data. Of 366 effects beyond
 # the textbook's in 39 robots of the battery two, and no helpful one, are beyond both (they add 0.5
 # and 0.7 to the logarithm of a held-out error); three harmful and four helpful ones with 0.3 in
-# place of 0.5; eight and 19 with 0.1. Imagined samples do not say it: without it a simulated arm
-# with a wave in a joint was given a spring, too, and left with 27 times the error.
+# place of 0.5; eight and 19 with 0.1. Imagined samples do not say it: without it a joint with a
+# wave was given a linear function of its angle, too, and 27 times the error.
 FARTHER, MUCH = 3.0, 0.5
 
 # What changes with time is looked for in so many recordings or more. Left of the KR300's split C
