@@ -13,14 +13,7 @@ from excite_cli.errors import ExciteError
 from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.filter_bias import filter_findings, fitted_behind
-from excite_cli.identification.fit import (
-    Fit,
-    all_rows,
-    effect_parameters,
-    fit,
-    follows_model,
-    rebuilt,
-)
+from excite_cli.identification.fit import Fit, effect_parameters, fit
 from excite_cli.identification.hausman import (
     SIGNIFICANT,
     Hausman,
@@ -34,7 +27,12 @@ from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import prepare_all, require_motion, standing_still
 from excite_cli.identification.processing import Processing, choose_processing
-from excite_cli.identification.regression import Regression, build_regression
+from excite_cli.identification.regression import (
+    Regression,
+    build_regression,
+    follows_model,
+    rebuilt,
+)
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_scale import assumed_scale, knowledge_of
@@ -199,8 +197,8 @@ def _hausman(
     except ExciteError as error:
         return not_testable(str(error))
     return hausman_test(
-        all_rows(training.runs),
-        [rows.columns for rows in all_rows(other.runs)],
+        [run.rows for run in training.runs],
+        [run.columns for run in other.runs],
         source,
         found.noise,
     )

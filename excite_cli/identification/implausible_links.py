@@ -6,7 +6,7 @@
               the farthest corner of this box by more than two standard deviations
 
 A mass needs no deviation: the set stands as near to the URDF as the data allow
-(`consistent_spread`), so that a link far from it was held there, and the data did not let it.
+(`consistent_near_prior`), so that a link far from it was held there, and the data did not let it.
 
 The box spans the frame, the joints and links that the body carries, the URDF's centre of mass, and
 the shapes of the URDF (collision, else visual). Where there are no shapes it is wider by a length

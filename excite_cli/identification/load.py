@@ -26,7 +26,7 @@ from excite_cli.effects.signals import Signals
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.filter_bias import filter_findings
-from excite_cli.identification.fit import Fit, fit, rebuilt
+from excite_cli.identification.fit import Fit, fit
 from excite_cli.identification.identify import judged
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.prepare import prepare_all, require_motion
@@ -35,6 +35,7 @@ from excite_cli.identification.regression import (
     Regression,
     build_regression,
     effect_columns,
+    rebuilt,
     with_effects,
 )
 from excite_cli.identification.stored_fit import StoredFit

@@ -36,12 +36,12 @@ def noise_of(residual: Array, usable: Mask) -> Noise:
     """Fit the model to residuals (M, n) of one run."""
     clean = np.where(usable, residual, 0.0)
     polynomials = [_polynomial(e, good) for e, good in zip(residual.T, usable.T, strict=True)]
-    innovations = [
+    white = [
         np.convolve(e, polynomial)[: len(e)]
         for e, polynomial in zip(clean.T, polynomials, strict=True)
     ]
     good = _after_gaps(usable, max(map(len, polynomials)))
-    innovations = np.where(good, np.stack(innovations, axis=1), 0.0)
+    innovations = np.where(good, np.stack(white, axis=1), 0.0)
     counts = good.T.astype(float) @ good
     covariance = innovations.T @ innovations / np.maximum(counts, 1.0)
     return Noise(tuple(polynomials), _positive(covariance))

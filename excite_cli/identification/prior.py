@@ -60,9 +60,9 @@ class InertialPrior:
         usual = float(np.median(np.abs(whiten @ values - target))) / _MEDIAN
         return self if usual <= _AS_USUAL else InertialPrior(self.mean, usual * self.std)
 
-    def narrowed(self, shares: Array) -> "InertialPrior":
-        """The same with deviations multiplied by `shares` (P,)."""
-        return InertialPrior(self.mean, shares * self.std)
+    def base_std(self, base: BaseParameters) -> Array:
+        """Standard deviations (r,) of base parameters."""
+        return np.sqrt(np.square(base.mapping) @ np.square(self.std))
 
     def rows(self, base: BaseParameters, more: int = 0) -> Array:
         """`on_base` as rows [A b] (r, r + more + 1), zero for `more` other parameters."""

@@ -10,28 +10,28 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
+from excite_cli.identification.covariance import Rows
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 
+# Samples on which columns are tried: whether they change with the model's torque.
+_PROBE = 60
+
 
 @dataclass(frozen=True)
 class RunColumns:
     """One prepared run with its columns.
 
-    `inertial` (M, n, r) the regressor of the base parameters, `effects` (M, n, k) all linear
-    parameters of all effects in order, `tau` (M, n), `usable` and `moving` (M, n), `step` between
-    the samples [s]; `prepared` holds the motion at the working rate.
+    `columns` (M, n, r + k): the regressor of the `rank` base parameters, then all linear parameters
+    of all effects in order; `tau` (M, n); `prepared` holds the motion at the working rate.
     """
 
-    step: float
     columns: Array
     rank: int
     tau: Array
-    usable: NDArray[np.bool_]
-    moving: NDArray[np.bool_]
     prepared: PreparedRun
 
     @property
@@ -43,6 +43,12 @@ class RunColumns:
     def effects(self) -> Array:
         """Columns (M, n, k) of the effects."""
         return self.columns[:, :, self.rank :]
+
+    @property
+    def rows(self) -> Rows:
+        """Rows for the least-squares fit."""
+        own = self.prepared
+        return Rows(self.columns, self.tau, own.usable, rounding=own.rounding)
 
 
 @dataclass(frozen=True)
@@ -76,13 +82,9 @@ def with_effects(signals: Signals, effects: Sequence[Effect], values: Array) -> 
     """
     if not len(values):
         return signals
-    in_robot = np.repeat(
-        [not effect.data_defect for effect in effects],
-        [len(effect.parameters) for effect in effects],
-    )
-    carried = np.repeat(
-        [effect.carried for effect in effects], [len(effect.parameters) for effect in effects]
-    )
+    counts = [len(effect.parameters) for effect in effects]
+    in_robot = np.repeat([not effect.data_defect for effect in effects], counts)
+    carried = np.repeat([effect.carried for effect in effects], counts)
     load = signals.load
     if carried.any():
         load = load + effect_columns(effects, signals) @ np.where(carried, values, 0.0)
@@ -121,7 +123,7 @@ def build_regression(
     effects: Sequence[Effect],
     runs: Sequence[PreparedRun],
     phi: Array | None = None,
-    values: Array | None = None,
+    values: Array = np.zeros(0),
 ) -> Regression:
     """Columns of every run; effects that look at the torque see the rigid body at `phi`.
 
@@ -130,31 +132,58 @@ def build_regression(
     found, spool = [], Spool()
     columns = each(_columns, (robot, base.selection, effects, phi, values), runs)
     for prepared, own in zip(runs, columns, strict=True):
-        found.append(
-            RunColumns(
-                step=prepared.step,
-                columns=spool.keep(own),
-                rank=len(base.selection),
-                tau=for_base_columns(robot, base, prepared),
-                usable=prepared.usable,
-                moving=prepared.moving,
-                prepared=prepared,
-            )
-        )
+        tau = for_base_columns(robot, base, prepared)
+        found.append(RunColumns(spool.keep(own), base.rank, tau, prepared))
     return Regression(robot, base, tuple(effects), tuple(found))
 
 
 def _columns(
-    shared: tuple[Robot, NDArray[np.intp], Sequence[Effect], Array | None, Array | None],
+    shared: tuple[Robot, NDArray[np.intp], Sequence[Effect], Array | None, Array],
     prepared: PreparedRun,
     tell: Tell,
 ) -> Array:
     """Averages of the regressor of the base parameters, and of the effects' columns."""
     robot, selection, effects, phi, values = shared
-    signals = signals_of(prepared, robot, phi)
-    if values is not None:
-        signals = with_effects(signals, effects, values)
+    signals = with_effects(signals_of(prepared, robot, phi), effects, values)
     inertial = prepared.averaged_for_fit(signals.body.regressor[:, :, selection])
     signals.body.forget()
+    own = prepared.averaged_for_fit(effect_columns(effects, signals))
+    return np.concatenate([inertial, own], axis=2)
+
+
+def follows_model(regression: Regression) -> bool:
+    """Whether columns of the effects change with φ, tried on a few samples."""
+    if not regression.effects or not regression.runs:
+        return False
+    prepared = regression.runs[0].prepared
+    cut = slice(0, _PROBE)
+    series = {name: getattr(prepared, name)[cut] for name in ("t", "q", "v", "a")}
+    covariates = {name: values[cut] for name, values in prepared.covariates.items()}
+    brief = replace(prepared, **series, covariates=covariates)
+    cad = standard_parameters(regression.robot)
+    one, other = (
+        effect_columns(regression.effects, signals_of(brief, regression.robot, phi))
+        for phi in (cad, 1.3 * cad)
+    )
+    return not np.allclose(one, other, rtol=1e-9, atol=1e-12)
+
+
+def rebuilt(regression: Regression, phi: Array, values: Array) -> Regression:
+    """The effects' columns again, with the rigid body at `phi` and effects of `values`."""
+    spool, shared = Spool(), (regression.robot, regression.effects, phi, values)
+    made = each(_again, shared, [(run.prepared, run.inertial) for run in regression.runs])
+    runs = zip(regression.runs, made, strict=True)
+    return replace(
+        regression, runs=tuple(replace(run, columns=spool.keep(own)) for run, own in runs)
+    )
+
+
+def _again(
+    shared: tuple[Robot, Sequence[Effect], Array, Array],
+    task: tuple[PreparedRun, Array],
+    tell: Tell,
+) -> Array:
+    (robot, effects, phi, values), (prepared, inertial) = shared, task
+    signals = with_effects(signals_of(prepared, robot, phi), effects, values)
     own = prepared.averaged_for_fit(effect_columns(effects, signals))
     return np.concatenate([inertial, own], axis=2)
