@@ -1,7 +1,7 @@
 """The regression: torque and the columns that explain it, filtered and decimated alike."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.covariance import Rows
 from excite_cli.identification.prepare import PreparedRun
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
 from excite_cli.workers.at_hand import each
@@ -61,17 +62,35 @@ class Regression:
     runs: tuple[RunColumns, ...]
 
 
-def signals_of(prepared: PreparedRun, robot: Robot, phi: Array | None = None) -> Signals:
-    """What effects may look at in a run, with the rigid-body torque at `phi` (default: URDF)."""
+@dataclass(frozen=True)
+class Series:
+    """States (T, n) at equidistant instants `t` (T,) [s], and what else effects look at.
+
+    `start` [s] on the campaign's clock; `covariates` (T,) by name; `before` (L, n) positions of the
+    same time step before the first, where they are known.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    run: RunId = field(default_factory=RunId)
+    start: float = 0.0
+    covariates: Mapping[str, Array] = field(default_factory=dict)
+    before: Array | None = None
+
+
+def signals_of(motion: PreparedRun | Series, robot: Robot, phi: Array | None = None) -> Signals:
+    """What effects may look at in a motion, with the rigid-body torque at `phi` (default: URDF)."""
     phi = standard_parameters(robot) if phi is None else phi
-    return seen_of(prepared, RigidBody(robot, phi, prepared.q, prepared.v, prepared.a))
+    return seen_of(motion, RigidBody(robot, phi, motion.q, motion.v, motion.a))
 
 
-def seen_of(prepared: PreparedRun, body: RigidBody) -> Signals:
-    """What effects may look at in a run whose rigid body is known, moving as the run does."""
+def seen_of(motion: PreparedRun | Series, body: RigidBody) -> Signals:
+    """What effects may look at in a motion whose rigid body is known, moving as it does."""
     return Signals(
-        prepared.t, prepared.q, prepared.v, prepared.a, body.load, body.load, body,
-        prepared.run, prepared.start, prepared.covariates, prepared.before,
+        motion.t, motion.q, motion.v, motion.a, body.load, body.load, body,
+        motion.run, motion.start, motion.covariates, motion.before,
     )  # fmt: skip
 
 
@@ -155,11 +174,10 @@ def follows_model(regression: Regression) -> bool:
     """Whether columns of the effects change with φ, tried on a few samples."""
     if not regression.effects or not regression.runs:
         return False
-    prepared = regression.runs[0].prepared
-    cut = slice(0, _PROBE)
-    series = {name: getattr(prepared, name)[cut] for name in ("t", "q", "v", "a")}
-    covariates = {name: values[cut] for name, values in prepared.covariates.items()}
-    brief = replace(prepared, **series, covariates=covariates)
+    whole, cut = regression.runs[0].prepared, slice(0, _PROBE)
+    covariates = {name: values[cut] for name, values in whole.covariates.items()}
+    states = whole.t[cut], whole.q[cut], whole.v[cut], whole.a[cut]
+    brief = Series(*states, whole.run, whole.start, covariates, whole.before)
     cad = standard_parameters(regression.robot)
     one, other = (
         effect_columns(regression.effects, signals_of(brief, regression.robot, phi))
