@@ -30,17 +30,13 @@ def average_rows(
     width = GAUSSIAN / cutoff / h if cutoff else 1.0
     kernel = np.exp(-0.5 * (offsets / width) ** 2)
     kernel /= kernel.sum()
-    shape = (len(centers), samples)
-    if len(centers) and centers.min() >= half and centers.max() + half < samples:
-        kind = np.int32 if len(centers) * len(kernel) < 2**31 else np.int64
-        columns = (centers.astype(kind)[:, None] + offsets.astype(kind)).ravel()
-        starts = np.arange(0, len(columns) + 1, len(kernel), dtype=kind)
-        return csr_matrix((np.tile(kernel, len(centers)), columns, starts), shape)
-    columns = (centers[:, None] + offsets).ravel()
+    # Indices of 32 bits where they do: those of long runs fill memory.
+    kind = np.int32 if len(centers) * len(kernel) < 2**31 else np.int64
+    columns = centers.astype(kind)[:, None] + offsets.astype(kind)
     inside = (columns >= 0) & (columns < samples)
-    rows = np.repeat(np.arange(len(centers)), len(kernel))
-    values = np.tile(kernel, len(centers))
-    return csr_matrix((values[inside], (rows[inside], columns[inside])), shape)
+    starts = np.concatenate([[0], np.cumsum(inside.sum(axis=1))]).astype(kind)
+    values = np.broadcast_to(kernel, inside.shape)[inside]
+    return csr_matrix((values, columns[inside], starts), (len(centers), samples))
 
 
 def without(averages: csr_matrix, counted: NDArray[np.bool_]) -> csr_matrix:
@@ -64,8 +60,15 @@ def interpolation(samples: int, stride: int, fine: int) -> csr_matrix:
         return csr_matrix(identity(samples, format="csr")[:fine])
     at = np.arange(min(fine, (samples - 1) * stride + 1))
     first = np.clip(at // stride - 1, 0, samples - 4)
-    u = at / stride - first  # 0, 1, 2, 3 at the four values
-    weights = np.stack(
+    weights = cubic_weights(at / stride - first)
+    columns = first[:, None] + np.arange(4)
+    rows = np.repeat(at, 4)
+    return csr_matrix((weights.ravel(), (rows, columns.ravel())), (fine, samples))
+
+
+def cubic_weights(u: Array) -> Array:
+    """Weights (M, 4) of the values at 0, 1, 2, 3 in that of their cubic polynomial at u (M,)."""
+    return np.stack(
         [
             -(u - 1) * (u - 2) * (u - 3) / 6,
             u * (u - 2) * (u - 3) / 2,
@@ -74,9 +77,6 @@ def interpolation(samples: int, stride: int, fine: int) -> csr_matrix:
         ],
         axis=1,
     )
-    columns = first[:, None] + np.arange(4)
-    rows = np.repeat(at, 4)
-    return csr_matrix((weights.ravel(), (rows, columns.ravel())), (fine, samples))
 
 
 def filled(averages: csr_matrix) -> NDArray[np.bool_]:

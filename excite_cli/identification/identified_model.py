@@ -113,14 +113,4 @@ def errors_on(
     robot: Robot, runs: Sequence[PreparedRun], predictions: Sequence[Prediction]
 ) -> Errors:
     """Errors of the predictions for `runs`."""
-    raw = [each.torque for each in predictions]
-    return torque_errors(
-        robot.joint_names,
-        [run.tau for run in runs],
-        [run.averaged_torque(each) for run, each in zip(runs, raw, strict=True)],
-        [run.valid for run in runs],
-        [run.moving & run.valid for run in runs],
-        [run.tau_raw for run in runs],
-        raw,
-        runs[0].step,
-    )
+    return torque_errors(robot.joint_names, runs, [each.torque for each in predictions])

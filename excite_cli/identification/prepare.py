@@ -1,7 +1,7 @@
 """From a raw run to smooth, differentiated motion, and the averages all columns go through."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -125,9 +125,7 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     counted = recorded & sliding[inside]
     past = q[:border]
     if run.before is not None and len(run.before):
-        earlier = run.before
-        if processing.position_cutoff is not None:
-            earlier = _smooth(earlier, processing.position_cutoff, fs, run.label)
+        earlier = _smooth(run.before, processing.position_cutoff, fs, run.label)
         past = np.concatenate([earlier, past])
     counted &= left_out.on_the_way(q[inside], past) & left_out.below_cuts(run.tau[inside])
     # The very same weights for the columns: left out at the working rate, other stretches of time
@@ -190,22 +188,18 @@ def _kept(run: PreparedRun, spool: Spool) -> PreparedRun:
     """The averages of joints are often the same, and are kept once."""
     seen: dict[int, csr_matrix] = {}
 
-    def rows(averages: csr_matrix) -> csr_matrix:
-        if id(averages) not in seen:
-            seen[id(averages)] = spool.keep_rows(averages)
-        return seen[id(averages)]
+    def kept(value: Any) -> Any:
+        if isinstance(value, csr_matrix):
+            if id(value) not in seen:
+                seen[id(value)] = spool.keep_rows(value)
+            return seen[id(value)]
+        if isinstance(value, np.ndarray):
+            return spool.keep(value)
+        return tuple(map(kept, value)) if isinstance(value, tuple) else value
 
-    names = ("t", "q", "v", "a", "tau_raw", "tau", "valid", "moving", "tau_fit", "usable")
-    series: dict[str, Any] = {name: spool.keep(getattr(run, name)) for name in names}
-    return replace(
-        run,
-        **series,
-        averages=rows(run.averages),
-        valid_averages=tuple(map(rows, run.valid_averages)),
-        fit_averages=tuple(map(rows, run.fit_averages)),
-        covariates={name: spool.keep(values) for name, values in run.covariates.items()},
-        rounding=tuple(each if each is None else rows(each) for each in run.rounding),
-    )
+    own = {each.name: kept(getattr(run, each.name)) for each in fields(run)}
+    covariates = {name: spool.keep(values) for name, values in run.covariates.items()}
+    return replace(run, **{**own, "covariates": covariates})
 
 
 @dataclass(frozen=True)
@@ -254,12 +248,7 @@ def _motion(
     def speed(j: int) -> Array:
         if processing.velocity != "measured" or run.dq is None:
             return np.asarray(np.gradient(q[:, j], run.step))
-        cutoff = processing.position_cutoff
-        return (
-            run.dq[:, j]
-            if cutoff is None
-            else _smooth(run.dq[:, j], cutoff, 1.0 / run.step, run.label)
-        )
+        return _smooth(run.dq[:, j], processing.position_cutoff, 1.0 / run.step, run.label)
 
     sliding = np.empty(q.shape, dtype=bool)
     v, a = (np.empty((len(q[keep]), n)) for _ in range(2))
@@ -357,7 +346,9 @@ def _require_smooth(run: Run, smoothed: Array, cutoff: float) -> None:
         )
 
 
-def _smooth(x: Array, cutoff: float, fs: float, name: str) -> Array:
+def _smooth(x: Array, cutoff: float | None, fs: float, name: str) -> Array:
+    if cutoff is None:
+        return x
     if cutoff > _HIGHEST_GIVEN * fs:  # set by hand for another rate
         raise FileError(
             f"run '{name}' was recorded at {fs:.4g} Hz: too slow for the cut-off of the positions, "

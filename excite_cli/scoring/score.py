@@ -187,10 +187,7 @@ def together(runs: Sequence[ScoredRun], names: Sequence[str]) -> Errors:
 def _sums(
     prepared: Sequence[PreparedRun], predictions: Sequence[Prediction]
 ) -> tuple[tuple[float, ...], ...]:
-    sums = [
-        block_sums(run.tau, run.averaged_torque(told.torque), run.valid, run.moving, run.step)
-        for run, told in zip(prepared, predictions, strict=True)
-    ]
+    sums = [block_sums(run, told.torque) for run, told in zip(prepared, predictions, strict=True)]
     total = np.concatenate(sums, axis=1).sum(axis=1)
     return tuple(tuple(map(float, row)) for row in total)
 
