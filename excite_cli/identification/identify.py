@@ -1,13 +1,12 @@
 """From a dataset to the parameters of the declared model, judged on data that took no part."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ExciteError
 from excite_cli.identification.declared_states import check_declared_runs, check_left_to_fit
@@ -32,12 +31,13 @@ from excite_cli.identification.regression import (
     build_regression,
     follows_model,
     rebuilt,
+    regression_on,
 )
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_scale import assumed_scale, knowledge_of
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
-from excite_cli.measurement.dataset import Dataset, Finding, Run
+from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.recorded import Recorded, recorded
 from excite_cli.robot.model import Robot
 from excite_cli.shown.record import Shown
@@ -92,24 +92,25 @@ def identify(
     known = knowledge_of(spec.identification, declared_effects(spec.effects, robot), robot, base)
     effects = known.effects
     check_declared_runs(spec, dataset)
-    parts = split(dataset, sealed, spec.diagnosis.block, spec.identification.needed_runs)
+
+    def cut(data: Dataset) -> Split:
+        return split(data, sealed, spec.diagnosis.block, spec.identification.needed_runs)
+
+    parts = cut(dataset)
     check_left_to_fit(spec, parts)
     refuse_sealed_copies(parts)
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )
     tell("columns of the regression")
-    training = _regression(robot, base, effects, parts.training, processing)
-    require_motion(
-        [run.prepared for run in training.runs],
-        processing,
-        robot.joint_names,
-        (*spec.measurement.without_torque, *robot.unmeasured),
-    )
+    training = regression_on(robot, base, effects, parts.training, processing)
+    prepared = [run.prepared for run in training.runs]
+    unmeasured = (*spec.measurement.without_torque, *robot.unmeasured)
+    require_motion(prepared, processing, robot.joint_names, unmeasured)
     tell("fit")
     found = fit(training, spec.identification, (known.rows, known.target))
     tell("errors on the sealed part")
-    held_out = _regression(robot, base, effects, parts.sealed, processing)
+    held_out = regression_on(robot, base, effects, parts.sealed, processing)
     if follows_model(training):
         values = found.values[found.rank :]
         training, held_out = (rebuilt(r, found.phi, values) for r in (training, held_out))
@@ -118,8 +119,7 @@ def identify(
     wanted = spec.measurement.filter
     biased = filter_findings(parts.training, processing, wanted, behind, found)
     tell("closed-loop bias")
-    cut = (sealed, spec.diagnosis.block, spec.identification.needed_runs)
-    hausman = _hausman(training, dataset, parts, processing, found, cut)
+    hausman = _hausman(training, dataset, cut, processing, found)
     floor = noise_floor(parts.training, processing)
     error, sealed_traces = judged(found, held_out, sealed=True)
     training_error, training_traces = judged(found, training, sealed=False)
@@ -133,7 +133,7 @@ def identify(
         findings=(
             *dataset.findings,
             *assumed_scale(spec.measurement, spec.identification),
-            *standing_still([run.prepared for run in training.runs], robot.joint_names),
+            *standing_still(prepared, robot.joint_names),
             *_hardly_moved(found),
             *_noticed(found, hausman),
             *biased,
@@ -146,17 +146,6 @@ def identify(
         traces=(*training_traces, *sealed_traces),
         recorded=recorded(dataset),
     )
-
-
-def _regression(
-    robot: Robot,
-    base: BaseParameters,
-    effects: Sequence[Effect],
-    runs: Sequence[Run],
-    processing: Processing,
-) -> Regression:
-    prepared = prepare_all(runs, processing, LeftOut.by(effects))
-    return build_regression(robot, base, effects, prepared)
 
 
 def judged(
@@ -176,32 +165,24 @@ def judged(
 def _hausman(
     training: Regression,
     dataset: Dataset,
-    parts: Split,
+    cut: Callable[[Dataset], Split],
     processing: Processing,
     found: Fit,
-    cut: tuple[str | None, float | None, tuple[str, ...]],
 ) -> Hausman:
     """The test with instruments cut and filtered as the data were."""
     instruments, source, reason = instrument_dataset(dataset)
     if instruments is None:
         return not_testable(reason)
-    runs = split(instruments, *cut).training
     processing = replace(processing, velocity="differentiated")
+    values = found.values[found.rank :]
+    robot, base, effects = training.robot, training.base, training.effects
     try:
-        left_out = LeftOut.by(training.effects)
-        prepared = prepare_all(runs, processing, left_out)
-        other = build_regression(
-            training.robot, training.base, training.effects, prepared, found.phi,
-            found.values[found.rank :],
-        )  # fmt: skip
+        prepared = prepare_all(cut(instruments).training, processing, LeftOut.by(effects))
+        other = build_regression(robot, base, effects, prepared, found.phi, values)
     except ExciteError as error:
         return not_testable(str(error))
-    return hausman_test(
-        [run.rows for run in training.runs],
-        [run.columns for run in other.runs],
-        source,
-        found.noise,
-    )
+    rows, columns = [run.rows for run in training.runs], [run.columns for run in other.runs]
+    return hausman_test(rows, columns, source, found.noise)
 
 
 def _much_left(error: Errors) -> list[Finding]:

@@ -28,15 +28,14 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.filter_bias import filter_findings
 from excite_cli.identification.fit import Fit, fit
 from excite_cli.identification.identify import judged
-from excite_cli.identification.left_out import LeftOut
-from excite_cli.identification.prepare import prepare_all, require_motion
+from excite_cli.identification.prepare import require_motion
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import (
     Regression,
     Series,
-    build_regression,
     effect_columns,
     rebuilt,
+    regression_on,
     signals_of,
     with_effects,
 )
@@ -110,10 +109,10 @@ def identify_load(
     plain = spec.identification.model_copy(update={"inertias": "free", "consistent": False})
 
     def behind(other: Processing) -> tuple[Regression, Fit]:
-        prepared = prepare_all(dataset.runs, other, LeftOut.by(effects))
+        made = regression_on(robot, base, effects, dataset.runs, other)
         unmeasured = (*spec.measurement.without_torque, *robot.unmeasured)
-        require_motion(prepared, other, robot.joint_names, unmeasured)
-        return _fitted(build_regression(robot, base, effects, prepared), plain, known)
+        require_motion([run.prepared for run in made.runs], other, robot.joint_names, unmeasured)
+        return _fitted(made, plain, known)
 
     regression, found = behind(processing)
     biased = filter_findings(

@@ -16,11 +16,11 @@ from excite_cli.identification.averages import (
     filled,
     interpolation,
     reach,
+    rounding_of,
     without,
 )
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.processing import Processing
-from excite_cli.identification.rounding import rounding_of
 from excite_cli.measurement.dataset import Array, Finding, Run
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.out_of_core import Spool

@@ -11,7 +11,10 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.covariance import Rows
-from excite_cli.identification.prepare import PreparedRun
+from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.prepare import PreparedRun, prepare_all
+from excite_cli.identification.processing import Processing
+from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
@@ -149,23 +152,43 @@ def build_regression(
     With `values` of the effects, they see the torque of these as well.
     """
     found, spool = [], Spool()
-    columns = each(_columns, (robot, base.selection, effects, phi, values), runs)
+    shared = robot, base.selection, effects, phi, values
+    columns = each(_columns, shared, [(prepared, None) for prepared in runs])
     for prepared, own in zip(runs, columns, strict=True):
         tau = for_base_columns(robot, base, prepared)
         found.append(RunColumns(spool.keep(own), base.rank, tau, prepared))
     return Regression(robot, base, tuple(effects), tuple(found))
 
 
+def regression_on(
+    robot: Robot,
+    base: BaseParameters,
+    effects: Sequence[Effect],
+    runs: Sequence[Run],
+    processing: Processing,
+) -> Regression:
+    """The regression of recorded runs, without what `effects` leave out.
+
+    Raises
+    ------
+    FileError
+        A run is too short.
+    """
+    prepared = prepare_all(runs, processing, LeftOut.by(effects))
+    return build_regression(robot, base, effects, prepared)
+
+
 def _columns(
     shared: tuple[Robot, NDArray[np.intp], Sequence[Effect], Array | None, Array],
-    prepared: PreparedRun,
+    task: tuple[PreparedRun, Array | None],
     tell: Tell,
 ) -> Array:
-    """Averages of the regressor of the base parameters, and of the effects' columns."""
-    robot, selection, effects, phi, values = shared
+    """Averages of the regressor of the base parameters (if not given), and of effects' columns."""
+    (robot, selection, effects, phi, values), (prepared, inertial) = shared, task
     signals = with_effects(signals_of(prepared, robot, phi), effects, values)
-    inertial = prepared.averaged_for_fit(signals.body.regressor[:, :, selection])
-    signals.body.forget()
+    if inertial is None:
+        inertial = prepared.averaged_for_fit(signals.body.regressor[:, :, selection])
+        signals.body.forget()
     own = prepared.averaged_for_fit(effect_columns(effects, signals))
     return np.concatenate([inertial, own], axis=2)
 
@@ -188,20 +211,10 @@ def follows_model(regression: Regression) -> bool:
 
 def rebuilt(regression: Regression, phi: Array, values: Array) -> Regression:
     """The effects' columns again, with the rigid body at `phi` and effects of `values`."""
-    spool, shared = Spool(), (regression.robot, regression.effects, phi, values)
-    made = each(_again, shared, [(run.prepared, run.inertial) for run in regression.runs])
+    selection = regression.base.selection
+    spool, shared = Spool(), (regression.robot, selection, regression.effects, phi, values)
+    made = each(_columns, shared, [(run.prepared, run.inertial) for run in regression.runs])
     runs = zip(regression.runs, made, strict=True)
     return replace(
         regression, runs=tuple(replace(run, columns=spool.keep(own)) for run, own in runs)
     )
-
-
-def _again(
-    shared: tuple[Robot, Sequence[Effect], Array, Array],
-    task: tuple[PreparedRun, Array],
-    tell: Tell,
-) -> Array:
-    (robot, effects, phi, values), (prepared, inertial) = shared, task
-    signals = with_effects(signals_of(prepared, robot, phi), effects, values)
-    own = prepared.averaged_for_fit(effect_columns(effects, signals))
-    return np.concatenate([inertial, own], axis=2)
