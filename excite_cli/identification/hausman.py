@@ -115,11 +115,6 @@ def _aligned(shared: None, run: Run, tell: Tell) -> Array:
     return shifted
 
 
-def not_testable(reason: str) -> Hausman:
-    """The verdict when there are no instruments."""
-    return Hausman(False, reason)
-
-
 def hausman_test(
     runs: Sequence[Rows], instruments: Sequence[Array], source: Source, noise: Array
 ) -> Hausman:
@@ -132,7 +127,7 @@ def hausman_test(
     values, directions = np.linalg.svd((c - z @ first_stage) / _norms(c))[1:]
     kept = values > _DUST * np.sqrt(p)
     if not kept.any():
-        return not_testable("the instruments repeat the columns without any noise")
+        return Hausman(False, "the instruments repeat the columns without any noise")
     turn = directions[kept].T / values[kept] / _norms(c)[:, None]  # V turn: orthonormal columns
     turn *= np.sqrt(sum(int(run.usable.sum()) for run in runs))
     spool = Spool()
@@ -142,7 +137,7 @@ def hausman_test(
         for run, columns in zip(runs, augmented, strict=True)
     ])  # fmt: skip
     if not fitted.seen[p:].all():
-        return not_testable("the parts of the columns that the instruments miss are not separate")
+        return Hausman(False, "the parts of the columns that the instruments miss are not separate")
     extra = int(kept.sum())
     gamma, covariance = fitted.x[p:], fitted.covariance[p:, p:]
     statistic = float(gamma @ np.linalg.solve(covariance, gamma)) / extra

@@ -1,6 +1,6 @@
 """From a dataset to the parameters of the declared model, judged on data that took no part."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,13 +18,17 @@ from excite_cli.identification.hausman import (
     Hausman,
     hausman_test,
     instrument_dataset,
-    not_testable,
 )
 from excite_cli.identification.identified_model import errors_on
 from excite_cli.identification.implausible_links import implausible
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import noise_floor
-from excite_cli.identification.prepare import prepare_all, require_motion, standing_still
+from excite_cli.identification.prepare import (
+    PreparedRun,
+    prepare_all,
+    require_motion,
+    standing_still,
+)
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import (
     Regression,
@@ -110,10 +114,9 @@ def identify(
     tell("fit")
     found = fit(training, spec.identification, (known.rows, known.target))
     tell("errors on the sealed part")
-    held_out = regression_on(robot, base, effects, parts.sealed, processing)
+    held_out = prepare_all(parts.sealed, processing, LeftOut.by(effects))
     if follows_model(training):
-        values = found.values[found.rank :]
-        training, held_out = (rebuilt(r, found.phi, values) for r in (training, held_out))
+        training = rebuilt(training, found.phi, found.values[found.rank :])
     tell("the filter")
     behind = fitted_behind(robot, base, known, spec.identification, parts.training)
     wanted = spec.measurement.filter
@@ -121,8 +124,8 @@ def identify(
     tell("closed-loop bias")
     hausman = _hausman(training, dataset, cut, processing, found)
     floor = noise_floor(parts.training, processing)
-    error, sealed_traces = judged(found, held_out, sealed=True)
-    training_error, training_traces = judged(found, training, sealed=False)
+    error, sealed_traces = judged(robot, found, held_out, sealed=True)
+    training_error, training_traces = judged(robot, found, prepared, sealed=False)
     return Identification(
         fit=found,
         sealed_run=parts.sealed_name,
@@ -149,14 +152,11 @@ def identify(
 
 
 def judged(
-    found: Fit, regression: Regression, sealed: bool
+    robot: Robot, found: Fit, runs: Sequence[PreparedRun], sealed: bool
 ) -> tuple[Errors, tuple[TorqueTrace, ...]]:
-    """Errors of the fit's torque on the runs of `regression`, and this torque over time."""
-    runs = [run.prepared for run in regression.runs]
-    robot = regression.robot
+    """Errors of the fit's torque on runs, and this torque over time."""
     predicted = [found.model.predicted(robot, run) for run in runs]
-    errors = errors_on(robot, runs, predicted)
-    return errors, tuple(
+    return errors_on(robot, runs, predicted), tuple(
         torque_trace(run, each.load, each.torque, sealed=sealed)
         for run, each in zip(runs, predicted, strict=True)
     )
@@ -172,7 +172,7 @@ def _hausman(
     """The test with instruments cut and filtered as the data were."""
     instruments, source, reason = instrument_dataset(dataset)
     if instruments is None:
-        return not_testable(reason)
+        return Hausman(False, reason)
     processing = replace(processing, velocity="differentiated")
     values = found.values[found.rank :]
     robot, base, effects = training.robot, training.base, training.effects
@@ -180,7 +180,7 @@ def _hausman(
         prepared = prepare_all(cut(instruments).training, processing, LeftOut.by(effects))
         other = build_regression(robot, base, effects, prepared, found.phi, values)
     except ExciteError as error:
-        return not_testable(str(error))
+        return Hausman(False, str(error))
     rows, columns = [run.rows for run in training.runs], [run.columns for run in other.runs]
     return hausman_test(rows, columns, source, found.noise)
 
@@ -190,7 +190,7 @@ def _much_left(error: Errors) -> list[Finding]:
     much = {name: x for name, x in error.relative_moving.items() if x > _MUCH_LEFT}
     if not much:
         return []
-    worst = max(much, key=lambda name: much[name])
+    worst = max(much, key=much.__getitem__)
     text = (
         f"{much[worst]:.0%} of the torque of {worst} is left on sealed data ({len(much)} "
         f"joint{'s' * (len(much) > 1)} above {_MUCH_LEFT:.0%}): the declared model lacks "
@@ -215,17 +215,15 @@ def _hardly_moved(found: Fit) -> list[Finding]:
 def _noticed(found: Fit, hausman: Hausman) -> list[Finding]:
     """What a person must know about the fit."""
     findings = []
-    parameters = effect_parameters(found.effects)
-    signed = np.array([parameter.nonnegative for parameter in parameters], bool)
+    signed = np.array([each.nonnegative for each in effect_parameters(found.effects)], bool)
     values, std = found.values[found.rank :], found.std[found.rank :]
     negative = np.flatnonzero(signed & (values < -_SURELY * std))
     if len(negative):
         names = ", ".join(found.names[found.rank + i] for i in negative)
-        text = f"{names}: significantly negative, which is physically impossible."
+        why = "The declared model lacks something."
         if len(negative) == signed.sum() > 1:
-            text += " The sign of the torque may be flipped (measurement.sign)."
-        else:
-            text += " The declared model lacks something."
+            why = "The sign of the torque may be flipped (measurement.sign)."
+        text = f"{names}: significantly negative, which is physically impossible. {why}"
         findings.append(Finding("negative", "warning", text))
     loose = [name for name, ok in zip(found.names, found.identifiable, strict=True) if not ok]
     if loose:

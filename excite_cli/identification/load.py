@@ -28,7 +28,7 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.filter_bias import filter_findings
 from excite_cli.identification.fit import Fit, fit
 from excite_cli.identification.identify import judged
-from excite_cli.identification.prepare import require_motion
+from excite_cli.identification.prepare import PreparedRun, require_motion
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import (
     Regression,
@@ -108,18 +108,18 @@ def identify_load(
     # What the URDF says of the robot is in its fit, and no consistent bodies are wanted here.
     plain = spec.identification.model_copy(update={"inertias": "free", "consistent": False})
 
-    def behind(other: Processing) -> tuple[Regression, Fit]:
+    def behind(other: Processing) -> tuple[list[PreparedRun], Fit]:
         made = regression_on(robot, base, effects, dataset.runs, other)
+        runs = [run.prepared for run in made.runs]
         unmeasured = (*spec.measurement.without_torque, *robot.unmeasured)
-        require_motion([run.prepared for run in made.runs], other, robot.joint_names, unmeasured)
-        return _fitted(made, plain, known)
+        require_motion(runs, other, robot.joint_names, unmeasured)
+        return runs, _fitted(made, plain, known)
 
-    regression, found = behind(processing)
+    runs, found = behind(processing)
     biased = filter_findings(
         dataset.runs, processing, spec.measurement.filter, lambda other: behind(other)[1], found
     )
-    with_load, _ = judged(found, regression, sealed=False)
-    without, _ = judged(alone, replace(regression, effects=alone.effects), sealed=False)
+    without, with_load = (judged(robot, each, runs, sealed=False)[0] for each in (alone, found))
     at = slice(len(found.values) - _WIDTH, None)
     own, spread = found.values[at], found.covariance[at, at]
     if not np.isfinite(spread).all():
@@ -148,9 +148,7 @@ def identify_load(
     )
 
 
-def _fitted(
-    regression: Regression, plain: IdentificationSpec, known: tuple[Array, Array]
-) -> tuple[Regression, Fit]:
+def _fitted(regression: Regression, plain: IdentificationSpec, known: tuple[Array, Array]) -> Fit:
     """The fit, with columns that follow what was found: gains act upon the load, too."""
     rank = regression.base.rank
     found = fit(regression, plain, known)
@@ -160,7 +158,7 @@ def _fitted(
         change = np.linalg.norm(found.values - last.values)
         if change <= _SETTLED * np.linalg.norm(found.values):
             break
-    return regression, found
+    return found
 
 
 @dataclass(frozen=True)

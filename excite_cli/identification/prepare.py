@@ -109,7 +109,8 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     keep = slice(border, len(run.t) - border, stride)
     t = run.t[keep]
     h, cutoff = run.step * stride, processing.parallel_cutoff
-    centers = _centers(len(t), h, processing)
+    half = reach(h, cutoff)  # the averages lie within the run
+    centers = np.arange(half, len(t) - half, max(1, round(1.0 / (h * processing.rate))))
     if len(centers) < _FEWEST:
         raise FileError(
             f"run '{run.label}' is too short: {run.duration:.3g} s leave {len(centers)} "
@@ -134,8 +135,9 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     tau, joints = run.tau[inside], range(run.q.shape[1])
     # Averages at the full rate are as large as all else together: one joint's at a time.
     fit = [_averaged(without(of_torque, counted[:, j]), to_full_rate, run, tau, j) for j in joints]
+    every = np.ones(len(centers), dtype=bool)
     valid = [
-        _Averaged(averages, np.asarray(of_torque @ tau[:, j]), filled(of_torque) & filled(averages))
+        _Averaged(averages, np.asarray(of_torque @ tau[:, j]), every)
         if recorded[:, j].all()
         else _averaged(without(of_torque, recorded[:, j]), to_full_rate, None, tau, j)
         for j in joints
@@ -231,7 +233,15 @@ def _positions(run: Run, processing: Processing, fs: float) -> Array:
     q = np.empty_like(run.q)
     for j in range(q.shape[1]):
         q[:, j] = _smooth(run.q[:, j], cutoff, fs, run.label)
-    _require_smooth(run, q, cutoff)
+    noise = np.std(run.q - q, axis=0)
+    wild = (noise > _NOISE) & (noise > 0.5 * np.std(run.q, axis=0))
+    if wild.any():  # no robot moves so
+        raise FileError(
+            f"run '{run.label}': positions jump by {noise.max():.3g} rad (m) from sample to sample "
+            f"(of joint {', '.join(str(j + 1) for j in np.flatnonzero(wild))} of the config, "
+            f"counted from 1); most of their change lies beyond {cutoff:.3g} Hz. Are these the "
+            "positions (measurement.channels), in the right unit (measurement.angle, time)?"
+        )
     return q
 
 
@@ -324,26 +334,6 @@ def _sliding(v: Array, h: float, processing: Processing) -> NDArray[np.bool_]:
     half = round(margin / h)
     near = maximum_filter1d(crossing, 2 * half + 1) > 0
     return ~near & (np.abs(v) > processing.moving_speed)
-
-
-def _centers(samples: int, h: float, processing: Processing) -> NDArray[np.intp]:
-    """Instants of the averages; their support lies within the run."""
-    stride = max(1, round(1.0 / (h * processing.rate)))
-    half = reach(h, processing.parallel_cutoff)
-    return np.arange(half, samples - half, stride)
-
-
-def _require_smooth(run: Run, smoothed: Array, cutoff: float) -> None:
-    """Refuse positions that are noise: no robot moves so."""
-    noise = np.std(run.q - smoothed, axis=0)
-    wild = (noise > _NOISE) & (noise > 0.5 * np.std(run.q, axis=0))
-    if wild.any():
-        raise FileError(
-            f"run '{run.label}': positions jump by {noise.max():.3g} rad (m) from sample to sample "
-            f"(of joint {', '.join(str(j + 1) for j in np.flatnonzero(wild))} of the config, "
-            f"counted from 1); most of their change lies beyond {cutoff:.3g} Hz. Are these the "
-            "positions (measurement.channels), in the right unit (measurement.angle, time)?"
-        )
 
 
 def _smooth(x: Array, cutoff: float | None, fs: float, name: str) -> Array:

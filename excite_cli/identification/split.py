@@ -156,8 +156,8 @@ def _folds(training: list[Run]) -> tuple[int, ...]:
 
 def _blocks(run: Run, block: float | None) -> Split:
     length = min(max(run.duration / _BLOCKS, _SHORTEST), _LONGEST)
-    length = max(length, min(_SAMPLES * run.step, run.duration / _EVERY))
-    length = block or max(length, run.duration / _MOST_BLOCKS)
+    few = min(_SAMPLES * run.step, run.duration / _EVERY)
+    length = block or max(length, few, run.duration / _MOST_BLOCKS)
     count = round(run.duration / length)
     if count < _EVERY:
         raise ConfigError(
@@ -170,17 +170,13 @@ def _blocks(run: Run, block: float | None) -> Split:
             f"{len(run.t) / count:.3g} samples each; {_FEWEST} are needed at least. Give longer "
             "blocks, or leave this key out."
         )
-    edges = [round(i * (len(run.t)) / count) for i in range(count + 1)]
+    edges = [round(i * len(run.t) / count) for i in range(count + 1)]
     training, sealed = [], []
-    start = 0
-    for i in range(count):
-        if i % _EVERY == _EVERY - 1:
-            if start < i:
-                training.append(_block(run, i, edges[start], edges[i]))
-            sealed.append(_block(run, i + 1, edges[i], edges[i + 1]))
-            start = i + 1
-    if start < count:
-        training.append(_block(run, count, edges[start], edges[count]))
+    for first in range(0, count, _EVERY):
+        last = min(first + _EVERY - 1, count)
+        training.append(_block(run, last, edges[first], edges[last]))
+        if last < count:
+            sealed.append(_block(run, last + 1, edges[last], edges[last + 1]))
     blocks = "1 block" if len(sealed) == 1 else f"{len(sealed)} blocks"
     share = f"{blocks} of {run.duration / count:.3g} s of {run.label}"
     # Few folds, each of stretches spread over the run.
