@@ -63,16 +63,7 @@ def judged(
     phi: Array | None = None,
 ) -> Verdict:
     """As `Judge.verdict`."""
-    found = torque_errors(
-        names,
-        [run.tau for run in sealed],
-        [run.averaged_torque(tau) for run, tau in zip(sealed, torques, strict=True)],
-        [run.valid for run in sealed],
-        [run.moving for run in sealed],
-        [],
-        [],
-        sealed[0].step,
-    )
+    found = torque_errors(names, sealed, torques)
     return Verdict(
         found.mean_relative_moving,
         found.relative_moving,

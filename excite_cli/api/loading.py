@@ -15,9 +15,9 @@ from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import load_spec, spec_of
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.identification.gravity import with_gravity
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset, Finding
@@ -205,12 +205,26 @@ def load_data(
         data, noticed = with_base(robot, data, spec, torques)
         data = replace(data, findings=(*data.findings, *noticed))
     if spec.gravity == "subtracted":
-        data = with_gravity(robot, data)
+        data = _with_gravity(robot, data)
     tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs_in_words(data)}"))
     if isinstance(problem, Case) and problem.base.note:  # a problem has told it
         tell(Note(Level.NOTE, problem.base.note))
     tell_findings(data.findings, tell)
     return data
+
+
+def _with_gravity(robot: Robot, data: Dataset) -> Dataset:
+    """Torques from which a controller subtracted gravity, made whole again with the URDF's.
+
+    Right where the controller's model is the URDF; what its masses are off by, the torque is.
+    """
+    dynamics = InverseDynamics(robot)
+    runs = []
+    for run in data.runs:
+        rest = np.zeros_like(run.q)
+        # Rounding is that of what was recorded: the sum comes in no steps.
+        runs.append(replace(run, tau=run.tau + dynamics.torques(run.q, rest, rest)))
+    return replace(data, runs=tuple(runs))
 
 
 def inputs_of(problem: Problem | Case, *given: object) -> list[Path]:

@@ -10,7 +10,8 @@ from excite_cli.api.arguments import checked
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.errors import ConfigError
-from excite_cli.identification.identified_model import IdentifiedModel, Series
+from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.regression import Series
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array
 from excite_cli.shown.record import Shown, show
@@ -86,7 +87,7 @@ class Model(Shown):
             Shapes do not fit; an effect needs `t` or a column that is not given.
         """
         series, single = self._series(q, v, a, t, covariates, start)
-        torque = self._standing.told(self.made.robot, series).torque
+        torque = self._standing.predicted(self.made.robot, series).torque
         return torque[0] if single else torque
 
     def friction(self, q: Array, v: Array, load: Array | None = None) -> Array:

@@ -60,7 +60,7 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameter_names
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
-from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
+from excite_cli.identification.declared_states import check_declared_runs, check_left_to_fit
 from excite_cli.identification.filter_bias import filter_findings, fitted_behind
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor

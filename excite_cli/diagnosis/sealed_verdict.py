@@ -154,10 +154,7 @@ def _moving_sums(
 ) -> tuple[Array, Array]:
     """‖e‖² and ‖τ‖² of every block, where the joints move: (B, n) each."""
     sums = [
-        block_sums(
-            run.tau, run.averaged_torque(each.torque), run.valid, run.moving, run.step, block
-        )
-        for run, each in zip(runs, predictions, strict=True)
+        block_sums(run, each.torque, block) for run, each in zip(runs, predictions, strict=True)
     ]
     wrong, size = np.concatenate(sums, axis=1)[2:4]
     return wrong, size

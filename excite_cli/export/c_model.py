@@ -14,7 +14,8 @@ from excite_cli.export.c_comment import in_comment
 from excite_cli.export.detector_in_c import detector_in_c
 from excite_cli.export.exported import ModelText, in_words
 from excite_cli.export.gaps import filled
-from excite_cli.identification.identified_model import IdentifiedModel, Series
+from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.regression import Series
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, tree_of
 from excite_cli.scoring.thresholds import Thresholds
@@ -108,7 +109,7 @@ def _tested(robot: Robot, model: IdentifiedModel, columns: tuple[str, ...]) -> d
     q = 0.1 * np.sin(angle) + rng.uniform(-1.0, 1.0, robot.n)
     v, a = 0.1 * rates * np.cos(angle), -0.1 * rates**2 * np.sin(angle)
     logged = {name: 20.0 + rng.uniform(0.0, 20.0, len(t)) for name in columns}
-    tau = model.told(robot, Series(t, q, v, a, covariates=logged)).torque
+    tau = model.predicted(robot, Series(t, q, v, a, covariates=logged)).torque
     column = np.stack(list(logged.values()), axis=1) if columns else np.zeros(0)
     return {
         "TESTED": str(_TESTED),

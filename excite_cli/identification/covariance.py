@@ -23,10 +23,10 @@ from excite_cli.robot.model import Array
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 
-MOST_ENLARGED = 4.0
+_MOST_ENLARGED = 4.0
 # Frequencies on either side, half a cycle of the run apart, over which a periodogram is averaged: 3
-# to 20 cover alike. Times the power that the model expects: it has its own at least.
-_NEIGHBOURS, _LEAST = 12, 1.0
+# to 20 cover alike.
+_NEIGHBOURS = 12
 _STRETCH = 4096  # samples; what is farther apart is independent
 _UNSTABLE = 1.0 - 1e-9
 
@@ -49,23 +49,10 @@ class Rows:
         return np.where(self.usable, self.tau - self.columns @ x, 0.0)
 
 
-@dataclass(frozen=True)
-class Covariance:
-    """`matrix` (p, p); `noises` per run; `samples` the effective number of independent samples.
-
-    That is never more than there are samples. Noise of high frequencies (of positions that were
-    differentiated) changes its sign from sample to sample and hardly shows in slow columns: these
-    are known better than behind white noise of that size, which `matrix` holds, but no sample is
-    two.
-    """
-
-    matrix: Array
-    noises: tuple[Noise, ...]
-    samples: float
-
-
-def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: Array) -> Covariance:
-    """Covariance of x from the runs it was fitted to.
+def estimate_covariance(
+    runs: Sequence[Rows], x: Array, inverse: Array, sigma: Array
+) -> tuple[Array, float]:
+    """Covariance (p, p) of x from the runs it was fitted to, and the effective number of samples.
 
     Parameters
     ----------
@@ -74,46 +61,41 @@ def estimate_covariance(runs: Sequence[Rows], x: Array, inverse: Array, sigma: A
     sigma: (n,) standard deviation of each joint's residual
 
     With `weights` in a run (robust fits) the weighted residual is what is modelled.
+
+    The number of independent samples is never more than there are. Noise of high frequencies (of
+    positions that were differentiated) changes its sign from sample to sample and hardly shows in
+    slow columns: these are known better than behind white noise of that size, which the covariance
+    holds, but no sample is two.
     """
-    p = len(x)
-    noises, meat = [], np.zeros((p, p))
-    white, plain = np.zeros(p), 0
-    for run, own in zip(runs, each(_part, (x, inverse, sigma), runs), strict=True):
-        noises.append(own.noise)
-        meat += own.meat
-        white += own.white
-        plain += int(run.usable.sum())
+    meat, white = np.zeros_like(inverse), np.zeros(len(x))
+    for own_meat, own_white in each(_meat_of, (x, inverse, sigma), runs):
+        meat += own_meat
+        white += own_white
     for run in runs:
         for j, rounding in enumerate(run.rounding):
             if rounding is not None:
-                x = np.where(run.usable[:, j, None], run.columns[:, j], 0.0) / sigma[j] ** 2
-                rounded = rounding.T @ (x if run.weights is None else x * run.weights[:, j, None])
+                columns = np.where(run.usable[:, j, None], run.columns[:, j], 0.0) / sigma[j] ** 2
+                if run.weights is not None:
+                    columns = columns * run.weights[:, j, None]
+                rounded = rounding.T @ columns
                 meat += rounded.T @ rounded
     matrix = inverse @ meat @ inverse
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = white / np.diag(matrix)
     shares = shares[np.isfinite(shares)]
-    samples = plain * min(float(np.median(shares)), 1.0) if len(shares) else float("nan")
-    return Covariance((matrix + matrix.T) / 2, tuple(noises), samples)
+    count = sum(int(run.usable.sum()) for run in runs)
+    samples = count * min(float(np.median(shares)), 1.0) if len(shares) else float("nan")
+    return (matrix + matrix.T) / 2, samples
 
 
-@dataclass(frozen=True)
-class _Part:
-    """What a run adds: its noise, and to the sandwich's inside (p, p) and white noise's (p,)."""
-
-    noise: Noise
-    meat: Array
-    white: Array
-
-
-def _part(shared: tuple[Array, Array, Array], run: Rows, tell: Tell) -> _Part:
+def _meat_of(shared: tuple[Array, Array, Array], run: Rows, tell: Tell) -> tuple[Array, Array]:
+    """What a run adds to the sandwich's inside (p, p), and to white noise's share (p,)."""
     x, inverse, sigma = shared
     residual = run.residual(x)
     if run.weights is not None:
         residual = residual * run.weights
     noise = noise_of(residual, run.usable)
-    values, vectors = np.linalg.eigh(inverse)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    root = _root(inverse)
     own = np.sqrt(np.diag(noise.innovation) * [_gain(each) for each in noise.polynomials])
     meat, white = np.zeros_like(inverse), np.zeros(len(x))
     for start in range(0, len(residual), _STRETCH):
@@ -126,7 +108,7 @@ def _part(shared: tuple[Array, Array, Array], run: Rows, tell: Tell) -> _Part:
         scores = (columns @ inverse) * (own / sigma)[:, None]
         white += np.square(scores).sum(axis=(0, 1))
         forget()
-    return _Part(noise, meat, white)
+    return meat, white
 
 
 def _meat(noise: Noise, columns: Array, more: Array) -> Array:
@@ -139,11 +121,15 @@ def _meat(noise: Noise, columns: Array, more: Array) -> Array:
     spread = rfft(noise.spread_back(np.concatenate([before, columns])), axis=0)
     spread *= np.sqrt(more.T)[:, :, None]
     spread[1:-1] *= np.sqrt(2.0)  # frequencies that stand for two
-    values, vectors = np.linalg.eigh(noise.innovation)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
     both = np.concatenate([spread.real, spread.imag])
-    mixed = np.einsum("fjp,jk->fkp", both, root).reshape(-1, columns.shape[2])
+    mixed = np.einsum("fjp,jk->fkp", both, _root(noise.innovation)).reshape(-1, columns.shape[2])
     return np.asarray(mixed.T @ mixed / count)
+
+
+def _root(matrix: Array) -> Array:
+    """B with B Bᵀ a positive semidefinite matrix."""
+    values, vectors = np.linalg.eigh(matrix)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _more(noise: Noise, residual: Array, usable: Mask, joint: int, leverage: Array) -> Array:
@@ -159,9 +145,9 @@ def _more(noise: Noise, residual: Array, usable: Mask, joint: int, leverage: Arr
     gate = np.square(np.abs(rfft(at.astype(float), count)))
     expected = np.maximum(rfft(irfft(spectrum, count) * irfft(gate, count)).real, 1e-300)
     eaten = np.square(np.abs(rfft(leverage, count, axis=0))).sum(axis=1) / max(int(at.sum()), 1)
-    left = 1.0 - np.minimum(_smooth(eaten), 1.0 - 1.0 / MOST_ENLARGED)
+    left = 1.0 - np.minimum(_smooth(eaten), 1.0 - 1.0 / _MOST_ENLARGED)
     power = np.square(np.abs(rfft(residual[:, joint], count)))
-    return np.maximum(_smooth(power) / (_smooth(expected) * left), _LEAST)
+    return np.maximum(_smooth(power) / (_smooth(expected) * left), 1.0)
 
 
 def _smooth(spectrum: Array) -> Array:

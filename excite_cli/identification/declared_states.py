@@ -1,4 +1,4 @@
-"""States of runs that the configuration declares: who carries what, by labels.
+"""Runs, columns and states of runs that the configuration names, and whether the data have them.
 
     runs: {monday_3: {payload: tool_2kg}, tuesday_1: {payload: tool_2kg}, friday_2: {payload: none}}
 
@@ -6,43 +6,18 @@ Runs with one label share one state: an effect of that kind is in all of them or
 labels of a kind are declared, runs without one are without the effect.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
+from excite_cli.config.spec import Spec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError, nearest
+from excite_cli.identification.split import Split
+from excite_cli.measurement.dataset import Dataset
 
 NONE = "none"
 
 States = Mapping[str, Mapping[str, str]]  # run -> kind -> label
-
-
-def check_states(states: States, names: tuple[str, ...]) -> None:
-    """Refuse states of runs that are not among the `names` of the data, or of other kinds.
-
-    Raises
-    ------
-    ConfigError
-        There is no such run or kind, or the kind does not differ between runs.
-    """
-    for run, labels in states.items():
-        if run not in names:
-            raise ConfigError(
-                f"runs: there is no run '{run}' in the data.{nearest(run, names)} "
-                f"Runs: {', '.join(names)}."
-            )
-        for kind in labels:
-            found = kind_named(kind, f"runs.{run}")
-            if not differs_between_runs(found):
-                able = [name for name, k in catalogue().items() if differs_between_runs(k)]
-                raise ConfigError(
-                    f"runs.{run}: {kind} is not of single runs. Kinds that are: {', '.join(able)}."
-                )
-
-
-def differs_between_runs(kind: type[Effect]) -> bool:
-    """Whether runs may have states of `kind`."""
-    return kind.per_run or kind.changes_between_runs
 
 
 def declared_sets(kind: str, states: States) -> list[tuple[str, ...]] | None:
@@ -52,3 +27,82 @@ def declared_sets(kind: str, states: States) -> list[tuple[str, ...]] | None:
         return None
     there = dict.fromkeys(label for label in labels.values() if label != NONE)
     return [tuple(run for run, its in labels.items() if its == label) for label in there]
+
+
+def check_declared_runs(spec: Spec, dataset: Dataset) -> None:
+    """Refuse effects and states that are declared for a run which `dataset` does not hold.
+
+    And effects that follow a column which is not declared.
+
+    Raises
+    ------
+    ConfigError
+        There is no run or column of such a name, or a state is of a kind that all runs share.
+    """
+    names, columns = dataset.names, spec.measurement.covariates
+    for index, effect in enumerate(spec.effects or ()):
+        if effect.covariate and effect.covariate not in columns:
+            raise ConfigError(
+                f"effects[{index}].covariate: '{effect.covariate}' is not declared."
+                f"{nearest(effect.covariate, columns)} measurement.covariates: "
+                f"{', '.join(columns) or 'none'}."
+            )
+        if effect.runs != "all":
+            _require_runs(f"effects[{index}].runs", effect.runs, names)
+    check_states(spec.runs, names)
+    known = spec.identification.known_payload
+    _require_runs("identification.known_payload.runs", known.runs if known else (), names)
+
+
+def _require_runs(where: str, declared: Iterable[str], names: Sequence[str]) -> None:
+    for name in declared:
+        if name not in names:
+            raise ConfigError(
+                f"{where}: there is no run '{name}' in the data.{nearest(name, names)} "
+                f"Runs: {', '.join(names)}."
+            )
+
+
+def check_states(states: States, names: Sequence[str]) -> None:
+    """Refuse states of runs that are not among the `names` of the data, or of other kinds.
+
+    Raises
+    ------
+    ConfigError
+        There is no such run or kind, or the kind does not differ between runs.
+    """
+    for run, labels in states.items():
+        _require_runs("runs", (run,), names)
+        for kind in labels:
+            if not _differs_between_runs(kind_named(kind, f"runs.{run}")):
+                able = [name for name, k in catalogue().items() if _differs_between_runs(k)]
+                raise ConfigError(
+                    f"runs.{run}: {kind} is not of single runs. Kinds that are: {', '.join(able)}."
+                )
+
+
+def _differs_between_runs(kind: type[Effect]) -> bool:
+    return kind.per_run or kind.changes_between_runs
+
+
+def check_left_to_fit(spec: Spec, parts: Split) -> None:
+    """Refuse effects, or a known payload, of sealed runs only: nothing would be fitted of them.
+
+    Raises
+    ------
+    ConfigError
+        There is such an effect.
+    """
+    declared = [
+        (f"effects[{index}]", each.kind, () if each.runs == "all" else each.runs)
+        for index, each in enumerate(spec.effects or ())
+    ]
+    needed = spec.identification.needed_runs
+    for where, what, names in [*declared, ("identification.known_payload", "the payload", needed)]:
+        if names and not any(run.id.is_among(names) for run in parts.training):
+            others = [unit for unit in parts.units if unit not in (*names, parts.sealed_name)]
+            instead = f" Seal another run: --sealed '{others[-1]}'." if others else ""
+            raise ConfigError(
+                f"{where}.runs: '{', '.join(names)}' is sealed, so that nothing is left "
+                f"to fit {what} on.{instead}"
+            )

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.errors import FileError
-from excite_cli.identification.factors import Mask
+from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
 
 FEWEST = 10  # samples that an error may rest on
@@ -41,22 +41,9 @@ class Errors:
 
 
 def torque_errors(
-    joint_names: Sequence[str],
-    tau: Sequence[Array],
-    predicted: Sequence[Array],
-    usable: Sequence[Mask],
-    moving: Sequence[Mask],
-    raw: Sequence[Array],
-    raw_predicted: Sequence[Array],
-    step: float,
+    joint_names: Sequence[str], runs: Sequence[PreparedRun], torques: Sequence[Array]
 ) -> Errors:
-    """Compare torque and prediction over all runs.
-
-    Parameters
-    ----------
-    tau, predicted, usable, moving: per run (M, n), filtered; `moving`: the joint itself moves
-    raw, raw_predicted: per run (T, n), torque as recorded; entries that are not finite are left out
-    step: between filtered samples [s]
+    """Compare the torque of runs with `torques` (T, n) that are predicted at their working rate.
 
     A joint with fewer than `FEWEST` (moving) samples has NaN and does not enter the mean.
 
@@ -65,10 +52,10 @@ def torque_errors(
     FileError
         No joint has as many.
     """
-    blocks = [block_sums(*run, step) for run in zip(tau, predicted, usable, moving, strict=True)]
+    blocks = [block_sums(*both) for both in zip(runs, torques, strict=True)]
     sums = np.concatenate(blocks, axis=1)  # (6, blocks, n)
     wrong, size, wrong_moving, size_moving, count, count_moving = sums.sum(axis=1)
-    enough = count >= FEWEST
+    enough, moves = count >= FEWEST, count_moving >= FEWEST
     if not enough.any():
         raise FileError(
             f"the data to judge by leave {count.max():.0f} filtered samples at most to any joint; "
@@ -76,14 +63,14 @@ def torque_errors(
             "are too short: record longer, or seal another run."
         )
     relative = np.where(enough, _ratio(wrong, size), np.nan)
-    moves = count_moving >= FEWEST
     relative_moving = np.where(moves, _ratio(wrong_moving, size_moving), np.nan)
     rms = np.sqrt(np.where(enough, wrong, np.nan) / np.maximum(count, 1))
     rms_moving = np.sqrt(np.where(moves, wrong_moving, np.nan) / np.maximum(count_moving, 1))
-    rms_raw = np.where(count > 0, _raw_rms(raw, raw_predicted, len(joint_names)), np.nan)
+    raw = [run.tau_raw - torque for run, torque in zip(runs, torques, strict=True)]
+    rms_raw = np.where(count > 0, np.sqrt(_mean(np.square(np.concatenate(raw)).T)), np.nan)
     return Errors(
-        mean_relative=_mean(relative),
-        mean_relative_moving=_mean(relative_moving),
+        mean_relative=float(_mean(relative)),
+        mean_relative_moving=float(_mean(relative_moving)),
         relative=_named(joint_names, relative),
         relative_moving=_named(joint_names, relative_moving),
         rms=_named(joint_names, rms),
@@ -94,18 +81,17 @@ def torque_errors(
     )
 
 
-def block_sums(
-    tau: Array, predicted: Array, usable: Mask, moving: Mask, step: float, seconds: float = _BLOCK
-) -> Array:
-    """Per block of about so many seconds, of the samples (M, n) of a run: (6, blocks, n).
+def block_sums(run: PreparedRun, torque: Array, seconds: float = _BLOCK) -> Array:
+    """Per block of about so many seconds of a run, beside a predicted torque: (6, blocks, n).
 
     ‖e‖², ‖τ‖², the same where moving, both counts. The last block has at least half the length.
     """
-    good, slow = usable.astype(float), (usable & moving).astype(float)
+    tau, usable, predicted = run.tau, run.valid, run.averaged_torque(torque)
+    good, slow = usable.astype(float), (usable & run.moving).astype(float)
     error = np.square(np.where(usable, tau - predicted, 0.0))
     size = np.square(np.where(usable, tau, 0.0))
     rows = np.stack([error, size, error * slow, size * slow, good, slow])
-    length = max(1, round(seconds / step))
+    length = max(1, round(seconds / run.step))
     edges = np.arange(0, max(len(tau) - length // 2, 1), length)
     return np.add.reduceat(rows, edges, axis=1)
 
@@ -115,34 +101,24 @@ def _ratio(wrong: Array, size: Array) -> Array:
         return np.where(size > 0, np.sqrt(wrong / np.where(size > 0, size, 1.0)), np.nan)
 
 
-def _mean(values: Array) -> float:
-    good = values[np.isfinite(values)]
-    return float(good.mean()) if len(good) else float("nan")
+def _mean(values: Array) -> Array:
+    """Along the last axis, of what is finite; NaN where nothing is."""
+    good = np.isfinite(values)
+    count = good.sum(axis=-1)
+    total = np.where(good, values, 0.0).sum(axis=-1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _named(names: Sequence[str], values: Array) -> dict[str, float]:
     return {name: float(value) for name, value in zip(names, values, strict=True)}
 
 
-def _raw_rms(raw: Sequence[Array], predicted: Sequence[Array], n: int) -> Array:
-    if not raw:
-        return np.full(n, np.nan)
-    squares = np.square(np.concatenate(raw) - np.concatenate(predicted))
-    good = np.isfinite(squares)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.sqrt(np.where(good, squares, 0.0).sum(axis=0) / good.sum(axis=0))
-
-
 def _interval(wrong: Array, size: Array) -> tuple[float, float]:
     """2.5 and 97.5 % of the mean relative error over blocks (B, n) drawn with replacement."""
-    if len(wrong) < 2:
-        return float("nan"), float("nan")
     draws = drawn_blocks(len(wrong))
-    ratios = _ratio(draws @ wrong, draws @ size)
-    good = np.isfinite(ratios)
-    count = good.sum(axis=1)
-    means = np.where(good, ratios, 0.0).sum(axis=1)[count > 0] / count[count > 0]
-    if not len(means):
+    means = _mean(_ratio(draws @ wrong, draws @ size))
+    means = means[np.isfinite(means)]
+    if len(wrong) < 2 or not len(means):
         return float("nan"), float("nan")
     low, high = np.percentile(means, [2.5, 97.5])
     return float(low), float(high)

@@ -55,16 +55,12 @@ def _apart(x: Array, known: NDArray[np.bool_]) -> Array:
     squares = np.fft.rfft(np.square(x).sum(axis=1), 2 * size)
     # Σ w_t |x_{t+L}|² + w_{t+L} |x_t|² − 2 x_t·x_{t+L}, even in L.
     spectrum = 2.0 * (squares.conj() * mask).real - 2.0 * np.square(np.abs(own)).sum(axis=1)
-    lags = slice(0, (size + _longest_gap(known)) // 2 + 1)
+    longest_gap = int(np.diff(np.flatnonzero(known)).max()) - 1
+    lags = slice(0, (size + longest_gap) // 2 + 1)
     total = np.fft.irfft(spectrum)[lags]
     pairs = np.fft.irfft(np.square(np.abs(mask)))[lags]
     enough = pairs > max(_FEWEST * weight.sum(), 1.0)
     return np.where(enough, total / np.maximum(pairs, 1.0) / x.shape[1], np.inf)
-
-
-def _longest_gap(known: NDArray[np.bool_]) -> int:
-    """Samples between known ones."""
-    return int(np.diff(np.flatnonzero(known)).max()) - 1
 
 
 def _multiples(most: int, step: int) -> list[int]:
@@ -83,19 +79,14 @@ def _refined(x: Array, known: NDArray[np.bool_], period: float) -> float:
     v[half:-half] = (x[2 * half :] - x[: -2 * half]) / (2 * half)
     sure[half:-half] = known[2 * half :] & known[half:-half] & known[: -2 * half]
     v[~sure] = 0.0
-    every = known.all()
-    squares, own = (np.cumsum((v * y).sum(axis=1)) for y in (v, x))
     for step in range(_STEPS):
         above, below = 0.0, 0.0
         for k in _multiples(int((len(x) - 1) / period), step):
             lag = round(k * period)
-            slope, last = v[:-lag], len(x) - lag - 1
-            energy, product = float(squares[last]), float(own[last])
-            if not every:
-                slope = slope * known[lag:, None]
-                energy, product = float(np.vdot(slope, slope)), float(np.vdot(slope, x[:-lag]))
+            slope = v[:-lag] * known[lag:, None]
+            energy = float(np.vdot(slope, slope))
             if energy > 0.0:
-                late = (float(np.vdot(slope, x[lag:])) - product) / energy
+                late = float(np.vdot(slope, x[lag:] - x[:-lag])) / energy
                 above += energy * k * (lag - late)
                 below += energy * k * k
         if below == 0.0:

@@ -20,10 +20,8 @@ from excite_cli.config.data_spec import FilterSpec, IdentificationSpec
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.errors import ExciteError
 from excite_cli.identification.fit import Fit, fit
-from excite_cli.identification.left_out import LeftOut
-from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import Processing, choose_processing
-from excite_cli.identification.regression import build_regression
+from excite_cli.identification.regression import regression_on
 from excite_cli.identification.torque_scale import Knowledge
 from excite_cli.measurement.dataset import Finding, Run
 from excite_cli.robot.model import Robot
@@ -50,8 +48,7 @@ def fitted_behind(
     plain = spec.model_copy(update={"consistent": False})
 
     def behind(processing: Processing) -> Fit:
-        prepared = prepare_all(runs, processing, LeftOut.by(known.effects))
-        regression = build_regression(robot, base, known.effects, prepared)
+        regression = regression_on(robot, base, known.effects, runs, processing)
         return fit(regression, plain, (known.rows, known.target))
 
     return behind

@@ -5,26 +5,25 @@ correlates the columns C with the errors. Columns Z made of the *reference* moti
 periods of the same motion, carry the same signal but not that noise. What Z does not explain of C,
 V = C − Z Π, is added to the regression: if C is free of the noise its coefficients are zero. They
 are tested with a covariance that respects serial correlation. (Hausman 1978; for robots Janot,
-Vandanjon & Gautier 2013, Brunot et al. 2018.) The instrumental-variable estimate is x of the
-regression on Z Π.
+Vandanjon & Gautier 2013, Brunot et al. 2018.)
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from scipy.special import fdtrc
 
-from excite_cli.identification.covariance import Rows, estimate_covariance
-from excite_cli.identification.factors import run_factors, solve, stacked, together
-from excite_cli.identification.least_squares import factors_of, fit_rows
-from excite_cli.identification.periods import mean_of_other_periods, period_of
+from excite_cli.identification.covariance import Rows
+from excite_cli.identification.exact_period import exact_period
+from excite_cli.identification.factors import run_factors, stacked, together
+from excite_cli.identification.least_squares import fit_rows
 from excite_cli.measurement.dataset import Dataset, Mask, Run
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array
 from excite_cli.workers.at_hand import each
-from excite_cli.workers.base import Function, Tell
+from excite_cli.workers.base import Tell
 
 Source = Literal["reference", "periods", "none"]
 REFERENCE = "q_ref"
@@ -36,10 +35,7 @@ _ALIGNMENTS = 8
 
 @dataclass(frozen=True)
 class Hausman:
-    """`p_value` that the columns are free of the noise; NaN if not `testable`, for `reason`.
-
-    `bias` (p,): estimate less instrumental-variable estimate, `bias_std` its standard deviation.
-    """
+    """`p_value` that the columns are free of the noise; NaN if not `testable`, for `reason`."""
 
     testable: bool
     reason: str
@@ -47,8 +43,6 @@ class Hausman:
     statistic: float = float("nan")
     degrees: int = 0
     p_value: float = float("nan")
-    bias: Array | None = None
-    bias_std: Array | None = None
 
     def sentence(self) -> str:
         """For people."""
@@ -73,34 +67,39 @@ def instrument_dataset(dataset: Dataset) -> tuple[Dataset | None, Source, str]:
     Reference positions (`extra['q_ref']`, (T, n)) if every run has them, each joint's shifted in
     time by its mean lag; else for each sample the mean of the other periods of a periodic motion.
     """
-    if all(
-        REFERENCE in run.extra and run.extra[REFERENCE].shape == run.q.shape for run in dataset.runs
-    ):
-        moved = each(_aligned, None, dataset.runs)
-        return replace(dataset, runs=_moving_as(dataset.runs, moved)), "reference", ""
-    positions = [run.q for run in dataset.runs]
-    periods = list(each(_period, None, positions))
-    if all(period is not None for period in periods):
-        moved = each(_other_periods, None, list(zip(positions, periods, strict=True)))
-        return replace(dataset, runs=_moving_as(dataset.runs, moved)), "periods", ""
-    return None, "none", (
-        "there is neither a reference motion (channel q_ref) nor a motion of two or more periods"
-    )  # fmt: skip
-
-
-def _moving_as(runs: Sequence[Run], motions: Iterable[Array]) -> tuple[Run, ...]:
-    """The runs with other positions."""
+    runs = dataset.runs
+    if all(REFERENCE in run.extra and run.extra[REFERENCE].shape == run.q.shape for run in runs):
+        source: Source = "reference"
+        motions = each(_aligned, None, runs)
+    else:
+        periods = list(each(_period, None, [run.q for run in runs]))
+        if None in periods:
+            return None, "none", (
+                "there is neither a reference motion (channel q_ref) nor a motion of two or more "
+                "periods"
+            )  # fmt: skip
+        source = "periods"
+        motions = each(
+            _other_periods, None, [(run.q, p) for run, p in zip(runs, periods, strict=True)]
+        )
     spool = Spool()
-    pairs = zip(runs, motions, strict=True)
-    return tuple(replace(run, q=spool.keep(q), dq=None) for run, q in pairs)
+    moved = [replace(run, q=spool.keep(q), dq=None) for run, q in zip(runs, motions, strict=True)]
+    return replace(dataset, runs=tuple(moved)), source, ""
 
 
 def _period(shared: None, q: Array, tell: Tell) -> int | None:
-    return period_of(q)
+    found = exact_period(q, np.ones(len(q), dtype=bool))
+    return None if found is None else round(found)
 
 
 def _other_periods(shared: None, task: tuple[Array, int], tell: Tell) -> Array:
-    return mean_of_other_periods(*task)
+    """For every sample of x (T, n) the mean of the samples whole periods away from it."""
+    x, period = task
+    phase = np.arange(len(x)) % period
+    total = np.zeros((period, x.shape[1]))
+    np.add.at(total, phase, x)
+    others = np.bincount(phase) - 1
+    return np.asarray((total[phase] - x) / np.maximum(others, 1)[phase, None])
 
 
 def _aligned(shared: None, run: Run, tell: Tell) -> Array:
@@ -116,74 +115,45 @@ def _aligned(shared: None, run: Run, tell: Tell) -> Array:
     return shifted
 
 
-def not_testable(reason: str) -> Hausman:
-    """The verdict when there are no instruments."""
-    return Hausman(False, reason)
-
-
 def hausman_test(
     runs: Sequence[Rows], instruments: Sequence[Array], source: Source, noise: Array
 ) -> Hausman:
     """Test columns of `runs` against instrument columns, per run (M, n, p); `noise` (n,) [N·m]."""
     p = runs[0].columns.shape[2]
-    triangle = _triangle(runs, instruments, noise)
+    tasks = [(own, run.columns, run.usable) for run, own in zip(runs, instruments, strict=True)]
+    triangle = stacked(together(each(_factors_of_both, None, tasks)), noise)[:, :-1]
     z, c = triangle[:, :p], triangle[:, p:]
     first_stage = np.linalg.lstsq(z / _norms(z), c, rcond=1e-10)[0] / _norms(z)[:, None]
     values, directions = np.linalg.svd((c - z @ first_stage) / _norms(c))[1:]
     kept = values > _DUST * np.sqrt(p)
     if not kept.any():
-        return not_testable("the instruments repeat the columns without any noise")
+        return Hausman(False, "the instruments repeat the columns without any noise")
     turn = directions[kept].T / values[kept] / _norms(c)[:, None]  # V turn: orthonormal columns
     turn *= np.sqrt(sum(int(run.usable.sum()) for run in runs))
-    fitted = fit_rows(_with(_augmented, (first_stage, turn), runs, instruments), "wls")
-    extra = int(kept.sum())
+    spool = Spool()
+    augmented = each(_augmented, (first_stage, turn), tasks)
+    fitted = fit_rows([
+        Rows(spool.keep(columns), run.tau, run.usable)
+        for run, columns in zip(runs, augmented, strict=True)
+    ])  # fmt: skip
     if not fitted.seen[p:].all():
-        return not_testable("the parts of the columns that the instruments miss are not separate")
+        return Hausman(False, "the parts of the columns that the instruments miss are not separate")
+    extra = int(kept.sum())
     gamma, covariance = fitted.x[p:], fitted.covariance[p:, p:]
     statistic = float(gamma @ np.linalg.solve(covariance, gamma)) / extra
     freedom = max(fitted.samples - 2 * p, 4.0)
-    bias, bias_std = _bias(runs, instruments, first_stage, noise)
-    return Hausman(
-        testable=True,
-        reason="",
-        source=source,
-        statistic=statistic,
-        degrees=extra,
-        p_value=float(fdtrc(extra, freedom, statistic)),
-        bias=bias,
-        bias_std=bias_std,
-    )
+    p_value = float(fdtrc(extra, freedom, statistic))
+    return Hausman(True, "", source, statistic, extra, p_value)
 
 
-def _with(
-    columns: Function, shared: Any, runs: Sequence[Rows], instruments: Sequence[Array]
-) -> list[Rows]:
-    """The runs with the columns that are made of theirs and of the instruments."""
-    spool = Spool()
-    tasks = [(run.columns, own) for run, own in zip(runs, instruments, strict=True)]
-    made = each(columns, shared, tasks)
-    return [Rows(spool.keep(own), run.tau, run.usable) for run, own in zip(runs, made, strict=True)]
-
-
-def _augmented(shared: tuple[Array, Array], task: tuple[Array, Array], tell: Tell) -> Array:
+def _augmented(shared: tuple[Array, Array], task: tuple[Array, Array, Mask], tell: Tell) -> Array:
     """Columns, and what the instruments miss of them."""
-    (first_stage, turn), (columns, instrument) = shared, task
+    (first_stage, turn), (instrument, columns, _) = shared, task
     return np.concatenate([columns, (columns - instrument @ first_stage) @ turn], axis=2)
 
 
-def _projected(first_stage: Array, task: tuple[Array, Array], tell: Tell) -> Array:
-    """What the instruments tell of the columns."""
-    return np.asarray(task[1] @ first_stage)
-
-
-def _triangle(runs: Sequence[Rows], instruments: Sequence[Array], noise: Array) -> Array:
-    """R (·, 2p) of the usable rows [Z C] of all runs, divided by `noise`."""
-    pairs = zip(runs, instruments, strict=True)
-    tasks = [(instrument, run.columns, run.usable) for run, instrument in pairs]
-    return stacked(together(each(_factors_of_both, None, tasks)), noise)[:, :-1]
-
-
 def _factors_of_both(shared: None, task: tuple[Array, Array, Mask], tell: Tell) -> Array:
+    """R (n, ·, 2p + 1) of the usable rows [Z C 0]."""
     instrument, columns, usable = task
     both = np.concatenate([instrument, columns], axis=2)
     return run_factors(both, np.zeros(usable.shape), usable)
@@ -192,17 +162,3 @@ def _factors_of_both(shared: None, task: tuple[Array, Array, Mask], tell: Tell) 
 def _norms(x: Array) -> Array:
     norms = np.linalg.norm(x, axis=0)
     return np.where(norms > 0, norms, 1.0)
-
-
-def _bias(
-    runs: Sequence[Rows], instruments: Sequence[Array], first_stage: Array, noise: Array
-) -> tuple[Array, Array]:
-    """Least squares less instrumental variables (p,), and the latter's standard deviation.
-
-    NaN where rounding leaves no variance: the instruments do not show that parameter.
-    """
-    projected = _with(_projected, first_stage, runs, instruments)
-    plain, second = (solve(stacked(factors_of(group), noise)) for group in (runs, projected))
-    covariance = estimate_covariance(projected, second.x, second.inverse, noise)
-    variance = np.diag(covariance.matrix)
-    return plain.x - second.x, np.sqrt(np.where(variance > 0.0, variance, np.nan))

@@ -6,16 +6,21 @@ R are the effects of the robot, which may look at the load L (gears carry bodies
 too), D the defects of the measurement, which look at the robot's whole torque.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.base import Effect
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns, seen_of, with_effects
+from excite_cli.identification.regression import (
+    Series,
+    effect_columns,
+    signals_of,
+    with_effects,
+)
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 
@@ -26,22 +31,6 @@ class Prediction:
 
     load: Array
     torque: Array
-
-
-@dataclass(frozen=True)
-class Series:
-    """States (T, n) at equidistant instants `t` (T,) [s], and what else effects look at.
-
-    `start` [s] on the campaign's clock; `covariates` (T,) by name.
-    """
-
-    t: Array
-    q: Array
-    v: Array
-    a: Array
-    run: RunId = field(default_factory=RunId)
-    start: float = 0.0
-    covariates: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -71,28 +60,14 @@ class IdentifiedModel:
         """Effects that some recordings had: no part of the robot as such."""
         return tuple(effect for effect in self.effects if effect.runs)
 
-    def predicted(self, robot: Robot, run: PreparedRun) -> Prediction:
-        """What it says of the motion of a prepared run."""
-        body = RigidBody(robot, self.phi, run.q, run.v, run.a)
-        return self._told(seen_of(run, body))
-
-    def told(self, robot: Robot, series: Series) -> Prediction:
-        """What it says of a series of states."""
-        return self._told(self._seen(robot, series))
-
-    def _told(self, signals: Signals) -> Prediction:
-        load = signals.load
+    def predicted(self, robot: Robot, run: PreparedRun | Series) -> Prediction:
+        """What it says of the motion of a prepared run, or of a series of states."""
+        signals = with_effects(signals_of(run, robot, self.phi), self.effects, self.values)
+        load = signals.body.load
         if not self.effects:
             return Prediction(load, load)
-        columns = effect_columns(self.effects, with_effects(signals, self.effects, self.values))
+        columns = effect_columns(self.effects, signals)
         return Prediction(load, np.asarray(load + columns @ self.values))
-
-    def _seen(self, robot: Robot, series: Series) -> Signals:
-        body = RigidBody(robot, self.phi, series.q, series.v, series.a)
-        return Signals(
-            series.t, series.q, series.v, series.a, body.load, body.load, body,
-            series.run, series.start, series.covariates,
-        )  # fmt: skip
 
     def pull_back(self, robot: Robot, series: Series, weights: Array) -> tuple[Array, Array, Array]:
         """Derivatives by q, v, a, each (T, n), of Σ weights ∘ τ; weights (T, n).
@@ -102,7 +77,7 @@ class IdentifiedModel:
         NotImplementedError
             An effect has no derivatives (`excitable` says so).
         """
-        signals = with_effects(self._seen(robot, series), self.effects, self.values)
+        signals = with_effects(signals_of(series, robot, self.phi), self.effects, self.values)
         carried = self.carried(robot, series.run)
         total = np.zeros((3, *weights.shape))
         onward = weights.copy()  # what reaches the torque, then the load
@@ -138,14 +113,4 @@ def errors_on(
     robot: Robot, runs: Sequence[PreparedRun], predictions: Sequence[Prediction]
 ) -> Errors:
     """Errors of the predictions for `runs`."""
-    raw = [each.torque for each in predictions]
-    return torque_errors(
-        robot.joint_names,
-        [run.tau for run in runs],
-        [run.averaged_torque(each) for run, each in zip(runs, raw, strict=True)],
-        [run.valid for run in runs],
-        [run.moving & run.valid for run in runs],
-        [run.tau_raw for run in runs],
-        raw,
-        runs[0].step,
-    )
+    return torque_errors(robot.joint_names, runs, [each.torque for each in predictions])

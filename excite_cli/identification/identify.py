@@ -7,39 +7,41 @@ import numpy as np
 
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ExciteError
-from excite_cli.identification.declared_runs import check_declared_runs, check_left_to_fit
+from excite_cli.identification.declared_states import check_declared_runs, check_left_to_fit
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.filter_bias import filter_findings, fitted_behind
-from excite_cli.identification.fit import (
-    Fit,
-    all_rows,
-    effect_parameters,
-    fit,
-    follows_model,
-    rebuilt,
-)
+from excite_cli.identification.fit import Fit, effect_parameters, fit
 from excite_cli.identification.hausman import (
     SIGNIFICANT,
     Hausman,
     hausman_test,
     instrument_dataset,
-    not_testable,
 )
 from excite_cli.identification.identified_model import errors_on
 from excite_cli.identification.implausible_links import implausible
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import noise_floor
-from excite_cli.identification.prepare import prepare_all, require_motion, standing_still
+from excite_cli.identification.prepare import (
+    PreparedRun,
+    prepare_all,
+    require_motion,
+    standing_still,
+)
 from excite_cli.identification.processing import Processing, choose_processing
-from excite_cli.identification.regression import Regression, build_regression
+from excite_cli.identification.regression import (
+    Regression,
+    build_regression,
+    follows_model,
+    rebuilt,
+    regression_on,
+)
 from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_scale import assumed_scale, knowledge_of
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
-from excite_cli.measurement.dataset import Dataset, Finding, Run
+from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.recorded import Recorded, recorded
 from excite_cli.robot.model import Robot
 from excite_cli.shown.record import Shown
@@ -94,37 +96,36 @@ def identify(
     known = knowledge_of(spec.identification, declared_effects(spec.effects, robot), robot, base)
     effects = known.effects
     check_declared_runs(spec, dataset)
-    parts = split(dataset, sealed, spec.diagnosis.block, spec.identification.needed_runs)
+
+    def cut(data: Dataset) -> Split:
+        return split(data, sealed, spec.diagnosis.block, spec.identification.needed_runs)
+
+    parts = cut(dataset)
     check_left_to_fit(spec, parts)
     refuse_sealed_copies(parts)
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )
     tell("columns of the regression")
-    training = _regression(robot, base, effects, parts.training, processing)
-    require_motion(
-        [run.prepared for run in training.runs],
-        processing,
-        robot.joint_names,
-        (*spec.measurement.without_torque, *robot.unmeasured),
-    )
+    training = regression_on(robot, base, effects, parts.training, processing)
+    prepared = [run.prepared for run in training.runs]
+    unmeasured = (*spec.measurement.without_torque, *robot.unmeasured)
+    require_motion(prepared, processing, robot.joint_names, unmeasured)
     tell("fit")
     found = fit(training, spec.identification, (known.rows, known.target))
     tell("errors on the sealed part")
-    held_out = _regression(robot, base, effects, parts.sealed, processing)
+    held_out = prepare_all(parts.sealed, processing, LeftOut.by(effects))
     if follows_model(training):
-        values = found.values[found.rank :]
-        training, held_out = (rebuilt(r, found.phi, values) for r in (training, held_out))
+        training = rebuilt(training, found.phi, found.values[found.rank :])
     tell("the filter")
     behind = fitted_behind(robot, base, known, spec.identification, parts.training)
     wanted = spec.measurement.filter
     biased = filter_findings(parts.training, processing, wanted, behind, found)
     tell("closed-loop bias")
-    cut = (sealed, spec.diagnosis.block, spec.identification.needed_runs)
-    hausman = _hausman(training, dataset, parts, processing, found, cut)
+    hausman = _hausman(training, dataset, cut, processing, found)
     floor = noise_floor(parts.training, processing)
-    error, sealed_traces = judged(found, held_out, sealed=True)
-    training_error, training_traces = judged(found, training, sealed=False)
+    error, sealed_traces = judged(robot, found, held_out, sealed=True)
+    training_error, training_traces = judged(robot, found, prepared, sealed=False)
     return Identification(
         fit=found,
         sealed_run=parts.sealed_name,
@@ -135,7 +136,7 @@ def identify(
         findings=(
             *dataset.findings,
             *assumed_scale(spec.measurement, spec.identification),
-            *standing_still([run.prepared for run in training.runs], robot.joint_names),
+            *standing_still(prepared, robot.joint_names),
             *_hardly_moved(found),
             *_noticed(found, hausman),
             *biased,
@@ -150,26 +151,12 @@ def identify(
     )
 
 
-def _regression(
-    robot: Robot,
-    base: BaseParameters,
-    effects: Sequence[Effect],
-    runs: Sequence[Run],
-    processing: Processing,
-) -> Regression:
-    prepared = prepare_all(runs, processing, LeftOut.by(effects))
-    return build_regression(robot, base, effects, prepared)
-
-
 def judged(
-    found: Fit, regression: Regression, sealed: bool
+    robot: Robot, found: Fit, runs: Sequence[PreparedRun], sealed: bool
 ) -> tuple[Errors, tuple[TorqueTrace, ...]]:
-    """Errors of the fit's torque on the runs of `regression`, and this torque over time."""
-    runs = [run.prepared for run in regression.runs]
-    robot = regression.robot
+    """Errors of the fit's torque on runs, and this torque over time."""
     predicted = [found.model.predicted(robot, run) for run in runs]
-    errors = errors_on(robot, runs, predicted)
-    return errors, tuple(
+    return errors_on(robot, runs, predicted), tuple(
         torque_trace(run, each.load, each.torque, sealed=sealed)
         for run, each in zip(runs, predicted, strict=True)
     )
@@ -178,32 +165,24 @@ def judged(
 def _hausman(
     training: Regression,
     dataset: Dataset,
-    parts: Split,
+    cut: Callable[[Dataset], Split],
     processing: Processing,
     found: Fit,
-    cut: tuple[str | None, float | None, tuple[str, ...]],
 ) -> Hausman:
     """The test with instruments cut and filtered as the data were."""
     instruments, source, reason = instrument_dataset(dataset)
     if instruments is None:
-        return not_testable(reason)
-    runs = split(instruments, *cut).training
+        return Hausman(False, reason)
     processing = replace(processing, velocity="differentiated")
+    values = found.values[found.rank :]
+    robot, base, effects = training.robot, training.base, training.effects
     try:
-        left_out = LeftOut.by(training.effects)
-        prepared = prepare_all(runs, processing, left_out)
-        other = build_regression(
-            training.robot, training.base, training.effects, prepared, found.phi,
-            found.values[found.rank :],
-        )  # fmt: skip
+        prepared = prepare_all(cut(instruments).training, processing, LeftOut.by(effects))
+        other = build_regression(robot, base, effects, prepared, found.phi, values)
     except ExciteError as error:
-        return not_testable(str(error))
-    return hausman_test(
-        all_rows(training.runs),
-        [rows.columns for rows in all_rows(other.runs)],
-        source,
-        found.noise,
-    )
+        return Hausman(False, str(error))
+    rows, columns = [run.rows for run in training.runs], [run.columns for run in other.runs]
+    return hausman_test(rows, columns, source, found.noise)
 
 
 def _much_left(error: Errors) -> list[Finding]:
@@ -211,7 +190,7 @@ def _much_left(error: Errors) -> list[Finding]:
     much = {name: x for name, x in error.relative_moving.items() if x > _MUCH_LEFT}
     if not much:
         return []
-    worst = max(much, key=lambda name: much[name])
+    worst = max(much, key=much.__getitem__)
     text = (
         f"{much[worst]:.0%} of the torque of {worst} is left on sealed data ({len(much)} "
         f"joint{'s' * (len(much) > 1)} above {_MUCH_LEFT:.0%}): the declared model lacks "
@@ -236,17 +215,15 @@ def _hardly_moved(found: Fit) -> list[Finding]:
 def _noticed(found: Fit, hausman: Hausman) -> list[Finding]:
     """What a person must know about the fit."""
     findings = []
-    parameters = effect_parameters(found.effects)
-    signed = np.array([parameter.nonnegative for parameter in parameters], bool)
+    signed = np.array([each.nonnegative for each in effect_parameters(found.effects)], bool)
     values, std = found.values[found.rank :], found.std[found.rank :]
     negative = np.flatnonzero(signed & (values < -_SURELY * std))
     if len(negative):
         names = ", ".join(found.names[found.rank + i] for i in negative)
-        text = f"{names}: significantly negative, which is physically impossible."
+        why = "The declared model lacks something."
         if len(negative) == signed.sum() > 1:
-            text += " The sign of the torque may be flipped (measurement.sign)."
-        else:
-            text += " The declared model lacks something."
+            why = "The sign of the torque may be flipped (measurement.sign)."
+        text = f"{names}: significantly negative, which is physically impossible. {why}"
         findings.append(Finding("negative", "warning", text))
     loose = [name for name, ok in zip(found.names, found.identifiable, strict=True) if not ok]
     if loose:

@@ -6,7 +6,7 @@
               the farthest corner of this box by more than two standard deviations
 
 A mass needs no deviation: the set stands as near to the URDF as the data allow
-(`consistent_spread`), so that a link far from it was held there, and the data did not let it.
+(`consistent_near_prior`), so that a link far from it was held there, and the data did not let it.
 
 The box spans the frame, the joints and links that the body carries, the URDF's centre of mass, and
 the shapes of the URDF (collision, else visual). Where there are no shapes it is wider by a length
@@ -40,10 +40,6 @@ class _Box:
     low: Array
     high: Array
 
-    def beyond(self, point: Array) -> Array:
-        """How far (3,) a point lies outside along each axis, signed."""
-        return np.asarray(point - np.clip(point, self.low, self.high))
-
     @property
     def reach(self) -> float:
         """Distance of the farthest corner from the frame's origin [m]."""
@@ -58,23 +54,22 @@ def marked(
     prior: InertialPrior,
 ) -> tuple[LinkChange, ...]:
     """`links`, one per body of φ (P,), with their `marks`."""
-    narrow = [_box(robot, body, prior.mean) for body in range(len(links))]
-    gyration = [_gyration(phi, covariance, body) for body in range(len(links))]
-    boxes = narrow
-    if any(
-        _outside(*each)
-        for each in zip(links, narrow, gyration, _gyrations(prior.mean), strict=True)
-    ):
-        boxes = _with_shapes(robot, narrow, prior.mean)
+    bodies = range(len(links))
+    radii, usual = _gyrations(phi), _gyrations(prior.mean)
+    spreads = [_gyration_std(phi, covariance, body) for body in bodies]
+
+    def outside(boxes: Sequence[_Box]) -> list[list[str]]:
+        reaches = np.maximum([box.reach for box in boxes], usual)
+        found = zip(links, boxes, radii, spreads, reaches, strict=True)
+        return [[*_centre_mark(*each[:2]), *_gyration_mark(*each[2:])] for each in found]
+
+    narrow = [_box(robot, body, prior.mean) for body in bodies]
+    marks = outside(narrow)
+    if any(marks):
+        marks = outside(_with_shapes(robot, narrow, prior.mean))
     return tuple(
-        replace(
-            link,
-            marks=(
-                *_mass_mark(link),
-                *_outside(link, boxes[body], gyration[body], usual),
-            ),
-        )
-        for body, (link, usual) in enumerate(zip(links, _gyrations(prior.mean), strict=True))
+        replace(link, marks=(*_mass_mark(link), *own))
+        for link, own in zip(links, marks, strict=True)
     )
 
 
@@ -104,45 +99,44 @@ def _mass_mark(link: LinkChange) -> list[str]:
     return [f"mass {found} where the URDF has {mass.before:.3g} kg"]
 
 
-def _outside(link: LinkChange, box: _Box, gyration: tuple[float, float], usual: float) -> list[str]:
-    """What is outside of the box, `usual` being the URDF's radius of gyration."""
+def _centre_mark(link: LinkChange, box: _Box) -> list[str]:
     after, std = (np.array([getattr(c, name) for c in link.center]) for name in ("after", "std"))
-    beyond = np.abs(box.beyond(after))
-    marks = []
+    beyond = np.abs(after - np.clip(after, box.low, box.high))
     sure = np.where(beyond > _SURELY * std, beyond, 0.0)
-    if sure.any():
-        k = int(sure.argmax())
-        marks.append(
-            f"centre of mass at {'xyz'[k]} = {1e3 * after[k]:.0f} ± {1e3 * std[k]:.0f} mm, "
-            f"{1e3 * sure[k]:.0f} mm outside of the link"
-        )
-    radius, spread = gyration
-    reach = max(box.reach, usual)
-    if radius - _SURELY * spread > reach:
-        marks.append(
-            f"radius of gyration {1e3 * radius:.0f} ± {1e3 * spread:.0f} mm about its joint, where "
-            f"the link ends after {1e3 * reach:.0f} mm"
-        )
-    return marks
+    if not sure.any():
+        return []
+    k = int(sure.argmax())
+    return [
+        f"centre of mass at {'xyz'[k]} = {1e3 * after[k]:.0f} ± {1e3 * std[k]:.0f} mm, "
+        f"{1e3 * sure[k]:.0f} mm outside of the link"
+    ]
 
 
-def _gyration(phi: Array, covariance: Array, body: int) -> tuple[float, float]:
-    """√(tr I / 2m) [m] about the joint's frame and its standard deviation, to first order."""
-    at = 10 * body + np.array([0, 4, 6, 9])
-    mass, trace = max(float(phi[at[0]]), _LEAST_MASS), max(float(phi[at[1:]].sum()), 0.0)
-    radius = np.sqrt(trace / 2.0 / mass)
-    # As with centres, at a mass that is not less than its deviation.
-    sure = max(mass, float(np.sqrt(covariance[at[0], at[0]])))
-    slope = np.append(-radius / 2.0, np.full(3, 0.25 / max(radius, 1e-9))) / sure
-    return float(radius), float(np.sqrt(slope @ covariance[np.ix_(at, at)] @ slope))
+def _gyration_mark(radius: float, std: float, reach: float) -> list[str]:
+    if radius - _SURELY * std <= reach:
+        return []
+    return [
+        f"radius of gyration {1e3 * radius:.0f} ± {1e3 * std:.0f} mm about its joint, where "
+        f"the link ends after {1e3 * reach:.0f} mm"
+    ]
 
 
 def _gyrations(phi: Array) -> Array:
-    """√(tr I / 2m) (bodies,) [m]; 0 of what has no mass."""
+    """√(tr I / 2m) (bodies,) [m] about the joint's frame; 0 of what has no mass."""
     bodies = phi.reshape(-1, 10)
     mass, trace = bodies[:, 0], bodies[:, [4, 6, 9]].sum(axis=1)
     square = np.where(mass > _LEAST_MASS, trace / 2.0 / np.maximum(mass, _LEAST_MASS), 0.0)
     return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+
+
+def _gyration_std(phi: Array, covariance: Array, body: int) -> float:
+    """Standard deviation [m] of a body's radius of gyration, to first order."""
+    at = 10 * body + np.array([0, 4, 6, 9])
+    radius = float(_gyrations(phi)[body])
+    # As with centres, at a mass that is not less than its deviation.
+    sure = max(float(phi[at[0]]), _LEAST_MASS, float(np.sqrt(covariance[at[0], at[0]])))
+    slope = np.append(-radius / 2.0, np.full(3, 0.25 / max(radius, 1e-9))) / sure
+    return float(np.sqrt(slope @ covariance[np.ix_(at, at)] @ slope))
 
 
 def _box(robot: Robot, body: int, cad: Array) -> _Box:

@@ -1,8 +1,10 @@
 """Least squares over runs: τ = C x + e, by `ols`, `wls` or `irls`, with a prior or without.
 
-`ols` weights all joints alike, `wls` by the noise of each joint (Gautier 1997), `irls` further
-lowers the weight of outliers. The fit works on triangular factors per run and joint (`factors`);
-its covariance respects that noise is serially correlated (`covariance`).
+`ols` weights all joints alike, `wls` by the noise of each joint (Gautier 1997). `irls` further
+lowers the weight of outliers (Huber 1964): a residual r beyond 1.345 of a robust scale, 1.4826
+times the median absolute deviation, counts by 1.345/|r| of its square. The fit works on triangular
+factors per run and joint (`factors`); its covariance respects that noise is serially correlated
+(`covariance`).
 """
 
 from collections.abc import Sequence
@@ -11,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from excite_cli.identification.covariance import Covariance, Rows, estimate_covariance
+from excite_cli.identification.covariance import Rows, estimate_covariance
 from excite_cli.identification.factors import (
     Mask,
     Solution,
@@ -21,7 +23,6 @@ from excite_cli.identification.factors import (
     stacked,
     together,
 )
-from excite_cli.identification.robust import huber_weights, robust_scale, within
 from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
 from excite_cli.workers.at_hand import each
@@ -31,6 +32,7 @@ Method = Literal["ols", "wls", "irls"]
 _ROUNDS, _SETTLED = 30, 1e-6
 # Residuals below this share of the torque are rounding, not noise.
 _EXACT = 1e-9
+_HUBER, _MAD = 1.345, 1.4826  # 95 % efficient where noise is normal
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class LinearFit:
     """x (p,) with its covariance (p, p); `seen` (p,) identifiable at all; `noise` (n,) [N·m].
 
     `factor` (p+1, p+1) of the rows divided by `noise`, without the prior; `count` (n,) usable
-    rows; `samples` effective number of independent ones; `weights` per run for robust fits.
+    rows; `samples` effective number of independent ones.
     """
 
     x: Array
@@ -48,7 +50,6 @@ class LinearFit:
     factor: Array
     count: Array
     samples: float
-    weights: tuple[Array, ...] | None = None
 
 
 def fit_rows(
@@ -67,19 +68,22 @@ def fit_rows(
     if sizes is not None:
         runs = _without_dust(runs, sizes)
     factors = factors_of(runs)
-    n = runs[0].tau.shape[1]
-    count = sum((run.usable.sum(axis=0) for run in runs), np.zeros(n, int))
-    floor = _EXACT * _torque_size(factors, count)
-    extra = None if prior is None else np.column_stack(prior)
+    p = factors[0].shape[-1] - 1
+    count = sum((run.usable.sum(axis=0) for run in runs), np.zeros(runs[0].tau.shape[1], int))
+    size = _rms(factors, np.zeros(p), count)
+    floor = _EXACT * np.where(size > 0, size, 1.0)
+    extra = np.zeros((0, p + 1)) if prior is None else np.column_stack(prior)
     sigma, solution = _by_noise(factors, count, floor, extra, method)
-    weights = None
+    bread = solution.inverse
     if method == "irls":
-        weights, sigma, solution = _reweighted(runs, solution, floor, extra)
-        factors = factors_of(runs, weights=weights)
-    found = _covariance(runs, weights, solution, sigma, extra)
-    noise = np.sqrt(residual_squares(factors, solution.x) / np.maximum(count, 1))
-    noise = np.maximum(noise, floor)
-    covariance = np.where(np.outer(solution.seen, solution.seen), found.matrix, 0.0)
+        runs, sigma, solution = _reweighted(runs, solution, floor, extra)
+        factors = factors_of(runs)
+        bread = _curvature(runs, solution.x, sigma, extra)
+    matrix, samples = estimate_covariance(runs, solution.x, bread, sigma)
+    of_prior = bread @ extra[:, :-1].T  # its rows are independent and of unit variance
+    matrix = matrix + of_prior @ of_prior.T
+    noise = np.maximum(_rms(factors, solution.x, count), floor)
+    covariance = np.where(np.outer(solution.seen, solution.seen), matrix, 0.0)
     covariance[~solution.seen, ~solution.seen] = np.inf
     return LinearFit(
         x=solution.x,
@@ -88,24 +92,13 @@ def fit_rows(
         noise=noise,
         factor=stacked(factors, noise),
         count=count,
-        samples=found.samples,
-        weights=weights,
+        samples=samples,
     )
 
 
-def factors_of(
-    runs: Sequence[Rows], usable: Sequence[Mask] | None = None, weights: Sequence[Array] = ()
-) -> list[Array]:
-    """Factors (n, p+1, p+1) of runs, `together`; with other `usable` rows or `weights` if given."""
-    tasks = [
-        (
-            run.columns,
-            run.tau,
-            run.usable if usable is None else usable[k],
-            weights[k] if weights else None,
-        )
-        for k, run in enumerate(runs)
-    ]
+def factors_of(runs: Sequence[Rows]) -> list[Array]:
+    """Factors (n, p+1, p+1) of runs, `together`."""
+    tasks = [(run.columns, run.tau, run.usable, run.weights) for run in runs]
     return together(each(_factors, None, tasks))
 
 
@@ -129,50 +122,26 @@ def _without_dust(runs: Sequence[Rows], sizes: Array) -> Sequence[Rows]:
     return found
 
 
-def _covariance(
-    runs: Sequence[Rows],
-    weights: Sequence[Array] | None,
-    solution: Solution,
-    sigma: Array,
-    extra: Array | None,
-) -> Covariance:
-    """Of x, with the share of the prior: its rows are independent and of unit variance."""
-    bread = solution.inverse
-    if weights is not None:
-        bread = _curvature(runs, solution.x, sigma, extra)
-        runs = [replace(run, weights=weight) for run, weight in zip(runs, weights, strict=True)]
-    found = estimate_covariance(runs, solution.x, bread, sigma)
-    if extra is None:
-        return found
-    rows = bread @ extra[:, :-1].T
-    return Covariance(found.matrix + rows @ rows.T, found.noises, found.samples)
-
-
-def _torque_size(factors: Sequence[Array], count: Array) -> Array:
-    squares = residual_squares(factors, np.zeros(factors[0].shape[-1] - 1))
-    size = np.sqrt(squares / np.maximum(count, 1))
-    return np.where(size > 0, size, 1.0)
-
-
-def _freedom(count: Array, p: int) -> Array:
-    """Rows per joint less its share of the parameters."""
-    return np.maximum(count - p * count / max(int(count.sum()), 1), 1.0)
+def _rms(factors: Sequence[Array], x: Array, count: Array) -> Array:
+    """RMS (n,) per joint of what x leaves of the torque, of so many rows."""
+    return np.sqrt(residual_squares(factors, x) / np.maximum(count, 1))
 
 
 def _by_noise(
-    factors: Sequence[Array], count: Array, floor: Array, extra: Array | None, method: Method
+    factors: Sequence[Array], count: Array, floor: Array, extra: Array, method: Method
 ) -> tuple[Array, Solution]:
     """Alternate between x and the noise of every joint until it settles."""
-    p = factors[0].shape[-1] - 1
+    p, total = factors[0].shape[-1] - 1, int(count.sum())
+    freedom = np.maximum(count - p * count / max(total, 1), 1.0)  # less its share of parameters
     sigma = np.ones(len(count))
-    solution = solve(stacked(factors, sigma, None if method == "ols" else extra))
-    if method == "ols" and extra is None:
+    solution = solve(stacked(factors, sigma, extra[:0] if method == "ols" else extra))
+    if method == "ols" and not len(extra):
         return sigma, solution
     for _ in range(_ROUNDS):
         squares = residual_squares(factors, solution.x)
-        found = np.maximum(np.sqrt(squares / _freedom(count, p)), floor)
+        found = np.maximum(np.sqrt(squares / freedom), floor)
         if method == "ols":  # one noise for all joints, to weigh the prior against
-            found = np.full_like(found, np.sqrt(squares.sum() / max(int(count.sum()) - p, 1)))
+            found = np.full_like(found, np.sqrt(squares.sum() / max(total - p, 1)))
         settled = np.abs(found - sigma).max() <= _SETTLED * found.max()
         sigma, solution = found, solve(stacked(factors, found, extra))
         if settled:
@@ -181,24 +150,37 @@ def _by_noise(
 
 
 def _reweighted(
-    runs: Sequence[Rows], solution: Solution, floor: Array, extra: Array | None
-) -> tuple[tuple[Array, ...], Array, Solution]:
-    usable = [run.usable for run in runs]
-    weights: tuple[Array, ...] = ()
+    runs: Sequence[Rows], solution: Solution, floor: Array, extra: Array
+) -> tuple[Sequence[Rows], Array, Solution]:
+    """The runs with Huber's weights, the scale (n,) that they are made of, and their fit."""
     sigma = floor
     for _ in range(_ROUNDS):
         residuals = [run.residual(solution.x) for run in runs]
-        sigma = np.maximum(robust_scale(residuals, usable), floor)
-        weights = tuple(huber_weights(residual, sigma) for residual in residuals)
-        factors = factors_of(runs, weights=weights)
-        before, solution = solution.x, solve(stacked(factors, sigma, extra))
+        sigma = np.maximum(_robust_scale(runs, residuals), floor)
+        runs = [
+            replace(run, weights=_HUBER / np.maximum(np.abs(residual) / sigma, _HUBER))
+            for run, residual in zip(runs, residuals, strict=True)
+        ]
+        before, solution = solution.x, solve(stacked(factors_of(runs), sigma, extra))
         step = np.abs(solution.x - before) / np.sqrt(np.maximum(np.diag(solution.inverse), 1e-300))
         if step[solution.seen].max(initial=0.0) < 1e-4:
             break
-    return weights, sigma, solution
+    return runs, sigma, solution
 
 
-def _curvature(runs: Sequence[Rows], x: Array, sigma: Array, extra: Array | None) -> Array:
+def _robust_scale(runs: Sequence[Rows], residuals: Sequence[Array]) -> Array:
+    """Robust standard deviation (n,) of the usable residuals; 0 where there are none."""
+    size, usable = np.abs(np.concatenate(residuals)), np.concatenate([run.usable for run in runs])
+    return np.array([
+        _MAD * float(np.median(size[good, j])) if good.any() else 0.0
+        for j, good in enumerate(usable.T)
+    ])  # fmt: skip
+
+
+def _curvature(runs: Sequence[Rows], x: Array, sigma: Array, extra: Array) -> Array:
     """Inverse of Σ c cᵀ/σ² over the rows that count in full."""
-    inner = [run.usable & within(run.residual(x), sigma) for run in runs]
-    return solve(stacked(factors_of(runs, inner), sigma, extra)).inverse
+    inner = [
+        replace(run, weights=None, usable=run.usable & (np.abs(run.residual(x)) <= _HUBER * sigma))
+        for run in runs
+    ]
+    return solve(stacked(factors_of(inner), sigma, extra)).inverse

@@ -5,11 +5,11 @@ Deviations are those of the Gaussian posterior of all standard parameters φ and
     covariance = ([mapping 0; 0 1]ᵀ RᵀR [mapping 0; 0 1] + diag(1/std², 0))⁻¹
 
 with R the triangular factor of the regression in units of its noise (samples counted by the
-independent ones that they stand for) and std that of the prior as it was given, not of the narrower
-one at which the consistent set stands (`consistent_spread`): narrowing says where to stand when the
-data are silent, not that the URDF is right. That bodies are real is not used, so deviations are
-rather too large. Centres c = h / m are carried over to first order at what was found; where the
-mass is less than its deviation, at that much mass, since c has no deviation where m may be zero.
+independent ones that they stand for) and std that of the prior as it was given: that the consistent
+set is kept nearer (`consistent_near_prior`) says where to stand when the data are silent, not that
+the URDF is right. That bodies are real is not used, so deviations are rather too large. Centres
+c = h / m are carried over to first order at what was found; where the mass is less than its
+deviation, at that much mass, since c has no deviation where m may be zero.
 """
 
 from dataclasses import dataclass

@@ -9,7 +9,6 @@ of the robot that nobody weighed are uncertain together along x (1 + g) = const,
 has as a straight line: columns that moved along the curve would take its bend for knowledge of g.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,23 +23,26 @@ from excite_cli.effects.catalogue import carried_body
 from excite_cli.effects.parameter import Value, deviation
 from excite_cli.effects.signals import Signals
 from excite_cli.errors import ConfigError, FileError
+from excite_cli.identification.body_numbers import about_centre, about_frame, slopes
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.filter_bias import filter_findings
-from excite_cli.identification.fit import Fit, fit, rebuilt
+from excite_cli.identification.fit import Fit, fit
 from excite_cli.identification.identify import judged
-from excite_cli.identification.left_out import LeftOut
-from excite_cli.identification.prepare import prepare_all, require_motion
+from excite_cli.identification.prepare import PreparedRun, require_motion
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import (
     Regression,
-    build_regression,
+    Series,
     effect_columns,
+    rebuilt,
+    regression_on,
+    signals_of,
     with_effects,
 )
 from excite_cli.identification.stored_fit import StoredFit
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.run_identity import RunId
-from excite_cli.robot.link_frame import carrying_frame
+from excite_cli.robot.link_frame import LinkFrame, carrying_frame
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.record import Shown
 
@@ -51,7 +53,6 @@ _REBUILDS, _SETTLED = 6, 1e-6
 # What no noise explains, one standard deviation each: of 48 loads on 16 simulated robots 93 % of
 # the 95 % intervals held the truth without it, of 40 on 40 robots 89 %; of the 48, 98 % with it.
 _SCALE, _PLACE = 1e-3, 1e-4  # share of the whole body; m of its centre
-_AT = ([0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2])  # of a tensor
 _TENSOR = ("Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 
 
@@ -97,35 +98,29 @@ def identify_load(
     FileError
         The fit is of another robot, or of a payload in all runs; a run is too short.
     """
-    require_same(robot, base, stored)
-    frame = carrying_frame(robot, link, "--link")
-    before = [effect for effect in stored.fit.effects if not effect.runs]
-    load = carried_body(frame.joint)
-    if load in before:
+    frame, load, alone, known = _begun(robot, base, stored, link)
+    if load in alone.effects:
         raise FileError("--fit: it has a payload in all runs itself. Identify the robot without.")
-    alone, covariance = _of_fit(stored.fit, before)
     effects = (*_as_fitted(alone, robot), load)
     processing = choose_processing(
         dataset.runs, spec.measurement.filter, spec.diagnosis.moving_speed
     )
     # What the URDF says of the robot is in its fit, and no consistent bodies are wanted here.
     plain = spec.identification.model_copy(update={"inertias": "free", "consistent": False})
-    known = _known(alone.values, covariance)
 
-    def behind(other: Processing) -> tuple[Regression, Fit]:
-        prepared = prepare_all(dataset.runs, other, LeftOut.by(effects))
+    def behind(other: Processing) -> tuple[list[PreparedRun], Fit]:
+        made = regression_on(robot, base, effects, dataset.runs, other)
+        runs = [run.prepared for run in made.runs]
         unmeasured = (*spec.measurement.without_torque, *robot.unmeasured)
-        require_motion(prepared, other, robot.joint_names, unmeasured)
-        return _fitted(build_regression(robot, base, effects, prepared), plain, known)
+        require_motion(runs, other, robot.joint_names, unmeasured)
+        return runs, _fitted(made, plain, known)
 
-    regression, found = behind(processing)
+    runs, found = behind(processing)
     biased = filter_findings(
         dataset.runs, processing, spec.measurement.filter, lambda other: behind(other)[1], found
     )
-    with_load, _ = judged(found, regression, sealed=False)
-    without, _ = judged(alone, replace(regression, effects=tuple(before)), sealed=False)
+    without, with_load = (judged(robot, each, runs, sealed=False)[0] for each in (alone, found))
     at = slice(len(found.values) - _WIDTH, None)
-    turned = load.seen_from(frame)
     own, spread = found.values[at], found.covariance[at, at]
     if not np.isfinite(spread).all():
         raise ConfigError(
@@ -133,6 +128,7 @@ def identify_load(
             "joints turn it, or too little. Name a link further out, or play a motion that "
             "`excite optimize --for payload` plans."
         )
+    turned = load.seen_from(frame)
     values = turned @ own
     spread_there = _with_systematic(values, turned @ spread @ turned.T)
     possible = load.possible(own) or not load.why_impossible(own, spread)
@@ -152,9 +148,7 @@ def identify_load(
     )
 
 
-def _fitted(
-    regression: Regression, plain: IdentificationSpec, known: tuple[Array, Array]
-) -> tuple[Regression, Fit]:
+def _fitted(regression: Regression, plain: IdentificationSpec, known: tuple[Array, Array]) -> Fit:
     """The fit, with columns that follow what was found: gains act upon the load, too."""
     rank = regression.base.rank
     found = fit(regression, plain, known)
@@ -164,7 +158,7 @@ def _fitted(
         change = np.linalg.norm(found.values - last.values)
         if change <= _SETTLED * np.linalg.norm(found.values):
             break
-    return regression, found
+    return found
 
 
 @dataclass(frozen=True)
@@ -192,32 +186,23 @@ def expected_load(
     With samples at the rate of the fit's averages, of its noise, each worth the share of
     independent ones that the fit's had; t (T,) is that of the samples.
     """
-    require_same(robot, base, stored)
-    t, q, v, a = motion
-    frame = carrying_frame(robot, link, "--link")
-    before = [effect for effect in stored.fit.effects if not effect.runs]
-    alone, covariance = _of_fit(stored.fit, before)
-    body = RigidBody(robot, alone.phi, q, v, a)
-    seen = Signals(t, q, v, a, body.load, body.load, body)
-    seen = with_effects(seen, before, alone.values[alone.rank :])
-    load = carried_body(frame.joint)
+    frame, load, alone, known = _begun(robot, base, stored, link)
+    signals = signals_of(Series(*motion), robot, alone.phi)
+    seen = with_effects(signals, alone.effects, alone.values[alone.rank :])
     blocks = (
-        body.regressor[:, :, base.selection],
-        effect_columns(before, seen),
+        signals.body.regressor[:, :, base.selection],
+        effect_columns(alone.effects, seen),
         load.columns(seen),
     )
     share = np.sqrt(np.clip(alone.samples / max(alone.count, 1), 1e-3, 1.0))
     rows = np.concatenate(blocks, axis=2) * (share / alone.noise)[:, None]
-    known, _ = _known(alone.values, covariance)
-    every = np.concatenate([rows.reshape(-1, rows.shape[2]), known])
+    every = np.concatenate([rows.reshape(-1, rows.shape[2]), known[0]])
     size = np.maximum(np.linalg.norm(every, axis=0), 1e-300)
     spread = np.linalg.pinv(every / size)
     spread = (spread @ spread.T / np.outer(size, size))[-_WIDTH:, -_WIDTH:]
     turned = load.seen_from(frame)
-    centre = np.array([0.0, 0.0, _COMPACT])
-    own, lever = 0.4 * _COMPACT**2, centre[2] ** 2
-    inertia = mass * np.array([own + lever, 0.0, own + lever, 0.0, 0.0, own])
-    values = np.concatenate([[mass], mass * centre, inertia])
+    about = 0.4 * mass * _COMPACT**2
+    values = about_frame(np.array([mass, 0.0, 0.0, _COMPACT, about, 0.0, about, 0.0, 0.0, about]))
     told = _parameters(values, _with_systematic(values, turned @ spread @ turned.T))
     return ExpectedLoad(mass, told["mass"].std, max(told[name].std for name in ("cx", "cy", "cz")))
 
@@ -237,17 +222,27 @@ def require_same(robot: Robot, base: BaseParameters, stored: StoredFit) -> None:
         )
 
 
-def _of_fit(stored: Fit, kept: Sequence[Effect]) -> tuple[Fit, Array]:
-    """The fit without effects of single runs, and the covariance of what is left."""
-    at = list(range(stored.rank))
-    start = stored.rank
-    for effect in stored.effects:
-        width = len(effect.parameters)
-        if effect in kept:
-            at += range(start, start + width)
-        start += width
-    fewer = replace(stored, effects=tuple(kept), values=stored.values[at])
-    return fewer, stored.covariance[np.ix_(at, at)]
+def _begun(
+    robot: Robot, base: BaseParameters, stored: StoredFit, link: str | None
+) -> tuple[LinkFrame, Effect, Fit, tuple[Array, Array]]:
+    """Where the load hangs, the load, the fit without effects of single runs, what is known of it.
+
+    That is rows on [parameters of the fit, those of the load], and their target; nothing of
+    parameters that the fit did not see.
+    """
+    require_same(robot, base, stored)
+    frame = carrying_frame(robot, link, "--link")
+    fit = stored.fit
+    kept = [True, *(not effect.runs for effect in fit.effects)]
+    at = np.repeat(kept, [fit.rank, *(len(effect.parameters) for effect in fit.effects)])
+    effects = tuple(effect for effect in fit.effects if not effect.runs)
+    alone = replace(fit, effects=effects, values=fit.values[at])
+    covariance = fit.covariance[np.ix_(at, at)]
+    seen = np.flatnonzero(np.isfinite(np.diag(covariance)))
+    whiten = np.linalg.inv(half_of(covariance[np.ix_(seen, seen)]))
+    rows = np.zeros((len(seen), len(alone.values) + _WIDTH))
+    rows[:, seen] = whiten
+    return frame, carried_body(frame.joint), alone, (rows, whiten @ alone.values[seen])
 
 
 def _as_fitted(alone: Fit, robot: Robot) -> list[Effect]:
@@ -272,15 +267,6 @@ def _as_fitted(alone: Fit, robot: Robot) -> list[Effect]:
     return [held(each) if each.of_whole_torque else each for each in alone.effects]
 
 
-def _known(mean: Array, covariance: Array) -> tuple[Array, Array]:
-    """Rows on [old parameters, load]; nothing is known of what the fit did not see."""
-    seen = np.flatnonzero(np.isfinite(np.diag(covariance)))
-    whiten = np.linalg.inv(half_of(covariance[np.ix_(seen, seen)]))
-    rows = np.zeros((len(seen), len(mean) + _WIDTH))
-    rows[:, seen] = whiten
-    return rows, whiten @ mean[seen]
-
-
 def _with_systematic(values: Array, covariance: Array) -> Array:
     """The covariance (10, 10) with an uncertain scale of the body and place of its centre."""
     place = np.zeros(_WIDTH)
@@ -290,25 +276,14 @@ def _with_systematic(values: Array, covariance: Array) -> Array:
 
 def _parameters(values: Array, covariance: Array) -> dict[str, Value]:
     """Mass, centre, and inertia about the centre, deviations to first order."""
-    about = _about_centre(values)
-    steps = np.diag(1e-6 * np.maximum(np.sqrt(np.diag(covariance)), 1e-12))
-    slopes = np.stack(
-        [(_about_centre(values + d) - _about_centre(values - d)) / (2.0 * d.max()) for d in steps],
-        axis=1,
-    )
+    steps = 1e-6 * np.maximum(np.sqrt(np.diag(covariance)), 1e-12)
+    by_number = zip(about_centre(values), slopes(about_centre, values, steps), strict=True)
     names = ("mass", "cx", "cy", "cz", *_TENSOR)
     units = ("kg", "m", "m", "m", *["kg·m²"] * 6)
     return {
         name: Value(float(value), deviation(slope, covariance), unit)
-        for name, value, slope, unit in zip(names, about, slopes, units, strict=True)
+        for name, unit, (value, slope) in zip(names, units, by_number, strict=True)
     }
-
-
-def _about_centre(values: Array) -> Array:
-    """Mass, centre and inertia about it, of mass, first moments and inertia about the frame."""
-    mass, centre = values[0], values[1:4] / values[0]
-    shift = mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    return np.concatenate([[mass], centre, values[4:] - shift[_AT]])
 
 
 def _noticed(with_load: Errors, fit_error: float, possible: bool) -> list[Finding]:

@@ -86,42 +86,39 @@ def check_motion(
 ) -> tuple[Finding, ...]:
     """Warnings where positions are too coarse, or too rare, for what is made of them."""
     errors, fs = motion_errors(runs, processing), processing.recorded_rate
+    cutoff = processing.position_cutoff or fs / 2
+    coarse = _too_much(errors.counted, _COUNTED)
+    # Only where a higher rate would let the filter of positions pass more.
+    limited = processing.position_cutoff is None or cutoff > 0.99 * HIGHEST_BY_RATE * fs
+    slow = _too_much(errors.lost, _LOST) & limited
     found = []
-    coarse = _told(errors.counted, _COUNTED)
     if coarse.any():
-        joints = tuple(names[j] for j in np.flatnonzero(coarse).tolist())
+        joints = tuple(np.array(names)[coarse].tolist())
         steps = ", ".join(dict.fromkeys(f"{each:.2g}" for each in errors.counts[coarse]))
+        speeds, accelerations = map(_shares, errors.counted[:, coarse])
         text = (
             f"positions of {', '.join(joints)} come in steps of {steps} rad (m): speeds are wrong "
-            f"by {_shares(errors.counted[0, coarse])}, accelerations by "
-            f"{_shares(errors.counted[1, coarse])}, which makes inertias too small and puts "
-            "friction off where joints are slow. Record finer positions (of the motors, with "
+            f"by {speeds}, accelerations by {accelerations}, which makes inertias too small and "
+            "puts friction off where joints are slow. Record finer positions (of the motors, with "
             "measurement.position: motor), or set measurement.filter.position [Hz] lower than "
-            f"{processing.position_cutoff or fs / 2:.3g}"
+            f"{cutoff:.3g}"
         )
         found.append(Finding("coarse_positions", "warning", text, "", joints))
-    slow = _told(errors.lost, _LOST) & _limited_by_rate(processing)
     if slow.any():
-        joints = tuple(names[j] for j in np.flatnonzero(slow).tolist())
+        joints = tuple(np.array(names)[slow].tolist())
         enough = max(_ENOUGH * processing.bandwidth, _TWICE * fs)
+        speeds, accelerations = map(_shares, errors.lost[:, slow])
         text = (
-            f"at {fs:.3g} Hz, with positions cut off at {processing.position_cutoff or fs / 2:.3g} "
-            f"Hz, speeds of {', '.join(joints)} lose {_shares(errors.lost[0, slow])} and "
-            f"accelerations {_shares(errors.lost[1, slow])}: inertias and friction come out wrong "
-            f"by as much. Record at {enough:.2g} Hz or more, move more "
+            f"at {fs:.3g} Hz, with positions cut off at {cutoff:.3g} Hz, speeds of "
+            f"{', '.join(joints)} lose {speeds} and accelerations {accelerations}: inertias and "
+            f"friction come out wrong by as much. Record at {enough:.2g} Hz or more, move more "
             "slowly, or set measurement.filter.position [Hz] yourself"
         )
         found.append(Finding("slow_rate", "warning", text, "", joints))
     return tuple(found)
 
 
-def _limited_by_rate(processing: Processing) -> bool:
-    """Whether a higher rate would let the filter of positions pass more."""
-    cutoff = processing.position_cutoff
-    return cutoff is None or cutoff > 0.99 * HIGHEST_BY_RATE * processing.recorded_rate
-
-
-def _told(errors: Array, least: tuple[float, float]) -> Mask:
+def _too_much(errors: Array, least: tuple[float, float]) -> Mask:
     return np.asarray((errors > np.array(least)[:, None]).any(axis=0))
 
 

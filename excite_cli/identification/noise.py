@@ -12,7 +12,7 @@ import numpy as np
 from excite_cli.identification.factors import Mask, triangle_of
 from excite_cli.robot.model import Array
 
-MOST_LAGS = 12
+_MOST_LAGS = 12
 
 
 @dataclass(frozen=True)
@@ -21,15 +21,6 @@ class Noise:
 
     polynomials: tuple[Array, ...]
     innovation: Array
-
-    def whitened(self, x: Array) -> Array:
-        """A x along time for x (M, n, …): noise of this model becomes white."""
-        from scipy.signal import lfilter  # takes a second to import
-
-        out = np.empty_like(x)
-        for j, polynomial in enumerate(self.polynomials):
-            out[:, j] = lfilter(polynomial, [1.0], x[:, j], axis=0)
-        return out
 
     def spread_back(self, x: Array) -> Array:
         """A⁻ᵀ x along time for x (M, n, …), with noise covariance A⁻¹ A⁻ᵀ per unit innovation."""
@@ -43,17 +34,17 @@ class Noise:
 
 def noise_of(residual: Array, usable: Mask) -> Noise:
     """Fit the model to residuals (M, n) of one run."""
-    n = residual.shape[1]
-    polynomials = tuple(_polynomial(residual[:, j], usable[:, j]) for j in range(n))
-    model = Noise(polynomials, np.eye(n))
     clean = np.where(usable, residual, 0.0)
-    innovations = model.whitened(clean)
-    longest = max(len(polynomial) for polynomial in polynomials)
-    good = _after_gaps(usable, longest)
-    innovations = np.where(good, innovations, 0.0)
+    polynomials = [_polynomial(e, good) for e, good in zip(residual.T, usable.T, strict=True)]
+    white = [
+        np.convolve(e, polynomial)[: len(e)]
+        for e, polynomial in zip(clean.T, polynomials, strict=True)
+    ]
+    good = _after_gaps(usable, max(map(len, polynomials)))
+    innovations = np.where(good, np.stack(white, axis=1), 0.0)
     counts = good.T.astype(float) @ good
     covariance = innovations.T @ innovations / np.maximum(counts, 1.0)
-    return Noise(polynomials, _positive(covariance))
+    return Noise(tuple(polynomials), _positive(covariance))
 
 
 def _after_gaps(usable: Mask, lags: int) -> Mask:
@@ -67,7 +58,7 @@ def _after_gaps(usable: Mask, lags: int) -> Mask:
 
 def _polynomial(e: Array, usable: Mask) -> Array:
     """(1, −a_1, …, −a_p) with the p of the least AICc, stable."""
-    most = min(MOST_LAGS, int(usable.sum()) // 20)
+    most = min(_MOST_LAGS, int(usable.sum()) // 20)
     good = _after_gaps(usable[:, None], most + 1)[:, 0]
     count = int(good.sum())
     if most < 1 or count < 4 * (most + 2):
@@ -78,8 +69,7 @@ def _polynomial(e: Array, usable: Mask) -> Array:
     squares = np.cumsum(np.square(triangle[::-1, -1]))[::-1]  # what is left after p lags
     if squares[0] <= 0:
         return np.ones(1)
-    orders = np.arange(most + 1)
-    parameters = orders + 1
+    parameters = np.arange(most + 1) + 1
     likelihood = count * np.log(np.maximum(squares, 1e-300) / count)
     aicc = likelihood + 2 * parameters * count / np.maximum(count - parameters - 1, 1)
     p = int(np.argmin(aicc))

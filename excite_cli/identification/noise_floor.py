@@ -20,7 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix, vstack
 
-from excite_cli.identification.averages import apply, average_rows, reach, without
+from excite_cli.identification.averages import (
+    apply,
+    average_rows,
+    cubic_weights,
+    reach,
+    without,
+)
 from excite_cli.identification.exact_period import exact_period
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
@@ -184,16 +190,7 @@ def _averages_around(
         parts = [instants[cut : cut + _AT_ONCE] for cut in cuts]
         return vstack([_averages_around(part, samples, step, cutoff) for part in parts], "csr")
     base = np.floor(instants).astype(int)
-    u = (instants - base)[:, None]
-    weights = np.concatenate(
-        [
-            -u * (u - 1) * (u - 2) / 6,
-            (u + 1) * (u - 1) * (u - 2) / 2,
-            -(u + 1) * u * (u - 2) / 2,
-            (u + 1) * u * (u - 1) / 6,
-        ],
-        axis=1,
-    )
+    weights = cubic_weights(instants - base + 1)
     around = average_rows(samples, (base[:, None] + np.arange(-1, 3)).ravel(), step, cutoff)
     count = len(instants)
     places = (np.repeat(np.arange(count), 4), np.arange(4 * count))

@@ -1,7 +1,7 @@
 """From a raw run to smooth, differentiated motion, and the averages all columns go through."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,11 +16,11 @@ from excite_cli.identification.averages import (
     filled,
     interpolation,
     reach,
+    rounding_of,
     without,
 )
 from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.processing import Processing
-from excite_cli.identification.rounding import rounding_of
 from excite_cli.measurement.dataset import Array, Finding, Run
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.out_of_core import Spool
@@ -109,7 +109,8 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     keep = slice(border, len(run.t) - border, stride)
     t = run.t[keep]
     h, cutoff = run.step * stride, processing.parallel_cutoff
-    centers = _centers(len(t), h, processing)
+    half = reach(h, cutoff)  # the averages lie within the run
+    centers = np.arange(half, len(t) - half, max(1, round(1.0 / (h * processing.rate))))
     if len(centers) < _FEWEST:
         raise FileError(
             f"run '{run.label}' is too short: {run.duration:.3g} s leave {len(centers)} "
@@ -125,9 +126,7 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     counted = recorded & sliding[inside]
     past = q[:border]
     if run.before is not None and len(run.before):
-        earlier = run.before
-        if processing.position_cutoff is not None:
-            earlier = _smooth(earlier, processing.position_cutoff, fs, run.label)
+        earlier = _smooth(run.before, processing.position_cutoff, fs, run.label)
         past = np.concatenate([earlier, past])
     counted &= left_out.on_the_way(q[inside], past) & left_out.below_cuts(run.tau[inside])
     # The very same weights for the columns: left out at the working rate, other stretches of time
@@ -136,8 +135,9 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     tau, joints = run.tau[inside], range(run.q.shape[1])
     # Averages at the full rate are as large as all else together: one joint's at a time.
     fit = [_averaged(without(of_torque, counted[:, j]), to_full_rate, run, tau, j) for j in joints]
+    every = np.ones(len(centers), dtype=bool)
     valid = [
-        _Averaged(averages, np.asarray(of_torque @ tau[:, j]), filled(of_torque) & filled(averages))
+        _Averaged(averages, np.asarray(of_torque @ tau[:, j]), every)
         if recorded[:, j].all()
         else _averaged(without(of_torque, recorded[:, j]), to_full_rate, None, tau, j)
         for j in joints
@@ -190,22 +190,18 @@ def _kept(run: PreparedRun, spool: Spool) -> PreparedRun:
     """The averages of joints are often the same, and are kept once."""
     seen: dict[int, csr_matrix] = {}
 
-    def rows(averages: csr_matrix) -> csr_matrix:
-        if id(averages) not in seen:
-            seen[id(averages)] = spool.keep_rows(averages)
-        return seen[id(averages)]
+    def kept(value: Any) -> Any:
+        if isinstance(value, csr_matrix):
+            if id(value) not in seen:
+                seen[id(value)] = spool.keep_rows(value)
+            return seen[id(value)]
+        if isinstance(value, np.ndarray):
+            return spool.keep(value)
+        return tuple(map(kept, value)) if isinstance(value, tuple) else value
 
-    names = ("t", "q", "v", "a", "tau_raw", "tau", "valid", "moving", "tau_fit", "usable")
-    series: dict[str, Any] = {name: spool.keep(getattr(run, name)) for name in names}
-    return replace(
-        run,
-        **series,
-        averages=rows(run.averages),
-        valid_averages=tuple(map(rows, run.valid_averages)),
-        fit_averages=tuple(map(rows, run.fit_averages)),
-        covariates={name: spool.keep(values) for name, values in run.covariates.items()},
-        rounding=tuple(each if each is None else rows(each) for each in run.rounding),
-    )
+    own = {each.name: kept(getattr(run, each.name)) for each in fields(run)}
+    covariates = {name: spool.keep(values) for name, values in run.covariates.items()}
+    return replace(run, **{**own, "covariates": covariates})
 
 
 @dataclass(frozen=True)
@@ -237,7 +233,15 @@ def _positions(run: Run, processing: Processing, fs: float) -> Array:
     q = np.empty_like(run.q)
     for j in range(q.shape[1]):
         q[:, j] = _smooth(run.q[:, j], cutoff, fs, run.label)
-    _require_smooth(run, q, cutoff)
+    noise = np.std(run.q - q, axis=0)
+    wild = (noise > _NOISE) & (noise > 0.5 * np.std(run.q, axis=0))
+    if wild.any():  # no robot moves so
+        raise FileError(
+            f"run '{run.label}': positions jump by {noise.max():.3g} rad (m) from sample to sample "
+            f"(of joint {', '.join(str(j + 1) for j in np.flatnonzero(wild))} of the config, "
+            f"counted from 1); most of their change lies beyond {cutoff:.3g} Hz. Are these the "
+            "positions (measurement.channels), in the right unit (measurement.angle, time)?"
+        )
     return q
 
 
@@ -254,12 +258,7 @@ def _motion(
     def speed(j: int) -> Array:
         if processing.velocity != "measured" or run.dq is None:
             return np.asarray(np.gradient(q[:, j], run.step))
-        cutoff = processing.position_cutoff
-        return (
-            run.dq[:, j]
-            if cutoff is None
-            else _smooth(run.dq[:, j], cutoff, 1.0 / run.step, run.label)
-        )
+        return _smooth(run.dq[:, j], processing.position_cutoff, 1.0 / run.step, run.label)
 
     sliding = np.empty(q.shape, dtype=bool)
     v, a = (np.empty((len(q[keep]), n)) for _ in range(2))
@@ -337,27 +336,9 @@ def _sliding(v: Array, h: float, processing: Processing) -> NDArray[np.bool_]:
     return ~near & (np.abs(v) > processing.moving_speed)
 
 
-def _centers(samples: int, h: float, processing: Processing) -> NDArray[np.intp]:
-    """Instants of the averages; their support lies within the run."""
-    stride = max(1, round(1.0 / (h * processing.rate)))
-    half = reach(h, processing.parallel_cutoff)
-    return np.arange(half, samples - half, stride)
-
-
-def _require_smooth(run: Run, smoothed: Array, cutoff: float) -> None:
-    """Refuse positions that are noise: no robot moves so."""
-    noise = np.std(run.q - smoothed, axis=0)
-    wild = (noise > _NOISE) & (noise > 0.5 * np.std(run.q, axis=0))
-    if wild.any():
-        raise FileError(
-            f"run '{run.label}': positions jump by {noise.max():.3g} rad (m) from sample to sample "
-            f"(of joint {', '.join(str(j + 1) for j in np.flatnonzero(wild))} of the config, "
-            f"counted from 1); most of their change lies beyond {cutoff:.3g} Hz. Are these the "
-            "positions (measurement.channels), in the right unit (measurement.angle, time)?"
-        )
-
-
-def _smooth(x: Array, cutoff: float, fs: float, name: str) -> Array:
+def _smooth(x: Array, cutoff: float | None, fs: float, name: str) -> Array:
+    if cutoff is None:
+        return x
     if cutoff > _HIGHEST_GIVEN * fs:  # set by hand for another rate
         raise FileError(
             f"run '{name}' was recorded at {fs:.4g} Hz: too slow for the cut-off of the positions, "

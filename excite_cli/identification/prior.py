@@ -26,15 +26,8 @@ Fit = TypeVar("Fit")
 _MASS_SHARE, _MOMENT_FLOOR, _INERTIA_FLOOR = 0.1, 0.2, 0.1
 _MEDIAN = 0.6745  # of |z|, z normal
 _AS_USUAL, _WIDENINGS = 1.05, 8
-# Standard deviation of the URDF's inertial parameters, as a share, where nobody says it. Left of
-# held-out data beside viscous and Coulomb friction, offset and rotor by `identify`, with 0.3, 1, 3,
-# 10, 10,000: TX40 42.6, 42.4, 42.5, 42.5, 42.4 %, UR10 7.6, 7.4, 7.5, 7.7, 8.9, KR300 split C 6.1,
-# 5.7, 5.8, 5.8, 6.1, A 6.8, 7.1, 9.4, 11, 11, Med 7 32, 32, 39, 47, 71, TIAGo 49.4, 49.6, 49.9,
-# 50.2, 50.4, Go2 11.3, 11.1, 11.0, 11.0, 10.9. By all that `diagnose` finds, with 0.3, 0.5, 1: TX40
-# 8.5, 9.0, 8.2 %, UR10 6.5, 6.3, 6.4, KR300 C 6.0, 5.6, 5.9, A 5.5, 5.7, 7.4, Med 7 25, 26, 24. Of
-# 33 simulated robots with inertias 30 % off, relative to the best share of each: 1.00 with 0.3,
-# 1.06 with 1, 1.27 with none, 1.14 with that of 0.3 to 100 which predicts blocks left out best.
-# With 0.5, of a simulated arm whose URDF is right, one small friction came with 14 of size zero.
+# Standard deviation of the URDF's inertial parameters, as a share, where nobody says it: over real
+# and simulated robots 0.3 is best or next to it (docs/decisions.md).
 _UNSURE, _UNKNOWN = 0.3, 1.0
 
 
@@ -60,9 +53,9 @@ class InertialPrior:
         usual = float(np.median(np.abs(whiten @ values - target))) / _MEDIAN
         return self if usual <= _AS_USUAL else InertialPrior(self.mean, usual * self.std)
 
-    def narrowed(self, shares: Array) -> "InertialPrior":
-        """The same with deviations multiplied by `shares` (P,)."""
-        return InertialPrior(self.mean, shares * self.std)
+    def base_std(self, base: BaseParameters) -> Array:
+        """Standard deviations (r,) of base parameters."""
+        return np.sqrt(np.square(base.mapping) @ np.square(self.std))
 
     def rows(self, base: BaseParameters, more: int = 0) -> Array:
         """`on_base` as rows [A b] (r, r + more + 1), zero for `more` other parameters."""

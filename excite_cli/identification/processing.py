@@ -70,20 +70,28 @@ def choose_processing(
     fs = float(np.median([1.0 / run.step for run in runs]))
     frequency, power = spectra(runs, fs)
     bandwidth = _bandwidth(frequency, power)
-    reasons: list[str] = []
     slowest = min(1.0 / run.step for run in runs)  # of every run the same is left
-    highest = (fs if _of_rate(slowest, fs) else slowest) * HIGHEST_BY_RATE
-    position = _position_cutoff(spec, frequency, power, fs, bandwidth, highest, reasons)
-    parallel = _parallel_cutoff(spec, bandwidth, highest / HIGHEST_BY_RATE, reasons)
+    highest = fs if _of_rate(slowest, fs) else slowest
+    reasons = []
+    if spec.position == "auto":
+        position, reason = _position_cutoff(frequency, power, fs, bandwidth, highest)
+        reasons.append(reason)
+    else:
+        position = _given_cutoff("position", spec.position, fs)
+    if spec.parallel == "auto":
+        parallel, reason = _parallel_cutoff(bandwidth, highest)
+        reasons.append(reason)
+    else:
+        parallel = _given_cutoff("parallel", spec.parallel, highest)
     rate = float(spec.rate) if spec.rate != "auto" else (4.0 * parallel if parallel else fs)
     rate = min(rate, fs)
     stride = 1
     if parallel:
         wanted = max(10.0 * parallel, 2.5 * (position or fs / 2.5))
         stride = max(1, int(fs // wanted))
-    border = spec.border
-    if border is None:
-        border = (1.2 / position if position else 0.0) + 2.0 / fs
+    border = (1.2 / position if position else 0.0) + 2.0 / fs
+    if spec.border is not None:
+        border = spec.border
     if spec.velocity == "measured" and any(run.dq is None for run in runs):
         raise ConfigError(
             "measurement.filter.velocity: 'measured' needs recorded speeds (dq) in every run. "
@@ -134,27 +142,29 @@ def _bandwidth(frequency: Array, power: Array) -> float:
 
 
 def _position_cutoff(
-    spec: FilterSpec,
-    frequency: Array,
-    power: Array,
-    fs: float,
-    bandwidth: float,
-    highest: float,
-    reasons: list,
-) -> float | None:
-    if spec.position != "auto":
-        return _given_cutoff("position", spec.position, fs)
+    frequency: Array, power: Array, fs: float, bandwidth: float, slowest: float
+) -> tuple[float | None, str]:
+    """Where the spectrum of the positions meets its floor, within bounds; and why."""
     floor = np.median(power[frequency > 0.3 * fs], axis=0)
     above = power > ABOVE_FLOOR * floor
     last = [frequency[np.flatnonzero(~column)[0]] if not column.all() else fs for column in above.T]
     found = float(np.median(last))
     lowest = max(_LOWEST_POSITION, 5.0 * bandwidth)
-    chosen = float(min(max(found, lowest), _HIGHEST_POSITION, highest))
-    reasons.append(
+    highest = min(_HIGHEST_POSITION, HIGHEST_BY_RATE * slowest)
+    chosen = float(min(max(found, lowest), highest))
+    return chosen, (
         f"positions cut off at {chosen:.3g} Hz: their spectrum meets its floor at {found:.3g} Hz "
-        f"(kept within {lowest:.3g} and {min(_HIGHEST_POSITION, highest):.3g} Hz)"
+        f"(kept within {lowest:.3g} and {highest:.3g} Hz)"
     )
-    return chosen
+
+
+def _parallel_cutoff(bandwidth: float, slowest: float) -> tuple[float | None, str]:
+    wanted = max(_PARALLEL_BY_BANDWIDTH * bandwidth, _LOWEST_PARALLEL)
+    chosen = float(min(wanted, _HIGHEST_PARALLEL, slowest / 5.0))
+    return chosen, (
+        f"torque and columns averaged to {chosen:.3g} Hz: "
+        f"{_PARALLEL_BY_BANDWIDTH:g} times the bandwidth of the speeds ({bandwidth:.3g} Hz)"
+    )
 
 
 def _given_cutoff(key: str, given: float | str, fs: float) -> float | None:
@@ -166,16 +176,3 @@ def _given_cutoff(key: str, given: float | str, fs: float) -> float | None:
             f"({fs:g} Hz). Give a lower cut-off, or 'none'."
         )
     return float(given)
-
-
-def _parallel_cutoff(spec: FilterSpec, bandwidth: float, fs: float, reasons: list) -> float | None:
-    if spec.parallel != "auto":
-        return _given_cutoff("parallel", spec.parallel, fs)
-    chosen = min(
-        max(_PARALLEL_BY_BANDWIDTH * bandwidth, _LOWEST_PARALLEL), _HIGHEST_PARALLEL, fs / 5.0
-    )
-    reasons.append(
-        f"torque and columns averaged to {chosen:.3g} Hz: "
-        f"{_PARALLEL_BY_BANDWIDTH:g} times the bandwidth of the speeds ({bandwidth:.3g} Hz)"
-    )
-    return float(chosen)

@@ -1,7 +1,7 @@
 """The regression: torque and the columns that explain it, filtered and decimated alike."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,28 +10,32 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
-from excite_cli.identification.prepare import PreparedRun
+from excite_cli.identification.covariance import Rows
+from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.prepare import PreparedRun, prepare_all
+from excite_cli.identification.processing import Processing
+from excite_cli.measurement.dataset import Run
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+
+# Samples on which columns are tried: whether they change with the model's torque.
+_PROBE = 60
 
 
 @dataclass(frozen=True)
 class RunColumns:
     """One prepared run with its columns.
 
-    `inertial` (M, n, r) the regressor of the base parameters, `effects` (M, n, k) all linear
-    parameters of all effects in order, `tau` (M, n), `usable` and `moving` (M, n), `step` between
-    the samples [s]; `prepared` holds the motion at the working rate.
+    `columns` (M, n, r + k): the regressor of the `rank` base parameters, then all linear parameters
+    of all effects in order; `tau` (M, n); `prepared` holds the motion at the working rate.
     """
 
-    step: float
     columns: Array
     rank: int
     tau: Array
-    usable: NDArray[np.bool_]
-    moving: NDArray[np.bool_]
     prepared: PreparedRun
 
     @property
@@ -44,6 +48,12 @@ class RunColumns:
         """Columns (M, n, k) of the effects."""
         return self.columns[:, :, self.rank :]
 
+    @property
+    def rows(self) -> Rows:
+        """Rows for the least-squares fit."""
+        own = self.prepared
+        return Rows(self.columns, self.tau, own.usable, rounding=own.rounding)
+
 
 @dataclass(frozen=True)
 class Regression:
@@ -55,17 +65,35 @@ class Regression:
     runs: tuple[RunColumns, ...]
 
 
-def signals_of(prepared: PreparedRun, robot: Robot, phi: Array | None = None) -> Signals:
-    """What effects may look at in a run, with the rigid-body torque at `phi` (default: URDF)."""
+@dataclass(frozen=True)
+class Series:
+    """States (T, n) at equidistant instants `t` (T,) [s], and what else effects look at.
+
+    `start` [s] on the campaign's clock; `covariates` (T,) by name; `before` (L, n) positions of the
+    same time step before the first, where they are known.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    run: RunId = field(default_factory=RunId)
+    start: float = 0.0
+    covariates: Mapping[str, Array] = field(default_factory=dict)
+    before: Array | None = None
+
+
+def signals_of(motion: PreparedRun | Series, robot: Robot, phi: Array | None = None) -> Signals:
+    """What effects may look at in a motion, with the rigid-body torque at `phi` (default: URDF)."""
     phi = standard_parameters(robot) if phi is None else phi
-    return seen_of(prepared, RigidBody(robot, phi, prepared.q, prepared.v, prepared.a))
+    return seen_of(motion, RigidBody(robot, phi, motion.q, motion.v, motion.a))
 
 
-def seen_of(prepared: PreparedRun, body: RigidBody) -> Signals:
-    """What effects may look at in a run whose rigid body is known, moving as the run does."""
+def seen_of(motion: PreparedRun | Series, body: RigidBody) -> Signals:
+    """What effects may look at in a motion whose rigid body is known, moving as it does."""
     return Signals(
-        prepared.t, prepared.q, prepared.v, prepared.a, body.load, body.load, body,
-        prepared.run, prepared.start, prepared.covariates, prepared.before,
+        motion.t, motion.q, motion.v, motion.a, body.load, body.load, body,
+        motion.run, motion.start, motion.covariates, motion.before,
     )  # fmt: skip
 
 
@@ -76,13 +104,9 @@ def with_effects(signals: Signals, effects: Sequence[Effect], values: Array) -> 
     """
     if not len(values):
         return signals
-    in_robot = np.repeat(
-        [not effect.data_defect for effect in effects],
-        [len(effect.parameters) for effect in effects],
-    )
-    carried = np.repeat(
-        [effect.carried for effect in effects], [len(effect.parameters) for effect in effects]
-    )
+    counts = [len(effect.parameters) for effect in effects]
+    in_robot = np.repeat([not effect.data_defect for effect in effects], counts)
+    carried = np.repeat([effect.carried for effect in effects], counts)
     load = signals.load
     if carried.any():
         load = load + effect_columns(effects, signals) @ np.where(carried, values, 0.0)
@@ -121,40 +145,76 @@ def build_regression(
     effects: Sequence[Effect],
     runs: Sequence[PreparedRun],
     phi: Array | None = None,
-    values: Array | None = None,
+    values: Array = np.zeros(0),
 ) -> Regression:
     """Columns of every run; effects that look at the torque see the rigid body at `phi`.
 
     With `values` of the effects, they see the torque of these as well.
     """
     found, spool = [], Spool()
-    columns = each(_columns, (robot, base.selection, effects, phi, values), runs)
+    shared = robot, base.selection, effects, phi, values
+    columns = each(_columns, shared, [(prepared, None) for prepared in runs])
     for prepared, own in zip(runs, columns, strict=True):
-        found.append(
-            RunColumns(
-                step=prepared.step,
-                columns=spool.keep(own),
-                rank=len(base.selection),
-                tau=for_base_columns(robot, base, prepared),
-                usable=prepared.usable,
-                moving=prepared.moving,
-                prepared=prepared,
-            )
-        )
+        tau = for_base_columns(robot, base, prepared)
+        found.append(RunColumns(spool.keep(own), base.rank, tau, prepared))
     return Regression(robot, base, tuple(effects), tuple(found))
 
 
+def regression_on(
+    robot: Robot,
+    base: BaseParameters,
+    effects: Sequence[Effect],
+    runs: Sequence[Run],
+    processing: Processing,
+) -> Regression:
+    """The regression of recorded runs, without what `effects` leave out.
+
+    Raises
+    ------
+    FileError
+        A run is too short.
+    """
+    prepared = prepare_all(runs, processing, LeftOut.by(effects))
+    return build_regression(robot, base, effects, prepared)
+
+
 def _columns(
-    shared: tuple[Robot, NDArray[np.intp], Sequence[Effect], Array | None, Array | None],
-    prepared: PreparedRun,
+    shared: tuple[Robot, NDArray[np.intp], Sequence[Effect], Array | None, Array],
+    task: tuple[PreparedRun, Array | None],
     tell: Tell,
 ) -> Array:
-    """Averages of the regressor of the base parameters, and of the effects' columns."""
-    robot, selection, effects, phi, values = shared
-    signals = signals_of(prepared, robot, phi)
-    if values is not None:
-        signals = with_effects(signals, effects, values)
-    inertial = prepared.averaged_for_fit(signals.body.regressor[:, :, selection])
-    signals.body.forget()
+    """Averages of the regressor of the base parameters (if not given), and of effects' columns."""
+    (robot, selection, effects, phi, values), (prepared, inertial) = shared, task
+    signals = with_effects(signals_of(prepared, robot, phi), effects, values)
+    if inertial is None:
+        inertial = prepared.averaged_for_fit(signals.body.regressor[:, :, selection])
+        signals.body.forget()
     own = prepared.averaged_for_fit(effect_columns(effects, signals))
     return np.concatenate([inertial, own], axis=2)
+
+
+def follows_model(regression: Regression) -> bool:
+    """Whether columns of the effects change with φ, tried on a few samples."""
+    if not regression.effects or not regression.runs:
+        return False
+    whole, cut = regression.runs[0].prepared, slice(0, _PROBE)
+    covariates = {name: values[cut] for name, values in whole.covariates.items()}
+    states = whole.t[cut], whole.q[cut], whole.v[cut], whole.a[cut]
+    brief = Series(*states, whole.run, whole.start, covariates, whole.before)
+    cad = standard_parameters(regression.robot)
+    one, other = (
+        effect_columns(regression.effects, signals_of(brief, regression.robot, phi))
+        for phi in (cad, 1.3 * cad)
+    )
+    return not np.allclose(one, other, rtol=1e-9, atol=1e-12)
+
+
+def rebuilt(regression: Regression, phi: Array, values: Array) -> Regression:
+    """The effects' columns again, with the rigid body at `phi` and effects of `values`."""
+    selection = regression.base.selection
+    spool, shared = Spool(), (regression.robot, selection, regression.effects, phi, values)
+    made = each(_columns, shared, [(run.prepared, run.inertial) for run in regression.runs])
+    runs = zip(regression.runs, made, strict=True)
+    return replace(
+        regression, runs=tuple(replace(run, columns=spool.keep(own)) for run, own in runs)
+    )

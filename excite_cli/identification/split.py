@@ -52,14 +52,6 @@ class Split:
         return run.name if run.name in self.units else run.key
 
 
-def units_of(dataset: Dataset) -> tuple[str, ...]:
-    """What can be sealed: recordings, or the stretches of the only one."""
-    recordings = dataset.recordings
-    if len(recordings) > 1:
-        return recordings
-    return tuple(dict.fromkeys(run.id.key for run in dataset.runs))
-
-
 def whole(dataset: Dataset) -> list[Run]:
     """All runs with time from their recording's start, on the campaign's clock; nothing sealed."""
     return on_campaign_clock([_from_start(run) for run in dataset.runs])
@@ -87,7 +79,9 @@ def split(
             f"--sealed: there is no run '{sealed}'.{nearest(sealed, dataset.names)} "
             f"Runs: {', '.join(dataset.names)}."
         )
-    units = units_of(dataset)
+    units = dataset.recordings
+    if len(units) == 1:
+        units = tuple(dict.fromkeys(run.id.key for run in dataset.runs))
     if len(runs) == 1:
         return _blocks(runs[0], block)
     if sealed is None or all(run.id.is_among((sealed,)) for run in runs):
@@ -134,12 +128,11 @@ def _short(runs: Sequence[Run]) -> list[Run]:
     for run in runs:
         count = -(-len(run.t) // _MOST_SAMPLES)
         edges = [round(i * len(run.t) / count) for i in range(count + 1)]
+        if count == 1:
+            found.append(run)
+            continue
         first = max(run.part.block or 1, 1 + sum(each.id == run.id for each in found))
-        found += (
-            [run]
-            if count == 1
-            else [_block(run, first + i, *ends) for i, ends in enumerate(pairwise(edges))]
-        )
+        found += [_block(run, first + i, *ends) for i, ends in enumerate(pairwise(edges))]
     return found
 
 
@@ -163,8 +156,8 @@ def _folds(training: list[Run]) -> tuple[int, ...]:
 
 def _blocks(run: Run, block: float | None) -> Split:
     length = min(max(run.duration / _BLOCKS, _SHORTEST), _LONGEST)
-    length = max(length, min(_SAMPLES * run.step, run.duration / _EVERY))
-    length = block or max(length, run.duration / _MOST_BLOCKS)
+    few = min(_SAMPLES * run.step, run.duration / _EVERY)
+    length = block or max(length, few, run.duration / _MOST_BLOCKS)
     count = round(run.duration / length)
     if count < _EVERY:
         raise ConfigError(
@@ -177,17 +170,13 @@ def _blocks(run: Run, block: float | None) -> Split:
             f"{len(run.t) / count:.3g} samples each; {_FEWEST} are needed at least. Give longer "
             "blocks, or leave this key out."
         )
-    edges = [round(i * (len(run.t)) / count) for i in range(count + 1)]
+    edges = [round(i * len(run.t) / count) for i in range(count + 1)]
     training, sealed = [], []
-    start = 0
-    for i in range(count):
-        if i % _EVERY == _EVERY - 1:
-            if start < i:
-                training.append(_block(run, i, edges[start], edges[i]))
-            sealed.append(_block(run, i + 1, edges[i], edges[i + 1]))
-            start = i + 1
-    if start < count:
-        training.append(_block(run, count, edges[start], edges[count]))
+    for first in range(0, count, _EVERY):
+        last = min(first + _EVERY - 1, count)
+        training.append(_block(run, last, edges[first], edges[last]))
+        if last < count:
+            sealed.append(_block(run, last + 1, edges[last], edges[last + 1]))
     blocks = "1 block" if len(sealed) == 1 else f"{len(sealed)} blocks"
     share = f"{blocks} of {run.duration / count:.3g} s of {run.label}"
     # Few folds, each of stretches spread over the run.

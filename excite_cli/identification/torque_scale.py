@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import lstsq
 
 from excite_cli.config.data_spec import (
     IdentificationSpec,
@@ -22,12 +23,13 @@ from excite_cli.config.data_spec import (
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.dynamics.pseudo_inertia import moved
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import carried_body, scales
 from excite_cli.errors import ConfigError
-from excite_cli.identification.total_mass import total_mass_row
+from excite_cli.identification.body_numbers import SIX_AT, about_frame, slopes
 from excite_cli.measurement.dataset import Finding
-from excite_cli.robot.link_frame import LinkFrame, link_frame, own_link
+from excite_cli.robot.link_frame import link_frame, own_link
 from excite_cli.robot.model import Array, Robot
 
 # Keys of what was weighed, as messages tell them.
@@ -37,6 +39,7 @@ _ANY_GAIN = 0.3
 # Of a body that nobody described: radius of a sphere of its mass, and how wrong that may be [m].
 _RADIUS = 0.05
 _LEAST = 1e-4  # of the mass, and m: what was weighed and measured is no truer
+_VISIBLE = 1e-6  # of a mass: what is more than rounding belongs to a mass that does not show
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,29 @@ def _with(known: Knowledge, more: Sequence[Effect], mean: Array, covariance: Arr
     )
 
 
+def total_mass_row(robot: Robot, base: BaseParameters) -> Array:
+    """w (r,) with wᵀ φ_B the mass of all bodies [kg], links that are locked or held among them.
+
+    mappingᵀ w is the indicator of the masses.
+
+    Raises
+    ------
+    ConfigError
+        The whole mass does not show in the measured rows.
+    """
+    masses = np.zeros(base.mapping.shape[1])
+    masses[robot.massless * PARAMETERS_PER_BODY :: PARAMETERS_PER_BODY] = 1.0
+    w = np.asarray(lstsq(base.mapping.T, masses)[0])
+    if not robot.base_joints or np.abs(base.mapping.T @ w - masses).max() > _VISIBLE:
+        raise ConfigError(
+            "identification.total_mass: the whole mass of this robot does not show in what is "
+            "measured. It does in the wrench at a floating base with gravity (robot.base: "
+            "floating, robot.rows with base). Without that, weigh a payload instead and record a "
+            "run with it: identification.known_payload."
+        )
+    return w
+
+
 def assumed_scale(measurement: MeasurementSpec, spec: IdentificationSpec) -> list[Finding]:
     """That what is found has the scale of constants that somebody gave, if nothing tells it."""
     told = (spec.known_payload, spec.total_mass, spec.gain_std)
@@ -134,7 +160,7 @@ def known_body(spec: KnownPayloadSpec, robot: Robot) -> tuple[Effect, Array, Arr
     mass, about = spec.mass, 0.4 * spec.mass * _RADIUS**2
     inertia = (about, 0.0, about, 0.0, 0.0, about) if spec.inertia is None else spec.inertia
     numbers = np.array([mass, *spec.center, *inertia])
-    principal = np.linalg.eigvalsh(_tensor(inertia))
+    principal = np.linalg.eigvalsh(np.array(inertia)[SIX_AT])
     if principal[0] < 0.0 or principal[2] > (1.0 + _LEAST) * (principal[0] + principal[1]):
         raise ConfigError(
             "identification.known_payload.inertia: no body has it: its principal moments are "
@@ -150,27 +176,7 @@ def known_body(spec: KnownPayloadSpec, robot: Robot) -> tuple[Effect, Array, Arr
             *[max(loose, _LEAST * about)] * 6,
         ]
     )
-    slope = np.stack(
-        [
-            (_ten(numbers + step, frame) - _ten(numbers - step, frame)) / (2.0 * step.max())
-            for step in np.diag(1e-4 * np.maximum(std, 1e-6))
-        ],
-        axis=1,
-    )
-    covariance = (slope * std**2) @ slope.T
-    return carried_body(frame.joint, spec.runs), _ten(numbers, frame), covariance
-
-
-def _ten(numbers: Array, frame: LinkFrame) -> Array:
-    """Ten parameters about the joint's frame of mass, centre, and inertia about it, in a link's."""
-    mass, centre = numbers[0], numbers[1:4]
-    about = _tensor(numbers[4:])
-    about = about + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    i = about[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
     back = moved(frame.rotation.T, -frame.rotation.T @ frame.translation)
-    return np.asarray(back @ np.concatenate([[mass], mass * centre, i]))
-
-
-def _tensor(six: Sequence[float] | Array) -> Array:
-    xx, xy, yy, xz, yz, zz = six
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    slope = back @ slopes(about_frame, numbers, 1e-4 * np.maximum(std, 1e-6))
+    covariance = (slope * std**2) @ slope.T
+    return carried_body(frame.joint, spec.runs), back @ about_frame(numbers), covariance

@@ -45,22 +45,15 @@ def torque_trace(
     predicted: Array,
     before: Array | None = None,
     sealed: bool = False,
+    whole: bool = False,
 ) -> TorqueTrace:
-    """As `whole_trace`, with at most `MOST_SAMPLES` samples, in single precision."""
-    return thinned(whole_trace(run, load, predicted, before, sealed))
+    """The trace of a prepared run; `load`, `predicted`, `before` (T, n) at the working rate.
 
-
-def whole_trace(
-    run: PreparedRun,
-    load: Array,
-    predicted: Array,
-    before: Array | None = None,
-    sealed: bool = False,
-) -> TorqueTrace:
-    """The trace of a prepared run; `load`, `predicted`, `before` (T, n) at the working rate."""
+    `thinned`, unless all of it is wanted.
+    """
     stacked = run.averaged(np.concatenate([run.t[:, None], run.q, run.v, run.a], axis=1))
     motion = np.split(stacked[:, 1:], 3, axis=1)
-    return TorqueTrace(
+    trace = TorqueTrace(
         run=run.run.key,
         sealed=sealed,
         t=stacked[:, 0],
@@ -73,6 +66,7 @@ def whole_trace(
         predicted=run.averaged_torque(predicted),
         before=None if before is None else run.averaged_torque(before),
     )
+    return trace if whole else thinned(trace)
 
 
 def thinned(trace: TorqueTrace) -> TorqueTrace:

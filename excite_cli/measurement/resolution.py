@@ -3,7 +3,7 @@
 A torque that is rounded to multiples of a step is wrong by up to half of it, step/√12 on average.
 While a joint moves through many steps that is noise; where the torque stays on one step the error
 stays as well, and no filter takes it out. So the step is kept with the run, for standard deviations
-(`identification.rounding`), and told where it is more than a few per cent of the torque.
+(`identification.averages`), and told where it is more than a few per cent of the torque.
 """
 
 from collections.abc import Sequence

@@ -12,7 +12,7 @@ from excite_cli.identification.identified_model import IdentifiedModel, Predicti
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.stored_model import StoredModel
-from excite_cli.identification.torque_trace import whole_trace
+from excite_cli.identification.torque_trace import torque_trace
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Array
 from excite_cli.scoring.allowance import Allowance, allowance_of, blocks_of, rms_of
@@ -130,7 +130,7 @@ class Scorer:
             torque = _by_name(found.error.rms, names) / _by_name(found.error.relative, names)
         allowed = allowance.rms(torque)
         traces = [
-            whole_trace(run, told.load, told.torque)
+            torque_trace(run, told.load, told.torque, whole=True)
             for run, told in zip(prepared, predictions, strict=True)
         ]
         filters, slowest = self.stored.processing, allowance.slowest
@@ -187,10 +187,7 @@ def together(runs: Sequence[ScoredRun], names: Sequence[str]) -> Errors:
 def _sums(
     prepared: Sequence[PreparedRun], predictions: Sequence[Prediction]
 ) -> tuple[tuple[float, ...], ...]:
-    sums = [
-        block_sums(run.tau, run.averaged_torque(told.torque), run.valid, run.moving, run.step)
-        for run, told in zip(prepared, predictions, strict=True)
-    ]
+    sums = [block_sums(run, told.torque) for run, told in zip(prepared, predictions, strict=True)]
     total = np.concatenate(sums, axis=1).sum(axis=1)
     return tuple(tuple(map(float, row)) for row in total)
 

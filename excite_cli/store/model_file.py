@@ -19,7 +19,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named, urdf_friction
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.given_files import require_stored
-from excite_cli.identification.consistent_spread import consistent_near_prior
+from excite_cli.identification.consistent import consistent_near_prior
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import effect_parameters
 from excite_cli.identification.identified_model import IdentifiedModel

@@ -16,7 +16,8 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.export.c_model import c_model
-from excite_cli.identification.identified_model import IdentifiedModel, Series
+from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.regression import Series
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.docs.test_predict import PLANTED as ON_JOINTS
@@ -102,7 +103,7 @@ def test_all_effects_at_once(compiler: str, tmp_path: Path) -> None:
     effects, values = planted()
     model = IdentifiedModel(standard_parameters(robot), effects, values)
     series = series_of(robot, columns=("temp",))
-    expected = model.told(robot, series).torque
+    expected = model.predicted(robot, series).torque
     library = compiled(c_model(robot, model).text, tmp_path, compiler)
     assert relative(by_c(library, series), expected) < 1e-9
     library.excite_self_test.restype = ctypes.c_double
@@ -116,8 +117,8 @@ def test_every_effect_alone(kind: str, tmp_path: Path) -> None:
     model = IdentifiedModel(standard_parameters(robot), effects, values)
     follows = effects[0].follows_covariate
     series = series_of(robot, columns=("temp",) if follows else ())
-    rigid = IdentifiedModel(model.phi).told(robot, series).torque
-    expected = model.told(robot, series).torque
+    rigid = IdentifiedModel(model.phi).predicted(robot, series).torque
+    expected = model.predicted(robot, series).torque
     library = compiled(c_model(robot, model).text, tmp_path, COMPILERS[0], level="-O0")
     found = by_c(library, series)
     effect = np.abs(expected - rigid).max()
@@ -142,7 +143,7 @@ def _assert_by_c(robot: Robot, j: int, tmp_path: Path) -> None:
     model = IdentifiedModel(standard_parameters(robot), effects, np.array([0.1, 1e-3]))
     series = series_of(robot)
     library = compiled(c_model(robot, model).text, tmp_path, COMPILERS[0])
-    assert relative(by_c(library, series), model.told(robot, series).torque) < 1e-9
+    assert relative(by_c(library, series), model.predicted(robot, series).torque) < 1e-9
 
 
 def test_single_precision(tmp_path: Path) -> None:
@@ -152,7 +153,7 @@ def test_single_precision(tmp_path: Path) -> None:
     series = series_of(robot)
     library = compiled(c_model(robot, model).text, tmp_path, COMPILERS[0], "-DEXCITE_FLOAT")
     found = by_c(library, series, ctypes.c_float)
-    assert relative(found, model.told(robot, series).torque) < 1e-3
+    assert relative(found, model.predicted(robot, series).torque) < 1e-3
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
@@ -200,7 +201,7 @@ def test_step_by_step_is_the_series_where_nothing_looks_ahead(tmp_path: Path) ->
         states = [np.ascontiguousarray(x[k]) for x in (series.q, series.v, series.a)]
         pointers = [x.ctypes.data_as(ctypes.c_void_p) for x in states]
         library.excite_torque(memory, *pointers, None, found[k].ctypes.data_as(ctypes.c_void_p))
-    assert relative(found, model.told(robot, series).torque) < 1e-9
+    assert relative(found, model.predicted(robot, series).torque) < 1e-9
 
 
 class Unknown(ViscousFriction):

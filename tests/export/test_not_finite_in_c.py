@@ -11,7 +11,8 @@ import pytest
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.export.c_model import c_model
-from excite_cli.identification.identified_model import IdentifiedModel, Series
+from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.regression import Series
 from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.scoring.thresholds import Residual, Thresholds
 from tests.export.test_c_model import COMPILERS, STRICT, UR10, by_c, compiled, planted, series_of

@@ -34,5 +34,5 @@ def test_columns_and_what_is_taken_off_are_the_whole_torque(tmp_path: Path) -> N
     assert shown + taken_off == pytest.approx(whole, abs=1e-9 * np.abs(whole).max())
     # The trunk turns: its own moments of inertia are what those columns lack.
     assert np.abs(taken_off[:, 3:6]).max() > 0.5
-    rest = np.abs(columns.tau - shown)[columns.usable].max()
+    rest = np.abs(columns.tau - shown)[columns.prepared.usable].max()
     assert rest < 0.1 * np.abs(taken_off).max()

@@ -1,4 +1,6 @@
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,13 +17,18 @@ def errors(tau: np.ndarray, predicted: np.ndarray, **given: np.ndarray) -> Error
     raw = given.get("raw", tau)
     half = len(tau) // 2
     parts = [slice(0, half), slice(half, None)]
-
-    def cut(x: np.ndarray) -> list[np.ndarray]:
-        return [x[part] for part in parts]
-
-    return torque_errors(
-        NAMES, cut(tau), cut(predicted), cut(usable), cut(moving), cut(raw), cut(predicted), 0.1
-    )
+    runs: Any = [
+        SimpleNamespace(
+            tau=tau[part],
+            tau_raw=raw[part],
+            valid=usable[part],
+            moving=moving[part],
+            step=0.1,
+            averaged_torque=lambda torque: torque,
+        )
+        for part in parts
+    ]
+    return torque_errors(NAMES, runs, [predicted[part] for part in parts])
 
 
 def test_figures_by_hand() -> None:

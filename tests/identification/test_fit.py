@@ -10,8 +10,10 @@ from excite_cli.config.data_spec import EffectSpec, IdentificationSpec
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
-from excite_cli.identification.fit import Fit, fit, follows_model, rebuilt
+from excite_cli.identification.factors import solve
+from excite_cli.identification.fit import Fit, essential, fit
 from excite_cli.identification.identify import judged
+from excite_cli.identification.regression import follows_model, rebuilt
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.true_robot import true_inertias
 from tests.identification.synthetic import measured, regression_of
@@ -143,6 +145,17 @@ def test_a_joint_that_stood_still_is_not_identifiable(
     assert found.identifiable[np.setdiff1d(of_friction, standing)].all()
 
 
+def test_parameters_that_are_noise_are_dropped() -> None:
+    rng = np.random.default_rng(0)
+    c = rng.normal(size=(400, 6))
+    c[:, 5] = c[:, 0] + 1e-3 * rng.normal(size=400)  # hardly told from the first
+    tau = c @ [5.0, 2.0, -1.0, 0.0, 0.0, 0.0] + 0.5 * rng.normal(size=400)
+    factor = np.linalg.qr(np.column_stack([c, tau]) / 0.5, mode="r")
+    kept = essential(factor, np.sqrt(np.diag(solve(factor).inverse)))
+    assert list(kept) in ([True, True, True, False, False, False],
+                          [False, True, True, False, False, True])  # fmt: skip
+
+
 def test_essential_parameters_predict_as_well(noisy: Fit, robot: Robot, truth: Array) -> None:
     assert 0 < noisy.essential.sum() <= len(noisy.values)
     loose = noisy.relative_std > 1.0
@@ -154,7 +167,7 @@ def test_errors_on_other_runs_reach_the_noise(
 ) -> None:
     other = measured(robot, truth, friction, sized(friction), noise=0.3, memory=0.8, seeds=(8,))
     regression = regression_of(robot, other, friction)
-    error, _ = judged(noisy, regression, sealed=True)
+    error, _ = judged(robot, noisy, [run.prepared for run in regression.runs], sealed=True)
     assert np.array(list(error.rms.values())) == pytest.approx(noisy.noise, rel=0.3)
     assert np.array(list(error.rms_raw.values())) == pytest.approx(0.3, rel=0.3)
 

@@ -18,11 +18,10 @@ from excite_cli.effects.payload import Payload
 from excite_cli.effects.sign import smooth_sign
 from excite_cli.effects.torque_delay import TorqueDelay
 from excite_cli.effects.viscous_friction import ViscousFriction
-from excite_cli.identification.fit import rebuilt
 from excite_cli.identification.identified_model import IdentifiedModel, errors_on
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import choose_processing
-from excite_cli.identification.regression import build_regression
+from excite_cli.identification.regression import build_regression, rebuilt
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from tests.identification.synthetic import measured

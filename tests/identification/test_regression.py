@@ -55,7 +55,7 @@ def test_columns_times_parameters_are_the_torque(robot: Robot) -> None:
         parameters = np.append(found.base.mapping @ phi, values)
         assert columns.columns @ parameters == pytest.approx(modelled, rel=1e-12, abs=1e-12)
         assert columns.tau is run.tau_fit
-        assert columns.usable is run.usable
+        assert columns.prepared is run
 
 
 def test_effects_stand_in_their_own_rows_and_runs(robot: Robot) -> None:

@@ -11,8 +11,7 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.errors import ConfigError
-from excite_cli.identification.torque_scale import knowledge_of, weighed
-from excite_cli.identification.total_mass import total_mass_row
+from excite_cli.identification.torque_scale import knowledge_of, total_mass_row, weighed
 from excite_cli.robot.model import build_measured_robot
 from tests.base_link.stander import stander
 

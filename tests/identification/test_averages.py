@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from excite_cli.identification.averages import average_rows
-from excite_cli.identification.rounding import rounding_of
+from excite_cli.identification.averages import average_rows, rounding_of
 
 T = np.arange(2000) / 250.0
 AVERAGES = average_rows(len(T), np.arange(40, 1960, 8), 1 / 250.0, 6.0)

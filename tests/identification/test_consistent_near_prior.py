@@ -12,8 +12,12 @@ from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parame
 from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
-from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
-from excite_cli.identification.consistent_spread import CLEARLY_WORSE, consistent_near_prior
+from excite_cli.identification.consistent import (
+    CLEARLY_WORSE,
+    ConsistentParameters,
+    consistent_near_prior,
+    consistent_parameters,
+)
 from excite_cli.identification.fit import fit
 from excite_cli.identification.prior import inertial_prior
 from excite_cli.measurement.dataset import Dataset, Run
