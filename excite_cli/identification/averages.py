@@ -34,11 +34,14 @@ def average_rows(
     kernel /= kernel.sum()
     # Indices of 32 bits where they do: those of long runs fill memory.
     kind = np.int32 if len(centers) * len(kernel) < 2**31 else np.int64
-    columns = centers.astype(kind)[:, None] + offsets.astype(kind)
-    inside = (columns >= 0) & (columns < samples)
-    starts = np.concatenate([[0], np.cumsum(inside.sum(axis=1))]).astype(kind)
-    values = np.broadcast_to(kernel, inside.shape)[inside]
-    return csr_matrix((values, columns[inside], starts), (len(centers), samples))
+    columns = (centers.astype(kind)[:, None] + offsets.astype(kind)).ravel()
+    values, counts = np.tile(kernel, len(centers)), np.full(len(centers), len(kernel))
+    if centers.min(initial=half) < half or centers.max(initial=0) + half >= samples:
+        inside = (columns >= 0) & (columns < samples)
+        counts = inside.reshape(-1, len(kernel)).sum(axis=1)
+        values, columns = values[inside], columns[inside]
+    starts = np.concatenate([[0], np.cumsum(counts)]).astype(kind)
+    return csr_matrix((values, columns, starts), (len(centers), samples))
 
 
 def without(averages: csr_matrix, counted: NDArray[np.bool_]) -> csr_matrix:

@@ -67,9 +67,7 @@ def stacked(factors: Sequence[Array], sigma: Array, extra: Array | None = None) 
     rows = [(factor / sigma[:, None, None]).reshape(-1, factor.shape[-1]) for factor in factors]
     if extra is not None:
         rows.append(extra)
-    triangle = triangle_of(np.concatenate(rows))
-    missing = triangle.shape[1] - len(triangle)
-    return np.pad(triangle, ((0, missing), (0, 0))) if missing > 0 else triangle
+    return triangle_of(np.concatenate(rows))
 
 
 def solve(factor: Array) -> Solution:

@@ -34,7 +34,8 @@ _DIFFERENT = 3.0
 # Deviations behind a better filter than the automatic one: 0.3 to 0.82 of those behind that one.
 _LESS_CERTAIN = 0.9
 _NAMED = 3
-_SAME = ("position_cutoff", "parallel_cutoff", "velocity")
+# What may bias, by its key of measurement.filter.
+_KEYS = {"position": "position_cutoff", "parallel": "parallel_cutoff", "velocity": "velocity"}
 
 
 def fitted_behind(
@@ -69,18 +70,13 @@ def filter_findings(
         return ()
     try:
         automatic = choose_processing(runs, FilterSpec(), chosen.moving_speed)
-        if all(getattr(automatic, name) == getattr(chosen, name) for name in _SAME):
+        keys = [k for k, name in _KEYS.items() if getattr(automatic, name) != getattr(chosen, name)]
+        if not keys:
             return ()
         other = fitted(automatic)
         found = fitted(chosen) if found is None else found
     except ExciteError:  # the automatic filter is not for these data: nothing can be compared
         return ()
-    return _compared(found, other, chosen, automatic)
-
-
-def _compared(
-    found: Fit, other: Fit, chosen: Processing, automatic: Processing
-) -> tuple[Finding, ...]:
     known = np.isfinite(found.std) & np.isfinite(other.std) & (found.std > 0) & (other.std > 0)
     if not known.any():
         return ()
@@ -92,13 +88,14 @@ def _compared(
     names = [name for name, one in zip(found.names, known, strict=True) if one]
     worst = np.argsort(-far)[:_NAMED].tolist()
     moved = ", ".join(f"{names[k]} by {far[k]:.2g}" for k in worst if far[k] >= _DIFFERENT)
+    leave_out = " and ".join(f"measurement.filter.{key}" for key in keys)
     text = (
         f"the filter that was set ({_in_words(chosen)}) biases: behind the automatic one "
         f"({_in_words(automatic)}) {int((far >= _DIFFERENT).sum())} of {len(far)} parameters "
         f"differ by more than {_DIFFERENT:g} of their standard deviations ({moved}). Standard "
         "deviations know neither the noise of differentiated positions nor the motion that a "
         f"filter takes away; here they are {wider:.2g} times those behind the automatic filter. "
-        f"Leave out {_keys(chosen, automatic)}"
+        f"Leave out {leave_out}"
     )
     return (Finding("filter_bias", "warning", text),)
 
@@ -110,9 +107,3 @@ def _in_words(processing: Processing) -> str:
     words = f"positions {cutoff(processing.position_cutoff)}"
     words += f", torque and columns {cutoff(processing.parallel_cutoff)}"
     return words + (", measured speeds" if processing.velocity == "measured" else "")
-
-
-def _keys(chosen: Processing, automatic: Processing) -> str:
-    keys = zip(_SAME, ("position", "parallel", "velocity"), strict=True)
-    differ = [key for name, key in keys if getattr(chosen, name) != getattr(automatic, name)]
-    return " and ".join(f"measurement.filter.{key}" for key in differ)

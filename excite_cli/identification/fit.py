@@ -226,7 +226,6 @@ def _record(
         known = (relative[:r] <= _FIXED) | (std[:r] <= _FIXED * usual)
     fixed = (relative[r:] <= _FIXED) | (std[r:] <= smallest)
     identifiable = linear.seen & np.concatenate([known, fixed])
-    unit_of = ((effect.unit_on, p.unit) for effect in effects for p in effect.parameters)
     return Fit(
         method=spec.method,
         inertias=spec.inertias,
@@ -239,7 +238,11 @@ def _record(
         ),
         units=(
             *(standard_parameter_unit(index) for index in base.selection),
-            *(unit_on(unit, robot.sliding) for unit_on, unit in unit_of),
+            *(
+                effect.unit_on(parameter.unit, robot.sliding)
+                for effect in effects
+                for parameter in effect.parameters
+            ),
         ),
         words=(*base.in_words(), *("" for _ in parameters)),
         values=linear.x,

@@ -173,11 +173,12 @@ def _hausman(
     instruments, source, reason = instrument_dataset(dataset)
     if instruments is None:
         return Hausman(False, reason)
+    runs = cut(instruments).training
     processing = replace(processing, velocity="differentiated")
     values = found.values[found.rank :]
     robot, base, effects = training.robot, training.base, training.effects
     try:
-        prepared = prepare_all(cut(instruments).training, processing, LeftOut.by(effects))
+        prepared = prepare_all(runs, processing, LeftOut.by(effects))
         other = build_regression(robot, base, effects, prepared, found.phi, values)
     except ExciteError as error:
         return Hausman(False, str(error))

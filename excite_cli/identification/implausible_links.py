@@ -156,24 +156,23 @@ def _box(robot: Robot, body: int, cad: Array) -> _Box:
 
 def _with_shapes(robot: Robot, boxes: Sequence[_Box], cad: Array) -> list[_Box]:
     """Boxes that hold the links' shapes, or are wider by a body's length where there are none."""
-    found: dict[int, Array] = {}
+    points: dict[int, list[Array]] = {}
     for of_kind in (collision_model, visual_model):
-        if len(found) == len(boxes):
+        if len(points) == len(boxes):
             break
         try:
             shapes = link_shapes(robot, of_kind(robot))
         except RobotError:  # meshes that are missing are none of a fit's business
             continue
-        points: dict[int, list[Array]] = {}
+        own: dict[int, list[Array]] = {}
         for shape in shapes:
-            points.setdefault(shape.joint - 1, []).append(shape.points)
-        found = {**{body: np.vstack(each) for body, each in points.items()}, **found}
-    lengths = body_lengths(robot, cad)
+            own.setdefault(shape.joint - 1, []).append(shape.points)
+        points = {**own, **points}
     wider = []
-    for body, box in enumerate(boxes):
-        if body in found:
-            low, high = found[body].min(axis=0), found[body].max(axis=0)
-            wider.append(_Box(np.minimum(box.low, low), np.maximum(box.high, high)))
-        else:
-            wider.append(_Box(box.low - lengths[body], box.high + lengths[body]))
+    for body, (box, length) in enumerate(zip(boxes, body_lengths(robot, cad), strict=True)):
+        corners = [box.low - length, box.high + length]
+        if body in points:
+            corners = [box.low, box.high, *points[body]]
+        every = np.vstack(corners)
+        wider.append(_Box(every.min(axis=0), every.max(axis=0)))
     return wider

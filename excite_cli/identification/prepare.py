@@ -169,13 +169,7 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
 def prepare_all(
     runs: Sequence[Run], processing: Processing, left_out: LeftOut = LeftOut()
 ) -> list[PreparedRun]:
-    """All of them, what is large of many on disk.
-
-    Raises
-    ------
-    FileError
-        See `prepare`.
-    """
+    """As `prepare`, all of them, what is large of many on disk."""
     spool, found = Spool(), []
     for run in each(_prepared, (processing, left_out), runs):
         found.append(_kept(run, spool))

@@ -38,11 +38,6 @@ class InertialPrior:
     mean: Array
     std: Array
 
-    @property
-    def known(self) -> bool:
-        """Whether there are any masses to keep to."""
-        return bool((self.mean[::10] > 0.0).any())
-
     def widened(self, base: BaseParameters, values: Array) -> "InertialPrior":
         """The same, as wide as the usual one of its differences from `values` (r,) of a fit.
 
@@ -118,9 +113,8 @@ def prior_of(spec: IdentificationSpec, robot: Robot, weighed: bool) -> InertialP
     cad = standard_parameters(robot)
     share = {"auto": _UNSURE, "free": _UNKNOWN, "cad": spec.uncertainty}[spec.inertias]
     prior = inertial_prior(robot, cad, share)
-    if spec.inertias == "cad":
-        return prior
-    return prior if prior.known and not weighed else None
+    masses = bool((cad[::10] > 0.0).any())
+    return prior if spec.inertias == "cad" or (masses and not weighed) else None
 
 
 def _regular(covariance: Array) -> Array:

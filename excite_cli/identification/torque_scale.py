@@ -58,13 +58,7 @@ class Knowledge:
 def knowledge_of(
     spec: IdentificationSpec, declared: Sequence[Effect], robot: Robot, base: BaseParameters
 ) -> Knowledge:
-    """As `weighed`, with gains beside, if anything tells them, and how uncertain they are.
-
-    Raises
-    ------
-    ConfigError
-        As `weighed`.
-    """
+    """As `weighed`, with gains beside, if anything tells them, and how uncertain they are."""
     known = weighed(spec, declared, robot, base)
     if not len(known.target) and spec.gain_std is None:
         return known

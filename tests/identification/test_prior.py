@@ -89,5 +89,3 @@ def test_what_the_urdf_is_worth(robot: Robot) -> None:
     assert share("free") == pytest.approx(1.0)
     assert share("cad") == share("cad", weighed=True) == pytest.approx(0.07)
     assert share("auto", weighed=True) is None
-    assert inertial_prior(robot, cad, 1.0).known
-    assert not inertial_prior(robot, np.zeros(len(cad)), 1.0).known
