@@ -24,7 +24,7 @@ from benchmarks.altered.recordings import NAMES, Recording, recording
 from benchmarks.altered.sound import TRUE, sound_logs
 from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.loading import Case, load_data
-from excite_cli.diagnosis.plausibility import check_dataset
+from excite_cli.checks.look import check_dataset
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import ExciteError
 from excite_cli.measurement.dataset import Dataset, Finding

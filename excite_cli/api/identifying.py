@@ -16,8 +16,8 @@ from excite_cli.api.loading import (
 )
 from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
+from excite_cli.checks.look import check_dataset
 from excite_cli.config.load import spec_as_yaml
-from excite_cli.diagnosis.plausibility import check_dataset
 from excite_cli.excitation.problem import Problem
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.identify import Identification

@@ -11,6 +11,7 @@ import numpy as np
 from excite_cli.api.arguments import checked
 from excite_cli.api.paths import paths_in, refuse_twice
 from excite_cli.base_link.rows import with_base
+from excite_cli.checks.bodies import bodies_in_words
 from excite_cli.config.inputs import files_of_config
 from excite_cli.config.load import load_spec, spec_of
 from excite_cli.config.spec import Spec
@@ -184,14 +185,35 @@ def load_data(
     ConfigError, MissingExtraError
         The config names what the file lacks; the library for bags is not installed.
     """
+    problem = measured_case(problem)
+    robot = problem.robot
+    data = as_recorded(problem, files)
+    raise_for_errors(data)
+    data = completed(problem, data)
+    tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs_in_words(data)}"))
+    if isinstance(problem, Case):  # a problem has told it
+        if problem.base.note:
+            tell(Note(Level.NOTE, problem.base.note))
+        if bodies := bodies_in_words(robot):
+            tell(Note(Level.WARNING, f"{bodies}."))
+    tell_findings(data.findings, tell)
+    return data
+
+
+def as_recorded(problem: Problem | Case, files: str | Path | Sequence[str | Path]) -> Dataset:
+    """What the files hold, converted and checked, with findings that forbid its use, too.
+
+    Raises
+    ------
+    FileError, ConfigError, MissingExtraError
+        As `load_data`, but for what its checks find.
+    """
     paths = [files] if isinstance(files, str | Path) else files
     given = [Path(each) for each in paths]
     refuse_twice(given)  # a run that is fitted must not be the sealed one, too
-    problem = measured_case(problem)
     robot, limits, spec = problem.robot, problem.robot.limits, problem.spec.measurement
     own = slice(robot.base_joints, None)
-    torques = "joints" in problem.spec.robot.rows
-    data = read_dataset(
+    return read_dataset(
         given,
         spec,
         robot.joint_names[own],
@@ -200,17 +222,16 @@ def load_data(
         motors_of(problem.spec.robot.transmissions, robot.joint_names[own]),
         problem.spec.robot.rows,
     )
-    raise_for_errors(data)
+
+
+def completed(problem: Problem | Case, data: Dataset) -> Dataset:
+    """With the joints of a base, and the weight that a controller took off."""
+    robot, spec = problem.robot, problem.spec.measurement
     if robot.base_joints:
+        torques = "joints" in problem.spec.robot.rows
         data, noticed = with_base(robot, data, spec, torques)
         data = replace(data, findings=(*data.findings, *noticed))
-    if spec.gravity == "subtracted":
-        data = _with_gravity(robot, data)
-    tell(Note(Level.INFO, f"{robot.name}: {robot.n} joints; {runs_in_words(data)}"))
-    if isinstance(problem, Case) and problem.base.note:  # a problem has told it
-        tell(Note(Level.NOTE, problem.base.note))
-    tell_findings(data.findings, tell)
-    return data
+    return _with_gravity(robot, data) if spec.gravity == "subtracted" else data
 
 
 def _with_gravity(robot: Robot, data: Dataset) -> Dataset:

@@ -18,6 +18,7 @@ from excite_cli.cli.export import export
 from excite_cli.cli.help_page import HelpfulCommand, HelpfulGroup, split_docstring
 from excite_cli.cli.identify import identify
 from excite_cli.cli.init import init
+from excite_cli.cli.inspect import inspect
 from excite_cli.cli.optimize import optimize
 from excite_cli.cli.replay import replay
 from excite_cli.cli.report import report
@@ -50,6 +51,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "verify-gradient": verify_gradient,
     "compare-random": compare_random,
     "check": check,
+    "inspect": inspect,
     "identify": identify,
     "simulate": simulate,
     "diagnose": diagnose,
@@ -69,7 +71,15 @@ _GROUPS = {
     "Get started": ("robots", "init", "schema"),
     "Plan motions": ("optimize", "check", "compare-random", "verify-gradient"),
     "Inspect and export": ("report", "view", "export"),
-    "From measured data": ("simulate", "identify", "diagnose", "score", "compare", "replay"),
+    "From measured data": (
+        "simulate",
+        "inspect",
+        "identify",
+        "diagnose",
+        "score",
+        "compare",
+        "replay",
+    ),
     "The whole loop": ("campaign",),
     "Many cases": ("study",),
 }

@@ -107,8 +107,19 @@ class MeasurementSpec(Section):
     clock: Positive = Field(
         1.0, description="true seconds in a second of the time stamps, of a clock that is off"
     )
+    torque_unit: Literal["Nm", "mNm", "Ncm", "kNm", "kgfcm"] | PerJoint = Field(
+        "Nm",
+        description="of recorded torques (forces likewise), or N·m in one unit of the file; with "
+        "torque: current, of torque_constant times current",
+    )
+    torque_lag: Finite = Field(
+        0.0, description="time by which recorded torques are late, against positions [s]"
+    )
     angle: Literal["rad", "deg"] = Field(
-        "rad", description="of positions and speeds; prismatic joints are in m either way"
+        "rad", description="of positions and speeds of joints that turn"
+    )
+    length: Literal["m", "cm", "mm"] = Field(
+        "m", description="of positions and speeds of joints that slide"
     )
     rate: Positive | None = Field(
         None, description="[Hz] sampling rate of files that have no column t"

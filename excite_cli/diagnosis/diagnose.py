@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from excite_cli.checks.look import findings_of
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.absorbed import absorbed_effects
 from excite_cli.diagnosis.aliases import joint_aliases, other_name
@@ -23,7 +24,6 @@ from excite_cli.diagnosis.large_rest import large_rests
 from excite_cli.diagnosis.modelled_run import ModelledRun
 from excite_cli.diagnosis.naming import information_of, named_effects
 from excite_cli.diagnosis.own_torque import at_its_own_torque
-from excite_cli.diagnosis.plausibility import check_recorded
 from excite_cli.diagnosis.records import (
     CUT_SHORT,
     Approximation,
@@ -124,7 +124,7 @@ def diagnose(
     standing = standing_still(training, robot.joint_names)
     model = _model(robot, base, spec)
     kept = prepare_all(parts.sealed, processing)  # refused early where too short
-    suspicious = check_recorded(robot, parts.training, training, processing, spec.measurement)
+    suspicious = findings_of(robot, parts.training, training, processing, spec)
     traced, bodies = _traced(model, spec, parts, processing, progress, over)
     with_ends = with_ends_sealed(parts, runs_of_their_own(traced.effects), processing)
     if with_ends.ends and not over():

@@ -12,6 +12,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+import numpy as np
+
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.campaign_clock import on_campaign_clock
@@ -28,6 +30,7 @@ _MOST_BLOCKS = 120  # of long ones: each loses its borders, and costs its share 
 _MOST_SAMPLES = 400_000  # of a part
 _EVERY = 3
 _FEWEST = 10  # samples of a block
+_MOVES = 0.05  # of a joint's largest span in a run: what is less is rest
 _MOST_FOLDS = 8
 
 
@@ -65,8 +68,9 @@ def split(
 ) -> Split:
     """Seal a recording (the last, unless `sealed` names one, or a stretch of one).
 
-    A single one without gaps is cut into blocks of time. Time counts from a recording's start. Of
-    those that are `needed` for the fit none is sealed, unless it is named or there is no other.
+    A single one without gaps is cut into blocks of time; so is each, where every joint is moved in
+    a recording of its own. Time counts from a recording's start. Of those that are `needed` for the
+    fit, or alone move a joint, none is sealed, unless it is named or there is no other.
 
     Raises
     ------
@@ -85,7 +89,11 @@ def split(
     if len(runs) == 1:
         return _blocks(runs[0], block)
     if sealed is None or all(run.id.is_among((sealed,)) for run in runs):
-        sealed = next((unit for unit in reversed(units) if unit not in needed), units[-1])
+        others = [unit for unit in units if unit not in needed] or list(units)
+        free = [unit for unit in others if _is_shown_elsewhere(unit, runs)]
+        if not free and sealed is None and block is None:
+            return _blocks_of_each(runs, units)
+        sealed = (free or others)[-1]
     training = [run for run in runs if not run.id.is_among((sealed,))]
     kept = [run for run in runs if run.id.is_among((sealed,))]
     if not training:
@@ -182,6 +190,26 @@ def _blocks(run: Run, block: float | None) -> Split:
     # Few folds, each of stretches spread over the run.
     folds = tuple(i % min(len(training), 4) for i in range(len(training)))
     return Split(tuple(training), tuple(sealed), share, folds, (run.id.key,))
+
+
+def _is_shown_elsewhere(unit: str, runs: Sequence[Run]) -> bool:
+    """Whether other runs move every joint that a unit moves, too."""
+    spans = np.array([np.ptp(run.q, axis=0) for run in runs])
+    moves = spans > _MOVES * spans.max(axis=0)
+    own = np.array([run.id.is_among((unit,)) for run in runs])
+    return bool((moves[~own].any(axis=0) | ~moves[own].any(axis=0)).all())
+
+
+def _blocks_of_each(runs: Sequence[Run], units: tuple[str, ...]) -> Split:
+    """Every third block of each run sealed."""
+    parts = [_blocks(run, None) for run in runs]
+    return Split(
+        tuple(run for part in parts for run in part.training),
+        tuple(run for part in parts for run in part.sealed),
+        f"every third block of each of {len(units)} runs",
+        tuple(fold for part in parts for fold in part.folds),
+        units,
+    )
 
 
 def _block(run: Run, number: int, first: int, last: int) -> Run:

@@ -109,7 +109,16 @@ def read_dataset(
         findings += [*noted[number], *more]
     _check_all_met(spec.names, seen)
     findings += covariates.check()
+    findings = [each for each in findings if not _moves_elsewhere(each, runs, joint_names)]
     return Dataset(joint_names, tuple(runs), tuple(map(str, paths)), tuple(findings))
+
+
+def _moves_elsewhere(found: Finding, runs: Sequence[Run], joint_names: tuple[str, ...]) -> bool:
+    """Whether a joint that one file holds still moves in another: it was held there."""
+    if found.kind != "dead" or len(found.joints) != 1:
+        return False
+    j = joint_names.index(found.joints[0])
+    return any(np.ptp(run.q[:, j]) > 0.0 for run in runs)
 
 
 def _recordings(paths: Sequence[Path], options: ReadOptions) -> Iterator[tuple[Path, list[RawRun]]]:

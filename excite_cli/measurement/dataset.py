@@ -25,7 +25,8 @@ class Finding:
     """Something about the data that a person must know.
 
     `kind` is a short name (`gap`, `jitter`, `nan`, `saturated`, `dead`, `swapped`, `units`, `sign`,
-    `truncated` …), `text` a sentence with what, where and what to do.
+    `truncated` …), `text` a sentence with what, where and what to do; `settings`: what to write in
+    the config, by the path of the key, where that settles it.
     """
 
     kind: str
@@ -33,6 +34,7 @@ class Finding:
     text: str
     run: str = ""
     joints: tuple[str, ...] = ()
+    settings: dict[str, Any] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True, repr=False)

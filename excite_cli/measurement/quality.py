@@ -1,8 +1,9 @@
 """All checks of measured data, in the order in which they can be made.
 
-Missing values first, then what needs the samples as recorded (dead, stuck, saturated channels),
-then the time stamps, then what needs equidistant samples (units, order, sign). Nothing is dropped
-without a finding; findings of severity `error` mean that any diagnosis would be wrong.
+Missing values first, then what needs the samples as recorded (wrapped positions, dead, stuck,
+saturated channels), then the time stamps, then what needs equidistant samples (units, order, sign).
+Nothing is dropped without a finding; findings of severity `error` mean that any diagnosis would be
+wrong.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,9 @@ from excite_cli.measurement.resolution import with_torque_steps
 from excite_cli.measurement.saturation import mask_saturated
 from excite_cli.measurement.stamps import equidistant
 from excite_cli.measurement.stuck import mask_stuck
+from excite_cli.measurement.torque import in_step
 from excite_cli.measurement.units import Limits, check_units
+from excite_cli.measurement.wrapped import unwrapped
 
 
 def checked(
@@ -34,6 +37,8 @@ def checked(
         kept, more = without_missing_covariates(kept)
         findings += more
         whole.append(kept)
+    whole, more = unwrapped(whole, joints, limits)
+    findings += more
     whole, more = dead_channels(whole, joints)
     findings += more
     whole, more = with_torque_steps(whole, joints)
@@ -45,7 +50,7 @@ def checked(
         run, more = mask_stuck(run, joints)
         findings += more
         even, more = equidistant(run)
-        parts += even
+        parts += [in_step(each, spec.torque_lag) for each in even]
         findings += more
     order = check_order(parts, joints, spec.filter.velocity == "measured")
     units = check_units(parts, spec, joints, limits)

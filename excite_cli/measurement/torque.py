@@ -20,6 +20,8 @@ from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.motors import Motors, at_motors
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+NEWTON_METERS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "kNm": 1e3, "kgfcm": 0.0980665}
 
 
 def check_motors(spec: MeasurementSpec, motors: Motors) -> None:
@@ -53,7 +55,7 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...], torques: bool =
         "offset": list(spec.offset),
         "without_torque": list(spec.without_torque),
     }
-    for key in ("gear_ratio", "torque_constant"):
+    for key in ("gear_ratio", "torque_constant", "torque_unit"):
         value = getattr(spec, key)
         if isinstance(value, dict):
             named[key] = list(value)
@@ -98,7 +100,7 @@ def to_joints(
 ) -> Run:
     """The run in s, rad (m) and N·m at the joints, as `spec` declares it."""
     ratio, shares = _per_joint(spec.gear_ratio, joints), _shares(spec, joints)
-    angle = np.where(revolute, np.pi / 180 if spec.angle == "deg" else 1.0, 1.0)
+    angle = np.where(revolute, np.pi / 180 if spec.angle == "deg" else 1.0, METERS[spec.length])
     q = run.q * angle * _per_joint(spec.position_sign, joints)
     dq = None if run.dq is None else run.dq * angle * _per_joint(spec.velocity_sign, joints)
     if spec.position == "motor":
@@ -109,7 +111,7 @@ def to_joints(
             q = motors.positions(q)
             dq = None if dq is None else motors.positions(dq)
     q = q + _per_joint(spec.offset, joints, 0.0)
-    tau = run.tau * _per_joint(spec.sign, joints)
+    tau = run.tau * _per_joint(spec.sign, joints) * torque_units(spec, joints)
     if spec.torque == "current":
         tau = tau * _per_joint(spec.torque_constant, joints)
     if spec.torque in ("motor", "current"):
@@ -119,6 +121,22 @@ def to_joints(
         coupled[:, j] += shares[j, k] * tau[:, k]
     converted = replace(run, q=q, dq=dq, tau=coupled)
     return converted if motors is None else motors.at_joints(converted, spec)
+
+
+def torque_units(spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:
+    """N·m (N) in one unit of the file, (n,)."""
+    unit = spec.torque_unit
+    return _per_joint(NEWTON_METERS[unit] if isinstance(unit, str) else unit, joints)
+
+
+def in_step(run: Run, lag: float) -> Run:
+    """An equidistant run whose torques are taken `lag` [s] later, where they belong."""
+    if not lag or len(run.t) < 2:
+        return run
+    later = np.clip(run.t + lag, run.t[0], run.t[-1])
+    tau = np.stack([np.interp(later, run.t, column) for column in run.tau.T], axis=1)
+    at = np.clip(np.round((later - run.t[0]) / run.step).astype(int), 0, len(run.t) - 1)
+    return replace(run, tau=tau, valid=None if run.valid is None else run.valid[at])
 
 
 def declared(

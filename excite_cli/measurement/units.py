@@ -13,7 +13,7 @@ from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.measurement.clock import check_clock
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.speeds import Speeds, speeds
-from excite_cli.measurement.torque import SECONDS
+from excite_cli.measurement.torque import METERS, SECONDS
 
 _DEGREES = 180 / np.pi
 _CLOSE = 0.2  # share by which a gain may miss the factor it is taken for
@@ -54,6 +54,7 @@ def check_units(
         findings = _angle_by_speed(found, spec, limits, where) or _angle_by_limits(
             runs, found, spec, limits, where
         )
+        findings += _length_by_limits(runs, joints, spec, limits, where)
     if not findings:
         findings = check_clock(runs, where) or _odd_gains(found, joints, where)
         findings += _outside(runs, joints, limits, where)
@@ -87,7 +88,7 @@ def _time_by_speed(found: Speeds, spec: MeasurementSpec, where: str) -> list[Fin
         f"recorded speeds are {gain:.4g} times the change of position per time: time stamps are "
         f"in {unit}, not {spec.time}. Write measurement.time: {unit}"
     )
-    return [Finding("units", "error", text, where)]
+    return [Finding("units", "error", text, where, (), {"measurement.time": unit})]
 
 
 def _time_by_limits(
@@ -112,7 +113,7 @@ def _time_by_limits(
                 f"speed limit; read in {unit} it is {rate * factor:.4g} Hz and "
                 f"{share * factor:.2g}. Write measurement.time: {unit}"
             )
-            return [Finding("units", "error", text, where)]
+            return [Finding("units", "error", text, where, (), {"measurement.time": unit})]
     return []
 
 
@@ -121,6 +122,7 @@ def _angle_by_speed(
 ) -> list[Finding]:
     gain = _gain(found, limits.revolute)
     leave = "leave the speeds out (measurement.channels: {dq: null})"
+    without: dict[str, object] = {"measurement.channels": {**spec.channels, "dq": None}}
     if _near(gain, 1 / _DEGREES):
         text = (
             f"recorded speeds are 1/{1 / gain:.3g} of the change of position per time: positions "
@@ -131,13 +133,14 @@ def _angle_by_speed(
                 f"recorded speeds are 1/{1 / gain:.3g} of the change of position per time: "
                 f"positions are in degrees, speeds already in rad/s; {leave}"
             )
-        return [Finding("units", "error", text, where)]
+        settings = {"measurement.angle": "deg", **without}
+        return [Finding("units", "error", text, where, (), settings)]
     if _near(gain, _DEGREES):
         text = (
             f"recorded speeds are {gain:.3g} times the change of position per time: speeds are in "
             f"degrees per second, positions in radians; {leave}"
         )
-        return [Finding("units", "error", text, where)]
+        return [Finding("units", "error", text, where, (), without)]
     return []
 
 
@@ -161,14 +164,45 @@ def _angle_by_limits(
             f"positions reach {worst:.4g}, {far.max():.3g} times the robot's limits; in degrees "
             "they keep them. Write measurement.angle: deg"
         )
-        return [Finding("units", "error", text, where)]
+        return [Finding("units", "error", text, where, (), {"measurement.angle": "deg"})]
     travel = (high - low) / (upper - lower)
     if spec.angle == "deg" and travel.max() < 0.02 and (travel * _DEGREES).max() > 0.1:
         text = (
             f"positions use {travel.max():.2g} of the robot's range at most: are they in radians "
             "already? Then write measurement.angle: rad"
         )
-        return [Finding("units", "warning", text, where)]
+        return [Finding("units", "warning", text, where, (), {"measurement.angle": "rad"})]
+    return []
+
+
+def _length_by_limits(
+    runs: Sequence[Run],
+    joints: tuple[str, ...],
+    spec: MeasurementSpec,
+    limits: Limits,
+    where: str,
+) -> list[Finding]:
+    """Of joints that slide: positions far beyond the limits, which keep them in mm or cm."""
+    lowest, highest = _extremes(runs)
+    slides = ~limits.revolute & np.isfinite(limits.lower) & np.isfinite(limits.upper)
+    if not slides.any() or spec.length != "m":
+        return []
+    lower, upper, low, high = (x[slides] for x in (limits.lower, limits.upper, lowest, highest))
+    reach = np.maximum(np.maximum(np.abs(lower), np.abs(upper)), 1e-9)
+    far = np.maximum(-low / reach, high / reach)
+    slack = 0.1 * (upper - lower)
+    if far.max() < 3:
+        return []
+    for unit in ("cm", "mm"):
+        scale = METERS[unit]
+        if ((scale * low > lower - slack) & (scale * high < upper + slack)).all():
+            whose = [joints[j] for j in np.flatnonzero(slides).tolist()]
+            text = (
+                f"positions of {', '.join(whose)} reach {far.max():.3g} times the robot's limits; "
+                f"in {unit} they keep them. Write measurement.length: {unit}"
+            )
+            settings = {"measurement.length": unit}
+            return [Finding("units", "error", text, where, tuple(whose), settings)]
     return []
 
 

@@ -228,6 +228,12 @@ class Robot:
             x[:, : self.base_joints] = 0.0
         return q, v, a
 
+    def with_gravity(self, gravity: Array) -> "Robot":
+        """The same robot under another gravity (3,) [m/s²], in the frame of its base."""
+        model = self.model.copy()
+        model.gravity.linear = np.array(gravity)
+        return replace(self, model=model)
+
     def fingerprint(self) -> str:
         """Hash of what decides the regressor: URDF, moved joints, posture, base and rows.
 

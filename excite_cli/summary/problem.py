@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
+from excite_cli.checks.bodies import bodies_in_words
 from excite_cli.config.spec import Spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.effects.catalogue import declared_effects
@@ -31,6 +32,8 @@ def problem_notes(problem: Problem) -> Iterator[Note]:
     moved = set(robot.joint_names)
     cut = [loop for loop in robot.description.loops if moved & set(loop.joints)]
     yield from (_warning(f"{told}.") for told in loops_in_words(cut))
+    if bodies := bodies_in_words(robot):
+        yield _warning(f"{bodies}.")
     yield from _limits(robot, problem.spec.robot.joints == "all")
     names = ", ".join(_counted_name(constraint) for constraint in problem.constraints) or "none"
     yield _said(f"constraints: {names}")

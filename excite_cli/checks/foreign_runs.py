@@ -1,9 +1,8 @@
-"""Runs whose torques belong to another motion.
+"""Runs whose torques belong to another motion, or to another robot.
 
 Channels of two files that were joined wrongly, or by a wrong offset in time, leave torques that do
-not fit their motion whatever the inertias, while those of all other runs do. Judged by the shares
-that the rough model leaves (`torque_shares`), run by run; then the motions of the other runs are
-tried.
+not fit their motion whatever the inertias, while those of all other runs do; so do torques of
+another robot. Then the motions of the other runs are tried.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,20 +10,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.diagnosis.torque_shares import RoughModel, Samples, samples_of
+from excite_cli.checks.result import Result
+from excite_cli.checks.samples import Samples, samples_of
+from excite_cli.checks.setup import Setup
+from excite_cli.checks.textbook_fit import TextbookFit
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.measurement.dataset import Finding
+from excite_cli.robot.model import Robot
 
+NAME = "runs of this robot"
 _SAMPLES = 300
 _FOREIGN = 0.4  # share that is left of a run's torques, in the median of its joints
 _TIMES = 4.0  # that share over that of the other runs
 _BELONGS = 0.3  # of it, left by the motion that they belong to
 
 
-def check_runs(model: RoughModel, runs: Sequence[PreparedRun]) -> tuple[Finding, ...]:
-    """A warning for every run whose torques do not fit its motion, as those of the others do."""
-    samples = {name: samples_of(each, _SAMPLES) for name, each in _recordings(runs).items()}
-    left = {name: _left(model, each) for name, each in samples.items() if len(each.q)}
+def foreign_runs(robot: Robot, runs: Sequence[PreparedRun]) -> list[Result]:
+    """A doubt for every run whose torques do not fit its motion, as those of the others do."""
+    recordings = _recordings(runs)
+    if len(recordings) < 2:
+        return []
+    samples = {name: samples_of(each, _SAMPLES) for name, each in recordings.items()}
+    left = {name: _left(robot, each) for name, each in samples.items() if len(each.q)}
     found = []
     for name, share in left.items():
         usual = min((x for other, x in left.items() if other != name), default=np.inf)
@@ -32,13 +38,15 @@ def check_runs(model: RoughModel, runs: Sequence[PreparedRun]) -> tuple[Finding,
             continue
         text = (
             f"torques of {name} do not belong to its motion: {share:.0%} of them do not fit the "
-            f"URDF with any friction or stiffness, of other runs {usual:.0%}"
+            f"URDF with any friction, of other runs {usual:.0%}"
         )
-        owner = _owner(model, runs, name, share)
-        text += f"; they fit the motion of {owner}. " if owner else ". "
+        owner = _owner(robot, recordings, name, share)
+        text += (
+            f"; they fit the motion of {owner}. " if owner else "; or they are of another robot. "
+        )
         text += "Join its channels anew, or leave this run out; measurement.trust: true takes it"
-        found.append(Finding("foreign_torque", "warning", text, name))
-    return tuple(found)
+        found.append(Result(NAME, "foreign_torque", "doubt", text, runs=name))
+    return found
 
 
 def _recordings(runs: Sequence[PreparedRun]) -> Mapping[str, list[PreparedRun]]:
@@ -48,21 +56,23 @@ def _recordings(runs: Sequence[PreparedRun]) -> Mapping[str, list[PreparedRun]]:
     return found
 
 
-def _left(model: RoughModel, samples: Samples) -> float:
+def _left(robot: Robot, samples: Samples) -> float:
     """Share of the torques that is left, in the median of the joints that can be judged."""
-    shares = model.own_shares_left([samples])[0, :, 0]
-    judged = shares[shares > 0.0]
+    explained = TextbookFit(robot, samples)(Setup.as_declared(robot))
+    judged = explained.shares[explained.judged]
     return float(np.median(judged)) if len(judged) else 0.0
 
 
-def _owner(model: RoughModel, runs: Sequence[PreparedRun], name: str, share: float) -> str:
+def _owner(
+    robot: Robot, recordings: Mapping[str, list[PreparedRun]], name: str, share: float
+) -> str:
     """The run whose motion the torques of run `name` fit; empty if there is none."""
-    torques = [run for run in runs if run.run.name == name]
+    torques = recordings[name]
     best, least = "", _BELONGS * share
-    for other, motion in _recordings(runs).items():
+    for other, motion in recordings.items():
         if other != name and len(motion) == len(torques) == 1:
-            left = _left(model, samples_of([_with_torque(motion[0], torques[0])], _SAMPLES))
-            if left < least:
+            joined = samples_of([_with_torque(motion[0], torques[0])], _SAMPLES)
+            if (left := _left(robot, joined)) < least:
                 best, least = other, left
     return best
 

@@ -10,29 +10,24 @@ from itertools import combinations
 import numpy as np
 from scipy.optimize import nnls
 
-from excite_cli.diagnosis.torque_shares import Samples
+from excite_cli.checks.result import Result
+from excite_cli.checks.samples import Samples
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.errors import FileError
 from excite_cli.robot.link_frame import leaves, own_link
 from excite_cli.robot.model import Array, Robot
 
+NAME = "what carries the robot"
 _LEFT = 0.4  # of the energy of what the URDF leaves that upward forces may leave
 _WEIGHT = 0.5, 1.5  # of the robot, that they carry together
 _MOST_FEET = 4
 
 
-def refuse_standing(robot: Robot, samples: Samples) -> None:
-    """See that the robot hangs or is bolted down, as it is declared.
-
-    Raises
-    ------
-    FileError
-        Its torques are those of a robot that stands on links of its own.
-    """
+def standing_legs(robot: Robot, samples: Samples) -> list[Result]:
+    """A fault where torques are those of a robot that stands on links of its own."""
     ends = leaves(robot)
     if robot.base_joints or len(ends) < 2 or not samples.known.any():
-        return
+        return []
     body = RigidBody(robot, standard_parameters(robot), samples.q, samples.v, samples.a)
     rest = np.where(samples.known, samples.tau - body.load, 0.0)
     whole = float(np.sum(rest**2))
@@ -47,20 +42,21 @@ def refuse_standing(robot: Robot, samples: Samples) -> None:
                 best, feet, held = float(left**2), some, found
     explains = bool(whole) and best <= _LEFT * whole
     if not (explains and _WEIGHT[0] * mass < held.sum() < _WEIGHT[1] * mass):
-        return
+        return []
     links = [own_link(robot, ends[k]).name for k in feet]
     gravity = float(np.linalg.norm(robot.model.gravity.linear))
     forces = ", ".join(
         f"{f * gravity:.3g} N at {link}" for f, link in zip(held, links, strict=True)
     )
-    raise FileError(
+    text = (
         f"these are torques of a robot that stands on {' and '.join(links)}, not of one that hangs "
         f"or is bolted down: upward forces there ({forces}; it weighs {mass * gravity:.3g} N) "
         f"explain {1 - best / whole:.0%} of what the URDF leaves. Declare robot.base: floating, "
         "robot.rows: [base, joints] and the forces measured there (measurement.wrench), or leave "
         "the joints that carry it out of robot.joints; measurement.trust: true takes them as they "
-        "are."
+        "are"
     )
+    return [Result(NAME, "standing", "fault", text)]
 
 
 def _held(robot: Robot, samples: Samples, ends: tuple[int, ...]) -> Array:

@@ -5,14 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import nnls
 
+from excite_cli.checks.look import check_dataset
 from excite_cli.config.load import load_spec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.spec import Spec
-from excite_cli.diagnosis.plausibility import check_dataset
-from excite_cli.diagnosis.rearranged import exchanges
-from excite_cli.diagnosis.torque_shares import nonnegative
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import robot_with
 from excite_cli.effects.catalogue import kind_named
@@ -201,19 +198,3 @@ def test_real_logs(name: str) -> None:
         assert told(robot, replace(data, runs=(run,))) == ""
     message = told(robot, changed(data, tau=negative(2)))
     assert f"torque of {robot.joint_names[2]} has the opposite sign" in message
-
-
-def test_stacked_least_squares_against_scipy() -> None:
-    rng = np.random.default_rng(3)
-    x = rng.normal(size=(20, 30, 5))
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    y = rng.normal(size=(20, 30))
-    found = nonnegative(x.transpose(0, 2, 1) @ x, np.einsum("btp,bt->bp", x, y))
-    expected = [nnls(each, target)[0] for each, target in zip(x, y, strict=True)]
-    assert found == pytest.approx(np.array(expected), abs=1e-8)
-
-
-def test_orders_are_counted_in_exchanges() -> None:
-    counts = {(0, 1, 2, 3): 0, (1, 0, 2, 3): 1, (1, 0, 3, 2): 2, (1, 2, 0, 3): 2}
-    counts |= {(1, 2, 3, 0): 1, (3, 2, 1, 0): 1}
-    assert {order: exchanges(np.array(order)) for order in counts} == counts

@@ -1,0 +1,142 @@
+"""Looking at log and model before any physics: `excite inspect`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from excite_cli.api.arguments import checked
+from excite_cli.api.loading import (
+    Case,
+    as_recorded,
+    completed,
+    inputs_of,
+    measured_case,
+)
+from excite_cli.api.outputs import held
+from excite_cli.atomic import write_atomically
+from excite_cli.checks import rows
+from excite_cli.checks.bodies import impossible_bodies
+from excite_cli.checks.look import look
+from excite_cli.checks.result import Result
+from excite_cli.config.amended import amended, with_values
+from excite_cli.config.load import spec_of
+from excite_cli.config.write import yaml_text
+from excite_cli.errors import ConfigError
+from excite_cli.excitation.problem import Problem
+from excite_cli.identification.prepare import prepare_all
+from excite_cli.identification.processing import choose_processing
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.measurement.merged_findings import merged
+from excite_cli.robot.model import build_robot
+from excite_cli.shown.note import Tell, log_note
+from excite_cli.shown.record import Shown
+from excite_cli.summary.inspection import inspection_answer as inspection_answer
+
+_ROUNDS = 4  # of looking, each with what the one before would set
+
+
+@dataclass(frozen=True, repr=False)
+class Inspection(Shown):
+    """`results` in the order of the checks; `settings`: what would change in the config."""
+
+    results: tuple[Result, ...]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    runs: tuple[str, ...] = ()
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing is wrong for certain."""
+        return all(each.status != "fault" for each in self.results)
+
+
+@checked()
+def inspect(
+    problem: Problem | Case,
+    data: str | Path | Sequence[str | Path] = (),
+    *,
+    apply: str | Path | None = None,
+    overwrite: bool = False,
+    tell: Tell = log_note,
+) -> Inspection:
+    """Mistakes of set-up in log and model: `excite inspect`.
+
+    Without `data` the description alone is judged. What would settle a fault or a doubt is tried,
+    and the data are looked at once more with it, until nothing new is found. With `apply` the
+    config that says so is written, its comments kept.
+
+    Returns
+    -------
+    Inspection
+        `results`, each with `status` ok, doubt or fault, `joints`, `evidence` and `settings`.
+
+    Raises
+    ------
+    ConfigError, FileError
+        A file cannot be read at all; nothing is to be written.
+    """
+    problem = measured_case(problem)
+    case = Case(problem.spec, problem.folder, problem.robot, problem.file)
+    files = [data] if isinstance(data, str | Path) else list(data)
+    with held({"apply": apply}, overwrite, inputs_of(problem, *files)):
+        found = impossible_bodies(case.robot)
+        settings: dict[str, Any] = {}
+        runs: tuple[str, ...] = ()
+        for _ in range(_ROUNDS if files else 0):
+            recorded = as_recorded(case, files)
+            runs = recorded.recordings
+            seen = {(each.name, each.joints, each.status) for each in found}
+            new = [each for each in _looked(case, recorded) if _key(each) not in seen]
+            found += new
+            more = {key: value for each in new for key, value in each.settings.items()}
+            if not more:
+                break
+            settings |= more
+            case = _changed(case, more)
+        inspection = Inspection(rows.in_order(found, bool(files)), settings, runs)
+        if apply is not None:
+            if not settings:
+                raise ConfigError("--apply: nothing is to be changed in the config.")
+            _write(Path(apply), problem, settings)
+        return inspection
+
+
+def _key(result: Result) -> tuple[str, tuple[str, ...], str]:
+    return result.name, result.joints, result.status
+
+
+def _looked(case: Case, recorded: Dataset) -> list[Result]:
+    """What is seen in files; and, where they may be used, what the dynamics say of them."""
+    told = [e for e in recorded.findings if e.severity != "note" or e.kind == "wrapped"]
+    found = rows.of_files(merged(told))
+    if any(each.status == "fault" for each in found):
+        return found
+    data = completed(case, recorded)
+    spec = case.spec
+    processing = choose_processing(data.runs, spec.measurement.filter, spec.diagnosis.moving_speed)
+    prepared = prepare_all(data.runs, processing)
+    return [*found, *look(case.robot, data.runs, prepared, spec)]
+
+
+def _changed(case: Case, settings: Mapping[str, Any]) -> Case:
+    """The same robot and data, set up otherwise."""
+    tree = with_values(case.spec.model_dump(mode="json", exclude_unset=True), settings)
+    spec = spec_of(tree)
+    if spec.robot == case.spec.robot:
+        return replace(case, spec=spec)
+    return Case(spec, case.folder, build_robot(spec.robot, case.folder), case.file)
+
+
+def _write(path: Path, problem: Problem | Case, settings: Mapping[str, Any]) -> None:
+    """The config that says what was found."""
+    if problem.file is not None:
+        text = amended(problem.file.read_text(encoding="utf-8"), settings)
+    else:
+        tree = problem.spec.model_dump(mode="json", exclude_unset=True)
+        text = yaml_text(with_values(tree, settings))
+    spec_of(with_values(problem.spec.model_dump(mode="json", exclude_unset=True), settings))
+
+    def write(to: Path) -> None:
+        to.write_text(text, encoding="utf-8")
+
+    write_atomically(path, write)

@@ -1,0 +1,1 @@
+"""Mistakes of set-up, found before any physics: one file for each."""

@@ -1,0 +1,61 @@
+"""A family of mistakes that people make of one thing: which set-ups may be meant instead."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from excite_cli.checks.setup import Setup
+from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.config.spec import Spec
+
+Settings = dict[str, Any]  # by the path of the key in the config
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Another set-up; the `joints` whose set-up it changes, none where it is that of all.
+
+    `is_plain`: a round value, which is meant where it explains as much as any near it. Of what has
+    the same joints and `variant` one is told. `price`, in L, of what hardly anybody does.
+    """
+
+    setup: Setup
+    joints: tuple[int, ...] = ()
+    variant: str = ""
+    price: float = 0.0
+    is_plain: bool = False
+
+
+class SetupCheck(ABC):
+    """One thing that may be set up wrongly."""
+
+    name: ClassVar[str]
+    kind: ClassVar[str]  # of its findings
+    of_all: ClassVar[bool] = False  # whether what it is about shows on every joint
+
+    @abstractmethod
+    def alternatives(
+        self, fit: TextbookFit, setup: Setup, explained: Explained
+    ) -> Iterator[Alternative]:
+        """What may be meant instead of a set-up."""
+
+    def refined(self, fit: TextbookFit, found: Alternative) -> Iterator[Alternative]:
+        """The alternative that explains most near the one that was found, and a plain one."""
+        yield found
+
+    @abstractmethod
+    def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:
+        """What is wrong."""
+
+    @abstractmethod
+    def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
+        """What to write in the config; nothing where no key says it."""
+
+    def trusted(self, names: Sequence[str], spec: Spec, joints: Sequence[int]) -> Settings:
+        """What to write where the data are right as they are."""
+        return {"measurement.trust": True}
+
+    def is_declared(self, name: str, spec: Spec) -> bool:
+        """Whether the config says already how joint `name` is set up."""
+        return False

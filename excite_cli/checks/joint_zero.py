@@ -1,0 +1,64 @@
+"""A joint that counts from another zero than its description: 90° or 180° off, or any angle."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from excite_cli.checks.base import Alternative, Settings, SetupCheck
+from excite_cli.checks.setup import Setup
+from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.config.spec import Spec
+
+_COARSE = np.radians(30.0)
+_FINE = np.radians([15.0, 7.5, 3.75, 1.9, 0.9, 0.45])  # half steps
+_QUARTER, _NEAR = np.pi / 2, np.radians(10.0)
+
+
+class JointZero(SetupCheck):
+    """Zero of every joint that turns."""
+
+    name = "zero of every joint"
+    kind = "zero"
+
+    def alternatives(
+        self, fit: TextbookFit, setup: Setup, explained: Explained
+    ) -> Iterator[Alternative]:
+        """All angles around, by 30°."""
+        for j in np.flatnonzero(~fit.robot.sliding).tolist():
+            for step in range(1, 12):
+                angle = (setup.zero[j] + step * _COARSE + np.pi) % (2 * np.pi) - np.pi
+                yield Alternative(setup.from_zero(j, float(angle)), (j,))
+
+    def refined(self, fit: TextbookFit, found: Alternative) -> Iterator[Alternative]:
+        """The angle that explains most, from steps that are halved; a right angle near it."""
+        (j,), setup = found.joints, found.setup
+        loss = fit(setup).loss
+        for step in _FINE:
+            for angle in (setup.zero[j] - step, setup.zero[j] + step):
+                tried = setup.from_zero(j, angle)
+                if (now := fit(tried).loss) < loss:
+                    loss, setup = now, tried
+        quarter = round(setup.zero[j] / _QUARTER) * _QUARTER
+        yield Alternative(setup, found.joints)
+        if abs(quarter - setup.zero[j]) < _NEAR:
+            yield Alternative(setup.from_zero(j, quarter), found.joints, is_plain=True)
+
+    def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:
+        """Whose zero is where."""
+        moved = np.flatnonzero(np.abs(after.zero - before.zero) > 1e-9).tolist()
+        told = [f"{names[j]} {np.degrees(after.zero[j] - before.zero[j]):+.3g}°" for j in moved]
+        return (
+            f"zeros lie elsewhere than the URDF's: positions are to be moved by {', '.join(told)}"
+        )
+
+    def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
+        """What is added to the positions."""
+        old = spec.measurement.offset
+        moved = np.flatnonzero(np.abs(after.zero - before.zero) > 1e-9).tolist()
+        new = {names[j]: float(after.zero[j] - before.zero[j]) for j in moved}
+        total = {name: round(old.get(name, 0.0) + x, 5) for name, x in new.items()}
+        return {"measurement.offset": {**old, **total}}
+
+    def is_declared(self, name: str, spec: Spec) -> bool:
+        """Whether its zero is given."""
+        return name in spec.measurement.offset

@@ -1,0 +1,54 @@
+"""The rows of `excite inspect`: everything that is looked at, in order, and what came of it."""
+
+from collections.abc import Sequence
+
+from excite_cli.checks import bodies, foreign_runs, look, standing_legs
+from excite_cli.checks.result import Result, Status
+from excite_cli.checks.set_up import CHECKS
+from excite_cli.measurement.dataset import Finding
+
+# What is seen while files are read, by the kind of finding.
+_OF_FILES: dict[str, tuple[str, ...]] = {
+    "time stamps and gaps": (
+        "stamps", "gap", "jitter", "order", "truncated", "ragged", "uneven_periods", "interpolated",
+        "slow_rate",
+    ),
+    "values that are missing or held": (
+        "nan", "nan_torque", "nan_speed", "nan_position", "stuck", "stale", "held", "dead",
+        "dead_torque", "mostly_constant", "saturated", "no_speed", "torque_steps",
+    ),
+    "names of columns": ("numbered", "words", "other_joints", "swapped", "sign"),
+    "angles of one turn": ("wrapped",),
+    "units of positions and time": ("units", "gain", "lag"),
+    "limits of the joints": ("outside_limits", "torque_units"),
+}  # fmt: skip
+NAMES = (
+    bodies.NAME, *_OF_FILES, foreign_runs.NAME, standing_legs.NAME,
+    *(check.name for check in CHECKS), look.BELONG,
+)  # fmt: skip
+_OTHER = "what else was noticed"
+_STATUS: dict[str, Status] = {"error": "fault", "warning": "doubt", "note": "ok"}
+
+
+def of_files(findings: Sequence[Finding]) -> list[Result]:
+    """Results of what was seen while files were read."""
+    row = {kind: name for name, kinds in _OF_FILES.items() for kind in kinds}
+    row |= {check.kind: check.name for check in CHECKS}
+    return [
+        Result(
+            row.get(each.kind, _OTHER), each.kind, _STATUS[each.severity], each.text, each.joints,
+            each.run, each.settings,
+        )
+        for each in findings
+    ]  # fmt: skip
+
+
+def in_order(found: Sequence[Result], judged: bool) -> tuple[Result, ...]:
+    """Results by the order of rows; a row without any is fine, if it was `judged`."""
+    rows: list[Result] = []
+    for name in (*NAMES, _OTHER):
+        own = [each for each in found if each.name == name]
+        if not own and judged and name != _OTHER:
+            own = [Result(name, "")]
+        rows += own
+    return tuple(rows)

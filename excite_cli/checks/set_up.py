@@ -1,0 +1,154 @@
+"""The set-up that explains the data, found step by step from the one that is declared.
+
+Everything that people set up wrongly is tried at once, and the alternative with which the same
+textbook model explains most is taken, if it explains far more; then the next. It is a fault where
+hardly anything of the torques concerned fits as they are, whatever the inertias, and nearly all of
+it the other way; else a doubt, and the person decides.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.checks.base import Alternative, SetupCheck
+from excite_cli.checks.column_order import ColumnOrder
+from excite_cli.checks.gravity_direction import GravityDirection
+from excite_cli.checks.gravity_subtracted import GravitySubtracted
+from excite_cli.checks.joint_sign import PositionSign, TorqueSign
+from excite_cli.checks.joint_zero import JointZero
+from excite_cli.checks.setup import Setup
+from excite_cli.checks.textbook_fit import FLOOR, Explained, TextbookFit
+from excite_cli.checks.time_scale import Clock, TorqueLag
+from excite_cli.checks.torque_unit import TorqueUnit
+from excite_cli.config.spec import Spec
+from excite_cli.measurement.dataset import Mask
+from excite_cli.robot.model import Array
+
+CHECKS: tuple[SetupCheck, ...] = (
+    GravityDirection(), JointZero(), PositionSign(), TorqueSign(), ColumnOrder(), TorqueUnit(),
+    GravitySubtracted(), Clock(), TorqueLag(),
+)  # fmt: skip
+# What an alternative must gain in L; and in the logarithm of the share of some joint, which falls
+# to 0.6 of what it was (all a little better is what effects do), unless it is the bodies that are
+# bent less. Of what shows on all joints half of them must gain, too.
+_CLEAR, _FALLS, _GAINS = 1.0, 0.5, 0.2
+_AS_GOOD = 0.35  # of L: alternatives that differ by less are told together
+_ROUGH, _CANDIDATES = 100, 4  # samples by which many alternatives are ranked; how many are kept
+_FINE = 2e-3  # share below which no difference is made between values of one thing
+_GOOD = 0.03  # data that leave less than this on every joint are what they say they are
+_STEPS = 4
+# A mistake is certain where so much of the torques concerned is left as they are (inertias would
+# have to be 5 standard deviations off), and it gains so much in L: odds of 10 to 1 where it leaves
+# hardly anything, else of 50 to 1.
+_CERTAIN, _SURE, _HARDLY, _SURER = 0.15, 2.3, 0.1, 4.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """One mistake: whose it is, the set-up without and with it undone, how well the data fit.
+
+    `rivals`: alternatives that explain about as much.
+    """
+
+    check: SetupCheck
+    before: Setup
+    after: Alternative
+    left_before: Explained
+    left_after: Explained
+    rivals: tuple[tuple[SetupCheck, Setup], ...] = ()
+
+    @property
+    def concerned(self) -> Mask:
+        """Joints (n,) whose torques it explains better, or whose own columns it changes."""
+        better = _gain(self.left_after, self.left_before) > _GAINS
+        own = np.zeros(len(better), bool)
+        own[list(self.after.joints) or slice(None)] = True
+        return better if better.any() else own
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether no inertias could make the torques concerned what they are recorded as."""
+        one, other = self.left_after, self.left_before
+        before, after = (np.median(each.shares[self.concerned]) for each in (other, one))
+        gain = other.loss - one.loss
+        bent = other.bent - one.bent > _SURE
+        return bool((before > _CERTAIN or bent) and gain > (_SURE if after < _HARDLY else _SURER))
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """An alternative of a check, and how well the data fit with it."""
+
+    check: SetupCheck
+    alternative: Alternative
+    explained: Explained
+
+    @property
+    def cost(self) -> float:
+        """L, and what is asked of the less likely."""
+        return self.explained.loss + self.alternative.price
+
+    @property
+    def question(self) -> tuple[str, tuple[int, ...], str]:
+        """What is set up: of one question there is one answer."""
+        return self.check.name, self.alternative.joints, self.alternative.variant
+
+    def is_far_better(self, other: Explained) -> bool:
+        """Whether it explains far more than another set-up."""
+        gain = _gain(self.explained, other)
+        shown = not self.check.of_all or np.mean(gain[other.judged] > _GAINS) >= 0.5
+        falls = gain.max() > _FALLS or other.bent - self.explained.bent > _CLEAR
+        return bool(self.cost < other.loss - _CLEAR and falls and shown)
+
+
+def mistakes(fit: TextbookFit, spec: Spec) -> Iterator[Step]:
+    """Mistakes, the one that explains most first, until none explains far more.
+
+    What the config says of a joint itself is taken as it is.
+    """
+    rough = TextbookFit(fit.robot, fit.samples.thinned(_ROUGH), _FINE)
+    setup = Setup.as_declared(fit.robot)
+    explained = fit(setup)
+    for _ in range(_STEPS):
+        if not explained.judged.any() or explained.shares[explained.judged].max() < _GOOD:
+            return
+        tried = _candidates(fit, rough, spec, setup, explained)
+        found = [each for each in tried if each.is_far_better(explained)]
+        if not found:
+            return
+        best = min(found, key=lambda each: each.cost)
+        near = [each for each in found if each.explained.loss < best.explained.loss + _AS_GOOD]
+        same = [each for each in near if each.question == best.question]
+        best = next((each for each in same if each.alternative.is_plain), best)
+        rivals = [(each.check, each.alternative.setup) for each in near if each not in same]
+        step = Step(best.check, setup, best.alternative, explained, best.explained, tuple(rivals))
+        yield step
+        setup, explained = best.alternative.setup, best.explained
+
+
+def _gain(one: Explained, other: Explained) -> Array:
+    return np.log(np.maximum(other.shares, FLOOR) / np.maximum(one.shares, FLOOR))
+
+
+def _candidates(
+    fit: TextbookFit, rough: TextbookFit, spec: Spec, setup: Setup, explained: Explained
+) -> Iterator[_Candidate]:
+    names = fit.robot.joint_names
+    for check in CHECKS:
+        settled = {j for j, name in enumerate(names) if check.is_declared(name, spec)}
+        every = check.alternatives(fit, setup, explained)
+        some = [each for each in every if settled.isdisjoint(each.joints)]
+        if len(some) > _CANDIDATES:
+            some = _best_of_each(some, [rough(each.setup).loss for each in some])[:_CANDIDATES]
+        for each in some:
+            for better in check.refined(rough, each):
+                yield _Candidate(check, better, fit(better.setup))
+
+
+def _best_of_each(some: Sequence[Alternative], losses: Sequence[float]) -> list[Alternative]:
+    """The best alternative of every set of joints and variant, best first."""
+    found: dict[tuple[tuple[int, ...], str], Alternative] = {}
+    for i in np.argsort(losses):
+        found.setdefault((some[i].joints, some[i].variant), some[i])
+    return list(found.values())

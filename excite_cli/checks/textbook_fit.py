@@ -1,0 +1,195 @@
+"""How well one textbook model explains some data, if the robot was set up in some way.
+
+With a set-up s the torque of joint j is taken as
+
+    τ_j = Y_j(s) (φ + D z) + X_j c_j,      X_j = [v, sgn v, |load| sgn v, a, 1],
+
+with the URDF's parameters φ, their standard deviations D (masses and inertias 30 %, centres of mass
+3 cm; all torques together 30 %), and c ≥ 0 but for the offset, since friction takes energy. z and c
+minimise
+
+    L(s) = Σ_j [ r_j² / (2 s_j²) + log s_j ] + ½ ‖z‖²,
+
+r_j the share of the joint's torque (RMS over RMS) that is left, and s_j how large it is taken to
+be: as large as it is, at least `FLOOR`. That is minus the logarithm of the posterior with one
+observation for each joint, not one for each sample: what the set-up should explain must not be
+explained by bodies that nobody built. At the minimum L = Σ_j log s_j + ½ ‖z‖² and a constant.
+Set-ups are compared by L: the one with which the same model explains far more is the truth.
+
+Instants in which a joint stands or reverses do not count: what it then carries is up to its
+friction.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.checks.samples import FEWEST, Samples
+from excite_cli.checks.setup import Setup
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.identification.prior import inertial_prior
+from excite_cli.measurement.dataset import Mask
+from excite_cli.robot.model import Array, Robot
+
+_UNCERTAIN, _CENTER = 0.3, 0.03  # share of masses and inertias; m by which centres of mass are off
+_SCALE = 0.3  # share by which all torques may be off together, as currents' constants are
+FLOOR = 0.02  # shares below this are noise and effects: no difference is made there
+_ROUNDS, _SETTLED = 6, 0.02  # of the weights; in log
+_FIRST = 0.3  # s_j to begin with
+_SIGNED = 4  # columns of X whose coefficients must not be negative
+_RIDGE = 1e-9  # of a column of X, whose norm is 1
+
+
+@dataclass(frozen=True)
+class Explained:
+    """`shares` (n,) of the torques that are left, 1 where not `judged` (n,); `loss` L.
+
+    `z` (P + 1,): by how many standard deviations bodies, and all torques, are others than the URDF
+    says.
+    """
+
+    shares: Array
+    judged: Mask
+    loss: float
+    z: Array
+
+    @property
+    def bent(self) -> float:
+        """½ ‖z‖²: how unlikely the bodies are that explain the data."""
+        return float(0.5 * self.z @ self.z)
+
+
+class TextbookFit:
+    """Fits the textbook's model to samples of a robot, for any set-up."""
+
+    def __init__(self, robot: Robot, samples: Samples, floor: float = FLOOR) -> None:
+        self.robot, self.samples, self._floor = robot, samples, floor
+        self.phi = standard_parameters(robot)
+        spread = inertial_prior(robot, self.phi, _UNCERTAIN).std.reshape(-1, 10).copy()
+        own = _UNCERTAIN * self.phi.reshape(-1, 10)[:, 1:4]
+        spread[:, 1:4] = np.hypot(own, _CENTER * spread[:, :1] / _UNCERTAIN)
+        self.spread: Array = spread.ravel()
+        self._motions: dict[bytes, tuple[Array, Array | None]] = {}
+
+    def __call__(self, setup: Setup) -> Explained:
+        """How well the data fit, set up so."""
+        _, v, a = setup.motion(self.samples)
+        columns, torque = self.columns(setup), setup.torque(self.samples)
+        whole = torque + self.weight(setup) @ setup.gravity if setup.weightless else torque
+        rows = (v, a, torque, whole)
+        bodies = (self.phi, self.spread, self._floor)
+        return _explained(columns, bodies, rows, self.counted(setup))
+
+    def bodies(self, z: Array) -> Array:
+        """Parameters φ (P,) of bodies that are so many standard deviations off."""
+        return np.asarray((1.0 + _SCALE * z[-1]) * self.phi + self.spread * z[:-1])
+
+    def counted(self, setup: Setup) -> Mask:
+        """Instants (T, n) that count of each joint."""
+        known, moves = self.samples.known[:, setup.tau_order], self.samples.moves[:, setup.q_order]
+        return np.asarray(known & moves)
+
+    def columns(self, setup: Setup) -> Array:
+        """Y (T, n, P) of the robot so mounted and so moved."""
+        q, v, a = setup.motion(self.samples)
+        robot = self.robot.with_gravity(setup.gravity)
+        return RigidBody(robot, self.phi, q, v, a).regressor
+
+    def weight(self, setup: Setup, phi: Array | None = None) -> Array:
+        """Torque (T, n, 3) of bodies φ under 1 m/s² along each axis."""
+        q = setup.motion(self.samples)[0]
+        phi, rest = self.phi if phi is None else phi, np.zeros_like(q)
+        turned = [self.robot.with_gravity(axis) for axis in np.eye(3)]
+        return np.stack([RigidBody(each, phi, q, rest, rest).load for each in turned], axis=-1)
+
+    def without_passive(self, setup: Setup, z: Array, j: int, values: Array) -> Array:
+        """Values (T', …) at the instants of joint j less what friction, rotor and offset explain.
+
+        With the load of bodies of `z`.
+        """
+        rows = self.counted(setup)[:, j]
+        _, v, a = setup.motion(self.samples)
+        load = self.columns(setup)[rows, j] @ self.bodies(z)
+        basis = np.linalg.qr(_passive(v[rows, j], a[rows, j], load))[0]
+        return np.asarray(values - basis @ (basis.T @ values))
+
+
+def _passive(v: Array, a: Array, load: Array) -> Array:
+    """X (T, 5), columns of norm 1."""
+    way = np.sign(v)
+    columns = np.column_stack([v, way, np.abs(load) * way, a, np.ones(len(v))])
+    norms = np.linalg.norm(columns, axis=0)
+    return np.asarray(columns / np.where(norms > 0.0, norms, 1.0))
+
+
+def _explained(
+    columns: Array, bodies: tuple[Array, Array, float], rows: tuple[Array, ...], counted: Mask
+) -> Explained:
+    """Of the `whole` torque, in shares of the recorded one: `rows` are v, a and these, (T, n)."""
+    judged = np.count_nonzero(counted, axis=0) >= FEWEST
+    phi, spread, floor = bodies
+    grams = []
+    for j in np.flatnonzero(judged):
+        at = counted[:, j]
+        v, a, torque, whole = (x[at, j] for x in rows)
+        size = float(np.sum(np.square(torque - torque.mean())))
+        if not size > 0.0:
+            judged[j] = False
+            continue
+        load = columns[at, j] @ phi
+        uncertain = [columns[at, j] * spread, _SCALE * load]
+        passive = np.sqrt(size) * _passive(v, a, load)
+        block = np.column_stack([*uncertain, passive, whole - load])
+        grams.append(block.T @ block / size)
+    shares, z = np.ones(counted.shape[1]), np.zeros(len(phi) + 1)
+    if not grams:
+        return Explained(shares, judged, 0.0, z)
+    products = _Products(np.array(grams), len(phi) + 1)
+    s = np.full(len(grams), _FIRST)
+    for _ in range(_ROUNDS):
+        z, left = products.solved(s)
+        before, s = s, np.maximum(left, floor)
+        shares[judged] = left
+        if np.abs(np.log(s / before)).max() < _SETTLED:
+            break
+    return Explained(shares, judged, float(np.log(s).sum() + 0.5 * z @ z), z)
+
+
+class _Products:
+    """Products (J, P + 6, P + 6) of the columns Y D, X and τ − Y φ of every judged joint.
+
+    Friction and rotors that would be negative leave for good.
+    """
+
+    def __init__(self, grams: Array, size: int) -> None:
+        self._grams, self._size = grams, size
+        self._active = np.ones((len(grams), grams.shape[1] - size - 1))
+        self._others = np.append(np.arange(size), grams.shape[1] - 1)
+        self._eliminate()
+
+    def _eliminate(self) -> None:
+        """What is left of the others, (J, P + 1, P + 1), beside X; and how X follows them."""
+        own, on = slice(self._size, -1), self._active
+        inner = self._grams[:, own, own] * on[:, :, None] * on[:, None, :]
+        inner += np.eye(on.shape[1]) * (_RIDGE + 1.0 - on)[:, None, :]
+        cross = self._grams[:, own, :][:, :, self._others] * on[:, :, None]
+        self._gain = np.linalg.solve(inner, cross)
+        whole = self._grams[:, self._others[:, None], self._others]
+        self._rest = whole - np.swapaxes(cross, 1, 2) @ self._gain
+
+    def solved(self, s: Array) -> tuple[Array, Array]:
+        """z (P,), and what is left of each joint (J,)."""
+        while True:
+            total = np.tensordot(s**-2, self._rest, axes=1)
+            z = np.asarray(
+                np.linalg.solve(total[:-1, :-1] + np.eye(self._size), total[:-1, -1]), float
+            )
+            both: Array = np.append(-z, 1.0)
+            follows = (self._gain @ both)[:, :_SIGNED]
+            negative = (follows < 0.0) & (self._active[:, :_SIGNED] > 0.0)
+            if not negative.any():
+                left = np.einsum("p,jpr,r->j", both, self._rest, both)
+                return z, np.asarray(np.sqrt(np.maximum(left, 0.0)))
+            self._active[:, :_SIGNED][negative] = 0.0
+            self._eliminate()

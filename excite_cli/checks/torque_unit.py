@@ -1,0 +1,91 @@
+"""Torques of another unit, of the motor before its gear, or currents; of one joint or of all.
+
+Masses may be wrong by a half, not by a factor of `_FACTOR`. What is found is a number, N·m in a
+unit of the file as the masses have it, or the power of ten next to it where that does as well.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from excite_cli.checks.base import Alternative, Settings, SetupCheck
+from excite_cli.checks.setup import Setup
+from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.config.spec import Spec
+from excite_cli.measurement.torque import NEWTON_METERS, torque_units
+
+_FACTOR = 6.0
+_TRIED = 10.0 ** np.concatenate([np.arange(-4.0, -0.5, 0.5), np.arange(1.0, 4.5, 0.5)])
+# Bodies must be seen to tell the unit: without their torque, so much in L must be lost.
+_WEIGHTLESS, _SEEN = 1e3, 1.0
+_FINE = np.log([1.8, 1.35, 1.16, 1.08])
+
+
+class TorqueUnit(SetupCheck):
+    """Unit of the torques."""
+
+    name = "unit of torques"
+    kind = "torque_scale"
+
+    def alternatives(
+        self, fit: TextbookFit, setup: Setup, explained: Explained
+    ) -> Iterator[Alternative]:
+        """Half decades, of every joint and of all."""
+        n = len(setup.zero)
+        groups: list[tuple[int, ...]] = [
+            tuple(range(n)),
+            *((j,) for j in np.flatnonzero(explained.judged).tolist()),
+        ]
+        for joints in groups if n > 1 else groups[:1]:
+            for factor in _TRIED:
+                yield Alternative(_scaled(setup, joints, factor), joints)
+
+    def refined(self, fit: TextbookFit, found: Alternative) -> Iterator[Alternative]:
+        """The factor that explains most; and the powers of ten next to it."""
+        setup, loss = found.setup, fit(found.setup).loss
+        for step in _FINE:
+            for factor in (np.exp(-step), np.exp(step)):
+                tried = _scaled(setup, found.joints, factor)
+                if (now := fit(tried).loss) < loss:
+                    loss, setup = now, tried
+        unit = setup.unit[found.joints[0]]
+        seen = fit(_scaled(setup, found.joints, _WEIGHTLESS)).loss > loss + _SEEN
+        if not seen or abs(np.log(unit)) < np.log(_FACTOR):
+            return
+        yield Alternative(setup, found.joints)
+        for power in 10.0 ** np.array([np.floor(np.log10(unit)), np.ceil(np.log10(unit))]):
+            if power == 1.0:
+                continue
+            yield Alternative(
+                _scaled(setup, found.joints, power / unit), found.joints, is_plain=True
+            )
+
+    def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:
+        """How much too large or small."""
+        ratio = before.unit / after.unit
+        off = np.flatnonzero(np.abs(np.log(ratio)) > 1e-9).tolist()
+        whose = "all joints" if len(off) == len(names) > 1 else ", ".join(names[j] for j in off)
+        return (
+            f"torques of {whose} are {ratio[off[0]]:.3g} times what bodies like the URDF's ask "
+            "for: another unit (mN·m, A, per cent), the motor's torque before its gear "
+            "(measurement.torque: motor), or a counterbalance"
+        )
+
+    def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
+        """N·m in a unit of the file, of a torque that is declared as of the link."""
+        own = torque_units(spec.measurement, tuple(names)) * after.unit / before.unit
+        if np.ptp(own) > 1e-9 * own.max():
+            return {
+                "measurement.torque_unit": {
+                    name: float(f"{x:.4g}") for name, x in zip(names, own, strict=True)
+                }
+            }
+        named = [name for name, x in NEWTON_METERS.items() if abs(x / own[0] - 1.0) < 1e-6]
+        return {"measurement.torque_unit": named[0] if named else float(f"{own[0]:.4g}")}
+
+
+def _scaled(setup: Setup, joints: Sequence[int], factor: float) -> Setup:
+    unit = setup.unit.copy()
+    unit[list(joints)] *= factor
+    return replace(setup, unit=unit)

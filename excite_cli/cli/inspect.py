@@ -1,0 +1,64 @@
+"""`excite inspect`: log and model, before any physics."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from excite_cli.cli import options
+from excite_cli.cli.console import Terminal
+from excite_cli.cli.help_page import OUTPUT
+
+
+def inspect(
+    config: options.Config,
+    data: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Measured data: HDF5, CSV or bags.", show_default=False),
+    ] = None,
+    apply: Annotated[
+        Path | None,
+        typer.Option(
+            "--apply",
+            metavar="NEW.yaml",
+            help="Write the config with what settles faults and doubts, its comments kept.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    overrides: options.Set = None,
+    overwrite: options.Overwrite = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
+    no_progress: options.NoProgress = False,
+) -> None:
+    """Look at log and model before any physics: mount, zeros, signs, order, units, clock, bodies.
+
+    One row per check: ok, doubt or fault, the joints, the evidence, and the key of the config that
+    settles it. What people set up wrongly is judged by one plain fit of the textbook's model: the
+    set-up with which it explains far more of the torques is the right one. Without data the
+    robot's description alone is looked at.
+
+    Exit status 1: something is wrong for certain.
+
+    Examples:
+      excite inspect ur10.yaml measured.h5 --apply corrected.yaml
+    """
+    from excite_cli.api.inspecting import inspect as inspect_data
+    from excite_cli.api.inspecting import inspection_answer
+    from excite_cli.api.loading import load_case
+    from excite_cli.api.threads import single_threaded
+
+    terminal = Terminal(as_json, quiet, verbose, not no_progress)
+    files = data or []
+    with single_threaded():
+        found = inspect_data(
+            load_case(config, overrides or ()),
+            files,
+            apply=apply,
+            overwrite=overwrite,
+            tell=terminal.tell,
+        )
+    written = None if apply is None else str(apply)
+    given = tuple(map(str, files))
+    terminal.show(inspection_answer(found, str(config), given, written))
