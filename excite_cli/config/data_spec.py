@@ -1,9 +1,10 @@
 """What a YAML file may say about measured data: torque, filters, declared effects, diagnosis."""
 
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from excite_cli.config.presets import with_preset
 from excite_cli.config.section import (
     Finite,
     Integer,
@@ -70,6 +71,9 @@ class MeasurementSpec(Section):
         )
     }
 
+    preset: Literal["ur_rtde", "ur_ros2", "franka", "kuka_rsi", "unitree", "dynamixel"] | None = (
+        Field(None, description="a recorder whose names and units are known; other keys go before")
+    )
     torque: Literal["link", "motor", "current"] = Field(
         "link",
         description="link: at the joint; motor: before the gear; current: before motor and gear",
@@ -115,8 +119,10 @@ class MeasurementSpec(Section):
     torque_lag: Finite = Field(
         0.0, description="time by which recorded torques are late, against positions [s]"
     )
-    angle: Literal["rad", "deg"] = Field(
-        "rad", description="of positions and speeds of joints that turn"
+    angle: Literal["rad", "deg"] | Positive = Field(
+        "rad",
+        description="of positions and speeds of joints that turn; or rad in one unit of the file, "
+        "as 0.0015339808 of 4096 counts a turn",
     )
     length: Literal["m", "cm", "mm"] = Field(
         "m", description="of positions and speeds of joints that slide"
@@ -153,6 +159,11 @@ class MeasurementSpec(Section):
     )
     topic: str | None = Field(None, description="topic of a bag; default: the only JointState")
     filter: FilterSpec = FilterSpec()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_a_known_recorder(cls, values: Any) -> Any:
+        return with_preset(values) if isinstance(values, dict) else values
 
     @model_validator(mode="after")
     def _each_channel_once(self) -> "MeasurementSpec":

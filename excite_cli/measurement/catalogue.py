@@ -17,6 +17,7 @@ from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.hdf5_reader import Hdf5Reader
 from excite_cli.measurement.joined_files import is_part, with_joined
+from excite_cli.measurement.mat_reader import MatReader
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.motors import Motors
 from excite_cli.measurement.quality import checked
@@ -28,7 +29,7 @@ from excite_cli.out_of_core import Spool
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 
-READERS: tuple[Reader, ...] = (Hdf5Reader(), CsvReader(), BagReader())
+READERS: tuple[Reader, ...] = (Hdf5Reader(), CsvReader(), BagReader(), MatReader())
 _EPOCH = 1e6  # s: stamps beyond count from 1970, not from the start
 
 

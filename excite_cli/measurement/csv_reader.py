@@ -7,6 +7,7 @@ from pathlib import Path
 
 from excite_cli.errors import FileError, nearest
 from excite_cli.measurement.arrange import listed
+from excite_cli.measurement.csv_dialects import in_our_names
 from excite_cli.measurement.csv_table import read_table
 from excite_cli.measurement.dataset import Array
 from excite_cli.measurement.reader import (
@@ -34,6 +35,7 @@ class CsvReader(Reader):
         """
         table = read_table(path)
         columns = {_bare(name): values for name, values in table.columns.items()}
+        columns, noticed = in_our_names(columns, table.words)
         words, samples = listed(list(columns)), len(next(iter(columns.values())))
         apart = {name: columns.pop(name) for name in [*columns] if wanted.is_apart(name)}
         wanted = _by_fields(columns, wanted)
@@ -51,7 +53,7 @@ class CsvReader(Reader):
         channels, others = _by_channel(columns, wanted)
         numbered = all(name.isdigit() for name in channels["q"])
         others |= apart
-        return [RawRun("", t, channels, others, numbered, not stamped, table.findings)]
+        return [RawRun("", t, channels, others, numbered, not stamped, (*table.findings, *noticed))]
 
 
 def _by_fields(columns: Mapping[str, Array], wanted: ReadOptions) -> ReadOptions:

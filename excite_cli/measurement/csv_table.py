@@ -3,13 +3,15 @@
 Nothing is evaluated; a line, a file and the unpacked size of a `.gz` have limits.
 """
 
+import codecs
 import csv
 import gzip
 import re
 import zlib
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -23,18 +25,21 @@ from excite_cli.measurement.reader import (
 )
 
 _MAX_LINE = 2**20
+_BEGIN = 2**16  # bytes by which the encoding is told
 _OFTEN = 4096  # rows between looks at how much it has become
 _MAX_TEXT = 2 * 2**30  # unpacked
 _BLANKS = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
+_SEPARATOR = re.compile(r'"?sep=(.)"?$', re.IGNORECASE)  # the first line of some spreadsheets
 _DECIMAL_COMMA = re.compile(r"\d,\d")
 
 
 @dataclass(frozen=True)
 class Table:
-    """Named columns (T,) of numbers; NaN where a field was empty."""
+    """Named columns (T,) of numbers; NaN where a field was empty; `words`: columns of one word."""
 
     columns: dict[str, Array]
     findings: tuple[Finding, ...]
+    words: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -66,12 +71,13 @@ def read_table(path: Path) -> Table:
         _check_unpacked(path)
         layout = _layout(path)
         findings: list[Finding] = []
+        words: dict[str, str] = {}
         try:
             values = _fast(path, layout)
         except (ValueError, OverflowError):
-            values, findings = _careful(path, layout)
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise FileError(f"{path} is not a text table in UTF-8: {error}.") from error
+            values, words, findings = _careful(path, layout)
+    except (UnicodeError, csv.Error) as error:
+        raise FileError(f"{path} is not a text table: {error}.") from error
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise FileError(f"{path} is a damaged or cut off .gz file: {error}.") from error
     except OSError as error:
@@ -79,15 +85,16 @@ def read_table(path: Path) -> Table:
     if layout.decimal_comma:
         text = "numbers are written with a decimal comma; read so"
         findings.append(Finding("decimal_comma", "note", text))
-    return Table(values, tuple(findings))
+    return Table(values, tuple(findings), words)
 
 
 def _lines(path: Path) -> Iterator[str]:
     """Lines without their ends, within limits."""
+    encoding = _encoding(path)
     with (
-        gzip.open(path, "rt", encoding="utf-8-sig", newline=None)
+        gzip.open(path, "rt", encoding=encoding, newline=None)
         if _is_packed(path)
-        else path.open(encoding="utf-8-sig", newline=None)
+        else path.open(encoding=encoding, newline=None)
     ) as file:
         total = 0
         while line := file.readline(_MAX_LINE):
@@ -98,6 +105,19 @@ def _lines(path: Path) -> Iterator[str]:
                     f"{_MAX_TEXT // 2**30} GiB of text. Cut it into several runs."
                 )
             yield line.rstrip("\n")
+
+
+def _encoding(path: Path) -> str:
+    """UTF-16 by its mark; UTF-8 where the beginning is; else that of Western spreadsheets."""
+    with gzip.open(path, "rb") if _is_packed(path) else path.open("rb") as file:
+        begin = file.read(_BEGIN)
+    if begin[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    try:
+        codecs.getincrementaldecoder("utf-8-sig")().decode(begin)
+    except UnicodeDecodeError:
+        return "utf-8-sig" if b"\0" in begin else "cp1252"
+    return "utf-8-sig"
 
 
 def _check_unpacked(path: Path) -> None:
@@ -119,8 +139,10 @@ def _layout(path: Path) -> _Layout:
     """Header and separator; a header may stand behind `#`, as numpy writes it."""
     remark, header = "", ""
     for count, line in enumerate(_lines(path)):
-        if not line.strip():
+        if not line.strip() or (count == 0 and _SEPARATOR.match(line.strip())):
             pass
+        elif line.startswith("%time"):  # of `rostopic echo -p`
+            header = line
         elif line.lstrip().startswith(("#", "%")):
             remark = line.lstrip().lstrip("#% ")
         elif header:
@@ -187,8 +209,11 @@ def _fast(path: Path, layout: _Layout) -> dict[str, Array]:
     return {name: np.ascontiguousarray(table[:, j]) for j, name in enumerate(layout.header)}
 
 
-def _careful(path: Path, layout: _Layout) -> tuple[dict[str, Array], list[Finding]]:
-    """Row by row: empty fields become NaN, columns of words are left out, a cut last row too."""
+def _careful(path: Path, layout: _Layout) -> tuple[dict[str, Array], dict[str, str], list[Finding]]:
+    """Row by row: empty fields become NaN, dates seconds; a cut last row is left out.
+
+    Columns of words are left out, too; where they are all the same, the word is known.
+    """
     width, fields, findings, numbers = len(layout.header), [], [], []
     first = layout.first_row
     for number, line in enumerate(_lines(path)):
@@ -213,9 +238,12 @@ def _careful(path: Path, layout: _Layout) -> tuple[dict[str, Array], list[Findin
     if not fields:
         raise FileError(f"{path} has a header and no whole rows.")
     columns: dict[str, Array] = {}
-    words = []
+    words: list[str] = []
+    same: dict[str, str] = {}
     for name, texts in zip(layout.header, zip(*fields, strict=True), strict=True):
         values = _numbers(texts)
+        if isinstance(values, int):
+            values = _dates(texts, values)
         if isinstance(values, int):
             if _any_number(texts):
                 raise FileError(
@@ -223,12 +251,14 @@ def _careful(path: Path, layout: _Layout) -> tuple[dict[str, Array], list[Findin
                     "is not a number. Leave the field empty where a value is missing."
                 )
             words.append(name)
+            if len({*texts}) == 1:
+                same[name] = texts[0]
         else:
             columns[name] = values
     if words:
         text = f"columns of words are left out: {', '.join(words)}"
         findings.append(Finding("words", "note", text))
-    return columns, findings
+    return columns, same, findings
 
 
 def _numbers(texts: tuple[str, ...]) -> Array | int:
@@ -242,6 +272,16 @@ def _numbers(texts: tuple[str, ...]) -> Array | int:
         except ValueError:
             return index
     return values
+
+
+def _dates(texts: tuple[str, ...], index: int) -> Array | int:
+    """Seconds since 1970 of ISO dates with a time, in UTC unless they say; or `index` again."""
+    try:
+        found = [datetime.fromisoformat(text) for text in texts]
+    except ValueError:
+        return index
+    zoned = (each if each.tzinfo else each.replace(tzinfo=UTC) for each in found)
+    return np.array([each.timestamp() for each in zoned])
 
 
 def _any_number(texts: tuple[str, ...]) -> bool:

@@ -20,6 +20,7 @@ from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.motors import Motors, at_motors
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+RADIANS = {"rad": 1.0, "deg": np.pi / 180}
 METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 NEWTON_METERS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "kNm": 1e3, "kgfcm": 0.0980665}
 
@@ -100,7 +101,8 @@ def to_joints(
 ) -> Run:
     """The run in s, rad (m) and N·m at the joints, as `spec` declares it."""
     ratio, shares = _per_joint(spec.gear_ratio, joints), _shares(spec, joints)
-    angle = np.where(revolute, np.pi / 180 if spec.angle == "deg" else 1.0, METERS[spec.length])
+    radians = RADIANS[spec.angle] if isinstance(spec.angle, str) else spec.angle
+    angle = np.where(revolute, radians, METERS[spec.length])
     q = run.q * angle * _per_joint(spec.position_sign, joints)
     dq = None if run.dq is None else run.dq * angle * _per_joint(spec.velocity_sign, joints)
     if spec.position == "motor":

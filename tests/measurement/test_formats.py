@@ -1,0 +1,158 @@
+"""Tables as other programs write them, MATLAB's files, and recorders that are known by name."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from excite_cli.api.loading import Case, load_case, load_data
+from excite_cli.errors import FileError
+from excite_cli.measurement.dataset import Array
+
+JOINTS = ("base", "elbow")
+URDF = """<robot name="two"><link name="w"/>{}</robot>""".format(
+    "".join(
+        f'<link name="{name}_link"><inertial><origin xyz="0.1 0 0"/><mass value="2"/><inertia '
+        'ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        f'<joint name="{name}" type="revolute"><parent link="{parent}"/>'
+        f'<child link="{name}_link"/><axis xyz="0 1 0"/>'
+        '<limit lower="-3" upper="3" velocity="5" effort="90"/></joint>'
+        for name, parent in zip(JOINTS, ("w", "base_link"), strict=True)
+    )
+)
+T = np.arange(400) * 0.01
+Q = np.column_stack([0.8 * np.sin(2 * T), 0.5 * np.cos(3 * T)])
+TAU = np.column_stack([9.0 * np.cos(2 * T) + 1.0, 3.0 * np.sin(3 * T)])
+
+
+def case(folder: Path, **measurement: object) -> Case:
+    (folder / "two.urdf").write_text(URDF, encoding="utf-8")
+    return load_case({"robot": {"urdf": str(folder / "two.urdf")}, "measurement": measurement})
+
+
+def read(folder: Path, name: str, **measurement: object) -> tuple[Array, Array, Array]:
+    data = load_data(case(folder, **measurement), folder / name, tell=lambda note: None)
+    (run,) = data.runs
+    return run.t - run.t[0], run.q, run.tau
+
+
+def assert_same(found: tuple[Array, Array, Array], scale: float = 1.0) -> None:
+    for one, other in zip(found, (T, Q, scale * TAU), strict=True):
+        np.testing.assert_allclose(one, other, atol=2e-6)
+
+
+def table(header: list[str], *columns: Array, separator: str = ",", comma: bool = False) -> str:
+    rows = [
+        separator.join(f"{x:.15g}".replace(".", ",") if comma else f"{x:.15g}" for x in row)
+        for row in np.column_stack(columns)
+    ]
+    return "\n".join([separator.join(header), *rows]) + "\n"
+
+
+PLAIN = ["t", *(f"q_{j}" for j in JOINTS), *(f"tau_{j}" for j in JOINTS)]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "cp1252", "utf-8-sig"])
+def test_spreadsheets(tmp_path: Path, encoding: str) -> None:
+    """`sep=;`, decimal commas, the encodings of spreadsheets, a unit with a degree sign."""
+    header = ["t", "q_base [°]", "q_elbow [°]", "tau_base [mNm]", "tau_elbow [mNm]"]
+    text = table(header, T, np.degrees(Q), 1e3 * TAU, separator=";", comma=True)
+    (tmp_path / "log.csv").write_text("sep=;\n" + text, encoding=encoding)
+    assert_same(read(tmp_path, "log.csv"))
+
+
+def test_dates(tmp_path: Path) -> None:
+    stamps = np.datetime64("2026-11-28T08:00:00.000000") + (T * 1e6).astype("timedelta64[us]")
+    rows = [
+        f"{stamp},{','.join(f'{x:.9g}' for x in row)}"
+        for stamp, row in zip(stamps, np.column_stack([Q, TAU]), strict=True)
+    ]
+    (tmp_path / "log.csv").write_text("\n".join([",".join(PLAIN), *rows]), encoding="utf-8")
+    assert_same(read(tmp_path, "log.csv"))
+
+
+def test_rostopic_echo(tmp_path: Path) -> None:
+    fields = [f"field.{w}{i}" for w in ("position", "velocity", "effort") for i in (0, 1)]
+    header = ["%time", "field.header.seq", "field.header.stamp", "field.name0", "field.name1"]
+    lines = [",".join([*header, *fields])]
+    for k, (q, tau) in enumerate(zip(Q, TAU, strict=True)):
+        stamp = 1_750_000_000_000_000_000 + round(T[k] * 1e9)
+        values = ",".join(f"{x:.9g}" for x in (*q[::-1], 0.0, 0.0, *tau[::-1]))
+        lines.append(f"{stamp + 9},{k},{stamp},elbow,base,{values}")
+    (tmp_path / "log.csv").write_text("\n".join(lines), encoding="utf-8")
+    assert_same(read(tmp_path, "log.csv", channels={"dq": None}))
+
+
+def test_plotjuggler(tmp_path: Path) -> None:
+    names = [f"/joint_states/{j}/{w}" for w in ("position", "effort") for j in JOINTS]
+    (tmp_path / "log.csv").write_text(table(["__time", *names], T + 1.7e9, Q, TAU))
+    assert_same(read(tmp_path, "log.csv"))
+
+
+@pytest.mark.parametrize("rows", [True, False])
+def test_matlab(tmp_path: Path, rows: bool) -> None:
+    turned = (lambda x: x) if rows else np.transpose
+    names = np.array(JOINTS[::-1], dtype=object)
+    held = {"t": T, "q": turned(Q[:, ::-1]), "tau": turned(TAU[:, ::-1]), "joint_names": names}
+    savemat(tmp_path / "log.mat", held)
+    assert_same(read(tmp_path, "log.mat"))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("log.mat", b"no such thing", "is no readable MATLAB file"),
+        ("log.csv", b"sep=;\nt;q_base\n", "has a header and no rows"),
+        ("log.csv", b"t,q_base\n\0\x81\xfe\n", "log.csv"),
+    ],
+)
+def test_a_wrong_file_gets_one_sentence(
+    tmp_path: Path, name: str, content: bytes, words: str
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(FileError, match=words):
+        read(tmp_path, name)
+
+
+def test_a_variable_that_is_missing(tmp_path: Path) -> None:
+    savemat(tmp_path / "log.mat", {"t": T, "pos": Q})
+    with pytest.raises(FileError, match="has no variable 'q'; its variables: t, pos"):
+        read(tmp_path, "log.mat")
+
+
+RECORDERS: dict[str, tuple[dict[str, Any], list[str], float, float, float]] = {
+    # further keys; header; units of time, position and torque in the file
+    "ur_rtde": (
+        {"torque_constant": 2.0},
+        ["timestamp", "actual_q_0", "actual_q_1", "actual_current_0", "actual_current_1"],
+        1.0, 1.0, 0.5,
+    ),
+    "ur_ros2": ({"torque_constant": 2.0}, PLAIN, 1.0, 1.0, 0.5),
+    "franka": ({}, ["t", "q[0]", "q[1]", "tau_J[0]", "tau_J[1]"], 1.0, 1.0, 1.0),
+    "kuka_rsi": (
+        {"torque_constant": 4.0},
+        ["IPOC", "AIPos_1", "AIPos_2", "MACur_1", "MACur_2"],
+        1e3, 180 / np.pi, 0.25,
+    ),
+    "unitree": ({}, ["t", "q_base", "q_elbow", "tau_est_base", "tau_est_elbow"], 1.0, 1.0, 1.0),
+    "dynamixel": (
+        {"torque_constant": 1.5},
+        ["t", *(f"present_position_{j}" for j in JOINTS),
+         *(f"present_current_{j}" for j in JOINTS)],
+        1.0, 4096 / (2 * np.pi), 1 / (1.5 * 2.69e-3),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("preset", RECORDERS)
+def test_presets(tmp_path: Path, preset: str) -> None:
+    more, header, time, angle, torque = RECORDERS[preset]
+    (tmp_path / "log.csv").write_text(table(header, time * T, angle * Q, torque * TAU))
+    assert_same(read(tmp_path, "log.csv", preset=preset, **more))
+
+
+def test_what_the_config_says_itself_goes_before_a_preset(tmp_path: Path) -> None:
+    spec = case(tmp_path, preset="franka", torque="motor", channels={"q": "pos"}).spec.measurement
+    assert (spec.torque, spec.channels) == ("motor", {"tau": "tau_J", "q": "pos"})
