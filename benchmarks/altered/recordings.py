@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from benchmarks.campaigns.robots import robot_of
 from excite_cli.api.loading import Case
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.load import load_spec
-from excite_cli.config.spec import Spec
 from excite_cli.effects.catalogue import declared_effects, kind_named
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset
@@ -30,20 +28,11 @@ _FRICTION = (EffectSpec(kind="viscous_friction"), EffectSpec(kind="coulomb_frict
 
 @dataclass(frozen=True)
 class Recording:
-    """Data as a sound file holds them, and the config they belong to; `measurement` as declared."""
+    """Data as a sound file holds them, and the config they belong to."""
 
     name: str
     case: Case
     data: Dataset
-
-    def with_keys(self, keys: dict[str, Any]) -> Case:
-        """The config with more keys of its measurement section."""
-        declared = self.case.spec.measurement.model_dump(exclude_unset=True)
-        for key, value in keys.items():
-            both = isinstance(value, dict) and isinstance(declared.get(key), dict)
-            declared[key] = {**declared[key], **value} if both else value
-        tree = self.case.spec.model_dump(exclude_unset=True)
-        return replace(self.case, spec=Spec.model_validate({**tree, "measurement": declared}))
 
 
 @cache
@@ -70,14 +59,11 @@ def _simulated(name: str) -> Recording:
 
 
 def _real(name: str) -> Recording:
-    """As its file holds it: what the config converts is declared to the reader later."""
+    """In N·m, as its config converts it."""
     folder = DATA / name
     spec = load_spec(folder / f"{name}.yaml", [])
     robot = build_robot(spec.robot, folder)
-    plain = spec.measurement.model_copy(
-        update={"torque": "link", "gear_ratio": 1.0, "torque_constant": 1.0}
-    )
-    data = read_dataset([folder / f"{name}.h5"], plain, robot.joint_names)
+    data = read_dataset([folder / f"{name}.h5"], spec.measurement, robot.joint_names)
     runs = tuple(replace(run, extra={}) for run in data.runs)
     return Recording(name, Case(spec, folder, robot), replace(data, runs=runs, findings=()))
 
@@ -87,7 +73,7 @@ _SIMULATED: dict[str, tuple[str, bool, str, int, float, float]] = {
     "panda": ("panda", False, "spring", 3, 12.0, 500.0),
     "ur10_moves": ("ur10", True, "torque_offset", 1, 6.0, 250.0),
 }
-REAL = ("kr300", "ur10_cb", "tx40")
+REAL = ("kr300", "ur10_cb", "tx40", "med7")
 _MAKERS: dict[str, Callable[[str], Recording]] = {
     **dict.fromkeys(_SIMULATED, _simulated),
     **dict.fromkeys(REAL, _real),

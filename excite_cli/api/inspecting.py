@@ -27,7 +27,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.measurement.merged_findings import merged
+from excite_cli.measurement.merged_findings import joined, merged
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.note import Tell, log_note
 from excite_cli.shown.record import Shown
@@ -88,10 +88,12 @@ def inspect(
             seen = {(each.name, each.joints, each.status) for each in found}
             new = [each for each in _looked(case, recorded) if _key(each) not in seen]
             found += new
-            more = {key: value for each in new for key, value in each.settings.items()}
+            more: dict[str, Any] = {}
+            for each in new:
+                more = joined(more, each.settings)
             if not more:
                 break
-            settings |= more
+            settings = joined(settings, more)
             case = _changed(case, more)
         inspection = Inspection(rows.in_order(found, bool(files)), settings, runs)
         if apply is not None:

@@ -56,13 +56,20 @@ class ColumnOrder(SetupCheck):
     def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
         """Names of the columns, where both positions and torques have another order."""
         order, what = _changed(before, after)
-        if what != "columns":
-            return {}
-        old = spec.measurement.names
-        column = {joint: name for name, joint in old.items()}
         moved = np.flatnonzero(order != np.arange(len(names))).tolist()
+        given = spec.measurement
+        column = {joint: name for name, joint in given.names.items()}
+        torque = column | {joint: name for name, joint in given.torque_names.items()}
         new = {column.get(names[order[j]], names[order[j]]): names[j] for j in moved}
-        return {"measurement.names": {**old, **new}}
+        same = {torque.get(names[j], names[j]): names[j] for j in moved}
+        here = {torque.get(names[order[j]], names[order[j]]): names[j] for j in moved}
+        if what == "torques":
+            return {"measurement.torque_names": {**given.torque_names, **here}}
+        found: Settings = {"measurement.names": {**given.names, **new}}
+        if what == "positions" or given.torque_names:
+            own = same if what == "positions" else here
+            found["measurement.torque_names"] = {**given.torque_names, **own}
+        return found
 
 
 def _changed(before: Setup, after: Setup) -> tuple[Order, str]:

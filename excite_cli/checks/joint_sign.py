@@ -39,8 +39,13 @@ class _Sign(SetupCheck):
     def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
         """The sign of each."""
         old = getattr(spec.measurement, self.key)
-        new = {names[j]: -old.get(names[j], 1) for j in self._turned(before, after)}
-        return {f"measurement.{self.key}": {**old, **new}}
+        turned = [names[j] for j in self._turned(before, after)]
+        found = {f"measurement.{self.key}": {**old, **{n: -old.get(n, 1) for n in turned}}}
+        if self.field == "q_sign":  # speeds are the positions' own, which was seen to before
+            speeds = spec.measurement.velocity_sign
+            new = {name: -speeds.get(name, 1) for name in turned}
+            found["measurement.velocity_sign"] = {**speeds, **new}
+        return found
 
     def trusted(self, names: Sequence[str], spec: Spec, joints: Sequence[int]) -> Settings:
         """The signs as they are."""

@@ -5,6 +5,7 @@ from the start. What no mistake explains is left to the diagnosis.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ def look(
 ) -> list[Result]:
     """Doubts and faults of the runs, filtered and as recorded; none of what is trusted."""
     clocked = any(run.dq is not None for run in runs)
-    samples = samples_of(prepared, _SAMPLES, clocked)
+    samples = replace(samples_of(prepared, _SAMPLES, clocked), turns=~robot.sliding)
     if spec.measurement.trust or not len(samples.q):  # nobody moves: there is nothing to judge
         return []
     foreign = foreign_runs.foreign_runs(robot, prepared)

@@ -19,7 +19,8 @@ class Samples:
     """q, v, a, tau (T, n) [rad (m), N·m (N), s]; which torques are `known`, which joints `move`.
 
     `known` and `moves` (T, n). `later` (K, T, n): torques that much later, at `LAGS` (K,) [s].
-    `clocked`: speeds were recorded, too, which would show a clock that is off.
+    `clocked`: speeds were recorded, too, which would show a clock that is off. `turns` (n,): joints
+    that turn.
     """
 
     q: Array
@@ -30,13 +31,15 @@ class Samples:
     known: Mask
     moves: Mask
     clocked: bool = False
+    turns: Mask | bool = True
 
     def thinned(self, most: int) -> "Samples":
         """At most `most` of them, evenly spread."""
         stride = max(1, -(-len(self.q) // most))
         q, v, a, tau = (x[::stride] for x in (self.q, self.v, self.a, self.tau))
         known, moves = self.known[::stride], self.moves[::stride]
-        return Samples(q, v, a, tau, self.later[:, ::stride], known, moves, self.clocked)
+        later, rest = self.later[:, ::stride], (self.clocked, self.turns)
+        return Samples(q, v, a, tau, later, known, moves, *rest)
 
     def torque(self, lag: float) -> Array:
         """τ (T, n) that much later [s], between the nearest `LAGS`."""

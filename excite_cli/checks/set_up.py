@@ -17,6 +17,7 @@ from excite_cli.checks.gravity_direction import GravityDirection
 from excite_cli.checks.gravity_subtracted import GravitySubtracted
 from excite_cli.checks.joint_sign import PositionSign, TorqueSign
 from excite_cli.checks.joint_zero import JointZero
+from excite_cli.checks.position_unit import PositionUnit
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import FLOOR, Explained, TextbookFit
 from excite_cli.checks.time_scale import Clock, TorqueLag
@@ -27,12 +28,12 @@ from excite_cli.robot.model import Array
 
 CHECKS: tuple[SetupCheck, ...] = (
     GravityDirection(), JointZero(), PositionSign(), TorqueSign(), ColumnOrder(), TorqueUnit(),
-    GravitySubtracted(), Clock(), TorqueLag(),
+    PositionUnit(), GravitySubtracted(), Clock(), TorqueLag(),
 )  # fmt: skip
 # What an alternative must gain in L; and in the logarithm of the share of some joint, which falls
-# to 0.6 of what it was (all a little better is what effects do), unless it is the bodies that are
+# to 0.7 of what it was (all a little better is what effects do), unless it is the bodies that are
 # bent less. Of what shows on all joints half of them must gain, too.
-_CLEAR, _FALLS, _GAINS = 1.0, 0.5, 0.2
+_CLEAR, _FALLS, _GAINS, _SHOWN = 0.5, 0.35, 0.2, 0.33
 _AS_GOOD = 0.35  # of L: alternatives that differ by less are told together
 _ROUGH, _CANDIDATES = 100, 4  # samples by which many alternatives are ranked; how many are kept
 _FINE = 2e-3  # share below which no difference is made between values of one thing
@@ -97,7 +98,7 @@ class _Candidate:
     def is_far_better(self, other: Explained) -> bool:
         """Whether it explains far more than another set-up."""
         gain = _gain(self.explained, other)
-        shown = not self.check.of_all or np.mean(gain[other.judged] > _GAINS) >= 0.5
+        shown = not self.check.of_all or np.mean(gain[other.judged] > _GAINS) >= _SHOWN
         falls = gain.max() > _FALLS or other.bent - self.explained.bent > _CLEAR
         return bool(self.cost < other.loss - _CLEAR and falls and shown)
 

@@ -16,8 +16,9 @@ class Setup:
     """Column `order[j]` of the file, times `sign[j]`, is that of joint j; all (n,).
 
     `gravity` (3,) [m/s²] in the frame in which the config has it, `zero` [rad] added to positions,
-    `unit`: N·m in one of the file. `clock`: true seconds in one of the stamps. `lag` [s] of the
-    torque behind the positions. `weightless`: a controller took the weight off the torque.
+    `unit`: N·m in one of the file, `turn`: rad in what the config takes for one. `clock`: true
+    seconds in one of the stamps. `lag` [s] of the torque behind the positions. `weightless`: a
+    controller took the weight off the torque.
     """
 
     gravity: Array
@@ -28,6 +29,7 @@ class Setup:
     tau_sign: Array
     unit: Array
     clock: float = 1.0
+    turn: float = 1.0
     lag: float = 0.0
     weightless: bool = False
 
@@ -41,7 +43,8 @@ class Setup:
     def motion(self, samples: Samples) -> tuple[Array, Array, Array]:
         """q, v, a (T, n) of the joints."""
         q, v, a = (x[:, self.q_order] * self.q_sign for x in (samples.q, samples.v, samples.a))
-        return q + self.zero, v / self.clock, a / self.clock**2
+        unit = self.turn if self.turn == 1.0 else np.where(samples.turns, self.turn, 1.0)
+        return unit * q + self.zero, unit * v / self.clock, unit * a / self.clock**2
 
     def torque(self, samples: Samples) -> Array:
         """τ (T, n) [N·m] of the joints."""

@@ -18,7 +18,7 @@ from excite_cli.config.spec import Spec
 _CLOCKS = (0.25, 0.5, 0.7, 0.85, 0.93, 1.07, 1.18, 1.4, 2.0, 4.0)
 _FINE_CLOCK = (0.05, 0.025, 0.012, 0.006)  # in log
 _FINE_LAG = (0.005, 0.0025, 0.00125)  # s
-_SMALLEST = 0.003  # s: shorter is a delay of the drive, left to the diagnosis
+_SMALLEST = 0.02  # s: shorter is a delay of the drive, left to the diagnosis
 
 
 class Clock(SetupCheck):
@@ -26,7 +26,6 @@ class Clock(SetupCheck):
 
     name = "clock"
     kind = "clock"
-    of_all = True
 
     def alternatives(
         self, fit: TextbookFit, setup: Setup, explained: Explained
@@ -83,7 +82,8 @@ class TorqueLag(SetupCheck):
                 tried = replace(setup, lag=lag)
                 if (now := fit(tried).loss) < loss:
                     loss, setup = now, tried
-        yield Alternative(setup)
+        if abs(setup.lag) >= _SMALLEST:
+            yield Alternative(setup)
 
     def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:
         """How late."""

@@ -18,7 +18,8 @@ from excite_cli.measurement.torque import NEWTON_METERS, torque_units
 _FACTOR = 6.0
 _TRIED = 10.0 ** np.concatenate([np.arange(-4.0, -0.5, 0.5), np.arange(1.0, 4.5, 0.5)])
 # Bodies must be seen to tell the unit: without their torque, so much in L must be lost.
-_WEIGHTLESS, _SEEN = 1e3, 1.0
+_WEIGHTLESS, _SEEN, _UNSEEN = 1e3, 0.7, 1.0
+_UNKNOWN = 1e6  # N·m in a unit of the file beside which bodies weigh nothing
 _FINE = np.log([1.8, 1.35, 1.16, 1.08])
 
 
@@ -51,7 +52,12 @@ class TorqueUnit(SetupCheck):
                     loss, setup = now, tried
         unit = setup.unit[found.joints[0]]
         seen = fit(_scaled(setup, found.joints, _WEIGHTLESS)).loss > loss + _SEEN
-        if not seen or abs(np.log(unit)) < np.log(_FACTOR):
+        if abs(np.log(unit)) < np.log(_FACTOR):
+            return
+        if not seen:  # friction alone shows: it is another unit, and nobody knows which
+            if len(found.joints) == 1:
+                alone = _scaled(setup, found.joints, _UNKNOWN / unit)
+                yield replace(found, setup=alone, variant="unknown", price=_UNSEEN)
             return
         yield Alternative(setup, found.joints)
         for power in 10.0 ** np.array([np.floor(np.log10(unit)), np.ceil(np.log10(unit))]):
@@ -65,6 +71,12 @@ class TorqueUnit(SetupCheck):
         """How much too large or small."""
         ratio = before.unit / after.unit
         off = np.flatnonzero(np.abs(np.log(ratio)) > 1e-9).tolist()
+        if len(off) == 1 and after.unit[off[0]] >= _UNKNOWN:
+            return (
+                f"torques of {names[off[0]]} are far smaller than what bodies like the URDF's ask "
+                "for, and hold nothing but friction: of the motor before its gear, another unit, "
+                "or a counterbalance"
+            )
         whose = "all joints" if len(off) == len(names) > 1 else ", ".join(names[j] for j in off)
         return (
             f"torques of {whose} are {ratio[off[0]]:.3g} times what bodies like the URDF's ask "
@@ -74,6 +86,10 @@ class TorqueUnit(SetupCheck):
 
     def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
         """N·m in a unit of the file, of a torque that is declared as of the link."""
+        off = np.flatnonzero(np.abs(np.log(after.unit / before.unit)) > 1e-9).tolist()
+        if len(off) == 1 and after.unit[off[0]] >= _UNKNOWN:
+            left = {*spec.measurement.without_torque, names[off[0]]}
+            return {"measurement.without_torque": [name for name in names if name in left]}
         own = torque_units(spec.measurement, tuple(names)) * after.unit / before.unit
         if np.ptp(own) > 1e-9 * own.max():
             return {

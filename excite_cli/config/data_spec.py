@@ -137,6 +137,10 @@ class MeasurementSpec(Section):
     names: dict[str, str] = Field(
         default_factory=dict, description="name in the file -> joint of the robot"
     )
+    torque_names: dict[str, str] = Field(
+        default_factory=dict,
+        description="the same of torques alone, where their columns stand in another order",
+    )
     covariates: tuple[str, ...] = Field(
         (),
         description="further columns of the files that friction or offsets may follow, as "

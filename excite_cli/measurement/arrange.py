@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -14,17 +15,17 @@ _LISTED, _LONGEST = 40, 60  # names that are reported; characters of each
 _CHANNEL_WORDS = {"q": "position", "tau": "torque", "dq": "speed"}
 
 
-def check_names(names: Mapping[str, str], joints: Sequence[str]) -> None:
-    """Raise ConfigError where `measurement.names` leads to no joint, or twice to one."""
+def check_names(names: Mapping[str, str], joints: Sequence[str], key: str = "names") -> None:
+    """Raise ConfigError where a `key` of `measurement` leads to no joint, or twice to one."""
     for column, joint in names.items():
         if joint not in joints:
             raise ConfigError(
-                f"measurement.names: '{column}' is mapped to '{joint}', which the robot does not "
+                f"measurement.{key}: '{column}' is mapped to '{joint}', which the robot does not "
                 f"move.{nearest(joint, joints)} Moved joints: {', '.join(joints)}."
             )
     twice = sorted(joint for joint, count in Counter(names.values()).items() if count > 1)
     if twice:
-        raise ConfigError(f"measurement.names maps two columns to '{twice[0]}'; each joint once.")
+        raise ConfigError(f"measurement.{key} maps two columns to '{twice[0]}'; each joint once.")
 
 
 def arrange(
@@ -33,10 +34,12 @@ def arrange(
     names: Mapping[str, str],
     source: str,
     without_torque: Sequence[str] = (),
+    torque_names: Mapping[str, str] = MappingProxyType({}),
 ) -> tuple[Run, list[Finding]]:
     """The run with columns in the order of `joints`; what belongs to no moved joint is `extra`.
 
     No torque of joints `without_torque` is valid: it is 0, whether it was recorded or not.
+    `torque_names` go before `names` where torques are concerned.
 
     Raises
     ------
@@ -54,7 +57,8 @@ def arrange(
     extra: dict[str, Array] = dict(raw.others)
     matrices: dict[str, Array] = {}
     for channel, columns in raw.columns.items():
-        by_joint = {names.get(column, column): values for column, values in columns.items()}
+        own = {**names, **torque_names} if channel == "tau" else names
+        by_joint = {own.get(column, column): values for column, values in columns.items()}
         if channel == "tau":
             by_joint.update(_none(without_torque, raw))
         missing = [joint for joint in joints if joint not in by_joint]

@@ -64,7 +64,9 @@ def read_dataset(
     """
     if not paths:
         raise FileError("No measured file is given.")
-    check_names(spec.names, joint_names if motors is None else (*joint_names, *motors.places))
+    places = joint_names if motors is None else (*joint_names, *motors.places)
+    check_names(spec.names, places)
+    check_names(spec.torque_names, places, "torque_names")
     torques = "joints" in rows
     if not torques:
         spec = spec.model_copy(update={"without_torque": joint_names, "coupling": {}})
@@ -95,7 +97,9 @@ def read_dataset(
             own, noticed = [], []
             for raw in _named(raws, path, taken):
                 raw = raw if motors is None else motors.renamed(raw, spec)
-                run, more = arrange(raw, joint_names, spec.names, str(path), spec.without_torque)
+                run, more = arrange(
+                    raw, joint_names, spec.names, str(path), spec.without_torque, spec.torque_names
+                )
                 t, epoch = _seconds(raw, spec)
                 run = replace(run, t=t, epoch=epoch, origin=Origin(str(path), raw.place))
                 run = covariates.take(run, raw, spec.names)

@@ -41,7 +41,8 @@ def check_clock(runs: Sequence[Run], where: str) -> list[Finding]:
         f"{1 / gain:.4g} s. If the stamps are wrong, write measurement.clock: {1 / gain:.4g}; if "
         "they are right, leave the speeds out (measurement.channels: {dq: null})"
     )
-    return [Finding("clock", "warning", text, where)]
+    settings = {"measurement.clock": float(f"{1 / gain:.4g}")}
+    return [Finding("clock", "warning", text, where, (), settings)]
 
 
 def _gains(runs: Sequence[Run]) -> Array:

@@ -67,7 +67,8 @@ def _of_run(
                 "is dead or too coarse for it (do without: measurement.without_torque), or another "
                 "one was meant (measurement.channels, measurement.names)"
             )
-            findings.append(Finding("dead_torque", "error", text, run.name, (joint,)))
+            without = {"measurement.without_torque": [joint]}
+            findings.append(Finding("dead_torque", "error", text, run.name, (joint,), without))
     for j in np.flatnonzero(stands & ~silent & ~still):
         text = f"position of {joints[j]} is constant at {run.q[0, j]:.6g} in this run"
         findings.append(Finding("held", "note", text, run.name, (joints[j],)))

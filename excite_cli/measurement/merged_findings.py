@@ -4,8 +4,9 @@ A fault of a recorder is found on many joints and in many runs. A record of each
 to a person it is told once.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from excite_cli.measurement.dataset import Finding
 
@@ -39,7 +40,24 @@ def _one(group: Sequence[Finding]) -> Finding:
         more = f", and {len(places) - _LISTED} more" if len(places) > _LISTED else ""
         text = f"{text.removesuffix('.')}; likewise {'; '.join(places[:_LISTED])}{more}"
     joints = tuple(dict.fromkeys(joint for found in group for joint in found.joints))
-    return replace(first, text=text, run=", ".join(runs), joints=joints)
+    settings: dict[str, Any] = {}
+    for found in group:
+        settings = joined(settings, found.settings)
+    return replace(first, text=text, run=", ".join(runs), joints=joints, settings=settings)
+
+
+def joined(some: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of both: mappings and lists have what either has, else the later one holds."""
+    found = dict(some)
+    for key, value in more.items():
+        old = found.get(key)
+        if isinstance(old, dict) and isinstance(value, dict):
+            found[key] = {**old, **value}
+        elif isinstance(old, list) and isinstance(value, list):
+            found[key] = list(dict.fromkeys([*old, *value]))
+        else:
+            found[key] = value
+    return found
 
 
 def _place(joints: str, runs: Sequence[str]) -> str:

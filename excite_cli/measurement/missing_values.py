@@ -111,7 +111,8 @@ def _fill_torque(run: Run, joints: tuple[str, ...]) -> tuple[Run, list[Finding]]
                 f"torque of {joint} is NaN or infinite throughout: the channel is dead. Leave the "
                 "run out, or do without this torque: measurement.without_torque"
             )
-            findings.append(Finding("dead_torque", "error", text, run.name, (joint,)))
+            without = {"measurement.without_torque": [joint]}
+            findings.append(Finding("dead_torque", "error", text, run.name, (joint,), without))
         elif missing:
             text = f"torque of {joint} is NaN or infinite in {_share(missing, len(run.t))}; masked"
             findings.append(Finding("nan_torque", "warning", text, run.name, (joint,)))

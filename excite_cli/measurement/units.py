@@ -21,6 +21,9 @@ _ODD = 0.2  # share by which a gain may miss 1
 _RATES = (20.0, 50_000.0)  # Hz, of robots' logs
 _SLOW = 0.005  # of the speed limit
 _TOO_FAST = 20.0  # times the speed limit
+_ABSURD = 20.0  # times the effort limit, of a joint whose neighbours keep theirs
+_COUNTED = 60.0  # times the limits: more than degrees would be
+_BITS = range(10, 25)  # of encoders, a turn
 _USUAL_SPEED = 3.0  # rad/s, of a robot without a limit
 
 
@@ -56,7 +59,7 @@ def check_units(
         )
         findings += _length_by_limits(runs, joints, spec, limits, where)
     if not findings:
-        findings = check_clock(runs, where) or _odd_gains(found, joints, where)
+        findings = check_clock(runs, where) or _odd_gains(found, joints, spec, where)
         findings += _outside(runs, joints, limits, where)
     return findings + _torque(runs, joints, limits, where)
 
@@ -172,6 +175,24 @@ def _angle_by_limits(
             "already? Then write measurement.angle: rad"
         )
         return [Finding("units", "warning", text, where, (), {"measurement.angle": "rad"})]
+    if far.max() > _COUNTED and spec.angle == "rad":
+        return _counts(low, high, lower - slack, upper + slack, where)
+    return []
+
+
+def _counts(low: Array, high: Array, lower: Array, upper: Array, where: str) -> list[Finding]:
+    """Positions in counts of an encoder: the fewest a turn that keep the limits."""
+    for bits in _BITS:
+        unit = 2 * np.pi / 2**bits
+        if ((unit * low > lower) & (unit * high < upper)).all():
+            text = (
+                f"positions reach {max(-low.min(), high.max()):.4g}: they are counts of an "
+                f"encoder. With {2**bits} a turn they keep the robot's limits. Write "
+                f"measurement.angle: "
+                f"{unit:.6g}, rad in one count"
+            )
+            settings = {"measurement.angle": unit}
+            return [Finding("units", "error", text, where, (), settings)]
     return []
 
 
@@ -213,18 +234,21 @@ def _extremes(runs: Sequence[Run]) -> tuple[Array, Array]:
     )
 
 
-def _odd_gains(found: Speeds, joints: tuple[str, ...], where: str) -> list[Finding]:
+def _odd_gains(
+    found: Speeds, joints: tuple[str, ...], spec: MeasurementSpec, where: str
+) -> list[Finding]:
     if found.recorded is None:
         return []
     gains, own = found.gain(), np.diag(found.correlation())
     findings = []
-    for j in np.flatnonzero((own > 0.8) & (np.abs(gains - 1) > _ODD)):
+    for j in np.flatnonzero((own > 0.8) & (np.abs(gains - 1) > _ODD)).tolist():
         text = (
             f"recorded speed of {joints[j]} is {gains[j]:.3g} times the change of its position: "
             "one of them has another unit or gear ratio (measurement.gear_ratio with position: "
-            "motor), or the speed is filtered"
+            "motor), or the speed is filtered; nothing needs it (measurement.channels: {dq: null})"
         )
-        findings.append(Finding("gain", "warning", text, where, (joints[j],)))
+        without = {"measurement.channels": {**spec.channels, "dq": None}}
+        findings.append(Finding("gain", "warning", text, where, (joints[j],), without))
     return findings
 
 
@@ -252,6 +276,16 @@ def _torque(
     largest = np.max([np.abs(run.tau).max(axis=0) for run in runs], axis=0)
     share = largest / limits.effort
     j = int(np.argmax(share))
+    above = np.flatnonzero((share > _ABSURD) & np.isfinite(share)).tolist()
+    if above and len(above) < 0.5 * len(joints) and np.delete(share, above).max(initial=0.0) < 3:
+        names = [joints[k] for k in above]
+        text = (
+            f"torques of {', '.join(names)} reach {share[j]:.3g} times their effort limits, those "
+            "of the other joints keep them: in mN·m they would keep them, too"
+        )
+        units = {name: 1e-3 if k in above else 1.0 for k, name in enumerate(joints)}
+        settings = {"measurement.torque_unit": units}
+        return [Finding("torque_scale", "warning", text, where, tuple(names), settings)]
     if share[j] > 3:
         unit = "N·m" if limits.revolute[j] else "N"
         text = (

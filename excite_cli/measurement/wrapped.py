@@ -13,6 +13,7 @@ from excite_cli.measurement.dataset import Array, Finding, Run
 from excite_cli.measurement.units import Limits
 
 _TURN = 2 * np.pi
+_WHOLE = 1.001  # turns within which angles of one turn lie
 _USUAL = 3.0  # times the largest step elsewhere that may be left of a jump
 _STEP = 0.02  # rad: so much a step may be whatever the others are
 
@@ -42,7 +43,7 @@ def _continuous(q: Array) -> Array | None:
     """Positions (T,) without jumps of whole turns; None where there are none."""
     steps = np.diff(q)
     jumps = np.abs(steps) > np.pi
-    if not jumps.any() or jumps.all():
+    if not jumps.any() or jumps.all() or np.ptp(q) > _TURN * _WHOLE:
         return None
     usual = max(float(np.abs(steps[~jumps]).max()), _STEP / _USUAL)
     turns = np.where(jumps, np.round(steps / _TURN), 0.0)

@@ -1,0 +1,236 @@
+"""Are mistakes of set-up found before physics? Logs altered as people do it, and sound ones.
+
+    python -m benchmarks.setups [--logs NAME …] [--mistakes NAME …] [--seed S] [--pairs N]
+    python -m benchmarks.setups --sound N [--seed S]
+
+Every mistake of `altered.mistakes` is made in logs of real and simulated robots, with sizes drawn
+at random. Asked of `excite inspect`: the right row, the right joints, the right key, no other row;
+and with what it would set, that the textbook's fit (viscous and Coulomb friction, offset, armature
+on all joints) misses at most 1.2 times what it misses of the log as it was. With `--pairs` two
+mistakes at once: both told. `--sound`: logs in which nothing is wrong, of which nothing should be
+said.
+"""
+
+import argparse
+import os
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+from benchmarks.altered.mistakes import MISTAKES, Altered
+from benchmarks.altered.recordings import NAMES, recording
+from benchmarks.altered.sound import TRUE, sound_logs
+from excite_cli.api.identifying import identify
+from excite_cli.api.inspecting import inspect
+from excite_cli.api.loading import Case, load_case
+from excite_cli.checks.result import Result
+from excite_cli.config.amended import with_values
+from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
+from excite_cli.errors import ExciteError
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.measurement.hdf5_writer import write_dataset
+
+AS_GOOD, HARMLESS = 1.2, 1.05
+_WITHOUT = "measurement.without_torque"  # settles a torque of which nobody knows the unit
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a mistake: which of the things that were asked hold."""
+
+    label: str
+    row: bool
+    joints: bool
+    key: bool
+    back: bool
+    others: tuple[str, ...] = ()
+    harmless: bool = False
+    seconds: float = 0.0
+    said: str = ""
+
+    @property
+    def right(self) -> bool:
+        """Whether the right row has the right joints and key; or nothing was to be said."""
+        return (self.row and self.joints and self.key) or self.harmless
+
+    def line(self) -> str:
+        """A row of the table."""
+        all_of = (self.row, self.joints, self.key, self.back)
+        marks = "".join(c if good else "-" for c, good in zip("rjkb", all_of, strict=True))
+        also = f"  ALSO {', '.join(self.others)}" if self.others else ""
+        words = f"{self.label}{' harmless' * self.harmless}{also}  {self.said}"
+        good = "ok" if self.right and self.back else "!!"
+        return f"{good} {marks} {self.seconds:4.1f} s  {words}"
+
+
+def _case(case: Case, robot: dict[str, object]) -> Case:
+    tree = case.spec.model_dump(mode="json", exclude_unset=True)
+    measured = tree.get("measurement", {})
+    kept = {key: measured[key] for key in ("filter", "without_torque") if key in measured}
+    urdf = str(case.spec.robot.urdf)
+    if not Path(urdf).is_absolute() and (case.folder / urdf).exists():
+        tree["robot"]["urdf"] = str((case.folder / urdf).resolve())
+    dirs = tree["robot"].get("package_dirs", [])
+    tree["robot"]["package_dirs"] = [str((case.folder / each).resolve()) for each in dirs]
+    return load_case({"robot": {**tree["robot"], **robot}, "measurement": kept})
+
+
+def _error(case: Case, file: Path) -> float:
+    """Of the textbook's fit on held-out data; infinite where it is refused."""
+    effects = [{"kind": kind, "joints": "all"} for kind in (*EVERYDAY_FRICTION, *EVERYDAY)]
+    tree = case.spec.model_dump(mode="json", exclude_unset=True)
+    trusted = with_values(tree, {"measurement.trust": True})
+    try:
+        found = identify(load_case({**trusted, "effects": effects}), file, tell=lambda note: None)
+    except ExciteError:
+        return float("inf")
+    return found.error.mean_relative_moving
+
+
+def _set(case: Case, settings: object) -> Case:
+    tree = case.spec.model_dump(mode="json", exclude_unset=True)
+    return load_case(with_values(tree, dict(settings)))  # type: ignore[call-overload]
+
+
+def _judged(
+    label: str, case: Case, altered: Altered, usual: frozenset[str], sound: float
+) -> Outcome:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "log.h5"
+        write_dataset(file, altered.data, {})
+        began = time.process_time()
+        try:
+            found = inspect(_case(case, altered.robot), file, tell=lambda note: None)
+        except ExciteError as refused:
+            return Outcome(label, False, False, False, False, said=f"refused: {refused}")
+        seconds = time.process_time() - began
+        told = [e for e in found.results if e.status != "ok" or (altered.told and e.evidence)]
+        own = [each for each in told if each.name in altered.rows]
+        named = {joint for each in own for joint in each.joints}
+        key = not altered.key or bool({altered.key, _WITHOUT} & {*found.settings})
+        before = _error(_case(case, altered.robot), file)
+        after = before
+        if found.settings:
+            after = _error(_set(_case(case, altered.robot), found.settings), file)
+        harmless = not own and before <= HARMLESS * sound
+        others = {e.name for e in told if e.status != "ok"} - {*altered.rows} - usual
+        return Outcome(
+            label, bool(own) or not altered.rows, {*altered.joints} <= named, key,
+            after <= AS_GOOD * sound, tuple(sorted(others)), harmless, seconds,
+            f"{100 * sound:.1f} {100 * before:.1f} {100 * after:.1f} %",
+        )  # fmt: skip
+
+
+def _usual(case: Case, data: Dataset) -> tuple[frozenset[str], float]:
+    """Rows that have a doubt in the log as it is, and the textbook's error."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "log.h5"
+        write_dataset(file, data, {})
+        found = inspect(_case(case, {}), file, tell=lambda note: None)
+        return frozenset(_doubted(found.results)), _error(_case(case, {}), file)
+
+
+def _doubted(results: tuple[Result, ...]) -> list[str]:
+    return [each.name for each in results if each.status != "ok"]
+
+
+def _both(one: Altered, other: Altered) -> Altered:
+    return Altered(
+        other.data, (*one.rows, *other.rows), (*one.joints, *other.joints), "",
+        {**one.robot, **other.robot},
+    )  # fmt: skip
+
+
+def altered_logs(logs: list[str], mistakes: list[str], seed: int) -> None:
+    """Every mistake in every log."""
+    outcomes: list[Outcome] = []
+    for name in logs:
+        of = recording(name)
+        usual, sound = _usual(of.case, of.data)
+        print(f"{name}: textbook {100 * sound:.1f} %; as it is: {', '.join(sorted(usual)) or '-'}")
+        for mistake in mistakes:
+            rng = np.random.default_rng([seed, *map(ord, name + mistake)])
+            altered = MISTAKES[mistake](of.data, of.case, rng)
+            outcomes.append(_judged(f"{name}: {mistake}", of.case, altered, usual, sound))
+            print(outcomes[-1].line(), flush=True)
+    count = len(outcomes)
+    asked = [each for each in outcomes if not each.harmless]
+    print(f"right row, joints, key: {sum(e.right for e in outcomes)} of {count} (≥ 97 %)")
+    print(
+        f"  of those that the textbook's fit notices: {sum(e.right for e in asked)} of {len(asked)}"
+    )
+    print(f"textbook's error is back: {sum(e.back for e in outcomes)} of {count} (≥ 95 %)")
+    print(f"another row, too: {sum(bool(e.others) for e in outcomes)} of {count}")
+    print(f"slowest: {max(e.seconds for e in outcomes):.1f} s")
+
+
+def pairs(logs: list[str], mistakes: list[str], seed: int, count: int) -> None:
+    """Two mistakes at once."""
+    rng, told, wrong = np.random.default_rng(seed), 0, 0
+    known = {name: _usual(recording(name).case, recording(name).data) for name in logs}
+    for _ in range(count):
+        name, (first, second) = str(rng.choice(logs)), rng.choice(mistakes, 2, replace=False)
+        of = recording(name)
+        one = MISTAKES[first](of.data, of.case, rng)
+        other = MISTAKES[second](one.data, of.case, rng)
+        usual, sound = known[name]
+        robot = {**one.robot, **other.robot}
+        both, *alone = (
+            _judged(f"{name}: {first} + {second}", of.case, each, usual, sound)
+            for each in (
+                _both(one, other),
+                replace(one, data=other.data, robot=robot),
+                replace(other, robot=robot),
+            )
+        )
+        told, wrong = told + all(e.row for e in alone), wrong + bool(both.others)
+        print(f"{'ok' if all(e.row for e in alone) else '!!'} {both.line()}", flush=True)
+    print(f"both told: {told} of {count} (≥ 85 %); another row: {wrong} (≤ 2 %)")
+
+
+def sound(count: int, seed: int) -> None:
+    """Logs of which nothing should be said."""
+    words: Counter[str] = Counter()
+    logs = 0
+    for each in sound_logs(count, seed):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "log.h5"
+            write_dataset(file, each.data, {})
+            try:
+                found = inspect(_case(each.case, {}), file, tell=lambda note: None)
+                said = [e for e in found.results if e.status != "ok" and e.kind not in TRUE]
+            except ExciteError as refused:
+                said = [Result("refused", "", "fault", str(refused))]
+        logs += 1
+        words.update(e.status for e in said[:1])
+        print(
+            f"{each.name}: {'; '.join(f'{e.name}: {e.evidence[:150]}' for e in said) or '-'}",
+            flush=True,
+        )
+    print(f"{logs} sound logs: {dict(words)}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--logs", nargs="+", default=list(NAMES), choices=NAMES)
+    parser.add_argument("--mistakes", nargs="+", default=list(MISTAKES), choices=list(MISTAKES))
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--pairs", type=int, default=0)
+    parser.add_argument("--sound", type=int, default=0, metavar="N")
+    given = parser.parse_args()
+    if given.sound:
+        sound(given.sound, given.seed)
+    elif given.pairs:
+        pairs(given.logs, given.mistakes, given.seed, given.pairs)
+    else:
+        altered_logs(given.logs, given.mistakes, given.seed)
+
+
+if __name__ == "__main__":
+    main()
