@@ -11,6 +11,8 @@ from excite_cli.config.spec import Spec
 
 _COARSE = np.radians(30.0)
 _FINE = np.radians([15.0, 7.5, 3.75, 1.9, 0.9, 0.45])  # half steps
+# Price, in L, of an angle that is no right one: a payload that is not in the URDF looks like 12°.
+_ODD = 1.0
 _QUARTER, _NEAR = np.pi / 2, np.radians(10.0)
 
 
@@ -39,7 +41,7 @@ class JointZero(SetupCheck):
                 if (now := fit(tried).loss) < loss:
                     loss, setup = now, tried
         quarter = round(setup.zero[j] / _QUARTER) * _QUARTER
-        yield Alternative(setup, found.joints)
+        yield Alternative(setup, found.joints, price=_ODD)
         if abs(quarter - setup.zero[j]) < _NEAR:
             yield Alternative(setup.from_zero(j, quarter), found.joints, is_plain=True)
 

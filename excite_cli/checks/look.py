@@ -27,6 +27,7 @@ from excite_cli.robot.model import Robot
 
 BELONG = "torques of this motion"
 _SAMPLES, _FEW = 300, 200
+_ANY = 10.0  # times the deviations of bodies: then they may be nearly any
 _FOREIGN = 0.85  # torques of which this is left have nothing to do with the motion
 
 
@@ -48,7 +49,8 @@ def look(
         if standing:
             return standing
     found = [_result(step, robot.joint_names, spec) for step in steps]
-    left = steps[-1].left_after if steps else fit(Setup.as_declared(robot))
+    setup = steps[-1].after.setup if steps else Setup.as_declared(robot)
+    left = TextbookFit(robot, samples, loose=_ANY)(setup)
     return [*found, *_unexplained(left, robot.joint_names)]
 
 

@@ -32,7 +32,7 @@ CHECKS: tuple[SetupCheck, ...] = (
 )  # fmt: skip
 # What an alternative must gain in L; and in the logarithm of the share of some joint, which falls
 # to 0.7 of what it was (all a little better is what effects do), unless it is the bodies that are
-# bent less. Of what shows on all joints half of them must gain, too.
+# bent less. Of what shows on all joints a third must gain, too.
 _CLEAR, _FALLS, _GAINS, _SHOWN = 0.5, 0.35, 0.2, 0.33
 _AS_GOOD = 0.35  # of L: alternatives that differ by less are told together
 _ROUGH, _CANDIDATES = 100, 4  # samples by which many alternatives are ranked; how many are kept

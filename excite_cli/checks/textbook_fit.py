@@ -61,15 +61,21 @@ class Explained:
 
 
 class TextbookFit:
-    """Fits the textbook's model to samples of a robot, for any set-up."""
+    """Fits the textbook's model to samples of a robot, for any set-up.
 
-    def __init__(self, robot: Robot, samples: Samples, floor: float = FLOOR) -> None:
+    `floor`: shares below which no difference is made. `loose`: times the usual deviations by which
+    bodies may be others than the URDF's.
+    """
+
+    def __init__(
+        self, robot: Robot, samples: Samples, floor: float = FLOOR, loose: float = 1.0
+    ) -> None:
         self.robot, self.samples, self._floor = robot, samples, floor
         self.phi = standard_parameters(robot)
         spread = inertial_prior(robot, self.phi, _UNCERTAIN).std.reshape(-1, 10).copy()
         own = _UNCERTAIN * self.phi.reshape(-1, 10)[:, 1:4]
         spread[:, 1:4] = np.hypot(own, _CENTER * spread[:, :1] / _UNCERTAIN)
-        self.spread: Array = spread.ravel()
+        self.spread: Array = loose * spread.ravel()
         self._motions: dict[bytes, tuple[Array, Array | None]] = {}
 
     def __call__(self, setup: Setup) -> Explained:

@@ -18,7 +18,7 @@ from excite_cli.measurement.torque import NEWTON_METERS, torque_units
 _FACTOR = 6.0
 _TRIED = 10.0 ** np.concatenate([np.arange(-4.0, -0.5, 0.5), np.arange(1.0, 4.5, 0.5)])
 # Bodies must be seen to tell the unit: without their torque, so much in L must be lost.
-_WEIGHTLESS, _SEEN, _UNSEEN = 1e3, 0.7, 1.0
+_WEIGHTLESS, _SEEN, _UNSEEN = 1e3, 0.7, 1.5
 _UNKNOWN = 1e6  # N·m in a unit of the file beside which bodies weigh nothing
 _FINE = np.log([1.8, 1.35, 1.16, 1.08])
 

@@ -146,6 +146,9 @@ def declared(
 ) -> list[Finding]:
     """Findings about a declaration that contradicts itself."""
     findings = []
+    if spec.preset is not None:
+        text = f"read as {spec.preset} writes it (measurement.preset)"
+        findings.append(Finding("preset", "note", text))
     ratio = _per_joint(spec.gear_ratio, joints)
     if spec.torque == "motor" and (ratio == 1.0).all() and motors is None:
         text = (
