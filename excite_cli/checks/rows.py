@@ -48,7 +48,7 @@ def in_order(found: Sequence[Result], judged: bool) -> tuple[Result, ...]:
     rows: list[Result] = []
     for name in (*NAMES, _OTHER):
         own = [each for each in found if each.name == name]
-        if not own and judged and name != _OTHER:
+        if not own and (judged or name == bodies.NAME) and name != _OTHER:
             own = [Result(name, "")]
         rows += own
     return tuple(rows)

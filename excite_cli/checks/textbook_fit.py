@@ -38,6 +38,7 @@ FLOOR = 0.02  # shares below this are noise and effects: no difference is made t
 _ROUNDS, _SETTLED = 6, 0.02  # of the weights; in log
 _FIRST = 0.3  # s_j to begin with
 _SIGNED = 4  # columns of X whose coefficients must not be negative
+_ROUNDING = 1e-13
 _RIDGE = 1e-9  # of a column of X, whose norm is 1
 
 
@@ -76,6 +77,7 @@ class TextbookFit:
         own = _UNCERTAIN * self.phi.reshape(-1, 10)[:, 1:4]
         spread[:, 1:4] = np.hypot(own, _CENTER * spread[:, :1] / _UNCERTAIN)
         self.spread: Array = loose * spread.ravel()
+        self._scale = loose * _SCALE
         self._motions: dict[bytes, tuple[Array, Array | None]] = {}
 
     def __call__(self, setup: Setup) -> Explained:
@@ -84,12 +86,12 @@ class TextbookFit:
         columns, torque = self.columns(setup), setup.torque(self.samples)
         whole = torque + self.weight(setup) @ setup.gravity if setup.weightless else torque
         rows = (v, a, torque, whole)
-        bodies = (self.phi, self.spread, self._floor)
+        bodies = (self.phi, self.spread, self._scale, self._floor)
         return _explained(columns, bodies, rows, self.counted(setup))
 
     def bodies(self, z: Array) -> Array:
         """Parameters φ (P,) of bodies that are so many standard deviations off."""
-        return np.asarray((1.0 + _SCALE * z[-1]) * self.phi + self.spread * z[:-1])
+        return np.asarray((1.0 + self._scale * z[-1]) * self.phi + self.spread * z[:-1])
 
     def counted(self, setup: Setup) -> Mask:
         """Instants (T, n) that count of each joint."""
@@ -130,11 +132,14 @@ def _passive(v: Array, a: Array, load: Array) -> Array:
 
 
 def _explained(
-    columns: Array, bodies: tuple[Array, Array, float], rows: tuple[Array, ...], counted: Mask
+    columns: Array,
+    bodies: tuple[Array, Array, float, float],
+    rows: tuple[Array, ...],
+    counted: Mask,
 ) -> Explained:
     """Of the `whole` torque, in shares of the recorded one: `rows` are v, a and these, (T, n)."""
     judged = np.count_nonzero(counted, axis=0) >= FEWEST
-    phi, spread, floor = bodies
+    phi, spread, scale, floor = bodies
     grams = []
     for j in np.flatnonzero(judged):
         at = counted[:, j]
@@ -144,7 +149,7 @@ def _explained(
             judged[j] = False
             continue
         load = columns[at, j] @ phi
-        uncertain = [columns[at, j] * spread, _SCALE * load]
+        uncertain = [columns[at, j] * spread, scale * load]
         passive = np.sqrt(size) * _passive(v, a, load)
         block = np.column_stack([*uncertain, passive, whole - load])
         grams.append(block.T @ block / size)
@@ -188,9 +193,10 @@ class _Products:
         """z (P,), and what is left of each joint (J,)."""
         while True:
             total = np.tensordot(s**-2, self._rest, axes=1)
-            z = np.asarray(
-                np.linalg.solve(total[:-1, :-1] + np.eye(self._size), total[:-1, -1]), float
-            )
+            inner = total[:-1, :-1]
+            # Of torques far smaller than any body makes them, rounding would be left of the one.
+            precision = 1.0 + _ROUNDING * np.trace(inner)
+            z = np.asarray(np.linalg.solve(inner + precision * np.eye(len(inner)), total[:-1, -1]))
             both: Array = np.append(-z, 1.0)
             follows = (self._gain @ both)[:, :_SIGNED]
             negative = (follows < 0.0) & (self._active[:, :_SIGNED] > 0.0)

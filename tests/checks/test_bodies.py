@@ -1,0 +1,38 @@
+"""Links that cannot be bodies."""
+
+from pathlib import Path
+
+import pytest
+
+from excite_cli.api.loading import load_case
+from excite_cli.checks.bodies import bodies_in_words, impossible_bodies
+
+_LINK = (
+    '<robot name="one"><link name="w"/><link name="arm"><inertial><mass value="{mass}"/>'
+    '<inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    '<joint name="j" type="revolute"><parent link="w"/><child link="arm"/><axis xyz="0 1 0"/>'
+    '<limit lower="-1" upper="1" velocity="1" effort="9"/></joint></robot>'
+)
+
+
+@pytest.mark.parametrize(
+    ("mass", "moments", "status", "words"),
+    [
+        (2.0, (0.02, 0.02, 0.01), "", ""),
+        (2.0, (-0.02, 0.03, 0.03), "fault", "none may be negative"),
+        (2.0, (0.01, 0.01, 0.05), "doubt", "no two may be less than the third"),
+        (2.0, (20.0, 20.0, 10.0), "doubt", "a body 6.3 m wide"),
+        (0.001, (1e-8, 1e-8, -1e-9), "", ""),  # of a sensor: no torque shows it
+    ],
+)
+def test_moments_of_inertia(
+    tmp_path: Path, mass: float, moments: tuple[float, ...], status: str, words: str
+) -> None:
+    xx, yy, zz = moments
+    urdf = tmp_path / "one.urdf"
+    urdf.write_text(_LINK.format(mass=mass, xx=xx, yy=yy, zz=zz), encoding="utf-8")
+    robot = load_case({"robot": {"urdf": str(urdf)}}).robot
+    found = impossible_bodies(robot)
+    assert [each.status for each in found] == ([status] if status else [])
+    assert words in bodies_in_words(robot)
+    assert ("arm" in bodies_in_words(robot)) == bool(status)

@@ -1,0 +1,136 @@
+"""Mount, zeros, units of positions and lags of torques, found by the fit that explains far more."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.checks.look import look
+from excite_cli.checks.result import Result
+from excite_cli.checks.samples import samples_of
+from excite_cli.checks.setup import Setup
+from excite_cli.checks.textbook_fit import TextbookFit
+from excite_cli.config.load import load_spec
+from excite_cli.config.spec import Spec
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.identification.prepare import prepare_all
+from excite_cli.identification.processing import choose_processing
+from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.robot.model import Array, Robot
+from excite_cli.simulation.planted import plant
+from tests.simulation.arms import arm, played
+
+SPEC: Spec = load_spec(Path(__file__).resolve().parents[2] / "configs" / "ur10.yaml")
+WALL = np.array([0.0, -9.81, 0.0])
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return arm()
+
+
+@pytest.fixture(scope="module")
+def sound(robot: Robot) -> Dataset:
+    """With dry friction, and masses that are up to 20 % off."""
+    sizes = [9.0, 9.0, 6.0, 2.0, 2.0, 1.0]
+    rubs = [plant(kind_named("coulomb_friction"), (j,), x) for j, x in enumerate(sizes)]
+    return played(robot, *rubs, torque_noise=0.01, inertia_error=0.2).dataset
+
+
+def found(robot: Robot, data: Dataset, spec: Spec = SPEC) -> list[Result]:
+    processing = choose_processing(data.runs, spec.measurement.filter)
+    return look(robot, data.runs, prepare_all(data.runs, processing), spec)
+
+
+def changed(data: Dataset, change: Callable[[Run], Run]) -> Dataset:
+    return replace(data, runs=tuple(map(change, data.runs)))
+
+
+def at(j: int, n: int = 6) -> Array:
+    return np.asarray(np.arange(n) == j, float)
+
+
+def test_sound_data(robot: Robot, sound: Dataset) -> None:
+    assert found(robot, sound) == []
+
+
+def test_a_robot_on_a_wall_whose_config_stands(robot: Robot, sound: Dataset) -> None:
+    """Seen from the other side: the robot stands, and its config hangs it on a wall."""
+    (result,) = found(robot.with_gravity(WALL), sound)
+    assert (result.kind, result.status) == ("mount", "fault")
+    roll, pitch, yaw = result.settings["robot.base_orientation"]
+    assert (roll, pitch, yaw) == pytest.approx((-np.pi / 2, 0.0, 0.0), abs=1e-3)
+
+
+def test_a_leaning_table_is_a_doubt_or_a_fault_with_its_angle(robot: Robot, sound: Dataset) -> None:
+    lean = np.radians(12.0)
+    tilted = robot.with_gravity(np.array([np.sin(lean), 0.0, -np.cos(lean)]) * 9.81)
+    (result,) = found(tilted, sound)
+    assert result.kind == "mount"
+    _, pitch, _ = result.settings["robot.base_orientation"]
+    assert abs(pitch) == pytest.approx(lean, abs=np.radians(1.5))
+
+
+@pytest.mark.parametrize("off", [np.pi / 2, np.pi, 0.7])
+def test_the_zero_of_a_joint(robot: Robot, sound: Dataset, off: float) -> None:
+    shifted = changed(sound, lambda run: replace(run, q=run.q + off * at(2)))
+    (result,) = found(robot, shifted)
+    assert (result.kind, result.joints) == ("zero", ("elbow_joint",))
+    written = result.settings["measurement.offset"]["elbow_joint"]
+    wrong = (written + off + np.pi) % (2 * np.pi) - np.pi
+    assert wrong == pytest.approx(0.0, abs=0.05)
+    declared = SPEC.measurement.model_copy(update={"offset": {"elbow_joint": 0.0}})
+    trusting = SPEC.model_copy(update={"measurement": declared})
+    # what is declared is taken as it is
+    assert all(each.kind != "zero" for each in found(robot, shifted, trusting))
+
+
+def test_counts_of_another_encoder(robot: Robot, sound: Dataset) -> None:
+    halved = changed(sound, lambda run: replace(run, q=0.5 * run.q, dq=None))
+    (result,) = found(robot, halved)
+    assert result.kind == "angle"
+    assert result.settings["measurement.angle"] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("late", [0.06, -0.06])
+def test_torques_behind_their_positions(robot: Robot, sound: Dataset, late: float) -> None:
+    def shift(run: Run) -> Run:
+        tau = [np.interp(run.t - late, run.t, column) for column in run.tau.T]
+        return replace(run, tau=np.column_stack(tau))
+
+    (result,) = found(robot, changed(sound, shift))
+    assert result.kind == "torque_lag"
+    assert result.settings["measurement.torque_lag"] == pytest.approx(late, abs=0.016)
+
+
+def test_two_mistakes_at_once(robot: Robot, sound: Dataset) -> None:
+    both = changed(
+        sound, lambda run: replace(run, q=run.q + np.pi / 2 * at(1), tau=run.tau * (1 - 2 * at(2)))
+    )
+    kinds = {(each.kind, each.joints) for each in found(robot, both)}
+    assert ("zero", ("shoulder_lift_joint",)) in kinds
+    assert ("torque_sign", ("elbow_joint",)) in kinds
+
+
+def test_the_fit_against_least_squares_of_its_own_rows(robot: Robot, sound: Dataset) -> None:
+    """Without a floor and with bodies that hardly bend, shares are those of plain least squares."""
+    processing = choose_processing(sound.runs, SPEC.measurement.filter)
+    samples = samples_of(prepare_all(sound.runs, processing), 200)
+    fit = TextbookFit(robot, samples, floor=1e-9, loose=1e-6)
+    explained = fit(Setup.as_declared(robot))
+    assert explained.bent == pytest.approx(0.0, abs=1e-3)
+    load = fit.columns(Setup.as_declared(robot)) @ fit.phi
+    for j in range(robot.n):
+        rows = samples.moves[:, j] & samples.known[:, j]
+        v, a, own = samples.v[rows, j], samples.a[rows, j], load[rows, j]
+        columns = [v, np.sign(v), np.abs(own) * np.sign(v), a, np.ones(len(v))]
+        x = np.column_stack([*columns, own])  # all torques may be off together by so little
+        tau = samples.tau[rows, j]
+        coefficients = np.linalg.lstsq(x[:, :5], tau - own, rcond=None)[0]
+        rest = tau - own - x[:, :5] @ coefficients
+        share = np.linalg.norm(rest) / np.linalg.norm(tau - tau.mean())
+        if (coefficients[:4] >= 0.0).all():
+            assert explained.shares[j] == pytest.approx(share, rel=1e-3)
+        assert explained.shares[j] >= share * (1 - 1e-6)

@@ -1,0 +1,91 @@
+"""`excite inspect` as a user runs it: a robot on its side, a wrong config, and what it writes."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.robot.model import Robot
+from tests.cli.program import Program
+from tests.simulation.arms import arm
+
+CONFIG = """\
+# the arm in the corner
+robot: {urdf: "example-robot-data:ur10"}  # bolted to the wall
+effects: [{kind: viscous_friction}, {kind: coulomb_friction}]
+"""
+
+
+def hanging(robot: Robot) -> Dataset:
+    """On a wall, torques of the shoulder in mN·m."""
+    dynamics = InverseDynamics(robot.with_gravity(np.array([0.0, -9.81, 0.0])))
+    t = np.arange(0.0, 12.0, 0.005)
+    rng = np.random.default_rng(1)
+    runs = []
+    for name, seed in (("a", 1), ("b", 2)):
+        q, v, a = _motion(robot, t, seed)
+        tau = dynamics.torques(q, v, a) + 3.0 * np.sign(v) + 2.0 * v
+        tau += 0.05 * rng.normal(size=tau.shape)
+        tau[:, 1] *= 1e3
+        runs.append(Run(name, t, q, tau))
+    return Dataset(robot.joint_names, tuple(runs))
+
+
+def _motion(robot: Robot, t: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    q, v, a = (np.zeros((len(t), robot.n)) for _ in range(3))
+    for k in range(1, 5):
+        w, phase = 2 * np.pi * 0.12 * k, rng.uniform(0, 2 * np.pi, robot.n)
+        size = rng.normal(size=robot.n) * 0.8 / k
+        angle = w * t[:, None] + phase
+        q += size * np.sin(angle)
+        v += size * w * np.cos(angle)
+        a -= size * w * w * np.sin(angle)
+    return q, v, a
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("inspect")
+    (path / "arm.yaml").write_text(CONFIG, encoding="utf-8")
+    write_dataset(path / "log.h5", hanging(arm()), {})
+    return path
+
+
+def test_two_faults_their_keys_and_the_config_that_settles_them(folder: Path, cache: Path) -> None:
+    program = Program(folder, cache)
+    said = program("inspect", "arm.yaml", "log.h5", "--apply", "new.yaml", "--json")
+    assert said.returncode == 1, said.stderr
+    answer = json.loads(said.stdout)
+    faults = {each["name"]: each for each in answer["checks"] if each["status"] != "ok"}
+    assert set(faults) == {"direction of gravity", "unit of torques"}
+    assert faults["direction of gravity"]["settings"] == {
+        "robot.base_orientation": pytest.approx([np.pi / 2, 0.0, 0.0], abs=1e-3)
+    }
+    units = faults["unit of torques"]["settings"]["measurement.torque_unit"]
+    assert units["shoulder_lift_joint"] == 0.001
+    written = (folder / "new.yaml").read_text(encoding="utf-8")
+    assert "# the arm in the corner" in written
+    assert "# bolted to the wall" in written
+    assert program("identify", "arm.yaml", "log.h5").returncode == 2  # with the same words
+    again = program("inspect", "new.yaml", "log.h5")
+    assert again.returncode == 0, again.stdout
+    assert again.stdout.startswith("Nothing is wrong: ")
+    assert "excite diagnose new.yaml log.h5" in again.stdout
+
+
+def test_the_description_alone(folder: Path, cache: Path) -> None:
+    said = Program(folder, cache)("inspect", "arm.yaml")
+    assert said.returncode == 0, said.stderr
+    assert said.stdout.startswith("Nothing is wrong: 1 check")
+
+
+def test_nothing_to_apply(folder: Path, cache: Path) -> None:
+    said = Program(folder, cache)("inspect", "arm.yaml", "--apply", "none.yaml")
+    assert said.returncode == 2
+    assert "nothing is to be changed" in said.stderr
+    assert not (folder / "none.yaml").exists()
