@@ -1,5 +1,6 @@
 """Looking at log and model before any physics: `excite inspect`."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -129,8 +130,23 @@ def _changed(case: Case, settings: Mapping[str, Any]) -> Case:
     return Case(spec, case.folder, build_robot(spec.robot, case.folder), case.file)
 
 
+def _paths_from(folder: Path, problem: Problem | Case) -> dict[str, Any]:
+    """The robot's relative paths as seen from another folder."""
+    spec = problem.spec.robot
+    if folder == problem.folder.resolve():
+        return {}
+    found: dict[str, Any] = {}
+    if ":" not in spec.urdf and not Path(spec.urdf).is_absolute():
+        found["robot.urdf"] = os.path.relpath(problem.folder / spec.urdf, folder)
+    if spec.package_dirs:
+        own = [os.path.relpath(problem.folder / each, folder) for each in spec.package_dirs]
+        found["robot.package_dirs"] = own
+    return found
+
+
 def _write(path: Path, problem: Problem | Case, settings: Mapping[str, Any]) -> None:
     """The config that says what was found."""
+    settings = {**settings, **_paths_from(path.resolve().parent, problem)}
     if problem.file is not None:
         text = amended(problem.file.read_text(encoding="utf-8"), settings)
     else:

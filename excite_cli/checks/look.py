@@ -48,8 +48,9 @@ def look(
         standing = standing_legs.standing_legs(robot, samples.thinned(_FEW))
         if standing:
             return standing
-    found = [_result(step, robot.joint_names, spec) for step in steps]
-    setup = steps[-1].after.setup if steps else Setup.as_declared(robot)
+    declared = Setup.as_declared(robot)
+    found = [_result(step, declared, robot.joint_names, spec) for step in steps]
+    setup = steps[-1].after.setup if steps else declared
     left = TextbookFit(robot, samples, loose=_ANY)(setup)
     return [*found, *_unexplained(left, robot.joint_names)]
 
@@ -95,15 +96,18 @@ def check_dataset(
     return findings_of(robot, runs, prepare_all(runs, processing), processing, spec)
 
 
-def _result(step: Step, names: Sequence[str], spec: Spec) -> Result:
-    """A step as one sentence: what is wrong, how sure that is, what to write in the config."""
+def _result(step: Step, declared: Setup, names: Sequence[str], spec: Spec) -> Result:
+    """A step as one sentence: what is wrong, how sure that is, what to write in the config.
+
+    Keys hold all that was found of one thing so far: a mapping is written whole.
+    """
     check, before, after = step.check, step.before, step.after.setup
     shown = step.concerned
     shares = [
         float(np.sqrt(np.mean(np.square(each.shares[shown]))))
         for each in (step.left_before, step.left_after)
     ]
-    settings = check.settings(names, spec, before, after)
+    settings = check.settings(names, spec, declared, after)
     text = check.sentence(names, before, after)
     if settings:
         text += f" (set {written(settings)})"
@@ -113,7 +117,7 @@ def _result(step: Step, names: Sequence[str], spec: Spec) -> Result:
     )
     others = dict.fromkeys(
         f"{rival.sentence(names, before, other)}"
-        + (f" ({written(more)})" if (more := rival.settings(names, spec, before, other)) else "")
+        + (f" ({written(more)})" if (more := rival.settings(names, spec, declared, other)) else "")
         for rival, other in step.rivals
     )
     if others:

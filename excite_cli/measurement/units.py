@@ -22,6 +22,7 @@ _RATES = (20.0, 50_000.0)  # Hz, of robots' logs
 _SLOW = 0.005  # of the speed limit
 _TOO_FAST = 20.0  # times the speed limit
 _ABSURD = 20.0  # times the effort limit, of a joint whose neighbours keep theirs
+_FAR = 20.0  # times the limits of a slide: in cm or mm, a fifth of its range
 _COUNTED = 60.0  # times the limits: more than degrees would be
 _BITS = range(10, 25)  # of encoders, a turn
 _USUAL_SPEED = 3.0  # rad/s, of a robot without a limit
@@ -212,7 +213,7 @@ def _length_by_limits(
     reach = np.maximum(np.maximum(np.abs(lower), np.abs(upper)), 1e-9)
     far = np.maximum(-low / reach, high / reach)
     slack = 0.1 * (upper - lower)
-    if far.max() < 3:
+    if far.max() < _FAR:
         return []
     for unit in ("cm", "mm"):
         scale = METERS[unit]
