@@ -23,7 +23,6 @@ from excite_cli.checks.result import Result
 from excite_cli.config.amended import amended, with_values
 from excite_cli.config.load import spec_of
 from excite_cli.config.write import yaml_text
-from excite_cli.errors import ConfigError
 from excite_cli.excitation.problem import Problem
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
@@ -64,7 +63,7 @@ def inspect(
 
     Without `data` the description alone is judged. What would settle a fault or a doubt is tried,
     and the data are looked at once more with it, until nothing new is found. With `apply` the
-    config that says so is written, its comments kept.
+    config that says so is written, its comments kept; where nothing is to be changed, as it is.
 
     Returns
     -------
@@ -74,7 +73,7 @@ def inspect(
     Raises
     ------
     ConfigError, FileError
-        A file cannot be read at all; nothing is to be written.
+        A file cannot be read at all.
     """
     problem = measured_case(problem)
     case = Case(problem.spec, problem.folder, problem.robot, problem.file)
@@ -98,8 +97,6 @@ def inspect(
             case = _changed(case, more)
         inspection = Inspection(rows.in_order(found, bool(files)), settings, runs)
         if apply is not None:
-            if not settings:
-                raise ConfigError("--apply: nothing is to be changed in the config.")
             _write(Path(apply), problem, settings)
         return inspection
 

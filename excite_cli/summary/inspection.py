@@ -51,7 +51,10 @@ def _parts(found: Inspected, config: str, data: tuple[str, ...], applied: str | 
     parts += [f"{each.evidence}." for each in noted]
     files = tuple(map(as_word, data))
     if applied is not None:
-        parts.append(f"Written: {applied}, with {written(found.settings)}.")
+        what = (
+            f"with {written(found.settings)}" if found.settings else "in which nothing is changed"
+        )
+        parts.append(f"Written: {applied}, {what}.")
         parts.append(Command(("excite", "diagnose", as_word(applied), *files)))
     elif found.settings:
         parts.append(
