@@ -15,7 +15,7 @@ from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.speeds import Speeds, speeds
 from excite_cli.measurement.torque import METERS, SECONDS
 
-_DEGREES = 180 / np.pi
+_DEGREES, _RPM = 180 / np.pi, 30 / np.pi
 _CLOSE = 0.2  # share by which a gain may miss the factor it is taken for
 _ODD = 0.2  # share by which a gain may miss 1
 _RATES = (20.0, 50_000.0)  # Hz, of robots' logs
@@ -139,10 +139,12 @@ def _angle_by_speed(
             )
         settings = {"measurement.angle": "deg", **without}
         return [Finding("units", "error", text, where, (), settings)]
-    if _near(gain, _DEGREES):
+    for factor, unit in ((_DEGREES, "degrees per second"), (_RPM, "turns per minute")):
+        if not _near(gain, factor):
+            continue
         text = (
             f"recorded speeds are {gain:.3g} times the change of position per time: speeds are in "
-            f"degrees per second, positions in radians; {leave}"
+            f"{unit}, positions in radians; {leave}"
         )
         return [Finding("units", "error", text, where, (), without)]
     return []

@@ -92,6 +92,7 @@ def test_degrees() -> None:
           "{dq: null}")  # fmt: skip
     error(check(replace(run, dq=np.degrees(run.dq)))[1], "units", "degrees per second",
           "{dq: null}")  # fmt: skip
+    error(check(replace(run, dq=run.dq * 30 / np.pi))[1], "units", "turns per minute")
 
 
 def test_radians_declared_as_degrees() -> None:
