@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from excite_cli.api.identifying import identify as identify
     from excite_cli.api.identifying import identify_load as identify_load
     from excite_cli.api.identifying import save_fit as save_fit
+    from excite_cli.api.inspecting import LogInspection as LogInspection
+    from excite_cli.api.inspecting import inspect as inspect
     from excite_cli.api.load_planning import LoadProblem as LoadProblem
     from excite_cli.api.load_planning import plan_load as plan_load
     from excite_cli.api.loading import Case as Case
@@ -110,6 +112,7 @@ _HOMES = {
         "write_result",
     ),
     "api.identifying": ("identify", "identify_load", "save_fit"),
+    "api.inspecting": ("LogInspection", "inspect"),
     "api.load_planning": ("LoadProblem", "plan_load"),
     "api.loading": ("Case", "load_case", "load_data", "load_problem"),
     "api.model": ("Model",),

@@ -21,7 +21,7 @@ from excite_cli.checks.bodies import impossible_bodies
 from excite_cli.checks.look import look
 from excite_cli.checks.result import Result
 from excite_cli.config.amended import amended, with_values
-from excite_cli.config.load import spec_of
+from excite_cli.config.load import load_spec, spec_of
 from excite_cli.config.write import yaml_text
 from excite_cli.excitation.problem import Problem
 from excite_cli.identification.prepare import prepare_all
@@ -30,14 +30,15 @@ from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.merged_findings import joined, merged
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.note import Tell, log_note
-from excite_cli.shown.record import Shown
+from excite_cli.shown.record import Shown, show
+from excite_cli.summary.inspection import headline, inspection_parts
 from excite_cli.summary.inspection import inspection_answer as inspection_answer
 
 _ROUNDS = 4  # of looking, each with what the one before would set
 
 
 @dataclass(frozen=True, repr=False)
-class Inspection(Shown):
+class LogInspection(Shown):
     """`results` in the order of the checks; `settings`: what would change in the config."""
 
     results: tuple[Result, ...]
@@ -50,6 +51,9 @@ class Inspection(Shown):
         return all(each.status != "fault" for each in self.results)
 
 
+show(LogInspection, headline, inspection_parts)
+
+
 @checked()
 def inspect(
     problem: Problem | Case,
@@ -58,7 +62,7 @@ def inspect(
     apply: str | Path | None = None,
     overwrite: bool = False,
     tell: Tell = log_note,
-) -> Inspection:
+) -> LogInspection:
     """Mistakes of set-up in log and model: `excite inspect`.
 
     Without `data` the description alone is judged. What would settle a fault or a doubt is tried,
@@ -67,7 +71,7 @@ def inspect(
 
     Returns
     -------
-    Inspection
+    LogInspection
         `results`, each with `status` ok, doubt or fault, `joints`, `evidence` and `settings`.
 
     Raises
@@ -85,7 +89,7 @@ def inspect(
         for _ in range(_ROUNDS if files else 0):
             recorded = as_recorded(case, files)
             runs = recorded.recordings
-            seen = {(each.name, each.joints, each.status) for each in found}
+            seen = set(map(_key, found))
             new = [each for each in _looked(case, recorded) if _key(each) not in seen]
             found += new
             more: dict[str, Any] = {}
@@ -95,7 +99,7 @@ def inspect(
                 break
             settings = joined(settings, more)
             case = _changed(case, more)
-        inspection = Inspection(rows.in_order(found, bool(files)), settings, runs)
+        inspection = LogInspection(rows.in_order(found, bool(files)), settings, runs)
         if apply is not None:
             _write(Path(apply), problem, settings)
         return inspection
@@ -144,12 +148,11 @@ def _paths_from(folder: Path, problem: Problem | Case) -> dict[str, Any]:
 def _write(path: Path, problem: Problem | Case, settings: Mapping[str, Any]) -> None:
     """The config that says what was found."""
     settings = {**settings, **_paths_from(path.resolve().parent, problem)}
-    if problem.file is not None:
+    tree = problem.spec.model_dump(mode="json", exclude_unset=True)
+    text = yaml_text(with_values(tree, settings))
+    # Values of --set are not in the file: then all is written anew.
+    if problem.file is not None and load_spec(problem.file) == problem.spec:
         text = amended(problem.file.read_text(encoding="utf-8"), settings)
-    else:
-        tree = problem.spec.model_dump(mode="json", exclude_unset=True)
-        text = yaml_text(with_values(tree, settings))
-    spec_of(with_values(problem.spec.model_dump(mode="json", exclude_unset=True), settings))
 
     def write(to: Path) -> None:
         to.write_text(text, encoding="utf-8")

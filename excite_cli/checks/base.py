@@ -1,7 +1,7 @@
 """A family of mistakes that people make of one thing: which set-ups may be meant instead."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -25,6 +25,18 @@ class Alternative:
     variant: str = ""
     price: float = 0.0
     is_plain: bool = False
+
+
+def descended(
+    fit: TextbookFit, setup: Setup, steps: Iterable[float], moved: Callable[[Setup, float], Setup]
+) -> tuple[Setup, float]:
+    """The set-up with the least L, one step after the other to either side, and L."""
+    loss = fit(setup).loss
+    for step in steps:
+        for tried in (moved(setup, -step), moved(setup, step)):
+            if (now := fit(tried).loss) < loss:
+                loss, setup = now, tried
+    return setup, loss
 
 
 class SetupCheck(ABC):

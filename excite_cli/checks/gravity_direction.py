@@ -33,7 +33,8 @@ class GravityDirection(SetupCheck):
         self, fit: TextbookFit, setup: Setup, explained: Explained
     ) -> Iterator[Alternative]:
         """The direction that explains most, and the wall, ceiling or 45° next to it."""
-        if fit.robot.floating or fit.robot.base_joints or not explained.judged.any():
+        held = not (fit.robot.floating or fit.robot.base_joints)
+        if not (held and setup.gravity.any() and explained.judged.any()):
             return
         z, shares, tried = explained.z, explained.shares, setup
         for _ in range(_ROUNDS):

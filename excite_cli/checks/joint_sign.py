@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from excite_cli.checks.base import Alternative, Settings, SetupCheck
+from excite_cli.checks.joint_zero import offsets
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import Explained, TextbookFit
 from excite_cli.config.spec import Spec
@@ -45,6 +46,7 @@ class _Sign(SetupCheck):
             speeds = spec.measurement.velocity_sign
             new = {name: -speeds.get(name, 1) for name in turned}
             found["measurement.velocity_sign"] = {**speeds, **new}
+            found |= offsets(names, spec, before, after)
         return found
 
     def trusted(self, names: Sequence[str], spec: Spec, joints: Sequence[int]) -> Settings:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from excite_cli.checks.base import Alternative, Settings, SetupCheck
+from excite_cli.checks.base import Alternative, Settings, SetupCheck, descended
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import Explained, TextbookFit
 from excite_cli.config.spec import Spec
@@ -33,13 +33,12 @@ class JointZero(SetupCheck):
 
     def refined(self, fit: TextbookFit, found: Alternative) -> Iterator[Alternative]:
         """The angle that explains most, from steps that are halved; a right angle near it."""
-        (j,), setup = found.joints, found.setup
-        loss = fit(setup).loss
-        for step in _FINE:
-            for angle in (setup.zero[j] - step, setup.zero[j] + step):
-                tried = setup.from_zero(j, angle)
-                if (now := fit(tried).loss) < loss:
-                    loss, setup = now, tried
+        (j,) = found.joints
+
+        def moved(setup: Setup, step: float) -> Setup:
+            return setup.from_zero(j, setup.zero[j] + step)
+
+        setup, _ = descended(fit, found.setup, _FINE, moved)
         quarter = round(setup.zero[j] / _QUARTER) * _QUARTER
         yield Alternative(setup, found.joints, price=_ODD)
         if abs(quarter - setup.zero[j]) < _NEAR:
@@ -55,12 +54,20 @@ class JointZero(SetupCheck):
 
     def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
         """What is added to the positions."""
-        old = spec.measurement.offset
-        moved = np.flatnonzero(np.abs(after.zero - before.zero) > 1e-9).tolist()
-        new = {names[j]: float(after.zero[j] - before.zero[j]) for j in moved}
-        total = {name: round(old.get(name, 0.0) + x, 5) for name, x in new.items()}
-        return {"measurement.offset": {**old, **total}}
+        return offsets(names, spec, before, after)
 
     def is_declared(self, name: str, spec: Spec) -> bool:
         """Whether its zero is given."""
         return name in spec.measurement.offset
+
+
+def offsets(names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
+    """What is added to positions: a sign that is turned turns what was added before, too."""
+    old = spec.measurement.offset
+    turned = after.q_sign * before.q_sign
+    new = {
+        name: round(float(old.get(name, 0.0) * turned[j] + after.zero[j] - before.zero[j]), 5)
+        for j, name in enumerate(names)
+    }
+    changed = {name: x for name, x in new.items() if x != round(old.get(name, 0.0), 5)}
+    return {"measurement.offset": {**old, **changed}} if changed else {}

@@ -78,7 +78,6 @@ class TextbookFit:
         spread[:, 1:4] = np.hypot(own, _CENTER * spread[:, :1] / _UNCERTAIN)
         self.spread: Array = loose * spread.ravel()
         self._scale = loose * _SCALE
-        self._motions: dict[bytes, tuple[Array, Array | None]] = {}
 
     def __call__(self, setup: Setup) -> Explained:
         """How well the data fit, set up so."""

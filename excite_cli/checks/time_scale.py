@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.checks.base import Alternative, Settings, SetupCheck
+from excite_cli.checks.base import Alternative, Settings, SetupCheck, descended
 from excite_cli.checks.samples import LAGS
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import Explained, TextbookFit
@@ -37,13 +37,11 @@ class Clock(SetupCheck):
 
     def refined(self, fit: TextbookFit, found: Alternative) -> Iterator[Alternative]:
         """The clock that explains most."""
-        setup, loss = found.setup, fit(found.setup).loss
-        for step in _FINE_CLOCK:
-            for factor in (np.exp(-step), np.exp(step)):
-                tried = replace(setup, clock=setup.clock * factor)
-                if (now := fit(tried).loss) < loss:
-                    loss, setup = now, tried
-        yield Alternative(setup)
+
+        def moved(setup: Setup, step: float) -> Setup:
+            return replace(setup, clock=setup.clock * float(np.exp(step)))
+
+        yield Alternative(descended(fit, found.setup, _FINE_CLOCK, moved)[0])
 
     def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:
         """How long a second is."""
@@ -76,12 +74,11 @@ class TorqueLag(SetupCheck):
 
     def refined(self, fit: TextbookFit, found: Alternative) -> Iterator[Alternative]:
         """The lag that explains most."""
-        setup, loss = found.setup, fit(found.setup).loss
-        for step in _FINE_LAG:
-            for lag in (setup.lag - step, setup.lag + step):
-                tried = replace(setup, lag=lag)
-                if (now := fit(tried).loss) < loss:
-                    loss, setup = now, tried
+
+        def moved(setup: Setup, step: float) -> Setup:
+            return replace(setup, lag=setup.lag + step)
+
+        setup, _ = descended(fit, found.setup, _FINE_LAG, moved)
         if abs(setup.lag) >= _SMALLEST:
             yield Alternative(setup)
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.checks.base import Alternative, Settings, SetupCheck
+from excite_cli.checks.base import Alternative, Settings, SetupCheck, descended
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import Explained, TextbookFit
 from excite_cli.config.spec import Spec
@@ -44,12 +44,11 @@ class TorqueUnit(SetupCheck):
 
     def refined(self, fit: TextbookFit, found: Alternative) -> Iterator[Alternative]:
         """The factor that explains most; and the powers of ten next to it."""
-        setup, loss = found.setup, fit(found.setup).loss
-        for step in _FINE:
-            for factor in (np.exp(-step), np.exp(step)):
-                tried = _scaled(setup, found.joints, factor)
-                if (now := fit(tried).loss) < loss:
-                    loss, setup = now, tried
+
+        def moved(setup: Setup, step: float) -> Setup:
+            return _scaled(setup, found.joints, float(np.exp(step)))
+
+        setup, loss = descended(fit, found.setup, _FINE, moved)
         unit = setup.unit[found.joints[0]]
         seen = fit(_scaled(setup, found.joints, _WEIGHTLESS)).loss > loss + _SEEN
         if abs(np.log(unit)) < np.log(_FACTOR):

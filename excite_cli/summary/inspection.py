@@ -33,11 +33,16 @@ def inspection_answer(
     return Answer((*_parts(found, config, data, applied),), _data(found, applied), found.good)
 
 
+def inspection_parts(found: Inspected) -> list[Part]:
+    """The headline, the rows, and the evidence of what is not fine."""
+    return _parts(found, "", (), None)
+
+
 def _parts(found: Inspected, config: str, data: tuple[str, ...], applied: str | None) -> list[Part]:
     faults, doubts = (
         [each for each in found.results if each.status == status] for status in ("fault", "doubt")
     )
-    parts: list[Part] = [_headline(len(faults), len(doubts), len(found.results))]
+    parts: list[Part] = [headline(found)]
     rows = tuple(
         (each.name, each.status, ", ".join(each.joints), written(each.settings))
         for each in found.results
@@ -56,7 +61,7 @@ def _parts(found: Inspected, config: str, data: tuple[str, ...], applied: str | 
         )
         parts.append(f"Written: {applied}, {what}.")
         parts.append(Command(("excite", "diagnose", as_word(applied), *files)))
-    elif found.settings:
+    elif found.settings and config:
         parts.append(
             Command(("excite", "inspect", as_word(config), *files, "--apply", "corrected.yaml"))
         )
@@ -69,7 +74,12 @@ def _where(result: Result) -> str:
     return f"{result.runs}: " if result.runs else ""
 
 
-def _headline(faults: int, doubts: int, count: int) -> str:
+def headline(found: Inspected) -> str:
+    """One sentence."""
+    faults, doubts = (
+        sum(each.status == status for each in found.results) for status in ("fault", "doubt")
+    )
+    count = len(found.results)
     if faults:
         more = f", {doubts} to be looked at" if doubts else ""
         return f"{faults} of {count} checks found a fault{more}: correct it before any fit."

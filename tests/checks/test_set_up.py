@@ -105,6 +105,17 @@ def test_torques_behind_their_positions(robot: Robot, sound: Dataset, late: floa
     assert result.settings["measurement.torque_lag"] == pytest.approx(late, abs=0.016)
 
 
+def test_a_turned_position_turns_what_the_config_adds(robot: Robot, sound: Dataset) -> None:
+    """The file's -q - 0.4 is read with an offset of 0.4: right are -1 and -0.4."""
+    declared = SPEC.measurement.model_copy(update={"offset": {"elbow_joint": 0.4}})
+    spec = SPEC.model_copy(update={"measurement": declared})
+    turned = changed(sound, lambda run: replace(run, q=run.q * (1 - 2 * at(2)), dq=None))
+    (result,) = found(robot, turned, spec)
+    assert result.kind == "position_sign"
+    assert result.settings["measurement.position_sign"] == {"elbow_joint": -1}
+    assert result.settings["measurement.offset"] == {"elbow_joint": -0.4}
+
+
 def test_two_mistakes_at_once(robot: Robot, sound: Dataset) -> None:
     both = changed(
         sound, lambda run: replace(run, q=run.q + np.pi / 2 * at(1), tau=run.tau * (1 - 2 * at(2)))

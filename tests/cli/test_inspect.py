@@ -89,3 +89,21 @@ def test_nothing_to_apply(folder: Path, cache: Path) -> None:
     assert said.returncode == 0, said.stderr
     assert "in which nothing is changed" in " ".join(said.stdout.split())
     assert (folder / "same.yaml").read_text(encoding="utf-8") == CONFIG
+
+
+def test_values_of_set_are_in_what_is_applied(folder: Path, cache: Path) -> None:
+    said = Program(folder, cache)("inspect", "arm.yaml", "--set", "seed=7", "--apply", "seven.yaml")
+    assert said.returncode == 0, said.stderr
+    assert "seed: 7" in (folder / "seven.yaml").read_text(encoding="utf-8")
+
+
+def test_a_bad_file_gets_one_message_and_loses_nothing(folder: Path, cache: Path) -> None:
+    (folder / "bad.h5").write_bytes((folder / "log.h5").read_bytes()[:3000])
+    (folder / "kept.yaml").write_text("# mine\n", encoding="utf-8")
+    said = Program(folder, cache)(
+        "inspect", "arm.yaml", "bad.h5", "--apply", "kept.yaml", "--overwrite"
+    )
+    assert said.returncode == 2
+    assert "Traceback" not in said.stderr
+    assert said.stderr.count("error: ") == 1
+    assert (folder / "kept.yaml").read_text(encoding="utf-8") == "# mine\n"
