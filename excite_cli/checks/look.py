@@ -39,18 +39,18 @@ def look(
     samples = replace(samples_of(prepared, _SAMPLES, clocked), turns=~robot.sliding)
     if spec.measurement.trust or not len(samples.q):  # nobody moves: there is nothing to judge
         return []
-    foreign = foreign_runs.foreign_runs(robot, prepared)
-    if foreign:
-        return foreign
-    fit = TextbookFit(robot, samples)
+    fit, declared = TextbookFit(robot, samples), Setup.as_declared(robot)
     steps = list(mistakes(fit, spec))
+    setup = steps[-1].after.setup if steps else declared
+    foreign = foreign_runs.foreign_runs(robot, prepared, declared)
+    # Of a wrong set-up some runs show more than others: they are foreign where it is no cure.
+    if foreign and (not steps or foreign_runs.foreign_runs(robot, prepared, setup)):
+        return foreign
     if not any(step.check.kind == "no_gravity" for step in steps):
         standing = standing_legs.standing_legs(robot, samples.thinned(_FEW))
         if standing:
             return standing
-    declared = Setup.as_declared(robot)
     found = [_result(step, declared, robot.joint_names, spec) for step in steps]
-    setup = steps[-1].after.setup if steps else declared
     left = TextbookFit(robot, samples, loose=_ANY)(setup)
     return [*found, *_unexplained(left, robot.joint_names)]
 

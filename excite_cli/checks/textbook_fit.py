@@ -81,12 +81,20 @@ class TextbookFit:
 
     def __call__(self, setup: Setup) -> Explained:
         """How well the data fit, set up so."""
-        _, v, a = setup.motion(self.samples)
-        columns, torque = self.columns(setup), setup.torque(self.samples)
-        whole = torque + self.weight(setup) @ setup.gravity if setup.weightless else torque
-        rows = (v, a, torque, whole)
-        bodies = (self.phi, self.spread, self._scale, self._floor)
-        return _explained(columns, bodies, rows, self.counted(setup))
+        return self._fitted(setup, self.columns(setup), self.phi, self.spread)
+
+    def gravity(self, setup: Setup, z: Array | None = None) -> Array:
+        """The direction (3,) of gravity that fits best beside the rest, at the bodies of `z`.
+
+        What is missing of gravity is as uncertain as gravity is large.
+        """
+        phi = self.phi if z is None else self.bodies(z)
+        columns = np.concatenate([self.columns(setup), self.weight(setup, phi)], axis=2)
+        size = float(np.linalg.norm(setup.gravity))
+        spread = np.append(self.spread, np.full(3, size))
+        found = self._fitted(setup, columns, np.append(self.phi, np.zeros(3)), spread)
+        gravity = setup.gravity + size * found.z[-4:-1]
+        return np.asarray(gravity / max(float(np.linalg.norm(gravity)), 1e-9))
 
     def bodies(self, z: Array) -> Array:
         """Parameters φ (P,) of bodies that are so many standard deviations off."""
@@ -110,16 +118,12 @@ class TextbookFit:
         turned = [self.robot.with_gravity(axis) for axis in np.eye(3)]
         return np.stack([RigidBody(each, phi, q, rest, rest).load for each in turned], axis=-1)
 
-    def without_passive(self, setup: Setup, z: Array, j: int, values: Array) -> Array:
-        """Values (T', …) at the instants of joint j less what friction, rotor and offset explain.
-
-        With the load of bodies of `z`.
-        """
-        rows = self.counted(setup)[:, j]
+    def _fitted(self, setup: Setup, columns: Array, phi: Array, spread: Array) -> Explained:
         _, v, a = setup.motion(self.samples)
-        load = self.columns(setup)[rows, j] @ self.bodies(z)
-        basis = np.linalg.qr(_passive(v[rows, j], a[rows, j], load))[0]
-        return np.asarray(values - basis @ (basis.T @ values))
+        torque = setup.torque(self.samples)
+        whole = torque + self.weight(setup) @ setup.gravity if setup.weightless else torque
+        bodies = (phi, spread, self._scale, self._floor)
+        return _explained(columns, bodies, (v, a, torque, whole), self.counted(setup))
 
 
 def _passive(v: Array, a: Array, load: Array) -> Array:

@@ -50,21 +50,21 @@ class TorqueUnit(SetupCheck):
 
         setup, loss = descended(fit, found.setup, _FINE, moved)
         unit = setup.unit[found.joints[0]]
+        alone = len(found.joints) == 1 < len(setup.unit)
+        usual = float(np.median(np.delete(setup.unit, found.joints))) if alone else 1.0
         seen = fit(_scaled(setup, found.joints, _WEIGHTLESS)).loss > loss + _SEEN
-        if abs(np.log(unit)) < np.log(_FACTOR):
+        if abs(np.log(unit / usual)) < np.log(_FACTOR):
             return
         if not seen:  # friction alone shows: it is another unit, and nobody knows which
             if len(found.joints) == 1:
-                alone = _scaled(setup, found.joints, _UNKNOWN / unit)
-                yield replace(found, setup=alone, variant="unknown", price=_UNSEEN)
+                nothing = _scaled(setup, found.joints, _UNKNOWN / unit)
+                yield replace(found, setup=nothing, variant="unknown", price=_UNSEEN)
             return
         yield Alternative(setup, found.joints)
         for power in 10.0 ** np.array([np.floor(np.log10(unit)), np.ceil(np.log10(unit))]):
-            if power == 1.0:
-                continue
-            yield Alternative(
-                _scaled(setup, found.joints, power / unit), found.joints, is_plain=True
-            )
+            if power != usual:
+                plain = _scaled(setup, found.joints, power / unit)
+                yield Alternative(plain, found.joints, is_plain=True)
 
     def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:
         """How much too large or small."""

@@ -47,13 +47,13 @@ def _one(group: Sequence[Finding]) -> Finding:
 
 
 def joined(some: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings of both: mappings and lists have what either has, else the later one holds."""
+    """Settings of both: mappings and lists of names have what either has, else the later holds."""
     found = dict(some)
     for key, value in more.items():
         old = found.get(key)
         if isinstance(old, dict) and isinstance(value, dict):
             found[key] = {**old, **value}
-        elif isinstance(old, list) and isinstance(value, list):
+        elif isinstance(old, list) and all(isinstance(each, str) for each in value):
             found[key] = list(dict.fromkeys([*old, *value]))
         else:
             found[key] = value

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from excite_cli.checks.foreign_runs import foreign_runs
 from excite_cli.checks.look import look
 from excite_cli.checks.result import Result
 from excite_cli.checks.samples import samples_of
@@ -14,6 +15,7 @@ from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import TextbookFit
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
+from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
@@ -70,7 +72,34 @@ def test_a_leaning_table_is_a_doubt_or_a_fault_with_its_angle(robot: Robot, soun
     (result,) = found(tilted, sound)
     assert result.kind == "mount"
     _, pitch, _ = result.settings["robot.base_orientation"]
-    assert abs(pitch) == pytest.approx(lean, abs=np.radians(1.5))
+    assert abs(pitch) == pytest.approx(lean, abs=np.radians(0.3))
+
+
+def test_a_robot_under_a_ceiling_is_not_one_with_zeros_and_signs_that_are_off(
+    robot: Robot, sound: Dataset
+) -> None:
+    """The shoulder half a turn off, and two signs turned, explain as much, in three steps."""
+    (result,) = found(robot.with_gravity(np.array([0.0, 0.0, 9.81])), sound)
+    assert (result.kind, result.status) == ("mount", "fault")
+
+
+def test_a_run_that_a_wrong_mount_fits_less_is_not_foreign(robot: Robot, sound: Dataset) -> None:
+    """Where only the last joint moves any mount fits: beside that the other run does not."""
+    (first,) = sound.runs
+    dynamics, noise = InverseDynamics(robot), np.random.default_rng(3)
+
+    def last_alone(run: Run) -> Run:
+        q = np.where(np.arange(6) == 5, run.q, run.q[0])
+        v, a = np.gradient(q, run.step, axis=0), np.zeros_like(q)
+        tau = dynamics.torques(q, v, a) + 0.5 * np.sign(v)
+        tau += 0.01 * noise.normal(size=tau.shape)
+        return replace(run, name="last", q=q, dq=v, tau=tau)
+
+    hung = robot.with_gravity(WALL)
+    data = replace(sound, runs=(first, last_alone(first)))
+    prepared = prepare_all(data.runs, choose_processing(data.runs, SPEC.measurement.filter))
+    assert foreign_runs(hung, prepared)
+    assert [each.kind for each in found(hung, data)] == ["mount"]
 
 
 @pytest.mark.parametrize("off", [np.pi / 2, np.pi, 0.7])

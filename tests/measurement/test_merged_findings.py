@@ -1,7 +1,7 @@
 """One line for a fault, however many joints and runs have it."""
 
 from excite_cli.measurement.dataset import Finding
-from excite_cli.measurement.merged_findings import merged
+from excite_cli.measurement.merged_findings import joined, merged
 
 
 def test_the_first_is_told_and_where_the_others_are() -> None:
@@ -35,3 +35,12 @@ def test_severities_and_what_is_about_no_place_stay_apart() -> None:
 def test_long_lists_are_cut() -> None:
     findings = [Finding("nan", "warning", f"{k}", "", (f"j{k}",)) for k in range(20)]
     assert merged(findings)[0].text.endswith("j8, and 11 more")
+
+
+def test_settings_of_both_hold_and_numbers_are_those_of_the_later() -> None:
+    one = {"robot.base_orientation": [0.1, 0.0, 0.0], "measurement.without_torque": ["a"]}
+    other = {"robot.base_orientation": [0.2, 0.0, 0.0], "measurement.without_torque": ["b", "a"]}
+    assert joined(one, other) == {
+        "robot.base_orientation": [0.2, 0.0, 0.0],
+        "measurement.without_torque": ["a", "b"],
+    }
