@@ -10,6 +10,7 @@ from excite_cli.api.loading import Case, dataset_of
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.models import for_simulators
 from excite_cli.api.scoring import recordings_of
+from excite_cli.checks.look import look, without_fault
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.errors import RobotError
@@ -21,7 +22,7 @@ from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.model import Array, Robot
 from excite_cli.scoring.replayed import Replay
 from excite_cli.scoring.score import Scorer
-from excite_cli.shown.note import Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.replay import Played, drift, inertias
 from excite_cli.summary.replay import replay_answer as replay_answer
 
@@ -49,7 +50,8 @@ def replay(
     Raises
     ------
     FileError, ConfigError, RobotError, MissingExtraError
-        See `Model.load` and `load_data`; MuJoCo refuses the model, or is not installed.
+        See `Model.load` and `load_data`; the data contradict the robot's set-up; MuJoCo refuses
+        the model, or is not installed.
     """
     given = model if isinstance(model, Model) else load_model(model)
     stored = given.made
@@ -58,6 +60,9 @@ def replay(
     own = recordings_of(dataset, stored.sealed_run if sealed else None, given)
     scorer = Scorer(stored)
     runs = [run for parts in own.values() for run in scorer.prepared(parts)]
+    recorded = [run for parts in own.values() for run in parts]
+    for doubt in without_fault(look(robot, recorded, runs, stored.spec)):
+        tell(Note(Level.WARNING, doubt.evidence))
     simple, notes = for_simulators(stored, "mjcf")
     exported = mjcf(robot, simple)
     q = np.concatenate([run.q for run in runs])

@@ -10,6 +10,7 @@ from excite_cli.api.loading import Case, load_data, tell_findings
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import refuse_twice
+from excite_cli.checks.look import look
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.identification.split import split, whole
 from excite_cli.identification.torque_trace import torque_units
@@ -141,12 +142,17 @@ def _scored(
     single: bool,
     worse: Shift | None = None,
 ) -> _Scored:
-    scorer, runs, findings = Scorer(model.made), [], list(data.findings)
-    own = recordings_of(data, model.made.sealed_run if sealed else None, model)
+    stored = model.made
+    scorer, runs, findings = Scorer(stored), [], list(data.findings)
+    own = recordings_of(data, stored.sealed_run if sealed else None, model)
     for name, parts in own.items():
         label = name if single else f"{Path(path).stem}: {name}"
         try:
             runs.append(scorer.of(parts, path or ", ".join(data.sources), label, worse))
+            if runs[-1].alarm:  # before what may have changed in the robot: is it set up as then?
+                wrong = look(stored.robot, parts, scorer.prepared(parts), stored.spec)
+                told = [replace(each.finding, severity="warning", run=label) for each in wrong]
+                findings += told
         except FileError as short:
             findings.append(Finding("not scored", "warning", str(short), name))
     return runs, findings

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from excite_cli.checks import foreign_runs, standing_legs
+from excite_cli.checks.own import Log, own_checks
 from excite_cli.checks.result import Result, Status
 from excite_cli.checks.samples import samples_of
 from excite_cli.checks.set_up import Step, mistakes
@@ -39,20 +40,21 @@ def look(
     samples = replace(samples_of(prepared, _SAMPLES, clocked), turns=~robot.sliding)
     if spec.measurement.trust or not len(samples.q):  # nobody moves: there is nothing to judge
         return []
+    own = [each for check in own_checks() for each in check.look(Log(robot, runs, prepared, spec))]
     fit, declared = TextbookFit(robot, samples), Setup.as_declared(robot)
     steps = list(mistakes(fit, spec))
     setup = steps[-1].after.setup if steps else declared
     foreign = foreign_runs.foreign_runs(robot, prepared, declared)
     # Of a wrong set-up some runs show more than others: they are foreign where it is no cure.
     if foreign and (not steps or foreign_runs.foreign_runs(robot, prepared, setup)):
-        return foreign
+        return [*foreign, *own]
     if not any(step.check.kind == "no_gravity" for step in steps):
         standing = standing_legs.standing_legs(robot, samples.thinned(_FEW))
         if standing:
-            return standing
+            return [*standing, *own]
     found = [_result(step, declared, robot.joint_names, spec) for step in steps]
     left = TextbookFit(robot, samples, loose=_ANY)(setup)
-    return [*found, *_unexplained(left, robot.joint_names)]
+    return [*found, *_unexplained(left, robot.joint_names), *own]
 
 
 def findings_of(
@@ -69,15 +71,25 @@ def findings_of(
     FileError
         `look` finds a fault.
     """
-    found = look(robot, runs, prepared, spec)
-    faults = [each.evidence for each in found if each.status == "fault"]
-    if faults:
-        text = "; and ".join(each.removesuffix(".") for each in faults)
-        raise FileError(f"the measured data contradict the robot: {text}.")
+    found = without_fault(look(robot, runs, prepared, spec))
     motion: tuple[Finding, ...] = ()
     if spec.measurement.filter.position == "auto":
         motion = check_motion(runs, processing, robot.joint_names)
     return (*motion, *(each.finding for each in found))
+
+
+def without_fault(found: Sequence[Result]) -> Sequence[Result]:
+    """The same, if none of them is a fault.
+
+    Raises
+    ------
+    FileError
+        One is.
+    """
+    faults = [each.evidence.removesuffix(".") for each in found if each.status == "fault"]
+    if faults:
+        raise FileError(f"the measured data contradict the robot: {'; and '.join(faults)}.")
+    return found
 
 
 def check_dataset(

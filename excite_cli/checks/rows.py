@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from excite_cli.checks import bodies, foreign_runs, look, standing_legs
+from excite_cli.checks.own import own_checks
 from excite_cli.checks.result import Result, Status
 from excite_cli.checks.set_up import CHECKS
 from excite_cli.measurement.dataset import Finding
@@ -46,7 +47,7 @@ def of_files(findings: Sequence[Finding]) -> list[Result]:
 def in_order(found: Sequence[Result], judged: bool) -> tuple[Result, ...]:
     """Results by the order of rows; a row without any is fine, if it was `judged`."""
     rows: list[Result] = []
-    for name in (*NAMES, _OTHER):
+    for name in (*NAMES, *(check.name for check in own_checks()), _OTHER):
         own = [each for each in found if each.name == name]
         if not own and (judged or name == bodies.NAME) and name != _OTHER:
             own = [Result(name, "")]

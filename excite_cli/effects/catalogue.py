@@ -3,11 +3,9 @@
 A package that declares, in the group `excite.effects`, a name for a subclass of `Effect` adds it.
 """
 
-import inspect
-import warnings
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 
 import numpy as np
 
@@ -42,7 +40,8 @@ from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.effects.torque_saturation import TorqueSaturation
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.effects.wrench_gain import WrenchGain
-from excite_cli.errors import ConfigError, ExciteWarning, nearest
+from excite_cli.errors import ConfigError, nearest
+from excite_cli.packages import members, set_aside
 from excite_cli.robot.model import Array, Robot
 
 GROUP = "excite.effects"
@@ -88,19 +87,15 @@ def catalogue() -> Mapping[str, type[Effect]]:
     An effect of a package that cannot be used is set aside, with an `ExciteWarning` that says why.
     """
     kinds = {effect.kind: effect for effect in _OURS}
-    for point in entry_points(group=GROUP):
-        found, flaw = _loaded(point)
-        if found is not None and found.kind in kinds:
-            flaw = f"there is another effect '{found.kind}'"
-        if flaw or found is None:
-            words = f"effect '{point.name}' ({point.value}) of a package is set aside: {flaw}."
-            warnings.warn(words, ExciteWarning, stacklevel=2)
+    needed = ("kind", "title", "parameters")
+    for whose, found in members(GROUP, Effect, needed, "effect"):  # type: ignore[type-abstract]
+        if found.kind in kinds:
+            set_aside(whose, f"there is another effect '{found.kind}'.")
         else:
             kinds[found.kind] = found
     for kind in [each for each in kinds.values() if is_of_a_package(each)]:
         if flaw := _names_of_none(kind, kinds):
-            words = f"effect '{kind.kind}' of a package is set aside: {flaw}"
-            warnings.warn(words, ExciteWarning, stacklevel=2)
+            set_aside(f"effect '{kind.kind}'", flaw)
             del kinds[kind.kind]
     return kinds
 
@@ -108,22 +103,6 @@ def catalogue() -> Mapping[str, type[Effect]]:
 def is_of_a_package(kind: type[Effect]) -> bool:
     """Whether it came through an entry point: it may do what effects of ours never do."""
     return kind not in _OURS
-
-
-def _loaded(point: EntryPoint) -> tuple[type[Effect] | None, str]:
-    """What an entry point leads to, and why it cannot be used, if so."""
-    try:
-        found = point.load()
-    except (Exception, SystemExit) as error:
-        return None, f"it cannot be loaded ({type(error).__name__}: {error})"
-    if not (isinstance(found, type) and issubclass(found, Effect)):
-        return None, "it is not a subclass of Effect"
-    if inspect.isabstract(found):
-        return None, f"it lacks {', '.join(sorted(found.__abstractmethods__))}"
-    missing = [name for name in ("kind", "title", "parameters") if not getattr(found, name, None)]
-    if missing:
-        return None, f"it does not state its {', '.join(missing)}"
-    return found, ""
 
 
 def _names_of_none(kind: type[Effect], kinds: Mapping[str, type[Effect]]) -> str:

@@ -4,6 +4,7 @@ import json
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import copyfile
 
 import h5py
 import pytest
@@ -129,6 +130,22 @@ def test_the_exported_model_moves_as_the_robot_did(days: Days) -> None:
     assert found["mean"]["after"] < 2e-3
     assert set(found["after"]) == set(found["before"])
     assert "deviates from the robot by" in days.program("replay", days.fit, days.first).stdout
+
+
+def test_a_torque_that_counts_the_other_way_is_told_before_what_may_have_changed(
+    days: Days,
+) -> None:
+    turned = days.program.folder / "turned.h5"
+    copyfile(days.first, turned)
+    with h5py.File(turned, "r+") as file:
+        for run in file["runs"].values():
+            run["tau"][:, 3] = -run["tau"][:, 3]
+    ran = days.program("score", days.fit, turned)
+    assert ran.returncode == 1
+    assert "the torque of wrist_roll has the opposite sign" in ran.stdout + ran.stderr
+    refused = days.program("replay", days.fit, turned)
+    assert refused.returncode == 2
+    assert "the measured data contradict the robot: the torque of wrist_roll" in refused.stderr
 
 
 def test_thresholds_hold_for_sound_runs_and_not_for_a_load(days: Days) -> None:

@@ -1,0 +1,77 @@
+"""A check of one's own, as docs/how-to/check.md writes it."""
+
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.checks import rows
+from excite_cli.checks.look import look
+from excite_cli.checks.own import GROUP, own_checks
+from excite_cli.config.load import load_spec
+from excite_cli.errors import ExciteWarning
+from excite_cli.identification.prepare import prepare_all
+from excite_cli.identification.processing import choose_processing
+from tests.simulation.arms import arm, played
+
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "check.md"
+SPEC = load_spec(Path(__file__).parents[2] / "configs" / "ur10.yaml")
+
+
+def block(language: str) -> str:
+    (found,) = re.findall(rf"```{language}\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    return str(found)
+
+
+@pytest.fixture(autouse=True)
+def _read_anew() -> Iterator[None]:
+    own_checks.cache_clear()
+    yield
+    own_checks.cache_clear()
+
+
+def install(folder: Path, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What an installer leaves of the package of the page."""
+    points = tomllib.loads(block("toml"))["project"]["entry-points"][GROUP]
+    (folder / "my_checks.py").write_text(code, encoding="utf-8")
+    info = folder / "my_checks-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my_checks\nVersion: 1.0\n")
+    lines = [f"[{GROUP}]", *(f"{name} = {value}" for name, value in points.items())]
+    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.delitem(sys.modules, "my_checks", raising=False)
+
+
+def test_the_check_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path, block("python"), monkeypatch)
+    robot = arm()
+    (run,) = played(robot, torque_noise=0.01).dataset.runs
+    processing = choose_processing([run], SPEC.measurement.filter)
+    for low, told in ((47.0, []), (41.0, ["the supply sagged to 41 V in"])):
+        runs = [replace(run, extra={"voltage": np.linspace(low, 48.0, len(run.t))})]
+        found = look(robot, runs, prepare_all(runs, processing), SPEC)
+        assert [each.evidence[: len("the supply sagged to 41 V in")] for each in found] == told
+        row = next(e for e in rows.in_order(found, True) if e.name == "voltage of the supply")
+        assert row.status == ("fault" if told else "ok")
+
+
+@pytest.mark.parametrize(
+    ("code", "why"),
+    [
+        ("Supply = 3", "it is not a subclass of Check"),
+        ("from excite_cli.checks.own import Check\nclass Supply(Check): name = 'x'", "lacks look"),
+        ("import nothing_of_that_name", "cannot be loaded"),
+    ],
+)
+def test_one_that_cannot_be_used_is_set_aside(
+    code: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, code, monkeypatch)
+    with pytest.warns(ExciteWarning, match=f"check 'supply'.*set aside.*{why}"):
+        assert own_checks() == ()
