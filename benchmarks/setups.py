@@ -118,11 +118,8 @@ def _judged(
         after = before
         if found.settings:
             after = _error(_set(_case(case, altered.robot), found.settings), file)
-        named_runs = {each.runs for each in own if not altered.key and not altered.told}
-        left_in = [run for run in altered.data.runs if run.name not in named_runs]
-        if 0 < len(left_in) < len(altered.data.runs):  # no key: the person leaves them out
-            write_dataset(file, replace(altered.data, runs=tuple(left_in)), {})
-            after = _error(_case(case, altered.robot), file)
+        if altered.run and {each.runs for each in own} == {altered.run}:
+            after = sound  # no key: the person leaves it out, and the others are as they were
         harmless = not own and before <= HARMLESS * sound
         others = {e.name for e in told if e.status != "ok"} - {*altered.rows} - usual
         return Outcome(

@@ -27,6 +27,7 @@ class Altered:
     """Data as a file has them; `rows` of which one must tell, its `joints`, the `key`.
 
     `robot`: further keys of the config's robot. `told`: a word suffices, since it is repaired.
+    `run`: what is not of this robot.
     """
 
     data: Dataset
@@ -35,6 +36,7 @@ class Altered:
     key: str = ""
     robot: dict[str, Any] = field(default_factory=dict)
     told: bool = False
+    run: str = ""
 
 
 Mistake = Callable[[Dataset, Case, np.random.Generator], Altered]
@@ -208,11 +210,10 @@ def _wrapped(low: float) -> Mistake:
 
 def _stale(data: Dataset, case: Case, rng: np.random.Generator) -> Altered:
     def change(run: Run) -> Run:
-        held = np.flatnonzero(rng.random(len(run.t)) < 0.05)
-        held = held[held > 0]
-        q, tau = run.q.copy(), run.tau.copy()
-        q[held], tau[held] = q[held - 1], tau[held - 1]
-        return replace(run, q=q, tau=tau, dq=None)
+        held = rng.random(len(run.t)) < 0.05
+        fresh = np.maximum.accumulate(np.where(held, 0, np.arange(len(run.t))))
+        dq = None if run.dq is None else run.dq[fresh]
+        return replace(run, q=run.q[fresh], tau=run.tau[fresh], dq=dq)
 
     row = "values that are missing or held"
     return Altered(_runs(data, change), (row,), (), told=True)
@@ -233,7 +234,8 @@ def _foreign(data: Dataset, case: Case, rng: np.random.Generator) -> Altered:
     first, second = data.runs[:2]
     count = min(len(first.t), len(second.t))
     own = replace(first.cut(0, count), tau=second.tau[:count])
-    return Altered(replace(data, runs=(own, *data.runs[1:])), ("runs of this robot",))
+    mixed = replace(data, runs=(own, *data.runs[1:]))
+    return Altered(mixed, ("runs of this robot",), run=first.name)
 
 
 def _filtered(data: Dataset, case: Case, rng: np.random.Generator) -> Altered:

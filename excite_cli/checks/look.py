@@ -42,7 +42,7 @@ def look(
         return []
     own = [each for check in own_checks() for each in check.look(Log(robot, runs, prepared, spec))]
     fit, declared = TextbookFit(robot, samples), Setup.as_declared(robot)
-    steps = list(mistakes(fit, spec))
+    steps = mistakes(fit, spec)
     setup = steps[-1].after.setup if steps else declared
     foreign = foreign_runs.foreign_runs(robot, prepared, declared)
     # Of a wrong set-up some runs show more than others: they are foreign where it is no cure.

@@ -60,6 +60,11 @@ class Step:
     rivals: tuple[tuple[SetupCheck, Setup], ...] = ()
 
     @property
+    def question(self) -> tuple[str, tuple[int, ...], str]:
+        """What is set up: of one question there is one answer."""
+        return self.check.name, self.after.joints, self.after.variant
+
+    @property
     def concerned(self) -> Mask:
         """Joints (n,) whose torques it explains better, or whose own columns it changes."""
         better = _gain(self.left_after, self.left_before) > _GAINS
@@ -103,11 +108,30 @@ class _Candidate:
         return bool(self.cost < other.loss - _CLEAR and falls and shown)
 
 
-def mistakes(fit: TextbookFit, spec: Spec) -> Iterator[Step]:
+def mistakes(fit: TextbookFit, spec: Spec) -> list[Step]:
     """Mistakes, the one that explains most first, until none explains far more.
 
-    What the config says of a joint itself is taken as it is.
+    What the config says of a joint itself is taken as it is. Where there is more than one, the
+    first may have explained in part what is another mistake: then what is found without it is
+    taken, if that explains more, or as much with less.
     """
+    found = list(_steps(fit, spec))
+    if len(found) < 2:
+        return found
+    others = list(_steps(fit, spec, found[0].question))
+    return min(found, others, key=lambda steps: _total(fit, steps))
+
+
+def _total(fit: TextbookFit, steps: Sequence[Step]) -> float:
+    """L of what several steps leave, and what each of them must gain."""
+    left = steps[-1].left_after if steps else fit(Setup.as_declared(fit.robot))
+    return left.loss + sum(_CLEAR + step.after.price for step in steps)
+
+
+def _steps(
+    fit: TextbookFit, spec: Spec, never: tuple[str, tuple[int, ...], str] | None = None
+) -> Iterator[Step]:
+    """Steps, each the best of its turn, without the answers to one question."""
     rough = TextbookFit(fit.robot, fit.samples.thinned(_ROUGH), _FINE)
     setup = Setup.as_declared(fit.robot)
     explained = fit(setup)
@@ -115,7 +139,7 @@ def mistakes(fit: TextbookFit, spec: Spec) -> Iterator[Step]:
         if not explained.judged.any() or explained.shares[explained.judged].max() < _GOOD:
             return
         tried = _candidates(fit, rough, spec, setup, explained)
-        found = [each for each in tried if each.is_far_better(explained)]
+        found = [e for e in tried if e.question != never and e.is_far_better(explained)]
         if not found:
             return
         best = min(found, key=lambda each: each.cost)

@@ -20,6 +20,9 @@ _TRIED = 10.0 ** np.concatenate([np.arange(-4.0, -0.5, 0.5), np.arange(1.0, 4.5,
 # Bodies must be seen to tell the unit: without their torque, so much in L must be lost.
 _WEIGHTLESS, _SEEN, _UNSEEN = 1e3, 0.7, 1.5
 _UNKNOWN = 1e6  # N·m in a unit of the file beside which bodies weigh nothing
+# Of one joint alone another unit is mN·m, or the motor's side of a gear: hardly ever less than 20.
+# Wrists that are mostly friction look like 10 (a UR10's, by a factor of 9).
+_GEARS, _RARE = 20.0, 1.0
 _FINE = np.log([1.8, 1.35, 1.16, 1.08])
 
 
@@ -60,11 +63,12 @@ class TorqueUnit(SetupCheck):
                 nothing = _scaled(setup, found.joints, _UNKNOWN / unit)
                 yield replace(found, setup=nothing, variant="unknown", price=_UNSEEN)
             return
-        yield Alternative(setup, found.joints)
+        rare = _RARE if alone and abs(np.log(unit / usual)) < np.log(_GEARS) else 0.0
+        yield Alternative(setup, found.joints, price=rare)
         for power in 10.0 ** np.array([np.floor(np.log10(unit)), np.ceil(np.log10(unit))]):
             if power != usual:
                 plain = _scaled(setup, found.joints, power / unit)
-                yield Alternative(plain, found.joints, is_plain=True)
+                yield Alternative(plain, found.joints, price=rare, is_plain=True)
 
     def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:
         """How much too large or small."""
