@@ -16,8 +16,6 @@ from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.measurement.reader import check_unpacked, check_values
 
 _MOST_NAMES, _MOST_LETTERS = 1000, 100_000  # texts of a cell; letters of each
-# Empty arrays, which hold their shape, and objects, which hold numbers of MATLAB's own.
-_NO_DATA = ("MATLAB_empty", "MATLAB_object_decode")
 
 
 def mat_hdf5(path: Path) -> tuple[dict[str, Array], list[str]]:
@@ -47,9 +45,9 @@ def _numbers(path: Path, group: Any, prefix: str = "") -> Iterator[tuple[str, An
 
 
 def _is_matrix(item: Any) -> bool:
-    """Whether it holds rows and columns of numbers."""
+    """Whether it holds rows and columns of numbers; objects hold MATLAB's own."""
     numbers = isinstance(item, h5py.Dataset) and item.ndim == 2 and item.dtype.kind in "fiu"
-    return numbers and not _is_text(item) and not any(word in item.attrs for word in _NO_DATA)
+    return numbers and not _is_text(item) and "MATLAB_object_decode" not in item.attrs
 
 
 def _is_text(item: Any) -> bool:
@@ -59,7 +57,7 @@ def _is_text(item: Any) -> bool:
 
 def _names(path: Path, file: Any) -> list[str]:
     """What a variable joint_names holds: a cell of texts, or rows of characters."""
-    held = member(path, file, "joint_names") if "joint_names" in file else None
+    held: Any = member(path, file, "joint_names") if "joint_names" in file else None
     if _is_text(held):
         return [_text(row) for row in np.atleast_2d(held[()].T)]
     cell = isinstance(held, h5py.Dataset) and h5py.check_ref_dtype(held.dtype) is h5py.Reference
