@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 
 from excite_cli.errors import ExciteError, FileError
-from excite_cli.measurement.memory_limit import is_shortage, limited_memory
+from excite_cli.measurement.memory_limit import is_shortage, limited_memory, short_of_memory
 from excite_cli.measurement.reader import check_size
 
 
@@ -32,7 +32,7 @@ def opened(path: Path, kind: str = "HDF5 file") -> Iterator[Any]:
         raise
     except OSError as error:
         if is_shortage(error):
-            raise _short_of_memory(path) from error
+            raise short_of_memory(path) from error
         raise FileError(
             f"{path} is not a readable {kind} ({error}). If it was being written when the "
             "program ended, it is lost."
@@ -40,16 +40,8 @@ def opened(path: Path, kind: str = "HDF5 file") -> Iterator[Any]:
     # Damaged bytes lead the library to whatever error: also of indices, sizes and encodings.
     except Exception as error:
         if is_shortage(error):
-            raise _short_of_memory(path) from error
+            raise short_of_memory(path) from error
         raise FileError(f"{path} is damaged, or not measured data: {error}.") from error
-
-
-def _short_of_memory(path: Path) -> FileError:
-    return FileError(
-        f"{path} has {path.stat().st_size / 2**20:.3g} MiB, and there is not enough memory to read "
-        "it. Free memory, cut it into several runs, or lower its rate. If it is small for that, it "
-        "is damaged."
-    )
 
 
 def member(path: Path, group: Any, name: str) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from excite_cli.errors import ExciteError, FileError, MissingExtraError
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.dataset import Array
-from excite_cli.measurement.memory_limit import limited_memory
+from excite_cli.measurement.memory_limit import is_shortage, limited_memory, short_of_memory
 from excite_cli.measurement.reader import check_size, check_unpacked, check_values
 
 
@@ -41,6 +41,8 @@ def read_parquet(path: Path) -> ParquetTable:
         raise
     # Damaged bytes lead the library to whatever error: of its own, of memory, of encodings.
     except Exception as error:
+        if is_shortage(error):
+            raise short_of_memory(path) from error
         raise FileError(
             f"{path} is not a readable parquet file ({error!s:.300}). If it was being written when "
             "the program ended, it is lost."
@@ -54,6 +56,9 @@ def _library() -> Any:
         raise MissingExtraError(
             "Reading parquet needs the library pyarrow: pip install 'excite-cli[parquet]'"
         ) from error
+    # Its allocator reserves a gibibyte of addresses when it is first used, and `limited_memory`,
+    # within which that fails, counts addresses.
+    pyarrow.allocate_buffer(2**20)
     return pyarrow.parquet
 
 

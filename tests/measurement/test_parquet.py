@@ -1,6 +1,7 @@
 """Parquet: tables named as in a CSV, and datasets of LeRobot as versions 2.1 and 3.0 lay them."""
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,17 @@ LAYOUTS: dict[str, dict[str, tuple[Any, Array]]] = {
 def test_lerobot(tmp_path: Path, layout: str) -> None:
     write_dataset(tmp_path / "set", LAYOUTS[layout])
     assert_same(read(tmp_path, "set/data/chunk-000/file-000.parquet", time="ms"))
+
+
+def test_a_new_process_reads_within_the_limit_of_memory(tmp_path: Path) -> None:
+    """In this one, the library has its memory from writing."""
+    path = write_dataset(tmp_path / "set", LAYOUTS["torques in the state"])
+    program = (
+        "from pathlib import Path; from excite_cli.measurement.parquet_table import read_parquet; "
+        f"print(read_parquet(Path({str(path)!r})).columns['observation.state'].shape)"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert ended.stdout.strip() == f"({len(T)}, 4)", ended.stderr
 
 
 @pytest.mark.parametrize("one_file", [True, False])
