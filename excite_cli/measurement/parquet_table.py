@@ -1,6 +1,5 @@
 """Tables of parquet: columns of numbers, and lists of numbers of one length, which are matrices."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,26 +66,19 @@ def _read(path: Path, file: Any) -> ParquetTable:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise FileError(f"{path}: column '{twice}' is there twice. Give each its own name.")
-    read = [field.name for field in file.schema_arrow if _is_read(field.type)]
-    count = sum(_counts(file.metadata, read))
+    kinds = {field.name: field.type for field in file.schema_arrow if _is_read(field.type)}
+    # Not the parts' own metadata: where they are damaged, looking at them ends the process.
+    count = file.metadata.num_rows * sum(getattr(k, "list_size", 1) for k in kinds.values())
     check_values(path, count)
     check_unpacked(path, 8 * count)
-    if not file.metadata.num_rows or not read:
-        raise FileError(f"{path} has no rows of numbers; its columns: {listed(names)}.")
     with limited_memory(path, 8 * count):
         # Several threads would each reserve addresses, which the limit counts.
-        table = file.read(columns=read, use_threads=False)
-        found = {name: _numbers(table.column(name).combine_chunks()) for name in read}
+        table = file.read(columns=[*kinds], use_threads=False)
+        found = {name: _numbers(table.column(name).combine_chunks()) for name in kinds}
     columns = {name: values for name, values in found.items() if values is not None}
+    if not columns or not table.num_rows:
+        raise FileError(f"{path} has no rows of numbers; its columns: {listed(names)}.")
     return ParquetTable(columns, tuple(name for name in names if name not in columns))
-
-
-def _counts(metadata: Any, columns: list[str]) -> Iterator[int]:
-    """How many numbers each part of these columns claims to hold."""
-    for group in map(metadata.row_group, range(metadata.num_row_groups)):
-        for part in map(group.column, range(group.num_columns)):
-            if any(f"{part.path_in_schema}.".startswith(f"{name}.") for name in columns):
-                yield part.num_values
 
 
 def _is_read(kind: Any) -> bool:
