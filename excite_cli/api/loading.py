@@ -175,8 +175,9 @@ def load_data(
 ) -> Dataset:
     """Measured data of the robot, converted as `measurement` of the config says, and checked.
 
-    Files are HDF5, CSV or bags. Runs have t (T,) in s, q (T, n) in rad (m), tau (T, n) in N·m (N);
-    `findings` tell what was noticed (gaps, jitter, dead channels …), and so does `tell`.
+    Files are HDF5, CSV, MATLAB's, parquet or bags. Runs have t (T,) in s, q (T, n) in rad (m), tau
+    (T, n) in N·m (N); `findings` tell what was noticed (gaps, jitter, dead channels …), and so does
+    `tell`.
 
     Raises
     ------

@@ -14,7 +14,7 @@ def inspect(
     config: options.Config,
     data: Annotated[
         list[Path] | None,
-        typer.Argument(help="Measured data: HDF5, CSV or bags.", show_default=False),
+        typer.Argument(help="Measured data: HDF5, CSV, MATLAB, parquet, bags.", show_default=False),
     ] = None,
     apply: Annotated[
         Path | None,

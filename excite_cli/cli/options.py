@@ -10,7 +10,8 @@ from excite_cli.cli.help_page import MESSAGES, OUTPUT, WORK
 
 Config = Annotated[Path, typer.Argument(help="The problem, a YAML file.", show_default=False)]
 Data = Annotated[
-    list[Path], typer.Argument(help="Measured data: HDF5, CSV or bags.", show_default=False)
+    list[Path],
+    typer.Argument(help="Measured data: HDF5, CSV, MATLAB, parquet, bags.", show_default=False),
 ]
 Sealed = Annotated[
     str | None,

@@ -14,7 +14,9 @@ def study(
     config: options.Config,
     logs: Annotated[
         list[Path] | None,
-        typer.Argument(help="Measured data, a case each: HDF5, CSV or bags.", show_default=False),
+        typer.Argument(
+            help="Measured data, a case each: HDF5, CSV, MATLAB, parquet, bags.", show_default=False
+        ),
     ] = None,
     vary: Annotated[
         list[str] | None,

@@ -20,6 +20,7 @@ from excite_cli.measurement.joined_files import is_part, with_joined
 from excite_cli.measurement.mat_reader import MatReader
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.motors import Motors
+from excite_cli.measurement.parquet_reader import ParquetReader
 from excite_cli.measurement.quality import checked
 from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOptions
 from excite_cli.measurement.run_identity import Origin
@@ -29,7 +30,9 @@ from excite_cli.out_of_core import Spool
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 
-READERS: tuple[Reader, ...] = (Hdf5Reader(), CsvReader(), BagReader(), MatReader())
+READERS: tuple[Reader, ...] = (
+    Hdf5Reader(), CsvReader(), BagReader(), MatReader(), ParquetReader(),
+)  # fmt: skip
 _EPOCH = 1e6  # s: stamps beyond count from 1970, not from the start
 
 
@@ -60,7 +63,7 @@ def read_dataset(
     ConfigError
         `spec` names what neither robot nor file has.
     MissingExtraError
-        A bag, and the library for bags is not installed.
+        A bag or parquet, and the library for it is not installed.
     """
     if not paths:
         raise FileError("No measured file is given.")
@@ -166,11 +169,11 @@ def reader_for(path: Path) -> Reader:
     require_stored(path)
     for reader in READERS:
         if reader.recognises(path):
-            if path.is_dir() and not isinstance(reader, BagReader):
-                break
             return reader
     known = "; ".join(f"{reader.title}: {', '.join(reader.suffixes)}" for reader in READERS)
-    what = "is a folder without a bag" if path.is_dir() else "is of no known format"
+    what = "is of no known format"
+    if path.is_dir():
+        what = "is a folder without a bag or a dataset of LeRobot"
     raise FileError(
         f"{path} {what}. Read are {known}. Other formats: export them to HDF5 or CSV; pickles are "
         "never opened."

@@ -8,7 +8,7 @@ from pathlib import Path
 from excite_cli.errors import FileError, nearest
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.csv_dialects import in_our_names
-from excite_cli.measurement.csv_table import read_table
+from excite_cli.measurement.csv_table import Table, read_table
 from excite_cli.measurement.dataset import Array
 from excite_cli.measurement.reader import (
     CHANNELS,
@@ -33,27 +33,38 @@ class CsvReader(Reader):
 
         Where positions or torques are not in it, it is a part of a run (`joined_files`).
         """
-        table = read_table(path)
-        columns = {_bare(name): values for name, values in table.columns.items()}
-        columns, noticed = in_our_names(columns, table.words)
-        words, samples = listed(list(columns)), len(next(iter(columns.values())))
-        apart = {name: columns.pop(name) for name in [*columns] if wanted.is_apart(name)}
-        wanted = _by_fields(columns, wanted)
-        of_joints = any((w := wanted.called(c)) and _joints(columns, w) for c in CHANNELS)
-        if not of_joints and not apart:
-            raise FileError(_no_columns(path, "q", wanted, words))
-        time = wanted.called("t")
-        stamped = time is not None and time in columns
-        if stamped:
-            t = columns.pop(str(time))
-        else:
-            if wanted.rate is None:
-                words += nearest(time or "t", columns)
-            t = times_from_rate(path, samples, wanted, words)
-        channels, others = _by_channel(columns, wanted)
-        numbered = all(name.isdigit() for name in channels["q"])
-        others |= apart
-        return [RawRun("", t, channels, others, numbered, not stamped, (*table.findings, *noticed))]
+        return [run_of_table(path, read_table(path), wanted)]
+
+
+def run_of_table(path: Path, table: Table, wanted: ReadOptions) -> RawRun:
+    """The run in a table whose columns `<channel>_<joint>` are matched by name.
+
+    Raises
+    ------
+    FileError
+        No column belongs to a channel, or there are no time stamps.
+    """
+    columns = {_bare(name): values for name, values in table.columns.items()}
+    columns, noticed = in_our_names(columns, table.words)
+    words, samples = listed(list(columns)), len(next(iter(columns.values())))
+    apart = {name: columns.pop(name) for name in [*columns] if wanted.is_apart(name)}
+    wanted = _by_fields(columns, wanted)
+    of_joints = any((w := wanted.called(c)) and _joints(columns, w) for c in CHANNELS)
+    if not of_joints and not apart:
+        raise FileError(_no_columns(path, "q", wanted, words))
+    time = wanted.called("t")
+    stamped = time is not None and time in columns
+    if stamped:
+        t = columns.pop(str(time))
+    else:
+        if wanted.rate is None:
+            words += nearest(time or "t", columns)
+        t = times_from_rate(path, samples, wanted, words)
+    channels, others = _by_channel(columns, wanted)
+    numbered = all(name.isdigit() for name in channels["q"])
+    others |= apart
+    findings = (*table.findings, *noticed)
+    return RawRun("", t, channels, others, numbered, not stamped, findings)
 
 
 def _by_fields(columns: Mapping[str, Array], wanted: ReadOptions) -> ReadOptions:

@@ -38,7 +38,7 @@ class Table:
     """Named columns (T,) of numbers; NaN where a field was empty; `words`: columns of one word."""
 
     columns: dict[str, Array]
-    findings: tuple[Finding, ...]
+    findings: tuple[Finding, ...] = ()
     words: dict[str, str] = field(default_factory=dict)
 
 

@@ -10,16 +10,16 @@ from typing import Any
 import h5py
 import numpy as np
 
-from excite_cli.errors import ExciteError, FileError
+from excite_cli.errors import FileError
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.dataset import Array, Finding
+from excite_cli.measurement.foreign_hdf5 import member, opened
 from excite_cli.measurement.hdf5_attributes import attribute
-from excite_cli.measurement.memory_limit import is_shortage, limited_memory
+from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.measurement.reader import (
     RawRun,
     Reader,
     ReadOptions,
-    check_size,
     check_unpacked,
     check_values,
     times_from_rate,
@@ -38,37 +38,13 @@ class Hdf5Reader(Reader):
 
     def read(self, path: Path, wanted: ReadOptions) -> list[RawRun]:
         """All runs, in the file's order; columns carry the names of `joint_names`."""
-        check_size(path)
-        try:
-            with limited_memory(path), h5py.File(path, "r") as file:
-                return _runs(path, file, wanted)
-        except ExciteError:
-            raise
-        except OSError as error:
-            if is_shortage(error):
-                raise _short_of_memory(path) from error
-            raise FileError(
-                f"{path} is not a readable HDF5 file ({error}). If it was being written when the "
-                "program ended, it is lost."
-            ) from error
-        # Damaged bytes lead the library to whatever error: also of indices, sizes and encodings.
-        except Exception as error:
-            if is_shortage(error):
-                raise _short_of_memory(path) from error
-            raise FileError(f"{path} is damaged, or not measured data: {error}.") from error
-
-
-def _short_of_memory(path: Path) -> FileError:
-    return FileError(
-        f"{path} has {path.stat().st_size / 2**20:.3g} MiB, and there is not enough memory to read "
-        "it. Free memory, cut it into several runs, or lower its rate. If it is small for that, it "
-        "is damaged."
-    )
+        with opened(path) as file:
+            return _runs(path, file, wanted)
 
 
 def _runs(path: Path, file: Any, wanted: ReadOptions) -> list[RawRun]:
     if "runs" in file:
-        group = _member(path, file, "runs")
+        group = member(path, file, "runs")
         if not isinstance(group, h5py.Group):
             raise FileError(f"{path}: 'runs' is not a group; runs lie in /runs/<name>/.")
         found = _groups(path, group, wanted, "", _DEPTH)
@@ -105,37 +81,20 @@ def _needed(wanted: ReadOptions) -> str:
     return ", ".join(wanted.called(name) or name for name in ("t", *wanted.needed))
 
 
-def _member(path: Path, group: Any, name: str) -> Any:
-    """An object of the file itself; links may lead anywhere, also out of the file."""
-    link = group.get(name, getlink=True)
-    if not isinstance(link, h5py.HardLink):
-        raise FileError(
-            f"{path}: '{group.name.rstrip('/')}/{name}' is a link; only data in the file itself "
-            "is read. Copy the data in place of the link."
-        )
-    member = group[name]
-    if isinstance(member, h5py.Dataset) and (member.is_virtual or member.external):
-        raise FileError(
-            f"{path}: '{member.name}' keeps its data in other files; only data in the file itself "
-            "is read."
-        )
-    return member
-
-
 def _groups(
     path: Path, group: Any, wanted: ReadOptions, prefix: str, depth: int
 ) -> list[tuple[str, Any]]:
     """Groups that hold positions, with their names: `run`, or `run/1`."""
     found: list[tuple[str, Any]] = []
     for name in group:
-        member = _member(path, group, name)
-        if not isinstance(member, h5py.Group):
+        lower = member(path, group, name)
+        if not isinstance(lower, h5py.Group):
             continue
         inner = f"{prefix}{name}"
-        if (wanted.called("q") or "q") in member or depth == 1:
-            found.append((inner, member))
+        if (wanted.called("q") or "q") in lower or depth == 1:
+            found.append((inner, lower))
         else:
-            found += _groups(path, member, wanted, f"{inner}/", depth - 1) or [(inner, member)]
+            found += _groups(path, lower, wanted, f"{inner}/", depth - 1) or [(inner, lower)]
     return found
 
 
@@ -160,7 +119,7 @@ def _run(path: Path, file: Any, group: Any, name: str, wanted: ReadOptions) -> R
             )
     for channel in ("t", "q", "dq", "tau"):
         if (wanted.called(channel) or "") in group:
-            _member(path, group, wanted.called(channel) or "")
+            member(path, group, wanted.called(channel) or "")
     names = _joint_names(where, file, group)
     q = _values(path, group, wanted.called("q") or "q")
     samples = len(q)
@@ -233,7 +192,7 @@ def _fits(dataset: Any, samples: int) -> bool:
 
 
 def _values(path: Path, group: Any, name: str) -> Array:
-    dataset = _member(path, group, name)
+    dataset = member(path, group, name)
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiub":
         raise FileError(f"{path}: '{group.name.rstrip('/')}/{name}' does not hold numbers.")
     if dataset.ndim not in (1, 2) or not dataset.size:

@@ -1,13 +1,17 @@
-"""MATLAB's `.mat` up to version 7: variables t, q, tau[, dq], each (T, n) or (n, T)."""
+"""MATLAB's `.mat`: variables t, q, tau[, dq], each (T, n) or (n, T), or fields of a struct."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from excite_cli.errors import FileError
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.dataset import Array
+from excite_cli.measurement.mat_hdf5 import mat_hdf5
+from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.measurement.reader import (
     CHANNELS,
     RawRun,
@@ -27,8 +31,7 @@ class MatReader(Reader):
 
     def read(self, path: Path, wanted: ReadOptions) -> list[RawRun]:
         """The file's only run; columns carry numbers unless a variable joint_names names them."""
-        held = _variables(path)
-        check_values(path, sum(values.size for values in held.values()))
+        held, named = mat_hdf5(path) if h5py.is_hdf5(path) else _before_7_3(path)
         words = listed([*held])
         time = wanted.called("t")
         stamped = time is not None and time in held
@@ -37,11 +40,11 @@ class MatReader(Reader):
         if missing:
             raise FileError(
                 f"{path} has no variable '{wanted.called(missing[0])}'; its variables: {words}. "
-                f"Another name: measurement.channels: {{{missing[0]}: …}}."
+                f"Another name: measurement.channels: {{{missing[0]}: …}}. Of a timeseries save "
+                "Time and Data as arrays."
             )
         samples = held[str(time)].size if stamped else max(found["q"].shape)
         t = held[str(time)].ravel() if stamped else times_from_rate(path, samples, wanted, words)
-        named = _names(path)
         columns = {}
         for channel, values in found.items():
             rows = values if len(values) == samples else values.T
@@ -57,33 +60,40 @@ class MatReader(Reader):
         return [RawRun("", np.asarray(t, float), columns, {}, numbered, not stamped)]
 
 
+def _before_7_3(path: Path) -> tuple[dict[str, Array], list[str]]:
+    """Variables of numbers, and texts of `joint_names`: a cell, or rows of characters."""
+    loaded = _loaded(path)
+    held = dict(_numbers(loaded))
+    check_values(path, sum(values.size for values in held.values()))
+    given = loaded.get("joint_names")
+    names = given.ravel() if isinstance(given, np.ndarray) else ()
+    return held, [str(np.ravel(each)[0] if np.size(each) else "").strip() for each in names]
+
+
 def _loaded(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat  # takes a moment to import
-    from scipy.io.matlab import MatReadError
 
     check_size(path)
     try:
-        return dict(loadmat(path, squeeze_me=False, chars_as_strings=True))
+        with limited_memory(path):
+            return dict(loadmat(path, squeeze_me=False, chars_as_strings=True))
     except NotImplementedError as error:
         raise FileError(
-            f"{path} is of MATLAB's version 7.3. Save it with save(…, '-v7'), or as HDF5 with "
-            "datasets t, q, tau."
+            f"{path} says that it is of MATLAB's version 7.3, and is damaged or cut off. Save it "
+            "again."
         ) from error
-    except (MatReadError, ValueError, TypeError, KeyError, OSError, EOFError) as error:
+    # Damaged bytes lead the library to whatever error, also of indices, sizes and memory.
+    except Exception as error:
         raise FileError(f"{path} is no readable MATLAB file: {error}.") from error
 
 
-def _variables(path: Path) -> dict[str, Array]:
-    found = {}
-    for name, values in _loaded(path).items():
-        if isinstance(values, np.ndarray) and values.dtype.kind in "fiu" and values.ndim == 2:
-            found[name] = values
-    return found
-
-
-def _names(path: Path) -> list[str]:
-    """What a variable joint_names holds: a cell of texts, or rows of characters."""
-    given = _loaded(path).get("joint_names")
-    if not isinstance(given, np.ndarray):
-        return []
-    return [str(np.ravel(each)[0] if np.size(each) else "").strip() for each in given.ravel()]
+def _numbers(held: dict[str, Any]) -> Iterator[tuple[str, Array]]:
+    """Matrices of numbers, those in a struct as `log.q`."""
+    for name, values in held.items():
+        if not isinstance(values, np.ndarray) or values.ndim != 2:
+            continue
+        if values.dtype.kind in "fiu":
+            yield name, values
+        elif values.dtype.names and values.size == 1 and "." not in name:
+            fields = {f"{name}.{field}": values[field].item() for field in values.dtype.names}
+            yield from _numbers(fields)

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from excite_cli.errors import FileError
+
 _LEAST = 2**30  # bytes that any file may take
 _PER_BYTE = 24  # of memory for each of the file: as doubles, with copies in between
 _COPIES = 4  # of what it unpacks to: the packed part grows by doubling, then the doubles
@@ -48,6 +50,15 @@ def limited_memory(path: Path, unpacked: int = 0) -> Iterator[None]:
 def is_shortage(error: BaseException) -> bool:
     """Whether memory was refused: by Python, or inside a library that says so in words only."""
     return isinstance(error, MemoryError) or "allocat" in str(error).lower()
+
+
+def short_of_memory(path: Path) -> FileError:
+    """What is said of a file for which memory was refused."""
+    return FileError(
+        f"{path} has {path.stat().st_size / 2**20:.3g} MiB, and there is not enough memory to read "
+        "it. Free memory, cut it into several runs, or lower its rate. If it is small for that, it "
+        "is damaged."
+    )
 
 
 class _Limit:

@@ -95,8 +95,8 @@ class Reader(ABC):
     suffixes: ClassVar[tuple[str, ...]]
 
     def recognises(self, path: Path) -> bool:
-        """Whether the file's name is one of this format."""
-        return path.name.lower().endswith(self.suffixes)
+        """Whether it is a file whose name is one of this format."""
+        return path.name.lower().endswith(self.suffixes) and not path.is_dir()
 
     @abstractmethod
     def read(self, path: Path, wanted: ReadOptions) -> list[RawRun]:

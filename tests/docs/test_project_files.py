@@ -210,7 +210,7 @@ def test_what_messages_say_to_install_is_there() -> None:
                 if path.suffix == ".py":
                     assert any(each in source for each in own), f"{path.name}: {found[1]}"
                 seen.add(found[1])
-    assert {"plot", "bags", "view", "sim", "cluster", "formats"} <= seen
+    assert {"plot", "bags", "parquet", "view", "sim", "cluster", "formats"} <= seen
 
 
 def test_the_command_and_the_module_have_the_names_that_are_told() -> None:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -98,6 +99,86 @@ def test_matlab(tmp_path: Path, rows: bool) -> None:
     held = {"t": T, "q": turned(Q[:, ::-1]), "tau": turned(TAU[:, ::-1]), "joint_names": names}
     savemat(tmp_path / "log.mat", held)
     assert_same(read(tmp_path, "log.mat"))
+
+
+def save_7_3(path: Path, held: dict[str, Any]) -> None:
+    """As MATLAB's `save(…, '-v7.3')`: after a header of 512 bytes, HDF5 of transposed arrays."""
+
+    def put(group: Any, name: str, kind: str, values: Any) -> Any:
+        group[name] = values
+        group[name].attrs["MATLAB_class"] = np.bytes_(kind)
+        return group[name]
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in held.items():
+            where = file
+            for part in name.split(".")[:-1]:
+                where = where.require_group(part)
+                where.attrs["MATLAB_class"] = np.bytes_("struct")
+            name = name.split(".")[-1]
+            if isinstance(values, np.ndarray):
+                put(where, name, "double", np.atleast_2d(values).T)
+            elif isinstance(values, str):
+                put(where, name, "char", np.array([[ord(c)] for c in values], "u2"))
+            else:
+                cells = [np.array([[ord(c)] for c in text], "u2") for text in values]
+                refs = [put(file, f"#refs#/{k}", "char", text).ref for k, text in enumerate(cells)]
+                put(where, name, "cell", np.array([refs], h5py.ref_dtype))
+        put(file, "nothing", "double", np.zeros(2, "u8")).attrs["MATLAB_empty"] = np.uint8(1)
+    header = b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\0\x02IM"
+    path.write_bytes(header.ljust(512, b"\0") + path.read_bytes()[512:])
+
+
+@pytest.mark.parametrize("rows", [True, False])
+def test_matlab_7_3(tmp_path: Path, rows: bool) -> None:
+    turned = (lambda x: x) if rows else np.transpose
+    held = {"t": T, "q": turned(Q[:, ::-1]), "tau": turned(TAU[:, ::-1]), "note": "warm"}
+    save_7_3(tmp_path / "log.mat", {**held, "joint_names": list(JOINTS[::-1])})
+    assert_same(read(tmp_path, "log.mat"))
+
+
+@pytest.mark.parametrize("version", ["7", "7.3"])
+def test_a_struct_of_matlab(tmp_path: Path, version: str) -> None:
+    held = {"t": T, "q": Q, "tau": TAU}
+    if version == "7":
+        savemat(tmp_path / "log.mat", {"log": held})
+    else:
+        save_7_3(tmp_path / "log.mat", {f"log.{name}": values for name, values in held.items()})
+    with pytest.raises(
+        FileError,
+        match=r"no variable 'q'; its variables: log.q, log.t, log.tau|"
+        r"no variable 'q'; its variables: log.t, log.q, log.tau",
+    ):
+        read(tmp_path, "log.mat")
+    assert_same(read(tmp_path, "log.mat", channels={name: f"log.{name}" for name in held}))
+
+
+def test_a_wrong_file_of_matlab_7_3_gets_one_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    save_7_3(path, {"t": T, "q": Q, "tau": TAU})
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(FileError, match=r"not a readable MATLAB file of version 7\.3"):
+        read(tmp_path, "log.mat")
+    save_7_3(path, {"t": T, "pos": Q})
+    with h5py.File(path, "a") as file:  # a timeseries
+        file["q"] = np.array([[0xDD000000, 2, 1, 1, 1, 1]], "u4")
+        file["q"].attrs["MATLAB_object_decode"] = np.int32(3)
+    with pytest.raises(FileError, match=r"no variable 'q'; .*: pos, t\..* Time and Data"):
+        read(tmp_path, "log.mat")
+
+
+def test_a_cell_of_matlab_7_3_leads_nowhere_outside(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    save_7_3(path, {"t": T, "q": Q, "tau": TAU, "joint_names": list(JOINTS)})
+    with h5py.File(path, "a") as file:
+        del file["#refs#/0"]
+        where = [("/etc/passwd", 0, 8)]
+        file.create_dataset("#refs#/0", (4, 1), "u2", external=where)
+        refs = [file["#refs#/0"].ref, file["#refs#/1"].ref]
+        file["joint_names"][...] = np.array([refs], h5py.ref_dtype)
+    with pytest.raises(FileError, match="only data in the file itself"):
+        read(tmp_path, "log.mat")
 
 
 @pytest.mark.parametrize(
