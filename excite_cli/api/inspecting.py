@@ -17,7 +17,6 @@ from excite_cli.api.loading import (
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_atomically
 from excite_cli.checks import rows
-from excite_cli.checks.bodies import impossible_bodies
 from excite_cli.checks.look import look
 from excite_cli.checks.result import Result
 from excite_cli.config.amended import amended, with_values
@@ -83,7 +82,7 @@ def inspect(
     case = Case(problem.spec, problem.folder, problem.robot, problem.file)
     files = [data] if isinstance(data, str | Path) else list(data)
     with held({"apply": apply}, overwrite, inputs_of(problem, *files)):
-        found = impossible_bodies(case.robot)
+        found = rows.of_description(case.robot)
         settings: dict[str, Any] = {}
         runs: tuple[str, ...] = ()
         for _ in range(_ROUNDS if files else 0):

@@ -2,11 +2,20 @@
 
 from collections.abc import Sequence
 
-from excite_cli.checks import bodies, foreign_runs, look, standing_legs
+from excite_cli.checks import (
+    bodies,
+    foreign_runs,
+    look,
+    solids,
+    standing_legs,
+    two_sides,
+    zero_limits,
+)
 from excite_cli.checks.own import own_checks
 from excite_cli.checks.result import Result, Status
 from excite_cli.checks.set_up import CHECKS
 from excite_cli.measurement.dataset import Finding
+from excite_cli.robot.model import Robot
 
 # What is seen while files are read, by the kind of finding.
 _OF_FILES: dict[str, tuple[str, ...]] = {
@@ -23,12 +32,23 @@ _OF_FILES: dict[str, tuple[str, ...]] = {
     "units of positions and time": ("units", "gain", "lag"),
     "limits of the joints": ("outside_limits", "torque_units"),
 }  # fmt: skip
+_OF_DESCRIPTION = (bodies.NAME, solids.NAME, two_sides.NAME, zero_limits.NAME)
 NAMES = (
-    bodies.NAME, *_OF_FILES, foreign_runs.NAME, standing_legs.NAME,
+    *_OF_DESCRIPTION, *_OF_FILES, foreign_runs.NAME, standing_legs.NAME,
     *(check.name for check in CHECKS), look.BELONG,
 )  # fmt: skip
 _OTHER = "what else was noticed"
 _STATUS: dict[str, Status] = {"error": "fault", "warning": "doubt", "note": "ok"}
+
+
+def of_description(robot: Robot) -> list[Result]:
+    """Doubts and faults of the description alone."""
+    return [
+        *bodies.impossible_bodies(robot),
+        *solids.misfit_solids(robot),
+        *two_sides.unequal_halves(robot),
+        *zero_limits.zero_limits(robot),
+    ]
 
 
 def of_files(findings: Sequence[Finding]) -> list[Result]:
@@ -49,7 +69,7 @@ def in_order(found: Sequence[Result], judged: bool) -> tuple[Result, ...]:
     rows: list[Result] = []
     for name in (*NAMES, *(check.name for check in own_checks()), _OTHER):
         own = [each for each in found if each.name == name]
-        if not own and (judged or name == bodies.NAME) and name != _OTHER:
+        if not own and (judged or name in _OF_DESCRIPTION) and name != _OTHER:
             own = [Result(name, "")]
         rows += own
     return tuple(rows)

@@ -81,7 +81,7 @@ def test_two_faults_their_keys_and_the_config_that_settles_them(folder: Path, ca
 def test_the_description_alone(folder: Path, cache: Path) -> None:
     said = Program(folder, cache)("inspect", "arm.yaml")
     assert said.returncode == 0, said.stderr
-    assert said.stdout.startswith("Nothing is wrong: 1 check")
+    assert said.stdout.startswith("Nothing is wrong: 4 checks")
 
 
 def test_nothing_to_apply(folder: Path, cache: Path) -> None:

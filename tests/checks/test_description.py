@@ -1,0 +1,226 @@
+"""The description alone: mistakes planted into random arms of solid bodies, and sound ones."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from excite_cli.api.inspecting import inspect
+from excite_cli.api.loading import load_case
+from excite_cli.checks.result import Result
+from excite_cli.checks.rows import NAMES, of_description
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.robot.model import Array, build_robot
+
+Link = dict[str, Any]
+_SIDES = ("left", "right")
+
+
+def arms(seed: int, joints: int = 4) -> list[Link]:
+    """Links of two arms, the right one the left's mirror image: many points of mass in a box.
+
+    Each link stands out along x from its joint, as long as its next joint is away. Its frame and
+    the axes of its inertia are turned.
+    """
+    rng = np.random.default_rng(seed)
+    links = []
+    for k in range(joints):
+        size = np.array([rng.uniform(0.2, 0.5), *rng.uniform(0.08, 0.12, 2)])
+        mass = rng.uniform(300.0, 2000.0) * float(size.prod())
+        angles = rng.uniform(-1.0, 1.0, 3)
+        points = (rng.random((200, 3)) - [0.0, 0.5, 0.5]) * size
+        for side, turn in zip(_SIDES, (1.0, -1.0), strict=True):
+            own = points * [1.0, turn, 1.0]
+            centre = own.mean(axis=0)
+            links.append({
+                "name": f"{side}_{k}", "parent": f"{side}_{k - 1}" if k else "base", "mass": mass,
+                "size": size, "at": links[-2]["size"][0] if k else 0.0, "centre": centre,
+                "inertia": mass * inertia_of(own - centre), "turn": turn * angles,
+                "limit": 'velocity="2" effort="50"',
+            })  # fmt: skip
+    return links
+
+
+def inertia_of(points: Array) -> Array:
+    """About the origin (3, 3) [m²], of points (N, 3) that weigh 1 kg together."""
+    second = points.T @ points / len(points)
+    return np.asarray(np.trace(second) * np.eye(3) - second)
+
+
+def urdf_of(links: list[Link]) -> str:
+    text = '<robot name="arms"><link name="base"/>'
+    for link in links:
+        c, s, axes = link["centre"], link["size"], Rotation.from_euler("xyz", link["turn"])
+        i = axes.as_matrix().T @ link["inertia"] @ axes.as_matrix()
+        box, rpy = " ".join(map(str, s)), " ".join(map(str, link["turn"]))
+        text += (
+            f'<link name="{link["name"]}"><inertial><origin xyz="{c[0]} {c[1]} {c[2]}" '
+            f'rpy="{rpy}"/>'
+            f'<mass value="{link["mass"]}"/><inertia ixx="{i[0, 0]}" iyy="{i[1, 1]}" '
+            f'izz="{i[2, 2]}" ixy="{i[0, 1]}" ixz="{i[0, 2]}" iyz="{i[1, 2]}"/></inertial>'
+            f'<collision><origin xyz="{s[0] / 2} 0 0"/><geometry><box size="{box}"/></geometry>'
+            f'</collision></link><joint name="to_{link["name"]}" type="revolute">'
+            f'<axis xyz="0 0 1"/><parent link="{link["parent"]}"/><child link="{link["name"]}"/>'
+            f'<origin xyz="{link["at"]} 0 0" rpy="{rpy}"/>'
+            f'<limit lower="-1" upper="1" {link["limit"]}/></joint>'
+        )
+    return f"{text}</robot>"
+
+
+def judged(links: list[Link], **keys: Any) -> list[Result]:
+    """What is doubted, but for what test_bodies.py tries."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "arms.urdf").write_text(urdf_of(links), encoding="utf-8")
+        found = of_description(build_robot(RobotSpec(urdf="arms.urdf", **keys), Path(folder)))
+    return [each for each in found if each.kind != "impossible_body"]
+
+
+seeds = st.integers(0, 10_000)
+few_examples = settings(max_examples=20, deadline=None)
+
+
+@few_examples
+@given(seeds)
+def test_sound_arms_are_quiet(seed: int) -> None:
+    assert judged(arms(seed)) == []
+
+
+def heavy(link: Link) -> None:
+    link["mass"] *= 1e3
+    link["inertia"] = link["inertia"] * 1e3
+
+
+def light(link: Link) -> None:
+    link["mass"] *= 1e-4
+    link["inertia"] = link["inertia"] * 1e-4
+
+
+def in_grams(link: Link) -> None:
+    link["inertia"] = link["inertia"] * 1e3
+
+
+def far_centre(link: Link) -> None:
+    link["centre"] = link["centre"] + 1.5 * link["size"][0]
+
+
+@few_examples
+@given(seeds, st.integers(0, 3))
+@pytest.mark.parametrize(
+    ("plant", "kind"),
+    [
+        (heavy, "density"),
+        (light, "density"),
+        (in_grams, "outside_shape"),
+        (far_centre, "outside_shape"),
+    ],
+)
+def test_one_link_that_does_not_fit_its_shape(
+    plant: Callable[[Link], None], kind: str, seed: int, at: int
+) -> None:
+    links = arms(seed)
+    for link in links[2 * at : 2 * at + 2]:  # the same on both sides
+        plant(link)
+    found = judged(links)
+    assert [(each.kind, each.status) for each in found] == [(kind, "doubt")]
+    assert set(found[0].joints) == {f"to_left_{at}", f"to_right_{at}"}
+    assert f"left_{at}" in found[0].evidence
+    assert f"right_{at}" in found[0].evidence
+
+
+@few_examples
+@given(seeds)
+def test_links_that_are_held_stand_in_their_own_frames(seed: int) -> None:
+    links = arms(seed)
+    assert judged(links, joints=["to_left_0"]) == []
+    far_centre(links[4])
+    found = judged(links, joints=["to_left_0"])
+    assert [each.joints for each in found] == [("to_left_0",)]
+    assert found[0].evidence.startswith("left_2: ")
+
+
+@few_examples
+@given(seeds)
+def test_inertias_about_the_frames_of_the_links(seed: int) -> None:
+    links = arms(seed)
+    for link in links:
+        link["inertia"] = link["inertia"] + link["mass"] * inertia_of(link["centre"][None])
+    found = judged(links)
+    assert [each.kind for each in found] == ["inertia_frame"]
+    moved = sum(link["mass"] for link in links)
+    shown = {f"to_{link['name']}" for link in links if link["mass"] > 0.01 * moved}
+    assert set(found[0].joints) == shown
+
+
+@few_examples
+@given(seeds, st.floats(1.6, 1.9), st.sampled_from(["mass", "inertia"]))
+def test_halves_that_differ(seed: int, factor: float, what: str) -> None:
+    links = arms(seed)
+    links[3][what] = links[3][what] * factor
+    found = [each for each in judged(links) if each.kind == "unequal_halves"]
+    assert len(found) == 1
+    assert "left_1 and right_1" in found[0].evidence
+    links[3][what] = links[2][what] * 1.4
+    assert all(each.kind != "unequal_halves" for each in judged(links))
+
+
+@pytest.mark.parametrize(
+    ("left", "right"),
+    [("l_arm", "r_arm"), ("arm_L", "arm_R"), ("LArmLink", "RArmLink"), ("FL_hip", "FR_hip"),
+     ("LH_HIP", "RH_HIP"), ("LeftFoot", "RightFoot"), ("L_l1", "R_l1")],
+)  # fmt: skip
+def test_names_of_two_sides(left: str, right: str) -> None:
+    links = arms(1, joints=1)
+    links[0]["name"], links[1]["name"] = left, right
+    links[1]["mass"] *= 2.0
+    assert f"{left} and {right}" in judged(links)[0].evidence
+
+
+def test_a_little_and_a_ring_finger_are_no_two_sides() -> None:
+    links = arms(1, joints=1)
+    links[0]["name"], links[1]["name"] = "L_lf_1", "L_rf_1"
+    links[1]["mass"] *= 2.0
+    assert judged(links) == []
+
+
+@pytest.mark.parametrize("key", ["velocity", "effort"])
+def test_limits_of_zero(key: str) -> None:
+    links = arms(2)
+    links[2]["limit"] = links[2]["limit"].replace(f'{key}="', f'{key}="0" was="')
+    found = judged(links)
+    assert [(each.kind, each.joints) for each in found] == [(f"zero_{key}", ("to_left_1",))]
+    assert f"robot.limits.to_left_1.{key}" in found[0].evidence
+    assert judged(links, limits={"to_left_1": {key: 3.0}}) == []
+    assert judged(links, joints=["to_right_1"]) == []
+
+
+def test_shapes_that_cannot_be_read_are_none(tmp_path: Path) -> None:
+    links = arms(3)
+    for link in links[:4]:
+        heavy(link)
+    text = urdf_of(links).replace('<box size="', '<mesh filename="missing.stl" was="', 2)
+    (tmp_path / "arms.urdf").write_text(text, encoding="utf-8")
+    found = of_description(build_robot(RobotSpec(urdf="arms.urdf"), tmp_path))
+    assert [each.joints for each in found] == [("to_left_1", "to_right_1")]
+
+
+def test_the_ground_is_in_no_torque() -> None:
+    links = arms(4, joints=2)
+    for link in links:
+        in_grams(link)
+    joints = ["to_left_1", "to_right_1"]
+    assert judged(links, joints=joints)[0].joints == tuple(joints)
+    floating = judged(links, joints=joints, base="floating", rows=("base", "joints"))
+    assert "left_0" in floating[0].evidence
+
+
+def test_rows_of_inspect_without_data(tmp_path: Path) -> None:
+    (tmp_path / "arms.urdf").write_text(urdf_of(arms(5)), encoding="utf-8")
+    found = inspect(load_case({"robot": {"urdf": str(tmp_path / "arms.urdf")}}))
+    assert tuple(each.name for each in found.results) == NAMES[:4]
+    assert all(each.status == "ok" for each in found.results)
