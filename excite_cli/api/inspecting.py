@@ -15,7 +15,8 @@ from excite_cli.api.loading import (
     measured_case,
 )
 from excite_cli.api.outputs import held
-from excite_cli.atomic import write_atomically
+from excite_cli.api.paths import page_path
+from excite_cli.atomic import write_atomically, write_text_atomically
 from excite_cli.checks import rows
 from excite_cli.checks.look import look
 from excite_cli.checks.result import Result
@@ -27,6 +28,8 @@ from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.merged_findings import joined, merged
+from excite_cli.report.inspection_page import inspection_page
+from excite_cli.report.page import render
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.note import Tell, log_note
 from excite_cli.shown.record import Shown, show
@@ -59,6 +62,7 @@ def inspect(
     data: str | Path | Sequence[str | Path] = (),
     *,
     apply: str | Path | None = None,
+    output: str | Path | None = None,
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> LogInspection:
@@ -67,6 +71,7 @@ def inspect(
     Without `data` the description alone is judged. What would settle a fault or a doubt is tried,
     and the data are looked at once more with it, until nothing new is found. With `apply` the
     config that says so is written, its comments kept; where nothing is to be changed, as it is.
+    `output`: a page (HTML) of all checks.
 
     Returns
     -------
@@ -76,12 +81,13 @@ def inspect(
     Raises
     ------
     ConfigError, FileError
-        A file cannot be read at all.
+        A file cannot be read at all; `output` is no name of a page; a file exists already.
     """
     problem = measured_case(problem)
     case = Case(problem.spec, problem.folder, problem.robot, problem.file)
     files = [data] if isinstance(data, str | Path) else list(data)
-    with held({"apply": apply}, overwrite, inputs_of(problem, *files)):
+    page = None if output is None else page_path(output)
+    with held({"apply": apply, "output": page}, overwrite, inputs_of(problem, *files)):
         found = rows.of_description(case.robot)
         settings: dict[str, Any] = {}
         runs: tuple[str, ...] = ()
@@ -101,6 +107,9 @@ def inspect(
         inspection = LogInspection(rows.in_order(found, bool(files)), settings, runs)
         if apply is not None:
             _write(Path(apply), problem, settings)
+        if page is not None:
+            title = f"Set-up of {case.robot.name}"
+            write_text_atomically(page, render(inspection_page(inspection, title)))
         return inspection
 
 

@@ -25,6 +25,16 @@ def inspect(
             rich_help_panel=OUTPUT,
         ),
     ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="PAGE.html",
+            help="A page with all checks and their evidence.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
     overrides: options.Set = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
@@ -56,9 +66,10 @@ def inspect(
             load_case(config, overrides or ()),
             files,
             apply=apply,
+            output=output,
             overwrite=overwrite,
             tell=terminal.tell,
         )
     written = None if apply is None else str(apply)
-    given = tuple(map(str, files))
-    terminal.show(inspection_answer(found, str(config), given, written))
+    page = None if output is None else str(output)
+    terminal.show(inspection_answer(found, str(config), tuple(map(str, files)), written, page))

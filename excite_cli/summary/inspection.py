@@ -27,22 +27,24 @@ class Inspected(Protocol):
 
 
 def inspection_answer(
-    found: Inspected, config: str = "", data: tuple[str, ...] = (), applied: str | None = None
+    found: Inspected,
+    config: str = "",
+    data: tuple[str, ...] = (),
+    applied: str | None = None,
+    page: str | None = None,
 ) -> Answer:
     """What `excite inspect` answers; status 1 with a fault."""
-    return Answer((*_parts(found, config, data, applied),), _data(found, applied), found.good)
+    parts = _parts(found, config, data, {"apply": applied, "page": page})
+    return Answer((*parts,), {**_data(found, applied), "page": page}, found.good)
 
 
 def inspection_parts(found: Inspected) -> list[Part]:
     """The headline, the rows, and the evidence of what is not fine."""
-    return _parts(found, "", (), None)
+    return _parts(found, "", (), {})
 
 
-def _parts(found: Inspected, config: str, data: tuple[str, ...], applied: str | None) -> list[Part]:
-    faults, doubts = (
-        [each for each in found.results if each.status == status] for status in ("fault", "doubt")
-    )
-    parts: list[Part] = [headline(found)]
+def checks_table(found: Inspected) -> Table:
+    """A row for every check: its status, its joints, and what settles it."""
     rows = tuple(
         (each.name, each.status, ", ".join(each.joints), written(each.settings))
         for each in found.results
@@ -50,10 +52,25 @@ def _parts(found: Inspected, config: str, data: tuple[str, ...], applied: str | 
     bold = tuple(k for k, each in enumerate(found.results) if each.status != "ok")
     columns = ("check", "status", "joints", "settled by")
     words = ("joints", "settled by")
-    parts.append(Table("Before any physics", columns, rows, columns, words, bold))
-    parts += [f"{each.status}: {_where(each)}{each.evidence}." for each in (*faults, *doubts)]
-    noted = [each for each in found.results if each.status == "ok" and each.evidence]
-    parts += [f"{each.evidence}." for each in noted]
+    return Table("Before any physics", columns, rows, columns, words, bold)
+
+
+def remarks(found: Inspected) -> list[str]:
+    """The evidence: of faults, then of doubts, then what was repaired."""
+    texts = []
+    for status, lead in (("fault", "fault: "), ("doubt", "doubt: "), ("ok", "")):
+        own = [each for each in found.results if each.status == status and each.evidence]
+        texts += [f"{lead}{_where(each) if lead else ''}{each.evidence}." for each in own]
+    return texts
+
+
+def _parts(
+    found: Inspected, config: str, data: tuple[str, ...], written_to: Mapping[str, str | None]
+) -> list[Part]:
+    parts: list[Part] = [headline(found), checks_table(found), *remarks(found)]
+    applied, page = written_to.get("apply"), written_to.get("page")
+    if page is not None:
+        parts.append(f"Written: {page} (page).")
     files = tuple(map(as_word, data))
     if applied is not None:
         what = (
@@ -76,16 +93,20 @@ def _where(result: Result) -> str:
 
 def headline(found: Inspected) -> str:
     """One sentence."""
-    faults, doubts = (
-        sum(each.status == status for each in found.results) for status in ("fault", "doubt")
-    )
-    count = len(found.results)
+    faults, doubts, count = counted(found)
     if faults:
         more = f", {doubts} to be looked at" if doubts else ""
         return f"{faults} of {count} checks found a fault{more}: correct it before any fit."
     if doubts:
         return f"Nothing is wrong for certain; {doubts} of {count} checks have a doubt."
     return f"Nothing is wrong: {count} checks."
+
+
+def counted(found: Inspected) -> tuple[int, int, int]:
+    """Checks with a fault, others with a doubt, all: the worse one counts where both were found."""
+    faulty = {each.name for each in found.results if each.status == "fault"}
+    doubted = {each.name for each in found.results if each.status == "doubt"} - faulty
+    return len(faulty), len(doubted), len({each.name for each in found.results})
 
 
 def _data(found: Inspected, applied: str | None) -> dict[str, Any]:

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from excite_cli.checks.foreign_runs import foreign_runs
-from excite_cli.checks.look import look
+from excite_cli.checks.look import BELONG, look
 from excite_cli.checks.result import Result
 from excite_cli.checks.samples import samples_of
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import TextbookFit
-from excite_cli.config.load import load_spec
+from excite_cli.config.amended import with_values
+from excite_cli.config.load import load_spec, spec_of
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.effects.catalogue import kind_named
@@ -175,3 +176,15 @@ def test_the_fit_against_least_squares_of_its_own_rows(robot: Robot, sound: Data
         if (coefficients[:4] >= 0.0).all():
             assert explained.shares[j] == pytest.approx(share, rel=1e-3)
         assert explained.shares[j] >= share * (1 - 1e-6)
+
+
+def test_a_sign_that_is_declared_is_taken_and_doubted(robot: Robot, sound: Dataset) -> None:
+    """Also where it is wrong: then nothing but the person can turn it."""
+    turned = changed(sound, lambda run: replace(run, tau=run.tau * np.where(at(2), -1.0, 1.0)))
+    (wrong,) = found(robot, turned)
+    assert (wrong.kind, wrong.status) == ("torque_sign", "fault")
+    declared = with_values(SPEC.model_dump(mode="json", exclude_unset=True),
+                           {"measurement.sign": {"elbow_joint": 1}})  # fmt: skip
+    (doubt,) = found(robot, turned, spec_of(declared))
+    assert (doubt.name, doubt.status) == (BELONG, "doubt")
+    assert doubt.joints == ("elbow_joint",)

@@ -78,6 +78,18 @@ def test_two_faults_their_keys_and_the_config_that_settles_them(folder: Path, ca
     assert "excite diagnose new.yaml log.h5" in again.stdout
 
 
+def test_the_page_has_the_checks_the_evidence_and_the_keys(folder: Path, cache: Path) -> None:
+    said = Program(folder, cache)("inspect", "arm.yaml", "log.h5", "-o", "set-up.html", "--json")
+    assert json.loads(said.stdout)["page"] == "set-up.html"
+    page = (folder / "set-up.html").read_text(encoding="utf-8")
+    for text in ("2 of 23 checks found a fault", "direction of gravity", "robot.base_orientation",
+                 "gravity pulls along", "What would change in the config"):  # fmt: skip
+        assert text in page
+    again = Program(folder, cache)("inspect", "arm.yaml", "-o", "set-up.html")
+    assert again.returncode == 2  # not overwritten
+    assert (folder / "set-up.html").read_text(encoding="utf-8") == page
+
+
 def test_the_description_alone(folder: Path, cache: Path) -> None:
     said = Program(folder, cache)("inspect", "arm.yaml")
     assert said.returncode == 0, said.stderr
