@@ -44,9 +44,7 @@ def look(
     fit, declared = TextbookFit(robot, samples), Setup.as_declared(robot)
     steps = mistakes(fit, spec)
     setup = steps[-1].after.setup if steps else declared
-    foreign = foreign_runs.foreign_runs(robot, prepared, declared)
-    # Of a wrong set-up some runs show more than others: they are foreign where it is no cure.
-    if foreign and (not steps or foreign_runs.foreign_runs(robot, prepared, setup)):
+    if foreign := foreign_runs.foreign_runs(robot, prepared, setup if steps else None):
         return [*foreign, *own]
     if not any(step.check.kind == "no_gravity" for step in steps):
         standing = standing_legs.standing_legs(robot, samples.thinned(_FEW))

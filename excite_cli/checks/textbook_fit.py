@@ -37,7 +37,7 @@ _SCALE = 0.3  # share by which all torques may be off together, as currents' con
 FLOOR = 0.02  # shares below this are noise and effects: no difference is made there
 _ROUNDS, _SETTLED = 6, 0.02  # of the weights; in log
 _FIRST = 0.3  # s_j to begin with
-_SIGNED = 4  # columns of X whose coefficients must not be negative
+_PASSIVE, _SIGNED = 5, 4  # columns of X; those whose coefficients must not be negative
 _ROUNDING = 1e-13
 _RIDGE = 1e-9  # of a column of X, whose norm is 1
 
@@ -47,13 +47,14 @@ class Explained:
     """`shares` (n,) of the torques that are left, 1 where not `judged` (n,); `loss` L.
 
     `z` (P + 1,): by how many standard deviations bodies, and all torques, are others than the URDF
-    says.
+    says; `passive` (n, 5): coefficients c of X.
     """
 
     shares: Array
     judged: Mask
     loss: float
     z: Array
+    passive: Array
 
     @property
     def bent(self) -> float:
@@ -118,6 +119,22 @@ class TextbookFit:
         turned = [self.robot.with_gravity(axis) for axis in np.eye(3)]
         return np.stack([RigidBody(each, phi, q, rest, rest).load for each in turned], axis=-1)
 
+    def missed(self, setup: Setup, found: Explained) -> Array:
+        """Shares (n,) of these torques that bodies and friction of other samples miss.
+
+        `nan` where either has none that count.
+        """
+        _, v, a = setup.motion(self.samples)
+        load = self.columns(setup) @ self.bodies(found.z)
+        torque, counted = setup.torque(self.samples), self.counted(setup)
+        shares = np.full(len(found.shares), np.nan)
+        for j in np.flatnonzero(found.judged & (counted.sum(axis=0) >= FEWEST)):
+            at = counted[:, j]
+            passive = _passive(v[at, j], a[at, j], self.columns(setup)[at, j] @ self.phi)
+            left = torque[at, j] - load[at, j] - passive @ found.passive[j]
+            shares[j] = np.sqrt(np.mean(left**2)) / max(float(np.std(torque[at, j])), 1e-9)
+        return shares
+
     def _fitted(self, setup: Setup, columns: Array, phi: Array, spread: Array) -> Explained:
         _, v, a = setup.motion(self.samples)
         torque = setup.torque(self.samples)
@@ -127,11 +144,9 @@ class TextbookFit:
 
 
 def _passive(v: Array, a: Array, load: Array) -> Array:
-    """X (T, 5), columns of norm 1."""
+    """X (T, 5)."""
     way = np.sign(v)
-    columns = np.column_stack([v, way, np.abs(load) * way, a, np.ones(len(v))])
-    norms = np.linalg.norm(columns, axis=0)
-    return np.asarray(columns / np.where(norms > 0.0, norms, 1.0))
+    return np.column_stack([v, way, np.abs(load) * way, a, np.ones(len(v))])
 
 
 def _explained(
@@ -143,7 +158,7 @@ def _explained(
     """Of the `whole` torque, in shares of the recorded one: `rows` are v, a and these, (T, n)."""
     judged = np.count_nonzero(counted, axis=0) >= FEWEST
     phi, spread, scale, floor = bodies
-    grams = []
+    grams, scales = [], []
     for j in np.flatnonzero(judged):
         at = counted[:, j]
         v, a, torque, whole = (x[at, j] for x in rows)
@@ -153,21 +168,25 @@ def _explained(
             continue
         load = columns[at, j] @ phi
         uncertain = [columns[at, j] * spread, scale * load]
-        passive = np.sqrt(size) * _passive(v, a, load)
-        block = np.column_stack([*uncertain, passive, whole - load])
+        passive = _passive(v, a, load)
+        norms = np.linalg.norm(passive, axis=0)
+        scales.append(np.sqrt(size) / np.where(norms > 0.0, norms, 1.0))
+        block = np.column_stack([*uncertain, passive * scales[-1], whole - load])
         grams.append(block.T @ block / size)
     shares, z = np.ones(counted.shape[1]), np.zeros(len(phi) + 1)
+    coefficients = np.zeros((len(shares), _PASSIVE))
     if not grams:
-        return Explained(shares, judged, 0.0, z)
+        return Explained(shares, judged, 0.0, z, coefficients)
     products = _Products(np.array(grams), len(phi) + 1)
     s = np.full(len(grams), _FIRST)
     for _ in range(_ROUNDS):
-        z, left = products.solved(s)
+        z, left, follows = products.solved(s)
         before, s = s, np.maximum(left, floor)
         shares[judged] = left
         if np.abs(np.log(s / before)).max() < _SETTLED:
             break
-    return Explained(shares, judged, float(np.log(s).sum() + 0.5 * z @ z), z)
+    coefficients[judged] = follows * np.array(scales)
+    return Explained(shares, judged, float(np.log(s).sum() + 0.5 * z @ z), z, coefficients)
 
 
 class _Products:
@@ -192,8 +211,8 @@ class _Products:
         whole = self._grams[:, self._others[:, None], self._others]
         self._rest = whole - np.swapaxes(cross, 1, 2) @ self._gain
 
-    def solved(self, s: Array) -> tuple[Array, Array]:
-        """z (P,), and what is left of each joint (J,)."""
+    def solved(self, s: Array) -> tuple[Array, Array, Array]:
+        """z (P,), what is left of each joint (J,), and coefficients of X (J, 5)."""
         while True:
             total = np.tensordot(s**-2, self._rest, axes=1)
             inner = total[:-1, :-1]
@@ -201,10 +220,10 @@ class _Products:
             precision = 1.0 + _ROUNDING * np.trace(inner)
             z = np.asarray(np.linalg.solve(inner + precision * np.eye(len(inner)), total[:-1, -1]))
             both: Array = np.append(-z, 1.0)
-            follows = (self._gain @ both)[:, :_SIGNED]
-            negative = (follows < 0.0) & (self._active[:, :_SIGNED] > 0.0)
+            follows = np.asarray(self._gain @ both)
+            negative = (follows[:, :_SIGNED] < 0.0) & (self._active[:, :_SIGNED] > 0.0)
             if not negative.any():
                 left = np.einsum("p,jpr,r->j", both, self._rest, both)
-                return z, np.asarray(np.sqrt(np.maximum(left, 0.0)))
+                return z, np.asarray(np.sqrt(np.maximum(left, 0.0))), follows
             self._active[:, :_SIGNED][negative] = 0.0
             self._eliminate()
