@@ -95,7 +95,7 @@ def inspect(
             recorded = as_recorded(case, files)
             runs = recorded.recordings
             seen = set(map(_key, found))
-            new = [each for each in _looked(case, recorded) if _key(each) not in seen]
+            new = [each for each in _looked(case, recorded, settings) if _key(each) not in seen]
             found += new
             more: dict[str, Any] = {}
             for each in new:
@@ -117,11 +117,14 @@ def _key(result: Result) -> tuple[str, tuple[str, ...], str]:
     return result.name, result.joints, result.status
 
 
-def _looked(case: Case, recorded: Dataset) -> list[Result]:
-    """What is seen in files; and, where they may be used, what the dynamics say of them."""
+def _looked(case: Case, recorded: Dataset, settled: Mapping[str, Any]) -> list[Result]:
+    """What is seen in files; and, where they may be used, what the dynamics say of them.
+
+    Of a unit or a clock that is not `settled` yet they would say what is wrong.
+    """
     told = [e for e in recorded.findings if e.severity != "note" or e.kind == "wrapped"]
     found = rows.of_files(merged(told))
-    if any(each.status == "fault" for each in found):
+    if any(each.status == "fault" or {*each.settings} - {*settled} for each in found):
         return found
     data = completed(case, recorded)
     spec = case.spec

@@ -50,9 +50,12 @@ def look(
         standing = standing_legs.standing_legs(robot, samples.thinned(_FEW))
         if standing:
             return [*standing, *own]
-    found = [_result(step, declared, robot.joint_names, spec) for step in steps]
     left = TextbookFit(robot, samples, loose=_ANY)(setup)
-    return [*found, *_unexplained(left, robot.joint_names, spec), *own]
+    unexplained = _unexplained(left, robot.joint_names, spec)
+    if any(each.status == "fault" for each in unexplained):  # then steps have led nowhere
+        return [*unexplained, *own]
+    found = [_result(step, declared, robot.joint_names, spec) for step in steps]
+    return [*found, *unexplained, *own]
 
 
 def findings_of(
