@@ -22,7 +22,7 @@ _STEP = 0.01  # of the largest torque of a joint
 # (the first link of a Panda spreads over twice its size), and a base that leans.
 TRUE = frozenset({
     "stale", "bridged", "jitter", "gap", "short_part", "outside_shape", "inertia_frame",
-    "unequal_halves", "density", "zero_limits",
+    "unequal_halves", "density", "zero_velocity", "zero_effort",
 })  # fmt: skip
 
 
