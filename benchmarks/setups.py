@@ -1,14 +1,16 @@
 """Are mistakes of set-up found before physics? Logs altered as people do it, and sound ones.
 
     python -m benchmarks.setups [--logs NAME …] [--mistakes NAME …] [--seed S] [--pairs N]
+    python -m benchmarks.setups --let-through [--logs NAME …] [--mistakes NAME …] [--seed S]
     python -m benchmarks.setups --sound N [--seed S]
 
 Every mistake of `altered.mistakes` is made in logs of real and simulated robots, with sizes drawn
 at random. Asked of `excite inspect`: the right row, the right joints, the right key, no other row;
 and with what it would set, that the textbook's fit (viscous and Coulomb friction, offset, armature
 on all joints) misses at most 1.2 times what it misses of the log as it was. With `--pairs` two
-mistakes at once: both told. `--sound`: logs in which nothing is wrong, of which nothing should be
-said.
+mistakes at once: both told. `--let-through`: altered logs without a fault are diagnosed as they
+are; asked is that no effect is *confirmed* which is not confirmed of the log as it was. `--sound`:
+logs in which nothing is wrong, of which nothing should be said.
 """
 
 import argparse
@@ -26,11 +28,13 @@ import numpy as np
 from benchmarks.altered.mistakes import MISTAKES, Altered
 from benchmarks.altered.recordings import NAMES, recording
 from benchmarks.altered.sound import TRUE, sound_logs
+from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.identifying import identify
 from excite_cli.api.inspecting import inspect
 from excite_cli.api.loading import Case, load_case
 from excite_cli.checks.result import Result
 from excite_cli.config.amended import with_values
+from excite_cli.diagnosis.verdict import SealedVerdict
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
 from excite_cli.errors import ExciteError
 from excite_cli.measurement.dataset import Dataset
@@ -196,6 +200,41 @@ def pairs(logs: list[str], mistakes: list[str], seed: int, count: int) -> None:
     print(f"both told: {told} of {count} (≥ 85 %); another row: {wrong} (≤ 2 %)")
 
 
+def let_through(logs: list[str], mistakes: list[str], seed: int) -> None:
+    """What a diagnosis confirms of altered logs in which nothing is wrong for certain."""
+    count = wrong = 0
+    for name in logs:
+        of = recording(name)
+        known = _confirmed(_case(of.case, {}), of.data)
+        print(f"{name}: {', '.join(sorted(known or ())) or '-'}", flush=True)
+        for mistake in mistakes:
+            rng = np.random.default_rng([seed, *map(ord, name + mistake)])
+            altered = MISTAKES[mistake](of.data, of.case, rng)
+            names = _confirmed(_case(of.case, altered.robot), altered.data)
+            if names is not None:
+                more = sorted(names - (known or set()))
+                count, wrong = count + 1, wrong + bool(more)
+                print(f"{'!!' if more else 'ok'} {name}: {mistake}: {', '.join(more)}", flush=True)
+    print(f"more is confirmed than of the log as it was: {wrong} of {count} let through (0)")
+
+
+def _confirmed(case: Case, data: Dataset) -> set[str] | None:
+    """Effects that a diagnosis confirms beyond the textbook's; None where it refuses the log."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "log.h5"
+        write_dataset(file, data, {})
+        try:
+            found = diagnose(case, file, tell=lambda note: None)
+        except ExciteError:
+            return None
+    return {
+        f"{each.effect.kind}@{','.join(each.effect.joints)}"
+        for each in found.effects
+        if each.verdict is SealedVerdict.CONFIRMED
+        and each.effect.kind not in (*EVERYDAY_FRICTION, *EVERYDAY)
+    }
+
+
 def sound(count: int, seed: int) -> None:
     """Logs of which nothing should be said."""
     words: Counter[str] = Counter()
@@ -226,8 +265,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--pairs", type=int, default=0)
     parser.add_argument("--sound", type=int, default=0, metavar="N")
+    parser.add_argument("--let-through", action="store_true")
     given = parser.parse_args()
-    if given.sound:
+    if given.let_through:
+        let_through(given.logs, given.mistakes, given.seed)
+    elif given.sound:
         sound(given.sound, given.seed)
     elif given.pairs:
         pairs(given.logs, given.mistakes, given.seed, given.pairs)
