@@ -68,8 +68,8 @@ def inspect(
 ) -> LogInspection:
     """Mistakes of set-up in log and model: `excite inspect`.
 
-    Without `data` the description alone is judged. What would settle a fault or a doubt is tried,
-    and the data are looked at once more with it, until nothing new is found. With `apply` the
+    Without `data` the description alone is judged. What would settle what is seen in the files is
+    tried, and the data are looked at once more with it, before the dynamics are. With `apply` the
     config that says so is written, its comments kept; where nothing is to be changed, as it is.
     `output`: a page (HTML) of all checks.
 
@@ -95,14 +95,15 @@ def inspect(
             recorded = as_recorded(case, files)
             runs = recorded.recordings
             seen = set(map(_key, found))
-            new = [each for each in _looked(case, recorded, settings) if _key(each) not in seen]
+            told, is_all = _looked(case, recorded, settings)
+            new = [each for each in told if _key(each) not in seen]
             found += new
             more: dict[str, Any] = {}
             for each in new:
                 more = joined(more, each.settings)
-            if not more:
-                break
             settings = joined(settings, more)
+            if is_all or not more:  # what the dynamics say was tried by them
+                break
             case = _changed(case, more)
         inspection = LogInspection(rows.in_order(found, bool(files)), settings, runs)
         if apply is not None:
@@ -117,20 +118,20 @@ def _key(result: Result) -> tuple[str, tuple[str, ...], str]:
     return result.name, result.joints, result.status
 
 
-def _looked(case: Case, recorded: Dataset, settled: Mapping[str, Any]) -> list[Result]:
-    """What is seen in files; and, where they may be used, what the dynamics say of them.
+def _looked(case: Case, recorded: Dataset, settled: Mapping[str, Any]) -> tuple[list[Result], bool]:
+    """What is seen in files; and, where they may be used, what the dynamics say of them, and true.
 
     Of a unit or a clock that is not `settled` yet they would say what is wrong.
     """
     told = [e for e in recorded.findings if e.severity != "note" or e.kind == "wrapped"]
     found = rows.of_files(merged(told))
     if any(each.status == "fault" or {*each.settings} - {*settled} for each in found):
-        return found
+        return found, False
     data = completed(case, recorded)
     spec = case.spec
     processing = choose_processing(data.runs, spec.measurement.filter, spec.diagnosis.moving_speed)
     prepared = prepare_all(data.runs, processing)
-    return [*found, *look(case.robot, data.runs, prepared, spec)]
+    return [*found, *look(case.robot, data.runs, prepared, spec)], True
 
 
 def _changed(case: Case, settings: Mapping[str, Any]) -> Case:

@@ -9,8 +9,8 @@ from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import Explained, TextbookFit
 from excite_cli.config.spec import Spec
 
-_COARSE = np.radians(30.0)
-_FINE = np.radians([15.0, 7.5, 3.75, 1.9, 0.9, 0.45])  # half steps
+_COARSE = np.radians(45.0)
+_FINE = np.radians([22.5, 11.2, 5.6, 2.8, 1.4, 0.7, 0.35])  # half steps
 # Price, in L, of an angle that is no right one: a payload that is not in the URDF looks like 12°.
 _ODD = 1.0
 _QUARTER, _NEAR = np.pi / 2, np.radians(10.0)
@@ -25,9 +25,9 @@ class JointZero(SetupCheck):
     def alternatives(
         self, fit: TextbookFit, setup: Setup, explained: Explained
     ) -> Iterator[Alternative]:
-        """All angles around, by 30°."""
+        """All angles around, by 45°."""
         for j in np.flatnonzero(~fit.robot.sliding).tolist():
-            for step in range(1, 12):
+            for step in range(1, 8):
                 angle = (setup.zero[j] + step * _COARSE + np.pi) % (2 * np.pi) - np.pi
                 yield Alternative(setup.from_zero(j, float(angle)), (j,))
 

@@ -44,6 +44,8 @@ _STEPS = 4
 # hardly anything, else of 50 to 1.
 _CERTAIN, _SURE, _HARDLY, _SURER = 0.15, 2.3, 0.1, 4.0
 
+_Question = tuple[str, tuple[int, ...], str]  # check, joints, variant
+
 
 @dataclass(frozen=True)
 class Step:
@@ -60,7 +62,7 @@ class Step:
     rivals: tuple[tuple[SetupCheck, Setup], ...] = ()
 
     @property
-    def question(self) -> tuple[str, tuple[int, ...], str]:
+    def question(self) -> _Question:
         """What is set up: of one question there is one answer."""
         return self.check.name, self.after.joints, self.after.variant
 
@@ -96,7 +98,7 @@ class _Candidate:
         return self.explained.loss + self.alternative.price
 
     @property
-    def question(self) -> tuple[str, tuple[int, ...], str]:
+    def question(self) -> _Question:
         """What is set up: of one question there is one answer."""
         return self.check.name, self.alternative.joints, self.alternative.variant
 
@@ -115,10 +117,13 @@ def mistakes(fit: TextbookFit, spec: Spec) -> list[Step]:
     first may have explained in part what is another mistake: then what is found without it is
     taken, if that explains more, or as much with less.
     """
-    found = list(_steps(fit, spec))
+    rough = TextbookFit(fit.robot, fit.samples.thinned(_ROUGH), _FINE)
+    setup = Setup.as_declared(fit.robot)
+    first = list(_candidates(fit, rough, spec, setup, fit(setup)))
+    found = list(_steps(fit, rough, spec, first))
     if len(found) < 2:
         return found
-    others = list(_steps(fit, spec, found[0].question))
+    others = list(_steps(fit, rough, spec, first, found[0].question))
     return min(found, others, key=lambda steps: _total(fit, steps))
 
 
@@ -129,16 +134,19 @@ def _total(fit: TextbookFit, steps: Sequence[Step]) -> float:
 
 
 def _steps(
-    fit: TextbookFit, spec: Spec, never: tuple[str, tuple[int, ...], str] | None = None
+    fit: TextbookFit,
+    rough: TextbookFit,
+    spec: Spec,
+    first: Sequence[_Candidate],
+    never: _Question | None = None,
 ) -> Iterator[Step]:
     """Steps, each the best of its turn, without the answers to one question."""
-    rough = TextbookFit(fit.robot, fit.samples.thinned(_ROUGH), _FINE)
     setup = Setup.as_declared(fit.robot)
     explained = fit(setup)
-    for _ in range(_STEPS):
+    for turn in range(_STEPS):
         if not explained.judged.any() or explained.shares[explained.judged].max() < _GOOD:
             return
-        tried = _candidates(fit, rough, spec, setup, explained)
+        tried = _candidates(fit, rough, spec, setup, explained) if turn else first
         found = [e for e in tried if e.question != never and e.is_far_better(explained)]
         if not found:
             return

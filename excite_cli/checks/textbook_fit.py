@@ -23,6 +23,7 @@ friction.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from excite_cli.checks.samples import FEWEST, Samples
 from excite_cli.checks.setup import Setup
@@ -39,6 +40,7 @@ _ROUNDS, _SETTLED = 6, 0.02  # of the weights; in log
 _FIRST = 0.3  # s_j to begin with
 _PASSIVE, _SIGNED = 5, 4  # columns of X; those whose coefficients must not be negative
 _ROUNDING = 1e-13
+_STATES, _SEEN = 40, 1e-9  # states; share of the largest singular value from which one counts
 _RIDGE = 1e-9  # of a column of X, whose norm is 1
 
 
@@ -46,7 +48,7 @@ _RIDGE = 1e-9  # of a column of X, whose norm is 1
 class Explained:
     """`shares` (n,) of the torques that are left, 1 where not `judged` (n,); `loss` L.
 
-    `z` (P + 1,): by how many standard deviations bodies, and all torques, are others than the URDF
+    `z` (r + 1,): by how many standard deviations bodies, and all torques, are others than the URDF
     says; `passive` (n, 5): coefficients c of X.
     """
 
@@ -77,12 +79,12 @@ class TextbookFit:
         spread = inertial_prior(robot, self.phi, _UNCERTAIN).std.reshape(-1, 10).copy()
         own = _UNCERTAIN * self.phi.reshape(-1, 10)[:, 1:4]
         spread[:, 1:4] = np.hypot(own, _CENTER * spread[:, :1] / _UNCERTAIN)
-        self.spread: Array = loose * spread.ravel()
         self._scale = loose * _SCALE
+        self._basis = loose * _seen(robot, self.phi, spread.ravel())
 
     def __call__(self, setup: Setup) -> Explained:
         """How well the data fit, set up so."""
-        return self._fitted(setup, self.columns(setup), self.phi, self.spread)
+        return self._fitted(setup, self.columns(setup), self.phi, self._basis)
 
     def gravity(self, setup: Setup, z: Array | None = None) -> Array:
         """The direction (3,) of gravity that fits best beside the rest, at the bodies of `z`.
@@ -92,14 +94,14 @@ class TextbookFit:
         phi = self.phi if z is None else self.bodies(z)
         columns = np.concatenate([self.columns(setup), self.weight(setup, phi)], axis=2)
         size = float(np.linalg.norm(setup.gravity))
-        spread = np.append(self.spread, np.full(3, size))
-        found = self._fitted(setup, columns, np.append(self.phi, np.zeros(3)), spread)
+        basis = block_diag(self._basis, size * np.eye(3))
+        found = self._fitted(setup, columns, np.append(self.phi, np.zeros(3)), basis)
         gravity = setup.gravity + size * found.z[-4:-1]
         return np.asarray(gravity / max(float(np.linalg.norm(gravity)), 1e-9))
 
     def bodies(self, z: Array) -> Array:
-        """Parameters φ (P,) of bodies that are so many standard deviations off."""
-        return np.asarray((1.0 + self._scale * z[-1]) * self.phi + self.spread * z[:-1])
+        """Parameters φ (P,) of bodies that are so many standard deviations off, z (r + 1,)."""
+        return np.asarray((1.0 + self._scale * z[-1]) * self.phi + self._basis @ z[:-1])
 
     def counted(self, setup: Setup) -> Mask:
         """Instants (T, n) that count of each joint."""
@@ -135,12 +137,25 @@ class TextbookFit:
             shares[j] = np.sqrt(np.mean(left**2)) / max(float(np.std(torque[at, j])), 1e-9)
         return shares
 
-    def _fitted(self, setup: Setup, columns: Array, phi: Array, spread: Array) -> Explained:
+    def _fitted(self, setup: Setup, columns: Array, phi: Array, basis: Array) -> Explained:
         _, v, a = setup.motion(self.samples)
         torque = setup.torque(self.samples)
         whole = torque + self.weight(setup) @ setup.gravity if setup.weightless else torque
-        bodies = (phi, spread, self._scale, self._floor)
+        bodies = (phi, basis, self._scale, self._floor)
         return _explained(columns, bodies, (v, a, torque, whole), self.counted(setup))
+
+
+def _seen(robot: Robot, phi: Array, spread: Array) -> Array:
+    """D V (P, r): directions of D z that show in some torque, however the robot is mounted.
+
+    Elsewhere z stays zero. They are those of Y D at random states, under gravity along each axis.
+    """
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-np.pi, np.pi, (3, _STATES, robot.n))
+    mounted = [robot.with_gravity(axis) for axis in np.eye(3)]
+    rows = [RigidBody(each, phi, *states).regressor.reshape(-1, len(phi)) for each in mounted]
+    _, sizes, directions = np.linalg.svd(np.vstack(rows) * spread, full_matrices=False)
+    return np.asarray((directions[sizes > _SEEN * sizes[0]] * spread).T)
 
 
 def _passive(v: Array, a: Array, load: Array) -> Array:
@@ -157,7 +172,7 @@ def _explained(
 ) -> Explained:
     """Of the `whole` torque, in shares of the recorded one: `rows` are v, a and these, (T, n)."""
     judged = np.count_nonzero(counted, axis=0) >= FEWEST
-    phi, spread, scale, floor = bodies
+    phi, basis, scale, floor = bodies
     grams, scales = [], []
     for j in np.flatnonzero(judged):
         at = counted[:, j]
@@ -167,17 +182,17 @@ def _explained(
             judged[j] = False
             continue
         load = columns[at, j] @ phi
-        uncertain = [columns[at, j] * spread, scale * load]
+        uncertain = [columns[at, j] @ basis, scale * load]
         passive = _passive(v, a, load)
         norms = np.linalg.norm(passive, axis=0)
         scales.append(np.sqrt(size) / np.where(norms > 0.0, norms, 1.0))
         block = np.column_stack([*uncertain, passive * scales[-1], whole - load])
         grams.append(block.T @ block / size)
-    shares, z = np.ones(counted.shape[1]), np.zeros(len(phi) + 1)
+    shares, z = np.ones(counted.shape[1]), np.zeros(basis.shape[1] + 1)
     coefficients = np.zeros((len(shares), _PASSIVE))
     if not grams:
         return Explained(shares, judged, 0.0, z, coefficients)
-    products = _Products(np.array(grams), len(phi) + 1)
+    products = _Products(np.array(grams), len(z))
     s = np.full(len(grams), _FIRST)
     for _ in range(_ROUNDS):
         z, left, follows = products.solved(s)

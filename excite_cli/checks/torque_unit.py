@@ -16,14 +16,14 @@ from excite_cli.config.spec import Spec
 from excite_cli.measurement.torque import NEWTON_METERS, torque_units
 
 _FACTOR = 6.0
-_TRIED = 10.0 ** np.concatenate([np.arange(-4.0, -0.5, 0.5), np.arange(1.0, 4.5, 0.5)])
+_TRIED = 10.0 ** np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
 # Bodies must be seen to tell the unit: without their torque, so much in L must be lost.
 _WEIGHTLESS, _SEEN, _UNSEEN = 1e3, 0.7, 1.5
 _UNKNOWN = 1e6  # N·m in a unit of the file beside which bodies weigh nothing
 # Of one joint alone another unit is mN·m, or the motor's side of a gear: hardly ever less than 20.
 # Wrists that are mostly friction look like 10 (a UR10's, by a factor of 9).
 _GEARS, _RARE = 20.0, 1.0
-_FINE = np.log([1.8, 1.35, 1.16, 1.08])
+_FINE = np.log([1.8, 1.35, 1.16, 1.08])  # together half a decade to each side
 
 
 class TorqueUnit(SetupCheck):
@@ -35,7 +35,7 @@ class TorqueUnit(SetupCheck):
     def alternatives(
         self, fit: TextbookFit, setup: Setup, explained: Explained
     ) -> Iterator[Alternative]:
-        """Half decades, of every joint and of all."""
+        """Decades, of every joint and of all."""
         n = len(setup.zero)
         groups: list[tuple[int, ...]] = [
             tuple(range(n)),
