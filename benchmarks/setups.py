@@ -125,7 +125,8 @@ def _judged(
         if altered.run and {each.runs for each in own} == {altered.run}:
             after = sound  # no key: the person leaves it out, and the others are as they were
         harmless = not own and before <= HARMLESS * sound
-        others = {e.name for e in told if e.status != "ok"} - {*altered.rows} - usual
+        right = {*altered.rows, *altered.also, "limits of the joints"} | usual
+        others = {e.name for e in told if e.status != "ok"} - right
         return Outcome(
             label, bool(own) or not altered.rows, {*altered.joints} <= named, key,
             after <= AS_GOOD * sound, tuple(sorted(others)), harmless, seconds,
@@ -149,7 +150,7 @@ def _doubted(results: tuple[Result, ...]) -> list[str]:
 def _both(one: Altered, other: Altered) -> Altered:
     return Altered(
         other.data, (*one.rows, *other.rows), (*one.joints, *other.joints), "",
-        {**one.robot, **other.robot},
+        {**one.robot, **other.robot}, also=(*one.also, *other.also),
     )  # fmt: skip
 
 
@@ -180,23 +181,26 @@ def pairs(logs: list[str], mistakes: list[str], seed: int, count: int) -> None:
     """Two mistakes at once."""
     rng, told, wrong = np.random.default_rng(seed), 0, 0
     known = {name: _usual(recording(name).case, recording(name).data) for name in logs}
-    for _ in range(count):
+    for k in range(count):
         name, (first, second) = str(rng.choice(logs)), rng.choice(mistakes, 2, replace=False)
         of = recording(name)
-        one = MISTAKES[first](of.data, of.case, rng)
-        other = MISTAKES[second](one.data, of.case, rng)
         usual, sound = known[name]
-        robot = {**one.robot, **other.robot}
-        both, *alone = (
-            _judged(f"{name}: {first} + {second}", of.case, each, usual, sound)
-            for each in (
-                _both(one, other),
-                replace(one, data=other.data, robot=robot),
-                replace(other, robot=robot),
-            )
+        one, alone = (
+            MISTAKES[each](of.data, of.case, np.random.default_rng([seed, k, place]))
+            for place, each in enumerate((first, second))
         )
-        told, wrong = told + all(e.row for e in alone), wrong + bool(both.others)
-        print(f"{'ok' if all(e.row for e in alone) else '!!'} {both.line()}", flush=True)
+        other = MISTAKES[second](one.data, of.case, np.random.default_rng([seed, k, 1]))
+        robot = {**one.robot, **other.robot}
+        label = f"{name}: {first} + {second}"
+        both = _judged(label, of.case, _both(one, other), usual, sound)
+        # What no fit notices of a log that is sound else is not asked for.
+        asked = [each for each in (one, alone) if _is_noticed(of.case, each, sound)]
+        each_told = all(
+            _judged(label, of.case, replace(each, data=other.data, robot=robot), usual, sound).row
+            for each in asked
+        )
+        told, wrong = told + each_told, wrong + bool(both.others)
+        print(f"{'ok' if each_told else '!!'} {len(asked)} {both.line()}", flush=True)
     print(f"both told: {told} of {count} (≥ 85 %); another row: {wrong} (≤ 2 %)")
 
 
@@ -233,6 +237,14 @@ def _confirmed(case: Case, data: Dataset) -> set[str] | None:
         if each.verdict is SealedVerdict.CONFIRMED
         and each.effect.kind not in (*EVERYDAY_FRICTION, *EVERYDAY)
     }
+
+
+def _is_noticed(case: Case, altered: Altered, sound: float) -> bool:
+    """Whether the textbook's error rises."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "log.h5"
+        write_dataset(file, altered.data, {})
+        return not _error(_case(case, altered.robot), file) <= HARMLESS * sound
 
 
 def sound(count: int, seed: int) -> None:

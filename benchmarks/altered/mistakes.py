@@ -27,7 +27,7 @@ class Altered:
     """Data as a file has them; `rows` of which one must tell, its `joints`, the `key`.
 
     `robot`: further keys of the config's robot. `told`: a word suffices, since it is repaired.
-    `run`: what is not of this robot.
+    `run`: what is not of this robot. `also`: rows that are right, too.
     """
 
     data: Dataset
@@ -37,6 +37,7 @@ class Altered:
     robot: dict[str, Any] = field(default_factory=dict)
     told: bool = False
     run: str = ""
+    also: tuple[str, ...] = ()
 
 
 Mistake = Callable[[Dataset, Case, np.random.Generator], Altered]
@@ -139,7 +140,10 @@ def _in_units(angle: float, speed: float, key: str) -> Mistake:
             speeds = np.gradient(run.q, run.step, axis=0) if run.dq is None else run.dq
             return replace(run, q=run.q * angle, dq=speeds * speed if speed else None)
 
-        return Altered(_runs(data, change), (UNITS, "limits of the joints"), (), key)
+        # The fewest bits with which counts keep the limits are a first guess.
+        also = ("unit of positions",) * (key == "measurement.angle")
+        rows = (UNITS, "limits of the joints")
+        return Altered(_runs(data, change), rows, (), key, also=also)
 
     return make
 
@@ -202,8 +206,11 @@ def _wrapped(low: float) -> Mistake:
             q[:, j] = (turned - low) % (2 * np.pi) + low
             return replace(run, q=q, dq=None)
 
-        # Its zero is another one, too: of that nothing is asked.
-        return Altered(_runs(data, change), ("angles of one turn",), (), told=True)
+        # Its zero is another one, too.
+        wrapped = _runs(data, change)
+        return Altered(
+            wrapped, ("angles of one turn",), (), told=True, also=("zero of every joint",)
+        )
 
     return make
 

@@ -40,12 +40,14 @@ def look(
     samples = replace(samples_of(prepared, _SAMPLES, clocked), turns=~robot.sliding)
     if spec.measurement.trust or not len(samples.q):  # nobody moves: there is nothing to judge
         return []
-    own = [each for check in own_checks() for each in check.look(Log(robot, runs, prepared, spec))]
     fit, declared = TextbookFit(robot, samples), Setup.as_declared(robot)
     steps = mistakes(fit, spec)
     setup = steps[-1].after.setup if steps else declared
-    if foreign := foreign_runs.foreign_runs(robot, prepared, setup if steps else None):
-        return [*foreign, *own]
+    foreign = foreign_runs.foreign_runs(robot, prepared, setup if steps else None)
+    rest = [run for run in prepared if run.run.name not in {each.runs for each in foreign}]
+    if foreign and rest and len(rest) < len(prepared):  # what is wrong of the others
+        return [*foreign, *look(robot, runs, rest, spec)]
+    own = [each for check in own_checks() for each in check.look(Log(robot, runs, prepared, spec))]
     if not any(step.check.kind == "no_gravity" for step in steps):
         standing = standing_legs.standing_legs(robot, samples.thinned(_FEW))
         if standing:

@@ -17,6 +17,7 @@ from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named,
 from excite_cli.effects.place import Place
 from excite_cli.effects.placing import places_named
 from excite_cli.errors import ConfigError, ExciteWarning
+from excite_cli.identification.least_squares import EXACT
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
 from excite_cli.out_of_core import Spool
@@ -218,7 +219,11 @@ def with_columns(
     signals: Sequence[Signals],
     runs: Sequence[PreparedRun],
 ) -> list[Candidate]:
-    """Candidates with their filtered columns; those that are zero everywhere are left out."""
+    """Candidates with their filtered columns; those that are zero everywhere are left out.
+
+    So are those that are rounding: a zero of the first axis, which gravity does not see, was given
+    1e11 rad of an upright robot, and with it the whole search hung on the processor.
+    """
     n = signals[0].q.shape[1]
     alike: dict[tuple[int, ...], list[int]] = {}
     for i, (effect, _) in enumerate(effects):
@@ -234,10 +239,11 @@ def with_columns(
                 shape = run.averages.shape[0], len(effect.rows(n)), len(effect.parameters)
                 block = np.broadcast_to(0.0, shape)
             own.append(spool.keep(block))
+    dust = EXACT * max(float(np.abs(run.tau_fit).max(initial=0.0)) for run in runs)
     return [
         Candidate(effect, effect.rows(n), tuple(blocks), tests)
         for (effect, tests), blocks, size in zip(effects, columns, sizes, strict=True)
-        if 0.0 < size < np.inf
+        if dust < size < np.inf
     ]
 
 
@@ -246,7 +252,7 @@ def _of_run(
     task: tuple[Signals, PreparedRun],
     tell: Tell,
 ) -> tuple[list[Array | None], Array]:
-    """Columns of all effects in one run, None of those that are not in it, and the largest value.
+    """Columns of all effects in one run, None of those that are not in it, and the largest torque.
 
     Effects on the same rows are filtered together: `alike` are their indices, by rows.
     """
@@ -263,7 +269,8 @@ def _of_run(
             filtered = run.averaged_for_fit(np.concatenate(blocks, axis=2), rows)
             for i, block in zip(some, np.split(filtered, ends[:-1], axis=2), strict=True):
                 columns[i] = block.copy()
-                largest[i] = np.abs(block).max(initial=0.0)
+                usual = [parameter.high for parameter in effects[i].parameters]
+                largest[i] = np.abs(block * usual).max(initial=0.0)
     signals.body.forget()
     return columns, largest
 

@@ -22,10 +22,10 @@ from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.cholesky import RIDGE, Cholesky
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.training import Columns, TrainingData
+from excite_cli.identification.least_squares import EXACT
 from excite_cli.robot.model import Array
 
 _ROUNDS, _SETTLED = 30, 1e-6
-_EXACT = 1e-9  # of the torque: what is less is rounding
 _ROUNDING = 1e-14  # of the largest eigenvalue
 
 
@@ -52,7 +52,7 @@ class WeightedFit:
             known = np.append(np.arange(found.fixed), found.torque)
             self._prior[np.ix_(known, known)] = data.prior
         whole = np.array([gram[-1, -1] for _, gram in self._grams])
-        self._floor = np.maximum(_EXACT * np.sqrt(whole / np.maximum(self._counts, 1)), 1e-12)
+        self._floor = np.maximum(EXACT * np.sqrt(whole / np.maximum(self._counts, 1)), 1e-12)
         self._usual, self._plain = usual, frozenset(plain)
         self._kept: dict[bytes, Array] = {}
 

@@ -30,8 +30,8 @@ from excite_cli.workers.base import Tell
 
 Method = Literal["ols", "wls", "irls"]
 _ROUNDS, _SETTLED = 30, 1e-6
-# Residuals below this share of the torque are rounding, not noise.
-_EXACT = 1e-9
+# Residuals and columns below this share of the torque are rounding.
+EXACT = 1e-9
 _HUBER, _MAD = 1.345, 1.4826  # 95 % efficient where noise is normal
 
 
@@ -71,7 +71,7 @@ def fit_rows(
     p = factors[0].shape[-1] - 1
     count = sum((run.usable.sum(axis=0) for run in runs), np.zeros(runs[0].tau.shape[1], int))
     size = _rms(factors, np.zeros(p), count)
-    floor = _EXACT * np.where(size > 0, size, 1.0)
+    floor = EXACT * np.where(size > 0, size, 1.0)
     extra = np.zeros((0, p + 1)) if prior is None else np.column_stack(prior)
     sigma, solution = _by_noise(factors, count, floor, extra, method)
     bread = solution.inverse
@@ -112,7 +112,7 @@ def _without_dust(runs: Sequence[Rows], sizes: Array) -> Sequence[Rows]:
         columns = np.maximum(columns, np.abs(run.columns).max(axis=(0, 1), initial=0.0))
         forget()
     torque = max(float(np.abs(run.tau[run.usable]).max(initial=0.0)) for run in runs)
-    dust = columns * sizes <= _EXACT * torque
+    dust = columns * sizes <= EXACT * torque
     if not dust.any():
         return runs
     spool, found = Spool(), []
