@@ -126,23 +126,27 @@ class TextbookFit:
 
         `nan` where either has none that count.
         """
-        _, v, a = setup.motion(self.samples)
-        load = self.columns(setup) @ self.bodies(found.z)
-        torque, counted = setup.torque(self.samples), self.counted(setup)
+        (v, a, torque, whole), counted = self._rows(setup), self.counted(setup)
+        columns = self.columns(setup)
+        load, known = columns @ self.bodies(found.z), columns @ self.phi
         shares = np.full(len(found.shares), np.nan)
         for j in np.flatnonzero(found.judged & (counted.sum(axis=0) >= FEWEST)):
             at = counted[:, j]
-            passive = _passive(v[at, j], a[at, j], self.columns(setup)[at, j] @ self.phi)
-            left = torque[at, j] - load[at, j] - passive @ found.passive[j]
+            passive = _passive(v[at, j], a[at, j], known[at, j])
+            left = whole[at, j] - load[at, j] - passive @ found.passive[j]
             shares[j] = np.sqrt(np.mean(left**2)) / max(float(np.std(torque[at, j])), 1e-9)
         return shares
 
     def _fitted(self, setup: Setup, columns: Array, phi: Array, basis: Array) -> Explained:
+        bodies = (phi, basis, self._scale, self._floor)
+        return _explained(columns, bodies, self._rows(setup), self.counted(setup))
+
+    def _rows(self, setup: Setup) -> tuple[Array, Array, Array, Array]:
+        """v, a, the torque, and that with the weight which was taken off it, (T, n)."""
         _, v, a = setup.motion(self.samples)
         torque = setup.torque(self.samples)
         whole = torque + self.weight(setup) @ setup.gravity if setup.weightless else torque
-        bodies = (phi, basis, self._scale, self._floor)
-        return _explained(columns, bodies, (v, a, torque, whole), self.counted(setup))
+        return v, a, torque, whole
 
 
 def _seen(robot: Robot, phi: Array, spread: Array) -> Array:
