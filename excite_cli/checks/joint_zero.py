@@ -9,7 +9,7 @@ from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import Explained, TextbookFit
 from excite_cli.config.spec import Spec
 
-_COARSE = np.radians(45.0)
+_COARSE = np.radians([15.0, 45.0, 90.0, 135.0, 180.0, -135.0, -90.0, -45.0, -15.0])
 _FINE = np.radians([22.5, 11.2, 5.6, 2.8, 1.4, 0.7, 0.35])  # half steps
 # Price, in L, of an angle that is no right one: a payload that is not in the URDF looks like 12°.
 _ODD = 1.0
@@ -25,10 +25,10 @@ class JointZero(SetupCheck):
     def alternatives(
         self, fit: TextbookFit, setup: Setup, explained: Explained
     ) -> Iterator[Alternative]:
-        """All angles around, by 45°."""
+        """Angles all around."""
         for j in np.flatnonzero(~fit.robot.sliding).tolist():
-            for step in range(1, 8):
-                angle = (setup.zero[j] + step * _COARSE + np.pi) % (2 * np.pi) - np.pi
+            for step in _COARSE:
+                angle = (setup.zero[j] + step + np.pi) % (2 * np.pi) - np.pi
                 yield Alternative(setup.from_zero(j, float(angle)), (j,))
 
     def refined(self, fit: TextbookFit, found: Alternative) -> Iterator[Alternative]:

@@ -113,15 +113,15 @@ class _Candidate:
 def mistakes(fit: TextbookFit, spec: Spec) -> list[Step]:
     """Mistakes, the one that explains most first, until none explains far more.
 
-    What the config says of a joint itself is taken as it is. Where there is more than one, the
-    first may have explained in part what is another mistake: then what is found without it is
+    What the config says of a joint itself is taken as it is. The first may have explained in part
+    what is another mistake: unless it alone leaves next to nothing, what is found without it is
     taken, if that explains more, or as much with less.
     """
     rough = TextbookFit(fit.robot, fit.samples.thinned(_ROUGH), _FINE)
     setup = Setup.as_declared(fit.robot)
     first = list(_candidates(fit, rough, spec, setup, fit(setup)))
     found = list(_steps(fit, rough, spec, first))
-    if len(found) < 2:
+    if not found or (len(found) == 1 and found[0].left_after.shares.max() < _HARDLY):
         return found
     others = list(_steps(fit, rough, spec, first, found[0].question))
     return min(found, others, key=lambda steps: _total(fit, steps))
