@@ -61,8 +61,9 @@ def replay(
     scorer = Scorer(stored)
     runs = [run for parts in own.values() for run in scorer.prepared(parts)]
     recorded = [run for parts in own.values() for run in parts]
-    for doubt in without_fault(look(robot, recorded, runs, stored.spec)):
-        tell(Note(Level.WARNING, doubt.evidence))
+    for each in without_fault(look(robot, recorded, runs, stored.spec)):
+        if each.status == "doubt":
+            tell(Note(Level.WARNING, each.evidence))
     simple, notes = for_simulators(stored, "mjcf")
     exported = mjcf(robot, simple)
     q = np.concatenate([run.q for run in runs])

@@ -151,7 +151,8 @@ def _scored(
             runs.append(scorer.of(parts, path or ", ".join(data.sources), label, worse))
             if runs[-1].alarm:  # before what may have changed in the robot: is it set up as then?
                 wrong = look(stored.robot, parts, scorer.prepared(parts), stored.spec)
-                told = [replace(each.finding, severity="warning", run=label) for each in wrong]
+                told = [replace(each.finding, severity="warning", run=label) for each in wrong
+                        if each.status != "ok"]  # fmt: skip
                 findings += told
         except FileError as short:
             findings.append(Finding("not scored", "warning", str(short), name))

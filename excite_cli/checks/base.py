@@ -45,6 +45,7 @@ class SetupCheck(ABC):
     name: ClassVar[str]
     kind: ClassVar[str]  # of its findings
     of_all: ClassVar[bool] = False  # whether what it is about shows on every joint
+    is_physical: ClassVar[bool] = False  # whether it is no mistake, and so never a fault
 
     @abstractmethod
     def alternatives(

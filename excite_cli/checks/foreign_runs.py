@@ -44,10 +44,12 @@ def foreign_runs(
         return []
     found = []
     for name, why in foreign.items():
-        text = f"torques of {name} do not belong to its motion: {why}"
+        text = f"torques of {name} do not fit its motion: {why}"
         owner = _owner(robot, recordings, name, fits[name](setup))
         text += (
-            f"; they fit the motion of {owner}. " if owner else "; or they are of another robot. "
+            f"; they fit the motion of {owner}. "
+            if owner
+            else ": it may be another robot's, or carry far more. "
         )
         text += "Join its channels anew, or leave this run out; measurement.trust: true takes it"
         status: Status = "fault" if owner else "doubt"

@@ -5,6 +5,7 @@ friction, rotors and offsets, at the bodies found so far, in turn; its length is
 """
 
 import itertools
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -75,7 +76,9 @@ class GravityDirection(SetupCheck):
         """Roll, pitch, yaw of the base that turn gravity to where it is."""
         turn, _ = Rotation.align_vectors([before.gravity], [after.gravity])
         old = Rotation.from_euler("xyz", spec.robot.base_orientation)
-        angles = (turn * old).as_euler("xyz")
+        with warnings.catch_warnings():  # a wall is where roll and yaw are one
+            warnings.simplefilter("ignore", UserWarning)
+            angles = (turn * old).as_euler("xyz")
         return {"robot.base_orientation": [round(float(x), _DIGITS) + 0.0 for x in angles]}
 
 

@@ -29,17 +29,20 @@ from excite_cli.robot.model import Robot
 BELONG = "torques of this motion"
 _SAMPLES, _FEW = 300, 200
 _ANY = 10.0  # times the deviations of bodies: then they may be nearly any
+_NOTHING = 0.4  # share left in the median of the joints with which no set-up is the true one
 _FOREIGN = 0.85  # torques of which this is left have nothing to do with the motion
 
 
 def look(
     robot: Robot, runs: Sequence[Run], prepared: Sequence[PreparedRun], spec: Spec
 ) -> list[Result]:
-    """Doubts and faults of the runs, filtered and as recorded; none of what is trusted."""
+    """Doubts and faults of the runs, filtered and as recorded; of what is trusted, a word."""
     clocked = any(run.dq is not None for run in runs)
     samples = replace(samples_of(prepared, _SAMPLES, clocked), turns=~robot.sliding)
-    if spec.measurement.trust or not len(samples.q):  # nobody moves: there is nothing to judge
-        return []
+    if spec.measurement.trust or not len(samples.q):
+        why = "measurement.trust is set" if len(samples.q) else "no joint moves for long enough"
+        text = f"mount, zeros, signs, order, units and clock are not judged: {why}"
+        return [Result(BELONG, "not_judged", "ok", text)]
     fit, declared = TextbookFit(robot, samples), Setup.as_declared(robot)
     steps = mistakes(fit, spec)
     setup = steps[-1].after.setup if steps else declared
@@ -56,6 +59,8 @@ def look(
     unexplained = _unexplained(left, robot.joint_names, spec)
     if any(each.status == "fault" for each in unexplained):  # then steps have led nowhere
         return [*unexplained, *own]
+    if steps and _median(steps[-1].left_after) > _NOTHING:
+        return [_no_set_up(robot.joint_names, steps[-1].left_after), *unexplained, *own]
     found = [_result(step, declared, robot.joint_names, spec) for step in steps]
     return [*found, *unexplained, *own]
 
@@ -78,7 +83,7 @@ def findings_of(
     motion: tuple[Finding, ...] = ()
     if spec.measurement.filter.position == "auto":
         motion = check_motion(runs, processing, robot.joint_names)
-    return (*motion, *(each.finding for each in found))
+    return (*motion, *(each.finding for each in found if each.status != "ok"))
 
 
 def without_fault(found: Sequence[Result]) -> Sequence[Result]:
@@ -145,6 +150,21 @@ def _result(step: Step, declared: Setup, names: Sequence[str], spec: Spec) -> Re
     return Result(check.name, check.kind, status, text, named, "", settings)
 
 
+def _median(left: Explained) -> float:
+    return float(np.median(left.shares[left.judged])) if left.judged.any() else 0.0
+
+
+def _no_set_up(names: Sequence[str], left: Explained) -> Result:
+    """Another set-up explains more, and none explains enough to be taken for true."""
+    off = left.judged & (left.shares > _NOTHING)
+    text = (
+        f"the torques of {_listed(names, off)} do not fit their motion, and no set-up explains "
+        f"most of them: {_median(left):.0%} are left with the best. Are positions too coarse, "
+        "torques another channel, or is it another robot's"
+    )
+    return Result(BELONG, "foreign_torque", "doubt", text, tuple(np.array(names)[off].tolist()))
+
+
 def _unexplained(left: Explained, names: Sequence[str], spec: Spec) -> list[Result]:
     """Torques that do not belong to the motion, for a reason that cannot be named.
 
@@ -178,6 +198,8 @@ def _value(value: Any) -> str:
         return "{" + ", ".join(f"{name}: {_value(x)}" for name, x in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(map(_value, value)) + "]"
+    if value is None:
+        return "null"
     if isinstance(value, bool):
         return str(value).lower()
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -21,6 +21,7 @@ from excite_cli.checks.position_unit import PositionUnit
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import FLOOR, Explained, TextbookFit
 from excite_cli.checks.time_scale import Clock, TorqueLag
+from excite_cli.checks.tool import Tool
 from excite_cli.checks.torque_unit import TorqueUnit
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.dataset import Mask
@@ -28,7 +29,7 @@ from excite_cli.robot.model import Array
 
 CHECKS: tuple[SetupCheck, ...] = (
     GravityDirection(), JointZero(), PositionSign(), TorqueSign(), ColumnOrder(), TorqueUnit(),
-    PositionUnit(), GravitySubtracted(), Clock(), TorqueLag(),
+    PositionUnit(), GravitySubtracted(), Clock(), TorqueLag(), Tool(),
 )  # fmt: skip
 # What an alternative must gain in L; and in the logarithm of the share of some joint, which falls
 # to 0.7 of what it was (all a little better is what effects do), unless it is the bodies that are
@@ -81,6 +82,8 @@ class Step:
         before, after = (np.median(each.shares[self.concerned]) for each in (other, one))
         gain = other.loss - one.loss
         bent = other.bent - one.bent > _SURE
+        if self.check.is_physical:
+            return False
         return bool((before > _CERTAIN or bent) and gain > (_SURE if after < _HARDLY else _SURER))
 
 

@@ -18,7 +18,7 @@ class Setup:
     `gravity` (3,) [m/s²] in the frame in which the config has it, `zero` [rad] added to positions,
     `unit`: N·m in one of the file, `turn`: rad in what the config takes for one. `clock`: true
     seconds in one of the stamps. `lag` [s] of the torque behind the positions. `weightless`: a
-    controller took the weight off the torque.
+    controller took the weight off the torque. `loaded`: last bodies with a tool or a load on them.
     """
 
     gravity: Array
@@ -32,6 +32,7 @@ class Setup:
     turn: float = 1.0
     lag: float = 0.0
     weightless: bool = False
+    loaded: tuple[int, ...] = ()
 
     @classmethod
     def as_declared(cls, robot: Robot) -> "Setup":

@@ -35,6 +35,10 @@ from excite_cli.robot.model import Array, Robot
 
 _UNCERTAIN, _CENTER = 0.3, 0.03  # share of masses and inertias; m by which centres of mass are off
 _SCALE = 0.3  # share by which all torques may be off together, as currents' constants are
+_TOOL, _REACH = 0.3, 0.2  # mass of a tool in that of the robot; m to its centre
+# Standard deviations by which all torques together may be smaller: a body of no mass fits nothing,
+# but beside torques in another unit, which then are no one's, anything does.
+_LIGHTEST = -1.5
 FLOOR = 0.02  # shares below this are noise and effects: no difference is made there
 _ROUNDS, _SETTLED = 6, 0.02  # of the weights; in log
 _FIRST = 0.3  # s_j to begin with
@@ -84,24 +88,24 @@ class TextbookFit:
 
     def __call__(self, setup: Setup) -> Explained:
         """How well the data fit, set up so."""
-        return self._fitted(setup, self.columns(setup), self.phi, self._basis)
+        return self._fitted(setup, self.columns(setup), self.phi, self._basis_of(setup))
 
     def gravity(self, setup: Setup, z: Array | None = None) -> Array:
         """The direction (3,) of gravity that fits best beside the rest, at the bodies of `z`.
 
         What is missing of gravity is as uncertain as gravity is large.
         """
-        phi = self.phi if z is None else self.bodies(z)
+        phi = self.phi if z is None else self.bodies(setup, z)
         columns = np.concatenate([self.columns(setup), self.weight(setup, phi)], axis=2)
         size = float(np.linalg.norm(setup.gravity))
-        basis = block_diag(self._basis, size * np.eye(3))
+        basis = block_diag(self._basis_of(setup), size * np.eye(3))
         found = self._fitted(setup, columns, np.append(self.phi, np.zeros(3)), basis)
         gravity = setup.gravity + size * found.z[-4:-1]
         return np.asarray(gravity / max(float(np.linalg.norm(gravity)), 1e-9))
 
-    def bodies(self, z: Array) -> Array:
+    def bodies(self, setup: Setup, z: Array) -> Array:
         """Parameters φ (P,) of bodies that are so many standard deviations off, z (r + 1,)."""
-        return np.asarray((1.0 + self._scale * z[-1]) * self.phi + self._basis @ z[:-1])
+        return np.asarray((1.0 + self._scale * z[-1]) * self.phi + self._basis_of(setup) @ z[:-1])
 
     def counted(self, setup: Setup) -> Mask:
         """Instants (T, n) that count of each joint."""
@@ -128,7 +132,7 @@ class TextbookFit:
         """
         (v, a, torque, whole), counted = self._rows(setup), self.counted(setup)
         columns = self.columns(setup)
-        load, known = columns @ self.bodies(found.z), columns @ self.phi
+        load, known = columns @ self.bodies(setup, found.z), columns @ self.phi
         shares = np.full(len(found.shares), np.nan)
         for j in np.flatnonzero(found.judged & (counted.sum(axis=0) >= FEWEST)):
             at = counted[:, j]
@@ -140,6 +144,15 @@ class TextbookFit:
     def _fitted(self, setup: Setup, columns: Array, phi: Array, basis: Array) -> Explained:
         bodies = (phi, basis, self._scale, self._floor)
         return _explained(columns, bodies, self._rows(setup), self.counted(setup))
+
+    def _basis_of(self, setup: Setup) -> Array:
+        """D V, and beside it the ten parameters of every tool, as wide as tools are heavy."""
+        mass = _TOOL * float(np.abs(self.phi[::10]).sum())
+        tools = np.zeros((len(self.phi), 10 * len(setup.loaded)))
+        for k, body in enumerate(setup.loaded):
+            sizes = mass * np.repeat([1.0, _REACH, _REACH**2], [1, 3, 6])
+            tools[10 * body : 10 * body + 10, 10 * k : 10 * k + 10] = np.diag(sizes)
+        return np.hstack([self._basis, tools])
 
     def _rows(self, setup: Setup) -> tuple[Array, Array, Array, Array]:
         """v, a, the torque, and that with the weight which was taken off it, (T, n)."""
@@ -237,7 +250,11 @@ class _Products:
             inner = total[:-1, :-1]
             # Of torques far smaller than any body makes them, rounding would be left of the one.
             precision = 1.0 + _ROUNDING * np.trace(inner)
-            z = np.asarray(np.linalg.solve(inner + precision * np.eye(len(inner)), total[:-1, -1]))
+            inner = inner + precision * np.eye(len(inner))
+            z = np.asarray(np.linalg.solve(inner, total[:-1, -1]))
+            if z[-1] < _LIGHTEST:
+                side = total[:-2, -1] - _LIGHTEST * inner[:-1, -1]
+                z = np.append(np.linalg.solve(inner[:-1, :-1], side), _LIGHTEST)
             both: Array = np.append(-z, 1.0)
             follows = np.asarray(self._gain @ both)
             negative = (follows[:, :_SIGNED] < 0.0) & (self._active[:, :_SIGNED] > 0.0)

@@ -188,3 +188,26 @@ def test_a_sign_that_is_declared_is_taken_and_doubted(robot: Robot, sound: Datas
     (doubt,) = found(robot, turned, spec_of(declared))
     assert (doubt.name, doubt.status) == (BELONG, "doubt")
     assert doubt.joints == ("elbow_joint",)
+
+
+@pytest.mark.parametrize("mass", [2.0, 5.0, 10.0])
+def test_a_tool_is_no_unit_of_torques(robot: Robot, mass: float) -> None:
+    """In units of which torques are next to nothing any bodies fit; a heavy hand is likelier."""
+    load = plant(kind_named("payload"), (5,), mass)
+    (result,) = found(robot, played(robot, load, torque_noise=0.01).dataset)
+    assert (result.kind, result.status) == ("tool", "doubt")
+    assert not result.settings
+
+
+def test_coarse_positions_are_no_clock(robot: Robot, sound: Dataset) -> None:
+    """Accelerations that are all rounding would be fewer if seconds were longer."""
+    coarse = changed(sound, lambda run: replace(run, q=np.round(run.q, 2), dq=None))
+    assert all(each.kind != "clock" for each in found(robot, coarse))
+
+
+def test_what_is_trusted_is_said_not_to_be_judged(robot: Robot, sound: Dataset) -> None:
+    values = {"measurement.trust": True}
+    trusted = spec_of(with_values(SPEC.model_dump(mode="json", exclude_unset=True), values))
+    (result,) = found(robot, sound, trusted)
+    assert result.status == "ok"
+    assert "not judged: measurement.trust is set" in result.evidence

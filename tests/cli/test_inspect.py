@@ -83,7 +83,7 @@ def test_the_page_has_the_checks_the_evidence_and_the_keys(folder: Path, cache: 
     assert json.loads(said.stdout)["page"] == "set-up.html"
     page = (folder / "set-up.html").read_text(encoding="utf-8")
     for text in (
-        "1 of 23 checks found a fault, 1 to be looked at",
+        "1 of 24 checks found a fault, 1 to be looked at",
         "robot.base_orientation",
         "gravity pulls along",
         "What would change in the config",
