@@ -64,10 +64,10 @@ def _foreign(fits: Mapping[str, TextbookFit], setup: Setup) -> dict[str, str]:
     if len(judged) < 2:
         return {}
     best = min(judged, key=lambda name: found[name].loss / found[name].judged.sum())
-    usual, why = _left(found[best]), {}
+    usual, why = found[best].left, {}
     for name in judged:
         alone, there, back = (
-            _left(found[name]),
+            found[name].left,
             _missed(fits[name], setup, found[best]),
             _missed(fits[best], setup, found[name]),
         )
@@ -78,11 +78,6 @@ def _foreign(fits: Mapping[str, TextbookFit], setup: Setup) -> dict[str, str]:
         elif name != best and min(there, back) > _FOREIGN:
             why[name] = f"a textbook's model that fits {best} misses {there:.0%} of them"
     return why
-
-
-def _left(found: Explained) -> float:
-    """Share of the torques that is left, in the median of the joints that can be judged."""
-    return float(np.median(found.shares[found.judged])) if found.judged.any() else 0.0
 
 
 def _missed(fit: TextbookFit, setup: Setup, found: Explained) -> float:
@@ -103,13 +98,13 @@ def _owner(
 ) -> str:
     """The run whose motion the torques of run `name` fit; empty if there is none."""
     torques, setup = recordings[name], Setup.as_declared(robot)
-    best, least = "", _BELONGS * _left(own)
+    best, least = "", _BELONGS * own.left
     for other, motion in recordings.items():
         if other != name and len(motion) == len(torques) == 1:
             joined = samples_of([_with_torque(motion[0], torques[0])], _SAMPLES)
             found = TextbookFit(robot, joined)(setup)
-            if found.judged.any() and _left(found) < least:
-                best, least = other, _left(found)
+            if found.judged.any() and found.left < least:
+                best, least = other, found.left
     return best
 
 

@@ -59,7 +59,7 @@ def look(
     unexplained = _unexplained(left, robot.joint_names, spec)
     if any(each.status == "fault" for each in unexplained):  # then steps have led nowhere
         return [*unexplained, *own]
-    if steps and _median(steps[-1].left_after) > _NOTHING:
+    if steps and steps[-1].left_after.left > _NOTHING:
         return [_no_set_up(robot.joint_names, steps[-1].left_after), *unexplained, *own]
     found = [_result(step, declared, robot.joint_names, spec) for step in steps]
     return [*found, *unexplained, *own]
@@ -150,16 +150,12 @@ def _result(step: Step, declared: Setup, names: Sequence[str], spec: Spec) -> Re
     return Result(check.name, check.kind, status, text, named, "", settings)
 
 
-def _median(left: Explained) -> float:
-    return float(np.median(left.shares[left.judged])) if left.judged.any() else 0.0
-
-
 def _no_set_up(names: Sequence[str], left: Explained) -> Result:
     """Another set-up explains more, and none explains enough to be taken for true."""
     off = left.judged & (left.shares > _NOTHING)
     text = (
         f"the torques of {_listed(names, off)} do not fit their motion, and no set-up explains "
-        f"most of them: {_median(left):.0%} are left with the best. Are positions too coarse, "
+        f"most of them: {left.left:.0%} are left with the best. Are positions too coarse, "
         "torques another channel, or is it another robot's"
     )
     return Result(BELONG, "foreign_torque", "doubt", text, tuple(np.array(names)[off].tolist()))

@@ -67,6 +67,11 @@ class Explained:
         """½ ‖z‖²: how unlikely the bodies are that explain the data."""
         return float(0.5 * self.z @ self.z)
 
+    @property
+    def left(self) -> float:
+        """Share of the torques that is left, in the median of the joints that can be judged."""
+        return float(np.median(self.shares[self.judged])) if self.judged.any() else 0.0
+
 
 class TextbookFit:
     """Fits the textbook's model to samples of a robot, for any set-up.

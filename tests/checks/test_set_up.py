@@ -211,3 +211,15 @@ def test_what_is_trusted_is_said_not_to_be_judged(robot: Robot, sound: Dataset) 
     (result,) = found(robot, sound, trusted)
     assert result.status == "ok"
     assert "not judged: measurement.trust is set" in result.evidence
+
+
+def test_bodies_of_no_mass_are_unlikely(robot: Robot, sound: Dataset) -> None:
+    """Beside torques in units of which there are 1e4 in one they fit, and anything with them.
+
+    If the scale that all torques share could go to zero, that would cost 5 in L.
+    """
+    processing = choose_processing(sound.runs, SPEC.measurement.filter)
+    fit = TextbookFit(robot, samples_of(prepare_all(sound.runs, processing), 300))
+    declared = Setup.as_declared(robot)
+    assert fit(replace(declared, unit=1e-4 * declared.unit)).bent > 15.0
+    assert fit(declared).bent < 5.0
