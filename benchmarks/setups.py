@@ -124,6 +124,8 @@ def _judged(
             after = _error(_set(_case(case, altered.robot), found.settings), file)
         if altered.run and {each.runs for each in own} == {altered.run}:
             after = sound  # no key: the person leaves it out, and the others are as they were
+        if altered.unknown and own and not found.settings:
+            after = sound
         harmless = not own and before <= HARMLESS * sound
         right = {*altered.rows, *altered.also, "limits of the joints"} | usual
         others = {e.name for e in told if e.status != "ok"} - right

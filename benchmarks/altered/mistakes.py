@@ -27,7 +27,8 @@ class Altered:
     """Data as a file has them; `rows` of which one must tell, its `joints`, the `key`.
 
     `robot`: further keys of the config's robot. `told`: a word suffices, since it is repaired.
-    `run`: what is not of this robot. `also`: rows that are right, too.
+    `run`: what is not of this robot. `also`: rows that are right, too. `unknown`: the data do not
+    say what would settle it.
     """
 
     data: Dataset
@@ -38,6 +39,7 @@ class Altered:
     told: bool = False
     run: str = ""
     also: tuple[str, ...] = ()
+    unknown: bool = False
 
 
 Mistake = Callable[[Dataset, Case, np.random.Generator], Altered]
@@ -144,6 +146,30 @@ def _in_units(angle: float, speed: float, key: str) -> Mistake:
         also = ("unit of positions",) * (key == "measurement.angle")
         rows = (UNITS, "limits of the joints")
         return Altered(_runs(data, change), rows, (), key, also=also)
+
+    return make
+
+
+def _one_in_degrees(data: Dataset, case: Case, rng: np.random.Generator) -> Altered:
+    """Of one joint alone, without recorded speeds."""
+    j = _one(data, case, rng)
+    by = lambda run: np.where(_at(run, j) > 0, _DEG, 1.0)  # noqa: E731
+    changed = _runs(data, lambda run: replace(run, q=run.q * by(run), dq=None))
+    joints = () if case.robot.n == 1 else (case.robot.joint_names[j],)
+    return Altered(changed, (UNITS, "unit of positions"), joints, "measurement.angle")
+
+
+def _numbered(speeds: bool) -> Mistake:
+    """Stamps that count samples; without recorded speeds nobody knows what a sample lasts."""
+
+    def make(data: Dataset, case: Case, rng: np.random.Generator) -> Altered:
+        def change(run: Run) -> Run:
+            dq = np.gradient(run.q, run.step, axis=0) if run.dq is None else run.dq
+            numbers = np.round((run.t - run.t[0]) / run.step)
+            return replace(run, t=numbers, dq=dq if speeds else None, epoch=None)
+
+        key = "measurement.clock" if speeds else ""
+        return Altered(_runs(data, change), (UNITS, "clock"), (), key, unknown=not speeds)
 
     return make
 
@@ -290,6 +316,9 @@ MISTAKES: dict[str, Mistake] = {
     "rpm": _in_units(1.0, _RPM, "measurement.channels"),
     "counts": _in_units(4096 / (2 * np.pi), 0.0, "measurement.angle"),
     "counts of 2^17": _in_units(2**17 / (2 * np.pi), 0.0, "measurement.angle"),
+    "one in degrees": _one_in_degrees,
+    "sample numbers": _numbered(speeds=False),
+    "sample numbers, speeds": _numbered(speeds=True),
     "ms": _time(1e3, "measurement.time"),
     "µs": _time(1e6, "measurement.time"),
     "ns": _time(1e9, "measurement.time"),

@@ -21,8 +21,8 @@ from excite_cli.diagnosis.words import approximation_in_words
 from excite_cli.effects.catalogue import catalogue, declared_effects
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Dataset
+from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.quality import checked, raise_for_errors
-from excite_cli.measurement.units import Limits
 from excite_cli.robot.model import Robot
 from excite_cli.simulation.planted import Planted
 from excite_cli.simulation.simulate import simulate

@@ -20,7 +20,8 @@ from excite_cli.atomic import write_atomically, write_text_atomically
 from excite_cli.checks import rows
 from excite_cli.checks.look import look
 from excite_cli.checks.result import Result
-from excite_cli.config.amended import amended, with_values
+from excite_cli.checks.trust import but_trusted, check_names
+from excite_cli.config.amended import amended, changed_values, with_values
 from excite_cli.config.load import load_spec, spec_of
 from excite_cli.config.write import yaml_text
 from excite_cli.excitation.problem import Problem
@@ -88,7 +89,8 @@ def inspect(
     files = [data] if isinstance(data, str | Path) else list(data)
     page = None if output is None else page_path(output)
     with held({"apply": apply, "output": page}, overwrite, inputs_of(problem, *files)):
-        found = rows.of_description(case.robot)
+        check_names(case.spec, rows.names())
+        found = but_trusted(rows.of_description(case.robot), case.spec)
         settings: dict[str, Any] = {}
         runs: tuple[str, ...] = ()
         for _ in range(_ROUNDS if files else 0):
@@ -105,7 +107,7 @@ def inspect(
             if is_all or not more:  # what the dynamics say was tried by them
                 break
             case = _changed(case, more)
-        inspection = LogInspection(rows.in_order(found, bool(files)), settings, runs)
+        inspection = LogInspection(rows.in_order(found, bool(files), case.spec), settings, runs)
         if apply is not None:
             _write(Path(apply), problem, settings)
         if page is not None:
@@ -162,9 +164,10 @@ def _write(path: Path, problem: Problem | Case, settings: Mapping[str, Any]) -> 
     settings = {**settings, **_paths_from(path.resolve().parent, problem)}
     tree = problem.spec.model_dump(mode="json", exclude_unset=True)
     text = yaml_text(with_values(tree, settings))
-    # Values of --set are not in the file: then all is written anew.
-    if problem.file is not None and load_spec(problem.file) == problem.spec:
-        text = amended(problem.file.read_text(encoding="utf-8"), settings)
+    if problem.file is not None:  # values of --set are not in the file
+        old = load_spec(problem.file).model_dump(mode="json", exclude_unset=True)
+        more = {**changed_values(old, tree), **settings}
+        text = amended(problem.file.read_text(encoding="utf-8"), more)
 
     def write(to: Path) -> None:
         to.write_text(text, encoding="utf-8")

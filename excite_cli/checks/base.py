@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.trust import key_of
 from excite_cli.config.spec import Spec
 
 Settings = dict[str, Any]  # by the path of the key in the config
@@ -67,7 +68,7 @@ class SetupCheck(ABC):
 
     def trusted(self, names: Sequence[str], spec: Spec, joints: Sequence[int]) -> Settings:
         """What to write where the data are right as they are."""
-        return {"measurement.trust": True}
+        return key_of(self.name)
 
     def is_declared(self, name: str, spec: Spec) -> bool:
         """Whether the config says already how joint `name` is set up."""

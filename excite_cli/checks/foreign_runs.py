@@ -51,7 +51,9 @@ def foreign_runs(
             if owner
             else ": it may be another robot's, or carry far more. "
         )
-        text += "Join its channels anew, or leave this run out; measurement.trust: true takes it"
+        text += (
+            f"Join its channels anew, or leave this run out; measurement.trust: [{NAME}] takes it"
+        )
         status: Status = "fault" if owner else "doubt"
         found.append(Result(NAME, "foreign_torque", status, text, runs=name))
     return found

@@ -21,6 +21,7 @@ from excite_cli.robot.model import Array
 _ROUNDS = 6
 _SAME = np.radians(0.3)  # a direction nearer than this is the same
 _NEAR = np.radians(6.0)  # to a wall, a ceiling, or half way between
+_LEANS = 30.0  # deg: more is no table
 _DIGITS = 4  # of angles [rad] that are written
 # Unit vectors along an axis, or half way between two.
 _PLAIN = [
@@ -66,10 +67,11 @@ class GravityDirection(SetupCheck):
     def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:
         """How far the robot is turned."""
         angle = np.degrees(_angle(before.gravity, after.gravity))
+        hangs = "leans" if angle < _LEANS else "hangs on a wall, under a ceiling, or leans"
         along = ", ".join(f"{x:.2f}" for x in after.gravity)
         return (
             f"gravity pulls along ({along}) m/s² in the frame of the base, {angle:.3g}° from where "
-            "the config has it: the robot hangs on a wall, under a ceiling, or leans"
+            f"the config has it: the robot {hangs}"
         )
 
     def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:

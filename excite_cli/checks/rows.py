@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from excite_cli.checks import (
     bodies,
     foreign_runs,
-    look,
+    sentences,
     solids,
     standing_legs,
     two_sides,
@@ -14,6 +14,8 @@ from excite_cli.checks import (
 from excite_cli.checks.own import own_checks
 from excite_cli.checks.result import Result, Status
 from excite_cli.checks.set_up import CHECKS
+from excite_cli.checks.trust import is_trusted
+from excite_cli.config.spec import Spec
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Robot
 
@@ -35,9 +37,10 @@ _OF_FILES: dict[str, tuple[str, ...]] = {
 _OF_DESCRIPTION = (bodies.NAME, solids.NAME, two_sides.NAME, zero_limits.NAME)
 NAMES = (
     *_OF_DESCRIPTION, *_OF_FILES, foreign_runs.NAME, standing_legs.NAME,
-    *(check.name for check in CHECKS), look.BELONG,
+    *(check.name for check in CHECKS), sentences.BELONG,
 )  # fmt: skip
 _OTHER = "what else was noticed"
+_TRUSTED = "not judged: measurement.trust names it"
 _STATUS: dict[str, Status] = {"error": "fault", "warning": "doubt", "note": "ok"}
 
 
@@ -64,12 +67,17 @@ def of_files(findings: Sequence[Finding]) -> list[Result]:
     ]  # fmt: skip
 
 
-def in_order(found: Sequence[Result], judged: bool) -> tuple[Result, ...]:
-    """Results by the order of rows; a row without any is fine, if it was `judged`."""
+def names() -> tuple[str, ...]:
+    """Of all checks, those of packages among them."""
+    return (*NAMES, *(check.name for check in own_checks()))
+
+
+def in_order(found: Sequence[Result], judged: bool, spec: Spec) -> tuple[Result, ...]:
+    """Results by the order of rows; a row without any is fine, if it was `judged` or trusted."""
     rows: list[Result] = []
-    for name in (*NAMES, *(check.name for check in own_checks()), _OTHER):
+    for name in (*names(), _OTHER):
         own = [each for each in found if each.name == name]
         if not own and (judged or name in _OF_DESCRIPTION) and name != _OTHER:
-            own = [Result(name, "")]
+            own = [Result(name, "", "ok", _TRUSTED if is_trusted(name, spec) else "")]
         rows += own
     return tuple(rows)

@@ -23,6 +23,7 @@ from excite_cli.checks.textbook_fit import FLOOR, Explained, TextbookFit
 from excite_cli.checks.time_scale import Clock, TorqueLag
 from excite_cli.checks.tool import Tool
 from excite_cli.checks.torque_unit import TorqueUnit
+from excite_cli.checks.trust import is_trusted
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.dataset import Mask
 from excite_cli.robot.model import Array
@@ -60,7 +61,7 @@ class Step:
     after: Alternative
     left_before: Explained
     left_after: Explained
-    rivals: tuple[tuple[SetupCheck, Setup], ...] = ()
+    rivals: "tuple[_Candidate, ...]" = ()
 
     @property
     def question(self) -> _Question:
@@ -157,7 +158,7 @@ def _steps(
         near = [each for each in found if each.explained.loss < best.explained.loss + _AS_GOOD]
         same = [each for each in near if each.question == best.question]
         best = next((each for each in same if each.alternative.is_plain), best)
-        rivals = [(each.check, each.alternative.setup) for each in near if each not in same]
+        rivals = [each for each in near if each not in same]
         step = Step(best.check, setup, best.alternative, explained, best.explained, tuple(rivals))
         yield step
         setup, explained = best.alternative.setup, best.explained
@@ -172,6 +173,8 @@ def _candidates(
 ) -> Iterator[_Candidate]:
     names = fit.robot.joint_names
     for check in CHECKS:
+        if is_trusted(check.name, spec):
+            continue
         settled = {j for j, name in enumerate(names) if check.is_declared(name, spec)}
         every = check.alternatives(fit, setup, explained)
         some = [each for each in every if settled.isdisjoint(each.joints)]

@@ -16,9 +16,10 @@ class Setup:
     """Column `order[j]` of the file, times `sign[j]`, is that of joint j; all (n,).
 
     `gravity` (3,) [m/s²] in the frame in which the config has it, `zero` [rad] added to positions,
-    `unit`: N·m in one of the file, `turn`: rad in what the config takes for one. `clock`: true
-    seconds in one of the stamps. `lag` [s] of the torque behind the positions. `weightless`: a
-    controller took the weight off the torque. `loaded`: last bodies with a tool or a load on them.
+    `unit`: N·m in one of the file, `turn`: rad in what the config takes for one, where joints turn.
+    `clock`: true seconds in one of the stamps. `lag` [s] of the torque behind the positions.
+    `weightless`: a controller took the weight off the torque. `loaded`: last bodies with a tool or
+    a load on them.
     """
 
     gravity: Array
@@ -28,8 +29,8 @@ class Setup:
     tau_order: Order
     tau_sign: Array
     unit: Array
+    turn: Array
     clock: float = 1.0
-    turn: float = 1.0
     lag: float = 0.0
     weightless: bool = False
     loaded: tuple[int, ...] = ()
@@ -39,12 +40,12 @@ class Setup:
         """As the config has it."""
         n, ones = robot.n, np.ones(robot.n)
         gravity = np.array(robot.model.gravity.linear)
-        return cls(gravity, np.zeros(n), np.arange(n), ones, np.arange(n), ones, ones)
+        return cls(gravity, np.zeros(n), np.arange(n), ones, np.arange(n), ones, ones, ones)
 
     def motion(self, samples: Samples) -> tuple[Array, Array, Array]:
         """q, v, a (T, n) of the joints."""
         q, v, a = (x[:, self.q_order] * self.q_sign for x in (samples.q, samples.v, samples.a))
-        unit = self.turn if self.turn == 1.0 else np.where(samples.turns, self.turn, 1.0)
+        unit = np.where(samples.turns, self.turn, 1.0)
         return unit * q + self.zero, unit * v / self.clock, unit * a / self.clock**2
 
     def torque(self, samples: Samples) -> Array:
@@ -57,7 +58,7 @@ class Setup:
         found = self
         if positions is not None:
             own = {"q_order": self.q_order[positions], "q_sign": self.q_sign[positions]}
-            found = replace(found, **own)  # type: ignore[arg-type]
+            found = replace(found, turn=self.turn[positions], **own)  # type: ignore[arg-type]
         if torques is not None:
             own = {"tau_order": self.tau_order[torques], "tau_sign": self.tau_sign[torques]}
             found = replace(found, unit=self.unit[torques], **own)  # type: ignore[arg-type]

@@ -53,8 +53,8 @@ def standing_legs(robot: Robot, samples: Samples) -> list[Result]:
         f"or is bolted down: upward forces there ({forces}; it weighs {mass * gravity:.3g} N) "
         f"explain {1 - best / whole:.0%} of what the URDF leaves. Declare robot.base: floating, "
         "robot.rows: [base, joints] and the forces measured there (measurement.wrench), or leave "
-        "the joints that carry it out of robot.joints; measurement.trust: true takes them as they "
-        "are"
+        f"the joints that carry it out of robot.joints; measurement.trust: [{NAME}] takes them as "
+        "they are"
     )
     return [Result(NAME, "standing", "fault", text)]
 

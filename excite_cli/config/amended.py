@@ -44,6 +44,26 @@ def with_values(tree: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[st
     return found
 
 
+def changed_values(
+    old: Mapping[str, Any], new: Mapping[str, Any], above: str = ""
+) -> dict[str, Any]:
+    """What of `new` is other than in `old`, by the path of its key.
+
+    A section whose keys are no words of a config (names of joints) is given whole.
+    """
+    found: dict[str, Any] = {}
+    for key, value in new.items():
+        before = old.get(key)
+        if key in old and before == value:
+            continue
+        both = isinstance(before, Mapping) and isinstance(value, Mapping)
+        if both and before and all(map(str.isidentifier, {*before, *value})):
+            found |= changed_values(before, value, f"{above}{key}.")
+        else:
+            found[above + key] = value
+    return found
+
+
 def _on_one_line(value: Any) -> Any:
     if isinstance(value, Mapping):
         found = CommentedMap(value)

@@ -38,6 +38,7 @@ class EffectSpec(Section):
 
 
 PerJoint = Finite | dict[str, Finite]
+AngleUnit = Literal["rad", "deg"] | Positive
 
 
 class FilterSpec(Section):
@@ -119,10 +120,10 @@ class MeasurementSpec(Section):
     torque_lag: Finite = Field(
         0.0, description="time by which recorded torques are late, against positions [s]"
     )
-    angle: Literal["rad", "deg"] | Positive = Field(
+    angle: AngleUnit | dict[str, AngleUnit] = Field(
         "rad",
         description="of positions and speeds of joints that turn; or rad in one unit of the file, "
-        "as 0.0015339808 of 4096 counts a turn",
+        "as 0.0015339808 of 4096 counts a turn; or {joint: unit}, others in rad",
     )
     length: Literal["m", "cm", "mm"] = Field(
         "m", description="of positions and speeds of joints that slide"
@@ -158,8 +159,10 @@ class MeasurementSpec(Section):
         "all that hold it",
     )
     base: BaseStateSpec = Field(BaseStateSpec(), description="how the base moved meanwhile")
-    trust: bool = Field(
-        False, description="take order and signs of the columns as they are, whatever the URDF says"
+    trust: bool | tuple[str, ...] = Field(
+        False,
+        description="checks of `excite inspect` whose doubts are settled, as [direction of "
+        "gravity]; true: mount, zeros, signs, order, units and clock are as the config says",
     )
     topic: str | None = Field(None, description="topic of a bag; default: the only JointState")
     filter: FilterSpec = FilterSpec()

@@ -115,7 +115,8 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
         raise FileError(
             f"run '{run.label}' is too short: {run.duration:.3g} s leave {len(centers)} "
             f"averaged samples at {processing.rate:.3g} Hz after its borders are cut; "
-            f"{_FEWEST} are needed. Record longer, or raise measurement.filter.rate."
+            f"{_FEWEST} are needed. Record longer, raise measurement.filter.rate, or check "
+            f"measurement.time: a sample lasts {run.step:.3g} s."
         )
     averages = average_rows(len(t), centers, h, cutoff)
     # The torque is averaged at the full rate: picking samples first would fold its noise down.

@@ -17,6 +17,7 @@ from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.hdf5_reader import Hdf5Reader
 from excite_cli.measurement.joined_files import is_part, with_joined
+from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.mat_reader import MatReader
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.motors import Motors
@@ -25,7 +26,6 @@ from excite_cli.measurement.quality import checked
 from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOptions
 from excite_cli.measurement.run_identity import Origin
 from excite_cli.measurement.torque import SECONDS, check_joints, check_motors, declared, to_joints
-from excite_cli.measurement.units import Limits
 from excite_cli.out_of_core import Spool
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell

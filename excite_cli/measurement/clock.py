@@ -17,8 +17,9 @@ from excite_cli.measurement.dataset import Array, Finding, Run
 
 _OFF = 0.02  # share by which all gains miss 1
 _ALIKE = 0.01  # share by which gains of joints may differ
-_LEFT = 0.05  # share of the change of position that a gain may leave
+_LEFT = 0.05  # share of the recorded speeds that a gain may leave
 _WINDOW = 0.1  # s
+_NARROW = 10  # samples: a step of an encoder is little beside what so many move
 _FEWEST = 2  # joints
 
 
@@ -42,6 +43,9 @@ def check_clock(runs: Sequence[Run], where: str) -> list[Finding]:
         "they are right, leave the speeds out (measurement.channels: {dq: null})"
     )
     settings = {"measurement.clock": float(f"{1 / gain:.4g}")}
+    if all((run.t == np.round(run.t)).all() for run in runs):  # no drive's speeds are so far off
+        text = f"time stamps are the numbers of the samples, not seconds: {text}"
+        return [Finding("clock", "error", text, where, (), settings)]
     return [Finding("clock", "warning", text, where, (), settings)]
 
 
@@ -54,14 +58,14 @@ def _gains(runs: Sequence[Run]) -> Array:
     moves = own > 1e-4 * own.max()
     gains = np.sum(moved * integrated, axis=0)[moves] / own[moves]
     left = np.linalg.norm(integrated[:, moves] - gains * moved[:, moves], axis=0)
-    return np.where(left < _LEFT * np.sqrt(own[moves]), gains, np.nan)
+    return np.where(left < _LEFT * np.abs(gains) * np.sqrt(own[moves]), gains, np.nan)
 
 
 def _over_windows(run: Run) -> tuple[Array, Array]:
     """Δq and ∫ v dt over windows (T', n)."""
     assert run.dq is not None
     # Steps of 1e-310 s come from damaged stamps: their window is as long as the data allow.
-    width = int(np.clip(_WINDOW / run.step, 1, max(len(run.t) // 4, 1)).round())
+    width = int(np.clip(_WINDOW / run.step, _NARROW, max(len(run.t) // 4, 1)).round())
     path = np.cumsum((run.dq[1:] + run.dq[:-1]) / 2 * run.step, axis=0)
     path = np.vstack([np.zeros(run.q.shape[1]), path])
     return run.q[width:] - run.q[:-width], path[width:] - path[:-width]

@@ -22,6 +22,12 @@ def dead_channels(runs: Sequence[Run], joints: tuple[str, ...]) -> tuple[list[Ru
     if still.all():
         text = "no joint moves: positions are constant throughout. Is this the right channel?"
         return list(runs), [Finding("dead", "error", text)]
+    if all(_constant(run.tau).all() for run in runs) and any(r.usable().any() for r in runs):
+        text = (
+            f"no torque is in the data: those of all joints are constant (at {runs[0].tau[0, 0]:g} "
+            "of the first). Which channel holds them (measurement.channels: {tau: …})?"
+        )
+        return list(runs), [*findings, Finding("dead_torque", "error", text)]
     kept = []
     for run, stands in zip(runs, held, strict=True):
         checked, more = _of_run(run, joints, stands, still)

@@ -14,6 +14,7 @@ from excite_cli.measurement.channel_order import check_order
 from excite_cli.measurement.covariates import without_missing_covariates
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.dead_channels import dead_channels
+from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.merged_findings import merged
 from excite_cli.measurement.missing_values import without_missing
 from excite_cli.measurement.resolution import with_torque_steps
@@ -21,7 +22,7 @@ from excite_cli.measurement.saturation import mask_saturated
 from excite_cli.measurement.stamps import equidistant
 from excite_cli.measurement.stuck import mask_stuck
 from excite_cli.measurement.torque import in_step
-from excite_cli.measurement.units import Limits, check_units
+from excite_cli.measurement.units import check_units
 from excite_cli.measurement.wrapped import unwrapped
 
 

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.measurement.dataset import Array, Run
+from excite_cli.measurement.dataset import Array, Mask, Run
+
+_FOLLOWS = 0.8  # correlation
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,21 @@ class Speeds:
         return np.divide(product, own, out=np.full(len(own), np.nan), where=own > 0)
 
 
+def following(found: Speeds, among: Mask) -> tuple[Mask, Array]:
+    """Joints (n,) whose recorded speeds follow their own positions, and the size of their gains."""
+    if found.recorded is None:
+        return np.zeros(len(among), bool), np.zeros(len(among))
+    follows = (np.abs(np.diag(found.correlation())) > _FOLLOWS) & among
+    return follows, np.abs(np.nan_to_num(found.gain()))
+
+
+def usual_gain(found: Speeds, among: Mask | None = None) -> float:
+    """Median gain of the recorded speeds of joints that follow their own positions; NaN if none."""
+    everywhere = np.ones(found.differentiated.shape[1], bool)
+    follows, gains = following(found, everywhere if among is None else among)
+    return float(np.median(gains[follows])) if follows.any() else float("nan")
+
+
 def _normed(x: Array) -> Array:
     x = x - x.mean(axis=0)
     size = np.sqrt((x**2).sum(axis=0))
@@ -58,3 +75,11 @@ def _of_run(run: Run) -> tuple[Array, Array | None]:
     moved = run.q[ahead] - run.q[behind]
     v = moved / (run.t[ahead] - run.t[behind])[:, None]
     return v, None if run.dq is None else run.dq[stride:-stride]
+
+
+def extremes(runs: Sequence[Run]) -> tuple[Array, Array]:
+    """Lowest and highest positions (n,) of all runs."""
+    return (
+        np.min([run.q.min(axis=0) for run in runs], axis=0),
+        np.max([run.q.max(axis=0) for run in runs], axis=0),
+    )

@@ -55,6 +55,7 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...], torques: bool =
         "velocity_sign": list(spec.velocity_sign),
         "offset": list(spec.offset),
         "without_torque": list(spec.without_torque),
+        "angle": list(spec.angle) if isinstance(spec.angle, dict) else [],
     }
     for key in ("gear_ratio", "torque_constant", "torque_unit"):
         value = getattr(spec, key)
@@ -101,8 +102,7 @@ def to_joints(
 ) -> Run:
     """The run in s, rad (m) and N·m at the joints, as `spec` declares it."""
     ratio, shares = _per_joint(spec.gear_ratio, joints), _shares(spec, joints)
-    radians = RADIANS[spec.angle] if isinstance(spec.angle, str) else spec.angle
-    angle = np.where(revolute, radians, METERS[spec.length])
+    angle = np.where(revolute, angle_units(spec, joints), METERS[spec.length])
     q = run.q * angle * _per_joint(spec.position_sign, joints)
     dq = None if run.dq is None else run.dq * angle * _per_joint(spec.velocity_sign, joints)
     if spec.position == "motor":
@@ -123,6 +123,13 @@ def to_joints(
         coupled[:, j] += shares[j, k] * tau[:, k]
     converted = replace(run, q=q, dq=dq, tau=coupled)
     return converted if motors is None else motors.at_joints(converted, spec)
+
+
+def angle_units(spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:
+    """Rad in one unit of the file, of joints that turn, (n,)."""
+    declared = spec.angle
+    units = [declared.get(j, "rad") if isinstance(declared, Mapping) else declared for j in joints]
+    return np.array([RADIANS[unit] if isinstance(unit, str) else unit for unit in units])
 
 
 def torque_units(spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.measurement.dataset import Array, Finding, Run
-from excite_cli.measurement.units import Limits
+from excite_cli.measurement.limits import Limits
 
 _TURN = 2 * np.pi
 _WHOLE = 1.001  # turns within which angles of one turn lie

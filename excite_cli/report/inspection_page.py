@@ -1,6 +1,6 @@
 """The page of an inspection: what of log and model is fine, doubtful or wrong, and its cure."""
 
-from excite_cli.checks.look import written
+from excite_cli.checks.sentences import written
 from excite_cli.report.page import KeyFigure, Page, Section, Table, Text
 from excite_cli.report.score_sections import table_of
 from excite_cli.summary.inspection import Inspected, checks_table, counted, headline, remarks

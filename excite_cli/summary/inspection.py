@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from excite_cli.checks.look import written
 from excite_cli.checks.result import Result
+from excite_cli.checks.sentences import written
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.command import Command, as_word
 from excite_cli.shown.table import Part, Table

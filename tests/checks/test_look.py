@@ -99,11 +99,11 @@ def test_what_is_declared_is_not_judged(robot: Robot, rubbing: Dataset) -> None:
     wrong = changed(rubbing, tau=negative(1))
     message = told(robot, wrong)
     assert f"measurement.sign: {{{name}: -1}}" in message
-    assert f"If the data are right as they are, say so: measurement.sign: {{{name}: 1}}." in message
+    assert f"If that is right as it is, say so: measurement.sign: {{{name}: 1}}." in message
     assert "measurement.sign" not in told(robot, wrong, with_(sign={name: 1}))
     assert name in told(robot, wrong, with_(sign={other: 1}))
     reversed_ = changed(rubbing, order=np.arange(6)[::-1])
-    assert "measurement.trust: true" in told(robot, reversed_)
+    assert "measurement.trust: [order of columns]" in told(robot, reversed_)
     assert told(robot, reversed_, with_(trust=True)) == ""
 
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from excite_cli.checks.foreign_runs import foreign_runs
-from excite_cli.checks.look import BELONG, look
+from excite_cli.checks.look import look
 from excite_cli.checks.result import Result
 from excite_cli.checks.samples import samples_of
+from excite_cli.checks.sentences import BELONG
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import TextbookFit
 from excite_cli.config.amended import with_values
@@ -211,6 +212,25 @@ def test_what_is_trusted_is_said_not_to_be_judged(robot: Robot, sound: Dataset) 
     (result,) = found(robot, sound, trusted)
     assert result.status == "ok"
     assert "not judged: measurement.trust is set" in result.evidence
+
+
+def test_one_check_that_is_trusted_leaves_the_others(robot: Robot, sound: Dataset) -> None:
+    both = changed(sound, lambda run: replace(run, q=run.q + np.pi / 2 * at(2)))
+    hung = robot.with_gravity(np.array([0.0, 0.0, 9.81]))
+    assert {each.kind for each in found(hung, both)} == {"mount", "zero"}
+    values = {"measurement.trust": ["direction of gravity"]}
+    spec = spec_of(with_values(SPEC.model_dump(mode="json", exclude_unset=True), values))
+    assert "mount" not in {each.kind for each in found(hung, both, spec)}
+
+
+def test_two_steps_of_one_check_are_one_row(robot: Robot, sound: Dataset) -> None:
+    signs = np.where(at(1) + at(2) > 0, -1.0, 1.0)
+    turned = changed(sound, lambda run: replace(run, tau=run.tau * signs))
+    (result,) = found(robot, turned)
+    assert result.kind == "torque_sign"
+    assert result.settings == {"measurement.sign": {"shoulder_lift_joint": -1, "elbow_joint": -1}}
+    assert result.evidence.count("As they are") == 1
+    assert "As likely" not in result.evidence
 
 
 def test_bodies_of_no_mass_are_unlikely(robot: Robot, sound: Dataset) -> None:

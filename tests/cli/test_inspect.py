@@ -110,7 +110,17 @@ def test_nothing_to_apply(folder: Path, cache: Path) -> None:
 def test_values_of_set_are_in_what_is_applied(folder: Path, cache: Path) -> None:
     said = Program(folder, cache)("inspect", "arm.yaml", "--set", "seed=7", "--apply", "seven.yaml")
     assert said.returncode == 0, said.stderr
-    assert "seed: 7" in (folder / "seven.yaml").read_text(encoding="utf-8")
+    text = (folder / "seven.yaml").read_text(encoding="utf-8")
+    assert "seed: 7" in text
+    assert text.startswith(CONFIG)  # comments and all
+
+
+def test_a_check_that_is_no_check(folder: Path, cache: Path) -> None:
+    said = Program(folder, cache)(
+        "inspect", "arm.yaml", "--set", "measurement.trust=[direction of gravty]"
+    )
+    assert said.returncode == 2
+    assert "'direction of gravty' is no check. Did you mean 'direction of gravity'" in said.stderr
 
 
 def test_a_bad_file_gets_one_message_and_loses_nothing(folder: Path, cache: Path) -> None:

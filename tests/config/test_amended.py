@@ -1,6 +1,6 @@
 """A config with some values changed keeps its comments."""
 
-from excite_cli.config.amended import amended, with_values
+from excite_cli.config.amended import amended, changed_values, with_values
 from excite_cli.config.load import parse_spec
 
 TEXT = """\
@@ -35,3 +35,11 @@ def test_plain_values() -> None:
     measurement = {"time": "ms", "angle": "deg"}
     assert found == {"robot": {"urdf": "a"}, "measurement": measurement, "seed": 2}
     assert tree["measurement"] == {"time": "ms"}
+
+
+def test_what_is_other_than_before() -> None:
+    old = {"seed": 1, "robot": {"urdf": "a"}, "measurement": {"sign": {"a.b": 1}, "time": "s"}}
+    new = {"seed": 1, "robot": {"urdf": "b"}, "measurement": {"sign": {"a.b": -1}, "time": "s"}}
+    changed = changed_values(old, new)
+    assert changed == {"robot.urdf": "b", "measurement.sign": {"a.b": -1}}
+    assert with_values(old, changed) == new

@@ -9,8 +9,8 @@ import numpy as np
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Finding, Run
+from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.quality import checked
-from excite_cli.measurement.units import Limits
 
 JOINTS = ("shoulder", "elbow", "wrist")
 BOUNDS = (np.full(3, -3.0), np.full(3, 3.0), np.full(3, 4.0), np.full(3, 50.0))

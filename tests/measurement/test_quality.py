@@ -310,4 +310,4 @@ def test_torques_too_small_for_a_square_are_none() -> None:
     run = recorded()
     found = check(replace(run, tau=run.tau * 1e-200))[1]
     assert {(each.kind, each.severity) for each in found} == {("dead_torque", "error")}
-    assert all("is constant at 0 while it moves" in each.text for each in found)
+    assert all("those of all joints are constant (at 0" in each.text for each in found)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from excite_cli.measurement.dataset import Array, Run
-from excite_cli.measurement.units import Limits
+from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.wrapped import unwrapped
 
 T = np.arange(1000) * 0.01
