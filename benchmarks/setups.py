@@ -179,11 +179,12 @@ def altered_logs(logs: list[str], mistakes: list[str], seed: int) -> None:
     print(f"slowest: {max(e.seconds for e in outcomes):.1f} s")
 
 
-def pairs(logs: list[str], mistakes: list[str], seed: int, count: int) -> None:
+def pairs(logs: list[str], mistakes: list[str], seed: int, wanted: int) -> None:
     """Two mistakes at once."""
-    rng, told, wrong = np.random.default_rng(seed), 0, 0
+    rng, told, wrong, count, k = np.random.default_rng(seed), 0, 0, 0, -1
     known = {name: _usual(recording(name).case, recording(name).data) for name in logs}
-    for k in range(count):
+    while count < wanted:
+        k += 1
         name, (first, second) = str(rng.choice(logs)), rng.choice(mistakes, 2, replace=False)
         of = recording(name)
         usual, sound = known[name]
@@ -191,6 +192,9 @@ def pairs(logs: list[str], mistakes: list[str], seed: int, count: int) -> None:
             MISTAKES[each](of.data, of.case, np.random.default_rng([seed, k, place]))
             for place, each in enumerate((first, second))
         )
+        if one.key == alone.key and not (one.joints or alone.joints):
+            continue  # two answers to one question of all joints: only their product is in the data
+        count += 1
         other = MISTAKES[second](one.data, of.case, np.random.default_rng([seed, k, 1]))
         robot = {**one.robot, **other.robot}
         label = f"{name}: {first} + {second}"
