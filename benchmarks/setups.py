@@ -192,7 +192,7 @@ def pairs(logs: list[str], mistakes: list[str], seed: int, wanted: int) -> None:
             MISTAKES[each](of.data, of.case, np.random.default_rng([seed, k, place]))
             for place, each in enumerate((first, second))
         )
-        if one.key == alone.key and not (one.joints or alone.joints):
+        if one.key and one.key == alone.key and not (one.joints or alone.joints):
             continue  # two answers to one question of all joints: only their product is in the data
         count += 1
         other = MISTAKES[second](one.data, of.case, np.random.default_rng([seed, k, 1]))
