@@ -20,10 +20,12 @@ from excite_cli.atomic import write_atomically, write_text_atomically
 from excite_cli.checks import rows
 from excite_cli.checks.look import look
 from excite_cli.checks.result import Result
+from excite_cli.checks.sentences import BELONG, written
 from excite_cli.checks.trust import but_trusted, check_names
 from excite_cli.config.amended import amended, changed_values, with_values
 from excite_cli.config.load import load_spec, spec_of
 from excite_cli.config.write import yaml_text
+from excite_cli.errors import ExciteError
 from excite_cli.excitation.problem import Problem
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
@@ -92,15 +94,23 @@ def inspect(
         check_names(case.spec, rows.names())
         found = but_trusted(rows.of_description(case.robot), case.spec)
         settings: dict[str, Any] = {}
+        before, more = settings, settings
         runs: tuple[str, ...] = ()
-        for _ in range(_ROUNDS if files else 0):
-            recorded = as_recorded(case, files)
-            runs = recorded.recordings
+        for turn in range(_ROUNDS if files else 0):
             seen = set(map(_key, found))
-            told, is_all = _looked(case, recorded, settings)
+            try:
+                recorded = as_recorded(case, files)
+                told, is_all = _looked(case, recorded, settings)
+            except ExciteError as error:  # of data as they are; or with what was tried
+                if not turn:
+                    raise
+                found.append(_in_vain(more, error))
+                settings = before
+                break
+            runs = recorded.recordings
             new = [each for each in told if _key(each) not in seen]
             found += new
-            more: dict[str, Any] = {}
+            before, more = settings, {}
             for each in new:
                 more = joined(more, each.settings)
             settings = joined(settings, more)
@@ -114,6 +124,12 @@ def inspect(
             title = f"Set-up of {case.robot.name}"
             write_text_atomically(page, render(inspection_page(inspection, title)))
         return inspection
+
+
+def _in_vain(settings: Mapping[str, Any], error: ExciteError) -> Result:
+    """That the data cannot be used with what would settle what is seen in the files."""
+    text = f"with {written(settings)} the data cannot be used: {error}".removesuffix(".")
+    return Result(BELONG, "in_vain", "fault", text)
 
 
 def _key(result: Result) -> tuple[str, tuple[str, ...], str]:

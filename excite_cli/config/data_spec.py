@@ -108,7 +108,9 @@ class MeasurementSpec(Section):
     velocity_sign: dict[str, Literal[-1, 1]] = Field(
         default_factory=dict, description="-1 where recorded speeds have the opposite sign"
     )
-    time: Literal["s", "ms", "us", "ns"] = Field("s", description="unit of the time stamps")
+    time: Literal["s", "ms", "us", "ns", "min", "h"] = Field(
+        "s", description="unit of the time stamps"
+    )
     clock: Positive = Field(
         1.0, description="true seconds in a second of the time stamps, of a clock that is off"
     )

@@ -34,6 +34,7 @@ _NOISE = 0.01  # rad (m), RMS, beyond what any encoder adds
 # Of a run's rate, for the cut-off of its positions: the filter begins on three periods of it, ten
 # samples at least.
 _HIGHEST_GIVEN = 0.3
+_FASTEST = 1e7  # Hz: beyond, filters of some Hz cannot be computed
 _FEWEST = 8  # decimated samples a run needs to say anything
 
 
@@ -99,9 +100,15 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     Raises
     ------
     FileError
-        The run is too short for the filters, or recorded too slowly for their cut-off.
+        The run is too short for the filters, or recorded too slowly for their cut-off, or faster
+        than any robot is.
     """
     fs = 1.0 / run.step
+    if fs > _FASTEST:
+        raise FileError(
+            f"run '{run.label}': samples come at {fs:.3g} Hz, which no robot's log does. Check "
+            "measurement.time."
+        )
     q = _positions(run, processing, fs)
     border = int(np.ceil(processing.border * fs))
     stride = processing.working_stride

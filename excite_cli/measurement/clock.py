@@ -17,6 +17,7 @@ from excite_cli.measurement.dataset import Array, Finding, Run
 
 _OFF = 0.02  # share by which all gains miss 1
 _ALIKE = 0.01  # share by which gains of joints may differ
+_FARTHEST = 5.0  # that a clock is off
 _LEFT = 0.05  # share of the recorded speeds that a gain may leave
 _WINDOW = 0.1  # s
 _NARROW = 10  # samples: a step of an encoder is little beside what so many move
@@ -34,7 +35,10 @@ def check_clock(runs: Sequence[Run], where: str) -> list[Finding]:
     if len(gains) < _FEWEST or not np.isfinite(gains).all():
         return []
     gain = float(np.median(gains))
+    numbered = all((run.t == np.round(run.t)).all() for run in runs)
     if gain == 0.0 or abs(gain - 1) < _OFF or np.ptp(gains) > _ALIKE * gain:
+        return []
+    if not (numbered or 1 / _FARTHEST < gain < _FARTHEST):  # a unit, not a clock
         return []
     text = (
         f"recorded speeds are {gain:.4g} times the change of position per time, on every joint "
@@ -43,7 +47,7 @@ def check_clock(runs: Sequence[Run], where: str) -> list[Finding]:
         "they are right, leave the speeds out (measurement.channels: {dq: null})"
     )
     settings = {"measurement.clock": float(f"{1 / gain:.4g}")}
-    if all((run.t == np.round(run.t)).all() for run in runs):  # no drive's speeds are so far off
+    if numbered:  # no drive's speeds are so far off
         text = f"time stamps are the numbers of the samples, not seconds: {text}"
         return [Finding("clock", "error", text, where, (), settings)]
     return [Finding("clock", "warning", text, where, (), settings)]

@@ -20,7 +20,7 @@ _PLOTTED_NUMBER = re.compile(r"/?.*/(position|velocity|effort)\[(\d+)\]$")
 _UNIT = re.compile(r"^(.*\S)\s*[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*)\s*[\])]$")
 # In s, rad, rad/s, m, m/s, N·m and N; those that say nothing of a unit of ours are left alone.
 _UNITS = {
-    "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9,
+    "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0,
     "rad": 1.0, "deg": np.pi / 180, "°": np.pi / 180, "m": 1.0, "cm": 1e-2, "mm": 1e-3,
     "rad/s": 1.0, "deg/s": np.pi / 180, "°/s": np.pi / 180, "rpm": np.pi / 30, "m/s": 1.0,
     "mm/s": 1e-3, "nm": 1.0, "n·m": 1.0, "n*m": 1.0, "mnm": 1e-3, "mn·m": 1e-3, "ncm": 1e-2,

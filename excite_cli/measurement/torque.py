@@ -19,7 +19,7 @@ from excite_cli.errors import ConfigError, nearest
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.motors import Motors, at_motors
 
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 RADIANS = {"rad": 1.0, "deg": np.pi / 180}
 METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 NEWTON_METERS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "kNm": 1e3, "kgfcm": 0.0980665}

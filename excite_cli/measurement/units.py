@@ -45,7 +45,9 @@ def check_units(
 
 
 def _unit_for(seconds: float) -> str:
-    return next((unit for unit, s in SECONDS.items() if abs(seconds / s - 1) < _CLOSE), "")
+    """Not minutes: to a twentieth, speeds are as many times too small beside degrees."""
+    near = [unit for unit, s in SECONDS.items() if abs(seconds / s - 1) < _CLOSE and unit != "min"]
+    return near[0] if near else ""
 
 
 def _time_by_speed(found: Speeds, spec: MeasurementSpec, where: str) -> list[Finding]:

@@ -1,6 +1,7 @@
 """`excite inspect` as a user runs it: a robot on its side, a wrong config, and what it writes."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -133,3 +134,17 @@ def test_a_bad_file_gets_one_message_and_loses_nothing(folder: Path, cache: Path
     assert "Traceback" not in said.stderr
     assert said.stderr.count("error: ") == 1
     assert (folder / "kept.yaml").read_text(encoding="utf-8") == "# mine\n"
+
+
+def test_what_settles_one_thing_and_spoils_the_data_is_not_set(folder: Path, cache: Path) -> None:
+    """Speeds 1e9 times too large ask for stamps in ns, with which the log lasts 12 ns."""
+    data = hanging(arm())
+    runs = tuple(replace(run, dq=1e9 * np.gradient(run.q, run.t, axis=0)) for run in data.runs)
+    write_dataset(folder / "fast.h5", replace(data, runs=runs), {})
+    said = Program(folder, cache)("inspect", "arm.yaml", "fast.h5", "--json")
+    answer = json.loads(said.stdout)
+    assert said.returncode == 1, said.stderr
+    assert answer["settings"] == {}
+    (vain,) = [each for each in answer["checks"] if "cannot be used" in each["evidence"]]
+    assert vain["evidence"].startswith("with measurement.time: ns and ")
+    assert "the data cannot be used: run 'a': samples come at 2e+11 Hz" in vain["evidence"]
