@@ -4,10 +4,10 @@
                                           [--group GROUP] [--columns] [--only INDEX …]
 
 A case is a MuJoCo robot whose inertias are 10–30 % off its URDF, two to eight runs of which one is
-sealed, and something that the config does not declare; see `benchmarks/campaigns/cases.py` for the
-sixteen groups. Cases follow from (seed, index) alone. Each is diagnosed from a file, as by a user.
-What was said is compared to what was planted: names, the runs they are of, sizes, and whether a
-rest that is large by the truth is said to be there.
+held out, and something that the config does not declare; see `benchmarks/campaigns/cases.py` for
+the sixteen groups. Cases follow from (seed, index) alone. Each is diagnosed from a file, as by a
+user. What was said is compared to what was planted: names, the runs they are of, sizes, and whether
+a rest that is large by the truth is said to be there.
 
 Seeds below 1000 are for development; the figures that are quoted are of a seed from 5000 on that
 nobody had looked at.

@@ -109,7 +109,7 @@ def scores(
     found = []
     for _ in range(trials):
         data = noisy(played.dataset, made, coarse, rng)
-        fit = identify(of.robot, of.base, data, spec, sealed="motion_3").fit
+        fit = identify(of.robot, of.base, data, spec, held_out="motion_3").fit
         own = [known[f"{each.kind}{each.joints}"] for each in fit.effects]
         truth = np.concatenate([of.base.mapping @ played.truth.phi, *own])
         found.append((fit.values - truth) / fit.std)

@@ -1,7 +1,7 @@
 """Payloads of 1 to 5 kg on a UR10 and a Panda whose torques have unknown gains of ±10 %.
 
 Four motions of ten seconds in MuJoCo: unloaded, with a payload that was weighed, with an unknown
-one, unloaded (sealed). The unknown mass with the known payload and without it: error, and whether
+one, unloaded (held out). The unknown mass with the known payload and without it: error, and whether
 the 95 % interval holds the truth; likewise every gain.
 """
 

@@ -49,7 +49,7 @@ def cases(name: str, count: int, seed: int, seconds: tuple[float, ...]) -> tuple
     spec = of.spec.model_copy(update={"effects": declared})
     found = identify(robot, of.base, alone, spec)
     stored = StoredFit(
-        "", "", robot.fingerprint(), found.fit, found.sealed_run, found.error,
+        "", "", robot.fingerprint(), found.fit, found.held_out_run, found.error,
         found.training_error, (), (), processing=found.processing.as_data(),
     )  # fmt: skip
     case = replace(load_case(CONFIGS / f"{name}.yaml"), spec=spec)

@@ -5,7 +5,7 @@
 A slow motion is played three times on a simulated robot that has a small effect; the diagnosis
 names an effect together with others that the data cannot tell from it. `optimize --after` plans
 the motion that tells them apart, the same robot plays it once, and both files are diagnosed
-together, an old take sealed. Divergences are in nats: 3 is where two effects count as told apart.
+together, an old take held out. Divergences are in nats: 3 is where two effects count as told apart.
 
 Over the seeds 1 to 5 of `simulate` (the sizes were chosen so that the first data leave it open):
 nonlinear: 5 of 5 start with an alias set that holds the truth, or the truth named; 5 of 5 settled.
@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-SEALED = "motion_1_take_3"
+HELD_OUT = "motion_1_take_3"
 # One start and few iterations: a motion that separates need not be the best one.
 _BRIEF = ("optimizer.restarts=1", "optimizer.max_iterations=60")
 
@@ -128,7 +128,7 @@ def run_loop(case: Case, folder: Path) -> Outcome:
     )
     timed("play next", "simulate", config, "next.h5", "-o", "next_data.h5", *simulated)
     last = timed(
-        "diagnose both", "diagnose", config, "slow_data.h5", "next_data.h5", "--sealed", SEALED,
+        "diagnose both", "diagnose", config, "slow_data.h5", "next_data.h5", "--held-out", HELD_OUT,
         "-o", "both.h5",
     )  # fmt: skip
     pairs = following["next_experiment"]["pairs"]
@@ -164,7 +164,7 @@ def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> floa
         (limits.lower, limits.upper, limits.velocity, limits.effort),
         (~robot.sliding).astype(float),
     )
-    parts = split(data, SEALED)
+    parts = split(data, HELD_OUT)
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )

@@ -46,7 +46,7 @@ def main() -> None:
                                  for e in found.effects))  # fmt: skip
             sets[names] += 1
             print(
-                f"noise {seed:3}: {', '.join(names) or 'nothing'}; sealed "
+                f"noise {seed:3}: {', '.join(names) or 'nothing'}; held out "
                 f"{100 * found.before.mean_relative:.2f} -> "
                 f"{100 * found.after.mean_relative:.2f} %",
                 flush=True,

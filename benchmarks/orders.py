@@ -1,11 +1,12 @@
 """A payload in one of four runs, and whether it matters in which order the files are given.
 
-    python -m benchmarks.orders [--sealed RUN]
+    python -m benchmarks.orders [--held-out RUN]
 
 A UR10 whose inertias are off by 20 % and whose torques by 8 %, with load-dependent friction on its
 elbow, carries 2.6 kg in run "loaded" and nothing in "a", "b" and "c". All 24 orders are diagnosed:
-what is named and of which run, and the error before and after on the sealed run (the last one,
-unless `--sealed` names it). Where the loaded run is sealed itself, nothing tells of the payload.
+what is named and of which run, and the error before and after on the held-out run (the last one,
+unless `--held-out` names it). Where the loaded run is held out itself, nothing tells of the
+payload.
 """
 
 import argparse
@@ -49,7 +50,7 @@ class Answer:
     """Names of one order, or why it was refused; of payloads the runs, and the first one's mass."""
 
     order: tuple[str, ...]
-    sealed: str
+    held_out: str
     names: tuple[str, ...]
     payloads: tuple[tuple[str, ...], ...]
     mass: tuple[float, float]
@@ -59,8 +60,8 @@ class Answer:
 
     @property
     def right(self) -> bool:
-        """The payload, of the loaded run alone if that was not sealed, and the friction."""
-        wanted = () if self.sealed == "loaded" else (("loaded",),)
+        """The payload, of the loaded run alone if that was not held out, and the friction."""
+        wanted = () if self.held_out == "loaded" else (("loaded",),)
         return self.payloads == wanted and any(
             name.startswith("load_dependent_friction@elbow_joint") for name in self.names
         )
@@ -68,13 +69,13 @@ class Answer:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sealed", choices=RUNS)
-    sealed = parser.parse_args().sealed
+    parser.add_argument("--held-out", choices=RUNS)
+    held_out = parser.parse_args().held_out
     case, data = made()
     found = []
     with threadpool_limits(1):
         for order in itertools.permutations(RUNS):
-            found.append(answer(case, data, order, sealed))
+            found.append(answer(case, data, order, held_out))
             print(line(found[-1]), flush=True)
     print("\n".join(summary(found)))
 
@@ -96,13 +97,13 @@ def made() -> tuple[Case, Dataset]:
     return Case(spec, CONFIGS, of.robot), replace(data, runs=runs)
 
 
-def answer(case: Case, data: Dataset, order: tuple[str, ...], sealed: str | None) -> Answer:
+def answer(case: Case, data: Dataset, order: tuple[str, ...], held_out: str | None) -> Answer:
     """Of the runs in this order."""
-    out = sealed or order[-1]
+    out = held_out or order[-1]
     by_name = {run.name: run for run in data.runs}
     ordered = replace(data, runs=tuple(by_name[name] for name in order))
     try:
-        found = diagnose(case, ordered, sealed, tell=lambda note: None)
+        found = diagnose(case, ordered, held_out, tell=lambda note: None)
     except ExciteError as error:
         return Answer(
             order, out, (f"refused: {error}",), (), (_NAN, _NAN), _NAN, _NAN, (_NAN, _NAN)
@@ -123,7 +124,7 @@ def answer(case: Case, data: Dataset, order: tuple[str, ...], sealed: str | None
 
 
 def _loaded(found: Diagnosis) -> tuple[float, float]:
-    """Errors of the sealed part of loaded runs, where there is one."""
+    """Errors of the held-out part of loaded runs, where there is one."""
     for part in getattr(found, "parts", ()):
         if "loaded" in part.runs:
             return part.before.mean_relative, part.after.mean_relative
@@ -135,7 +136,7 @@ def line(a: Answer) -> str:
     payloads = "; ".join("+".join(runs) or "all runs" for runs in a.payloads) or "none"
     return (
         f"{' '.join(a.order):18} payload in {payloads:12} {a.mass[0]:5.2f} ± {a.mass[1]:4.2f} kg  "
-        f"sealed {100 * a.before:5.2f} -> {100 * a.after:5.2f} %  loaded part "
+        f"held out {100 * a.before:5.2f} -> {100 * a.after:5.2f} %  loaded part "
         f"{100 * a.loaded[0]:5.2f} -> {100 * a.loaded[1]:5.2f} %  "
         f"{'right' if a.right else 'WRONG'}: {', '.join(a.names)}"
     )
@@ -143,13 +144,13 @@ def line(a: Answer) -> str:
 
 def summary(found: Sequence[Answer]) -> list[str]:
     """How many orders are right, and whether all say the same."""
-    trained = [a for a in found if a.sealed != "loaded"]
+    trained = [a for a in found if a.held_out != "loaded"]
     return [
         f"{sum(a.right for a in trained)} of {len(trained)} orders with the loaded run in training "
         "name the payload for that run alone, and the load-dependent friction",
         f"{sum(a.right for a in found) - sum(a.right for a in trained)} of "
-        f"{len(found) - len(trained)} with it sealed name that friction and no payload",
-        f"{sum(a.after < a.before for a in found)} of {len(found)}: the sealed error falls",
+        f"{len(found) - len(trained)} with it held-out name that friction and no payload",
+        f"{sum(a.after < a.before for a in found)} of {len(found)}: the held-out error falls",
         f"{len({tuple(sorted(a.names)) for a in trained})} different sets of names",
     ]
 

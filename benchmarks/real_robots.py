@@ -106,7 +106,7 @@ def diagnosed(log: Log, options: Sequence[str]) -> Answer:
         text=True,
         check=False,
     )
-    if run.returncode not in (0, 1):  # 1: the sealed error did not fall, which the table shows
+    if run.returncode not in (0, 1):  # 1: the held-out error did not fall, which the table shows
         raise SystemExit(f"{log.words}: {run.stderr}")
     return Answer(json.loads(run.stdout))
 
@@ -211,12 +211,12 @@ def beside_textbook(answers: Sequence[Answer]) -> str:
 
 
 LOGS = (
-    Log("Stäubli TX40, 9 s, every third second sealed", "tx40", "tx40.h5", tx40),
+    Log("Stäubli TX40, 9 s, every third second held out", "tx40", "tx40.h5", tx40),
     Log("UR10 (CB3), 27 s, from the rosbag", "ur10_cb", "ur10_exciting_trajectory.db3", ur10),
-    Log("KUKA KR300, run C sealed, inertias free", "kr300", "kr300.h5", kr300,
-        (("--sealed", "C"),)),
+    Log("KUKA KR300, run C held out, inertias free", "kr300", "kr300.h5", kr300,
+        (("--held-out", "C"),)),
     Log("the same, inertias kept at CAD within 10 %", "kr300", "kr300.h5", kr300_cad,
-        tuple(("--sealed", run, *_CAD) for run in "CBA")),
+        tuple(("--held-out", run, *_CAD) for run in "CBA")),
     Log("TIAGo, torso and arm, 80 s, currents with assumed constants", "tiago", "tiago.h5", tiago),
     Log("the same, without the four torques that are warned of", "tiago", "tiago.h5", tiago,
         (("--set", f"measurement.without_torque=[{','.join(_USELESS)}]"),)),

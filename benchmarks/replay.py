@@ -4,7 +4,7 @@
 
 Six robots of the campaigns in MuJoCo, inertias 10 to 30 % off their URDF, with viscous, Coulomb and
 load-dependent friction, a spring on one joint and an armature on another, four motions each. They
-are diagnosed, exported, and `excite replay` plays the sealed motion's torques on the URDF and on
+are diagnosed, exported, and `excite replay` plays the held-out motion's torques on the URDF and on
 the exported model.
 """
 
@@ -49,7 +49,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             file, case = Path(folder) / "found.h5", Case(of.spec, Path("configs"), of.robot)
             diagnose(case, data, output=file, tell=lambda note: None)
-            found = replay(file, data, sealed=True, tell=lambda note: None)
+            found = replay(file, data, held_out=True, tell=lambda note: None)
         before, after = found.means
         worst = max(found.after, key=lambda joint: found.after[joint])
         told = "-" if before is None else f"{1e3 * before:.2f} mrad"

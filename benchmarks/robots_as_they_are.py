@@ -31,7 +31,7 @@ from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.identifying import identify
 from excite_cli.api.loading import Case as Robotic
 from excite_cli.api.loading import load_case, load_data
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
 from excite_cli.errors import ExciteError
 
@@ -110,7 +110,7 @@ def _judged(case: Case, file: Path, more: bool) -> Outcome:
     wrong = [
         name
         for name, each in zip(names, found.effects, strict=True)
-        if each.verdict is SealedVerdict.CONFIRMED
+        if each.verdict is HeldOutVerdict.CONFIRMED
         and not each.approximates
         and each.effect.kind not in allowed
     ]

@@ -34,7 +34,7 @@ from excite_cli.api.inspecting import inspect
 from excite_cli.api.loading import Case, load_case
 from excite_cli.checks.result import Result
 from excite_cli.config.amended import with_values
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
 from excite_cli.errors import ExciteError
 from excite_cli.measurement.dataset import Dataset
@@ -240,7 +240,7 @@ def _confirmed(case: Case, data: Dataset) -> set[str] | None:
     return {
         f"{each.effect.kind}@{','.join(each.effect.joints)}"
         for each in found.effects
-        if each.verdict is SealedVerdict.CONFIRMED
+        if each.verdict is HeldOutVerdict.CONFIRMED
         and each.effect.kind not in (*EVERYDAY_FRICTION, *EVERYDAY)
     }
 

@@ -17,7 +17,7 @@ from excite_cli.summary.friction_lines import friction_table
 from excite_cli.summary.named_effects import approximation_parts, effect_parts
 
 HEAD = "---\nhide: [toc]\n---\n\n<!-- Made by `python -m docs.make_gallery`; edit nothing here. -->"
-# Figures of the first answer, and of the others; torque in time has one for each sealed run.
+# Figures of the first answer, and of the others; torque in time has one for each held-out run.
 IN_FULL = ("before_", "friction", "effects_1", "errors", "after_")
 OTHERWISE = ("effects_1", "errors")
 _SOURCES = ("source", "licence", "torque", "note", "rate_note", "changes")  # attributes of a log
@@ -73,10 +73,10 @@ def _log(facts: Mapping[str, str], data: Dataset, first: Diagnosed) -> list[str]
             f"{len(run.t)}",
             f"{run.duration:.3g}",
             f"{(len(run.t) - 1) / run.duration:.4g}",
-            "sealed"
+            "held out"
             if run.name not in training
-            else f"training, {found.sealed_run} sealed"
-            if run.name in found.sealed_run
+            else f"training, {found.held_out_run} held out"
+            if run.name in found.held_out_run
             else "training",
         )
         for run in data.runs
@@ -88,7 +88,7 @@ def _log(facts: Mapping[str, str], data: Dataset, first: Diagnosed) -> list[str]
         "## The log",
         bullets(f"{name.replace('_', ' ')}: {facts[name]}" for name in _SOURCES if name in facts),
         as_markdown(runs),
-        "*Sealed* data take no part in choosing or fitting; every error on this page is told on "
+        "*Held-out* data take no part in choosing or fitting; every error on this page is told on "
         "them. All of it is one command:",
         as_markdown(first.command),
         "What the program says of these data:",
@@ -101,7 +101,7 @@ def _residual(first: Diagnosed) -> list[str]:
     return [
         "## What the declared model leaves",
         "The config declares no effect: the declared model is the rigid bodies of the URDF (with "
-        "the friction of its `<dynamics>`, if any), refitted to the training data. On the sealed "
+        "the friction of its `<dynamics>`, if any), refitted to the training data. On the held-out "
         f"data it leaves {before.mean_relative_moving:.1%} of the torque (RMS, where joints move, "
         "mean over joints).",
         *_pictures(first, "before_", "Measured torque, the declared model, and what it leaves"),
@@ -155,7 +155,7 @@ def _unexplained(found: Diagnosis) -> list[str]:
 
 
 def left_of(found: Diagnosis) -> dict[str, str]:
-    """By joint: its error on sealed data, and what is said of the rest of its torque."""
+    """By joint: its error on held-out data, and what is said of the rest of its torque."""
     said = {}
     for joint in found.joint_names:
         only = replace(
@@ -174,7 +174,7 @@ def left_of(found: Diagnosis) -> dict[str, str]:
         )
         share = found.after.relative_moving[joint]
         moving = f"{share:.1%} of its torque is left where it moves" if share == share else (
-            "it does not move in the sealed data, or has no torque"
+            "it does not move in the held-out data, or has no torque"
         )  # fmt: skip
         said[joint] = f"{moving}. {words}"
     return said
@@ -195,7 +195,7 @@ def _otherwise(each: Diagnosed) -> list[str]:
 
 
 def _pictures(each: Diagnosed, figure: str, words: str) -> list[str]:
-    """Pictures of a figure; of torque in time there is one for each run with sealed data."""
+    """Pictures of a figure; of torque in time there is one for each run with held-out data."""
     names = [name for name in each.pictures if name.startswith(figure)]
     return [f"![{words}]({each.pictures[name]})" for name in names]
 

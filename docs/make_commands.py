@@ -24,7 +24,7 @@ to stderr.
 |---|---|
 | 0 | good |
 | 1 | it ran, and the answer is bad: no admissible motion, a limit broken, a wrong gradient,\
- effects that do not lower the error on sealed data |
+ effects that do not lower the error on held-out data |
 | 2 | bad input: a file, a config, an option |
 | 70 | a bug in excite |
 | 130 | interrupted |

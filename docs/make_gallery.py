@@ -25,8 +25,8 @@ from excite_cli.report.style import (
     FORBIDDEN,
     GREEN,
     GREY,
+    HELD_OUT,
     PURPLE,
-    SEALED,
     VERMILION,
     save_figure,
 )
@@ -119,7 +119,7 @@ def _palette() -> Image.Image:
     dark = ("#000000", GREY, BLUE, VERMILION, GREEN, PURPLE)
     steps = [
         round(255 + (int(colour[at : at + 2], 16) - 255) * share)
-        for colours, shares in ((dark, whole), ((SEALED, FORBIDDEN), light))
+        for colours, shares in ((dark, whole), ((HELD_OUT, FORBIDDEN), light))
         for colour in colours
         for share in shares
         for at in (1, 3, 5)

@@ -28,12 +28,12 @@ TRUE = frozenset({
 
 @dataclass(frozen=True)
 class Sound:
-    """A recording as it is, the config for it, and the run that is sealed."""
+    """A recording as it is, the config for it, and the run that is held out."""
 
     name: str
     case: Case
     data: Dataset
-    sealed: str | None = None
+    held_out: str | None = None
     leans: bool = False
 
 
@@ -53,7 +53,7 @@ def sound_logs(simulated: int, seed: int) -> Iterator[Sound]:
         name = f"{index} {case.group} {case.robot.name}{' coarse' if coarse else ''}"
         leans = any("base_tilt" in plant.kinds for plant in case.plants)
         own = Case(case.spec, CONFIGS, case.robot.robot)
-        yield Sound(name, own, data, case.sealed, leans)
+        yield Sound(name, own, data, case.held_out, leans)
 
 
 def _coarse(run: Run) -> Run:

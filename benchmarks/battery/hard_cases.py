@@ -2,7 +2,7 @@
 
 A case follows from (seed, index) alone; topics come in turn, shuffled by the seed. The robot, its
 noise and its motions are those of the other cases (`cases`); what differs is what is planted and
-how many motions there are, the last of which is sealed.
+how many motions there are, the last of which is held out.
 """
 
 from collections.abc import Callable, Mapping, Sequence

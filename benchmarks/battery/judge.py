@@ -129,7 +129,7 @@ def _checked(dataset: Dataset, case: Case) -> Dataset:
 
 
 def oracle(case: Case, dataset: Dataset) -> Errors:
-    """Errors on the sealed run with the truth declared."""
+    """Errors on the held-out run with the truth declared."""
     names = case.robot.robot.joint_names
     truth = [
         _spec_of(record)

@@ -100,7 +100,7 @@ class Case:
     spec: Spec
     plants: tuple[Plant, ...]
     hidden: tuple[Planted, ...]
-    sealed: str
+    held_out: str
     friction: str
 
     @property
@@ -140,7 +140,7 @@ def make_case(seed: int, index: int) -> Case:
 def _attempt(index: int, group: str, rng: np.random.Generator) -> Case | None:
     of = robot_of(drawn_robot(rng, group == "payload_on_leaf"))
     runs = _run_names(group, rng)
-    sealed = runs[-1] if rng.uniform() < 0.6 else str(rng.choice(runs))
+    held_out = runs[-1] if rng.uniform() < 0.6 else str(rng.choice(runs))
     motions = (short_moves if group == "short_moves" else series)(of, runs, rng)
     settings = _settings(group, rng)
     clock, instruments = _instruments(group, len(runs), settings.seed, rng)
@@ -163,7 +163,7 @@ def _attempt(index: int, group: str, rng: np.random.Generator) -> Case | None:
         ground,
         model_columns(of, declared, ground),
         runs,
-        sealed,
+        held_out,
         clock,
         _sizes(of, inside),
     )
@@ -172,10 +172,10 @@ def _attempt(index: int, group: str, rng: np.random.Generator) -> Case | None:
         return None
     background = () if modelled or not declared else _background(scene, inside)
     hidden = (_moved(of, rng),) if group == "clean_centers" else ()
-    spec = _with_states(spec, changes, sealed, rng)
+    spec = _with_states(spec, changes, held_out, rng)
     return Case(
         index, group, of, motions, settings, instruments, spec, (*changes, *background), hidden,
-        sealed, friction,
+        held_out, friction,
     )  # fmt: skip
 
 
@@ -299,11 +299,11 @@ def _moved(of: Arm, rng: np.random.Generator) -> Planted:
 
 
 def _with_states(
-    spec: Spec, plants: tuple[Plant, ...], sealed: str, rng: np.random.Generator
+    spec: Spec, plants: tuple[Plant, ...], held_out: str, rng: np.random.Generator
 ) -> Spec:
-    """Half of the users whose sealed run is loaded say so, where a config can hold it."""
+    """Half of the users whose held-out run is loaded say so, where a config can hold it."""
     says = rng.uniform() < 0.5
-    loaded = [plant for plant in plants if plant.kinds == ("payload",) and sealed in plant.runs]
+    loaded = [plant for plant in plants if plant.kinds == ("payload",) and held_out in plant.runs]
     if not (says and loaded and "runs" in Spec.model_fields):
         return spec
     states = {run: {"payload": "tool"} for plant in loaded for run in sorted(plant.runs)}

@@ -40,7 +40,7 @@ class Outcome:
 
     `left`: joints of which it is said that more than noise is left. `rest`: residual over noise
     floor by joint. `silent`: joints of which a large rest is not said. `refused`: the data, sound
-    as they are, were not taken. `worse`: the sealed error did not fall (of effects in other runs
+    as they are, were not taken. `worse`: the held-out error did not fall (of effects in other runs
     alone: it rose), `admitted`: and the program says so. `worse_joints`: where it rose, and no
     effect there is doubted. `seconds` are of the processor.
     """
@@ -49,7 +49,7 @@ class Outcome:
     group: str
     robot: str = ""
     runs: int = 0
-    sealed: str = ""
+    held_out: str = ""
     friction: str = ""
     noise: float = 0.0
     correlation: float = 0.0
@@ -140,7 +140,7 @@ def _diagnosed(case: Case, data: Recorded) -> Diagnosis:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "campaign.h5"
         write_dataset(path, data.dataset, {})
-        return diagnose(robot, path, case.sealed, tell=lambda note: None)
+        return diagnose(robot, path, case.held_out, tell=lambda note: None)
 
 
 def truth_of(case: Case) -> Truth:
@@ -148,7 +148,7 @@ def truth_of(case: Case) -> Truth:
     robot = case.robot.robot
     return Truth(
         case.plants,
-        frozenset(case.runs) - {case.sealed},
+        frozenset(case.runs) - {case.held_out},
         robot.joint_names,
         robot.joint_names[leaves(robot)[-1]],
         case.friction,
@@ -205,7 +205,7 @@ def rests(case: Case, data: Recorded, found: Diagnosis) -> dict[str, float]:
     n = case.robot.robot.n
     noise, left, counted = np.zeros(n), np.zeros(n), np.zeros((2, n))
     for run in data.sound.runs:
-        if run.name == case.sealed:
+        if run.name == case.held_out:
             continue
         prepared = prepare(replace(run, tau=data.noise[run.name], valid=None), processing)
         noise += np.square(np.where(prepared.usable, prepared.tau, 0.0)).sum(axis=0)
@@ -222,7 +222,7 @@ def rests(case: Case, data: Recorded, found: Diagnosis) -> dict[str, float]:
 
 def _describe(outcome: Outcome, case: Case) -> None:
     outcome.robot, outcome.friction = case.robot.name, case.friction
-    outcome.runs, outcome.sealed = len(case.runs), case.sealed
+    outcome.runs, outcome.held_out = len(case.runs), case.held_out
     outcome.noise, outcome.correlation = case.instruments.noise, case.instruments.correlation
     outcome.planted = [plant.in_words for plant in case.plants if plant.required]
 
@@ -261,7 +261,7 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score) -> 
         for size in result.sizes
     ]
     outcome.before, outcome.after = found.before.mean_relative, found.after.mean_relative
-    elsewhere = all(each.effect.runs for each in found.effects)  # and not in the sealed run
+    elsewhere = all(each.effect.runs for each in found.effects)  # and not in the held-out run
     outcome.worse = bool(found.effects) and not outcome.after < outcome.before * (
         _UNCHANGED if elsewhere else 1.0
     )
@@ -270,7 +270,7 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score) -> 
 
 
 def _unsaid_worse(found: Diagnosis, joint: str) -> bool:
-    """Whether a joint's sealed error rose clearly, and all effects on it pass for confirmed."""
+    """Whether a joint's held-out error rose clearly, and all effects on it pass for confirmed."""
     rose = found.after.rms[joint] > ROSE * found.before.rms[joint]
     on_it = [each for each in found.effects if joint in each.effect.joints]
     verdicts = {str(getattr(each, "verdict", None) or "confirmed") for each in on_it}

@@ -29,7 +29,7 @@ _STRONGER = (0.25, 0.6)  # friction that changes, as a share of itself
 class Scene:
     """On what effects are planted: motions, and an orthonormal `model` of what is declared.
 
-    `runs` in their order, the `sealed` one among them; `clock` in units of the whole campaign;
+    `runs` in their order, the `held_out` one among them; `clock` in units of the whole campaign;
     `friction` (2, n): Coulomb and viscous friction of the joints; zero where there is none.
     """
 
@@ -37,13 +37,13 @@ class Scene:
     ground: Ground
     model: Array
     runs: tuple[str, ...]
-    sealed: str
+    held_out: str
     clock: tuple[float, ...]
     friction: Array
 
     @property
     def training(self) -> tuple[str, ...]:
-        return tuple(run for run in self.runs if run != self.sealed)
+        return tuple(run for run in self.runs if run != self.held_out)
 
     def names(self, joints: Sequence[int]) -> tuple[str, ...]:
         return tuple(self.of.robot.joint_names[j] for j in joints)
@@ -68,12 +68,12 @@ def shows(scene: Scene, planted: Sequence[Planted]) -> bool:
 
 
 def some_runs(scene: Scene, rng: np.random.Generator) -> frozenset[str]:
-    """Some of the training runs, not all; the sealed run with a chance of 0.4."""
+    """Some of the training runs, not all; the held-out run with a chance of 0.4."""
     training = list(scene.training)
     count = int(rng.integers(1, max(len(training), 2)))
     chosen = {str(run) for run in rng.choice(training, min(count, len(training) - 1), False)}
     if rng.uniform() < 0.4:
-        chosen.add(scene.sealed)
+        chosen.add(scene.held_out)
     return frozenset(chosen)
 
 

@@ -182,11 +182,11 @@ def _is(called: Called, plant: Plant, truth: Truth, answer: Answer) -> bool:
     if not _kind_and_place(plant, called.name, truth):
         return False
     told, true = _trained(called.runs, truth), _trained(plant.runs, truth)
-    of_sealed = called.runs - truth.training
+    of_held_out = called.runs - truth.training
     if told == truth.training - true and _opposite(called, truth, answer):
-        return not of_sealed & plant.runs
-    if plant.runs and not of_sealed <= plant.runs:
-        return False  # it is said of a sealed run that does not have it
+        return not of_held_out & plant.runs
+    if plant.runs and not of_held_out <= plant.runs:
+        return False  # it is said of a held-out run that does not have it
     if told == true:
         return True
     return told < true and true == frozenset().union(*_alike(called, true, truth, answer))

@@ -68,7 +68,7 @@ def where(joints: Sequence[str]) -> str:
 
 
 def unsaid(o: Outcome) -> bool:
-    """Whether the sealed error rose, as a whole or on a joint, and nothing says so."""
+    """Whether the held-out error rose, as a whole or on a joint, and nothing says so."""
     return (o.worse and not o.admitted) or bool(o.worse_joints)
 
 
@@ -145,7 +145,7 @@ def failures(outcomes: Sequence[Outcome]) -> list[str]:
 def in_detail(judged: Judged) -> str:
     """All that is known of one case."""
     o, found = judged.outcome, judged.diagnosis
-    text = [HEADER, line(o), f"sealed {o.sealed}; seconds {o.seconds}"]
+    text = [HEADER, line(o), f"held out {o.held_out}; seconds {o.seconds}"]
     if judged.case is not None:
         text += [
             f"planted: {plant.in_words} sizes {dict(plant.sizes)} "

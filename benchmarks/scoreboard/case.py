@@ -9,7 +9,8 @@ DATA = Path(__file__).parents[2] / "data"
 
 @dataclass(frozen=True)
 class Case:
-    """A config that declares no effect, its data, the run that is `sealed` (None: as excite does).
+    """A config that declares no effect, its data, the run that is `held_out` (None: as excite
+    does).
 
     `planted`: what a simulated robot has, by `benchmarks.robots.planting` (one record per effect).
     `coupled`: joints whose motors are coupled, as authors of another tool say in their example.
@@ -19,7 +20,7 @@ class Case:
     words: str
     config: Path
     data: Path
-    sealed: str | None = None
+    held_out: str | None = None
     planted: tuple[dict[str, Any], ...] = ()
     coupled: tuple[str, ...] = ()
 

@@ -116,7 +116,7 @@ def ran(words: Sequence[str | Path]) -> Ran:
 
 def excite(case: Case, stored: Path) -> tuple[dict[str, Any] | None, Ran]:
     """What `excite diagnose` says, with the diagnosis in the file `stored`."""
-    sealed = () if case.sealed is None else ("--sealed", case.sealed)
-    files = (case.config, case.data, *sealed, "-o", stored, "--overwrite")
+    held_out = () if case.held_out is None else ("--held-out", case.held_out)
+    files = (case.config, case.data, *held_out, "-o", stored, "--overwrite")
     run = ran([sys.executable, "-c", _PROGRAM, "diagnose", *files, "--json", "--no-progress"])
     return (json.loads(run.output) if run.output.strip() else None), run

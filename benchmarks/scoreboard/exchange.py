@@ -18,7 +18,8 @@ BEGIN, END = "# --- what a user writes", "# --- until here"
 class Recording:
     """t (T,) [s]; q, dq, tau (T, n) as recorded; `used` (T,): samples that a fit may use.
 
-    Of sealed parts of a recording the positions are there; in place of torques is a straight line.
+    Of held-out parts of a recording the positions are there; in place of torques is a straight
+    line.
     """
 
     t: np.ndarray

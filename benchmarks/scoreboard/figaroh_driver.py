@@ -5,7 +5,7 @@
 Its pipeline as in its TX40 example: friction, armature and offset of every joint, its Butterworth
 filter, its decimation, base parameters by QR, weighted least squares. It takes one recording:
 several are put one after the other with a smooth second between them, and its sample mask leaves
-out that, what is sealed and the borders that its filters reach over. Predicted torques are its
+out that, what is held out and the borders that its filters reach over. Predicted torques are its
 regressor times its base parameters, as in its own validation. Two joints that are named have
 coupled motors: the columns for these are those that the helper class of its TX40 example has.
 """

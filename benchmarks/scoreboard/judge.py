@@ -43,31 +43,31 @@ class Judge:
     """Parts that are held out, filtered, and the training recordings as they were recorded."""
 
     case: Loaded
-    sealed: tuple[PreparedRun, ...]
+    held_out: tuple[PreparedRun, ...]
     recordings: tuple[Recording, ...]
 
     def given(self, folder: Path) -> Given:
         """What every tool is given, in `folder`."""
-        asked = tuple(States(run.q, run.v, run.a) for run in self.sealed)
+        asked = tuple(States(run.q, run.v, run.a) for run in self.held_out)
         return Given(folder / "robot.urdf", self.case.robot.joint_names, self.recordings, asked)
 
     def verdict(self, torques: Sequence[Array], phi: Array | None = None) -> Verdict:
         """Of torques (T, n) at the states of every held-out part, and link inertias if any."""
-        return judged(self.case.robot.joint_names, self.sealed, torques, phi)
+        return judged(self.case.robot.joint_names, self.held_out, torques, phi)
 
 
 def judged(
     names: Sequence[str],
-    sealed: Sequence[PreparedRun],
+    held_out: Sequence[PreparedRun],
     torques: Sequence[Array],
     phi: Array | None = None,
 ) -> Verdict:
     """As `Judge.verdict`."""
-    found = torque_errors(names, sealed, torques)
+    found = torque_errors(names, held_out, torques)
     return Verdict(
         found.mean_relative_moving,
         found.relative_moving,
-        _raw(sealed, torques),
+        _raw(held_out, torques),
         None if phi is None else physical(phi),
     )
 
@@ -77,8 +77,8 @@ def physical(phi: Array) -> bool:
     return bool(np.linalg.eigvalsh(pseudo_inertias(phi.ravel())).min() > 0.0)
 
 
-def _raw(sealed: Sequence[PreparedRun], torques: Sequence[Array]) -> float:
-    measured = np.concatenate([run.tau_raw for run in sealed])
+def _raw(held_out: Sequence[PreparedRun], torques: Sequence[Array]) -> float:
+    measured = np.concatenate([run.tau_raw for run in held_out])
     error, size = measured - np.concatenate(list(torques)), np.nansum(measured**2, axis=0)
     known = size > 0.0
     return float(np.mean(np.sqrt(np.nansum(error**2, axis=0)[known] / size[known])))
@@ -89,13 +89,13 @@ def judge_of(case: Case) -> Judge:
     loaded = load_case(case.config)
     dataset = load_data(loaded, case.data, lambda note: None)
     spec = loaded.spec
-    parts = split(dataset, case.sealed, spec.diagnosis.block)
+    parts = split(dataset, case.held_out, spec.diagnosis.block)
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )
     recordings = [_recording(run, parts.training) for run in whole(dataset)]
     kept = tuple(each for each in recordings if each.used.any())
-    return Judge(loaded, tuple(prepare_all(parts.sealed, processing)), kept)
+    return Judge(loaded, tuple(prepare_all(parts.held_out, processing)), kept)
 
 
 def _recording(run: Run, training: Sequence[Run]) -> Recording:

@@ -30,7 +30,7 @@ def diagnosed(case: Case, judge: Judge, folder: Path) -> list[Result]:
 def predicted(model: IdentifiedModel, judge: Judge) -> tuple[list[Any], Any]:
     """Torques at the states that are asked, and inertias (bodies, 10)."""
     robot = judge.case.robot
-    torques = [model.predicted(robot, run).torque for run in judge.sealed]
+    torques = [model.predicted(robot, run).torque for run in judge.held_out]
     return torques, model.phi.reshape(-1, 10)
 
 

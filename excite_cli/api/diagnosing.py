@@ -33,8 +33,8 @@ from excite_cli.workers.at_hand import at_hand
 from excite_cli.workers.base import Workers
 
 _HAVE_IT = (
-    "What was found does not lower the error on sealed data. To have it in a config all the same: "
-    "--apply-unconfirmed (in Python apply_unconfirmed=True of diagnose, unconfirmed=True of "
+    "What was found does not lower the error on held-out data. To have it in a config all the "
+    "same: --apply-unconfirmed (in Python apply_unconfirmed=True of diagnose, unconfirmed=True of "
     "save_config)."
 )
 
@@ -43,7 +43,7 @@ _HAVE_IT = (
 def diagnose(
     problem: Problem | Case,
     data: Dataset | str | Path | Sequence[str | Path],
-    sealed: str | None = None,
+    held_out: str | None = None,
     *,
     output: str | Path | None = None,
     apply: str | Path | None = None,
@@ -58,7 +58,7 @@ def diagnose(
     """What the declared model lacks: `excite diagnose`.
 
     `data` are measured data or their files. Written to `output` (HDF5) if that is given, and the
-    config with what was found to `apply` (YAML); where the error on sealed data did not fall
+    config with what was found to `apply` (YAML); where the error on held-out data did not fall
     (`good` is false), that is written with `apply_unconfirmed` only, and where the textbook's model
     is better (`worse_than_textbook`), that one is. `smallest`: with the fewest
     effects that are within one standard error of the best on runs left out. `workers`
@@ -69,14 +69,14 @@ def diagnose(
     -------
     Diagnosis
         `effects` (kind, joints, parameters with standard deviations, p-value, aliases), `absorbed`,
-        `unexplained`, and the errors `before` and `after` on the run `sealed` (default: the last),
-        which nothing else saw; `verdict` and `removes` say what every effect is worth there.
+        `unexplained`, and the errors `before` and `after` on the run `held_out` (default: the
+        last), which nothing else saw; `verdict` and `removes` say what every effect is worth there.
 
     Raises
     ------
     ConfigError, FileError
         Config and data do not fit; order or signs of torques cannot be right; data too short, or
-        sealed ones a copy of others; a file exists already.
+        held-out ones a copy of others; a file exists already.
     """
     if apply_unconfirmed and apply is None:
         raise ConfigError("--apply-unconfirmed says nothing without --apply NEW.yaml.")
@@ -87,7 +87,7 @@ def diagnose(
     with held({"output": output, "apply": apply}, overwrite, inputs), at_hand(workers):
         dataset = dataset_of(problem, data, tell)
         found = diagnose_dataset(
-            problem.robot, robot_base(problem), dataset, problem.spec, sealed, progress, ended
+            problem.robot, robot_base(problem), dataset, problem.spec, held_out, progress, ended
         )
         found = replace(
             found,
@@ -126,7 +126,7 @@ def save_config(
     Raises
     ------
     ConfigError
-        The error on sealed data did not fall, and it is not asked for what is `unconfirmed`.
+        The error on held-out data did not fall, and it is not asked for what is `unconfirmed`.
     FileError
         It cannot be written.
     """

@@ -38,7 +38,7 @@ from excite_cli.workers.base import Workers
 def identify(
     problem: Problem | Case,
     data: Dataset | str | Path | Sequence[str | Path],
-    sealed: str | None = None,
+    held_out: str | None = None,
     *,
     output: str | Path | None = None,
     urdf: str | Path | None = None,
@@ -59,7 +59,7 @@ def identify(
     -------
     Identification
         `fit` has `names`, `values` and `std` (P,), base parameters first, then those of effects;
-        `error` is that on the run `sealed` (default: the last), which no fit saw.
+        `error` is that on the run `held_out` (default: the last), which no fit saw.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def identify(
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, **models}, overwrite, inputs), at_hand(workers):
         dataset = dataset_of(problem, data, tell)
-        suspicious = check_dataset(problem.robot, dataset, problem.spec, sealed)
+        suspicious = check_dataset(problem.robot, dataset, problem.spec, held_out)
         dataset = replace(dataset, findings=(*dataset.findings, *suspicious))
         tell_findings(suspicious, tell)
         found = identify_dataset(
@@ -80,7 +80,7 @@ def identify(
             robot_base(problem),
             dataset,
             problem.spec,
-            sealed,
+            held_out,
             lambda text: progress(text, 0),
         )
         for reason in found.processing.reasons:

@@ -35,7 +35,7 @@ from excite_cli.summary.dataset import runs_in_words
 from excite_cli.summary.problem import problem_notes
 from excite_cli.summary.robots import robot_parts
 
-# Share of a joint's torque on sealed data from which a fit is doubted.
+# Share of a joint's torque on held-out data from which a fit is doubted.
 _MUCH_LEFT = 0.1
 # A YAML file, or what it would hold.
 Config = str | Path | Mapping[str, Any]
@@ -211,7 +211,7 @@ def as_recorded(problem: Problem | Case, files: str | Path | Sequence[str | Path
     """
     paths = [files] if isinstance(files, str | Path) else files
     given = [Path(each) for each in paths]
-    refuse_twice(given)  # a run that is fitted must not be the sealed one, too
+    refuse_twice(given)  # a run that is fitted must not be the held-out one, too
     robot, limits, spec = problem.robot, problem.robot.limits, problem.spec.measurement
     own = slice(robot.base_joints, None)
     return read_dataset(

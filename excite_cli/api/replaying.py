@@ -34,12 +34,12 @@ def replay(
     model: Model | str | Path,
     data: Dataset | str | Path | Sequence[str | Path],
     *,
-    sealed: bool = False,
+    held_out: bool = False,
     tell: Tell = log_note,
 ) -> Replay:
     """Recorded torques played on the exported model (MJCF), and on the URDF: `excite replay`.
 
-    `sealed`: of the data that the model was made of, only the part that was sealed then.
+    `held_out`: of the data that the model was made of, only the part that was held out then.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def replay(
     stored = given.made
     robot = stored.robot
     dataset = dataset_of(Case(stored.spec, stored.folder, robot), data, tell)
-    own = recordings_of(dataset, stored.sealed_run if sealed else None, given)
+    own = recordings_of(dataset, stored.held_out_run if held_out else None, given)
     scorer = Scorer(stored)
     runs = [run for parts in own.values() for run in scorer.prepared(parts)]
     recorded = [run for parts in own.values() for run in parts]

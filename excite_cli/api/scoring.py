@@ -34,7 +34,7 @@ def score(
     model: Model | str | Path,
     data: Dataset | str | Path | Sequence[str | Path],
     *,
-    sealed: bool = False,
+    held_out: bool = False,
     output: str | Path | None = None,
     overwrite: bool = False,
     workers: Workers | None = None,
@@ -43,17 +43,17 @@ def score(
 ) -> Score:
     """Torque predicted by a stored model beside measured torque, nothing fitted: `excite score`.
 
-    `data` are measured data or their files, which are read one after the other; `sealed`: of the
-    data that the model was made of, only the part that was sealed then. Written to `output` (HDF5)
-    if that is given. `workers` (`open_workers`) share the files; of many, one that cannot be read
-    is told and left out.
+    `data` are measured data or their files, which are read one after the other; `held_out`: of the
+    data that the model was made of, only the part that was held out then. Written to `output`
+    (HDF5) if that is given. `workers` (`open_workers`) share the files; of many, one that cannot be
+    read is told and left out.
 
     Returns
     -------
     Score
         `runs` with their errors by joint, the `ratio` of each to what the model's own residual
         allows, and where it is beyond that (`alarm`) the likely `reasons`; `error` over all runs
-        beside `made`, that on sealed data when the model was made.
+        beside `made`, that on held-out data when the model was made.
 
     Raises
     ------
@@ -68,8 +68,8 @@ def score(
 
         def scored(worse: Shift | None, files: Sequence[Path]) -> list[_Scored | Exception]:
             if isinstance(data, Dataset):
-                return [_scored(given, data, "", sealed, True, worse)]
-            shared = (str(stored.path), sealed, len(paths) == 1, worse)
+                return [_scored(given, data, "", held_out, True, worse)]
+            shared = (str(stored.path), held_out, len(paths) == 1, worse)
 
             def watch(news: News) -> None:
                 progress(f"{news.done} of {news.total} files", news.done)
@@ -100,11 +100,11 @@ def score(
             tuple(runs),
             together(runs, stored.robot.joint_names),
             stored.error,
-            stored.sealed_run,
+            stored.held_out_run,
             stored.noise or {},
             tuple(findings),
         )
-        found = replace(found, findings=(*found.findings, *_noticed(found, given, sealed)))
+        found = replace(found, findings=(*found.findings, *_noticed(found, given, held_out)))
         for finding in found.findings[len(findings) :]:
             tell(Note(Level.WARNING, finding.text))
         if output is not None:
@@ -120,12 +120,12 @@ def score_file(
 ) -> _Scored:
     """Scores of the runs of one file, for workers.
 
-    `shared`: the model's file, sealed, only one, and what was seen of its runs before.
+    `shared`: the model's file, held out, only one, and what was seen of its runs before.
     """
-    model, sealed, single, worse = shared
+    model, held_out, single, worse = shared
     given = _known_model(model, Path(model).stat().st_mtime_ns)
     case = Case(given.made.spec, given.made.folder, given.made.robot)
-    return _scored(given, load_data(case, path, lambda note: None), path, sealed, single, worse)
+    return _scored(given, load_data(case, path, lambda note: None), path, held_out, single, worse)
 
 
 @lru_cache(maxsize=1)
@@ -138,13 +138,13 @@ def _scored(
     model: Model,
     data: Dataset,
     path: str,
-    sealed: bool,
+    held_out: bool,
     single: bool,
     worse: Shift | None = None,
 ) -> _Scored:
     stored = model.made
     scorer, runs, findings = Scorer(stored), [], list(data.findings)
-    own = recordings_of(data, stored.sealed_run if sealed else None, model)
+    own = recordings_of(data, stored.held_out_run if held_out else None, model)
     for name, parts in own.items():
         label = name if single else f"{Path(path).stem}: {name}"
         try:
@@ -221,26 +221,26 @@ def _paths(data: str | Path | Sequence[str | Path]) -> list[Path]:
     return [Path(each) for each in ([data] if isinstance(data, str | Path) else data)]
 
 
-def recordings_of(dataset: Dataset, sealed: str | None, model: Model) -> dict[str, list[Run]]:
-    """Parts of every recording by its name; of the `sealed` part alone if it is named."""
+def recordings_of(dataset: Dataset, held_out: str | None, model: Model) -> dict[str, list[Run]]:
+    """Parts of every recording by its name; of the `held_out` part alone if it is named."""
     runs = whole(dataset)
-    if sealed is not None:
+    if held_out is not None:
         spec = model.made.spec
-        named = sealed if sealed in dataset.names else None
+        named = held_out if held_out in dataset.names else None
         if named is None and len(dataset.recordings) > 1:
             raise FileError(
-                f"--sealed: these data have no run '{sealed}', on which {model.made.path} was "
-                "judged. Give the data that it was made of, or leave --sealed out."
+                f"--held-out: these data have no run '{held_out}', on which {model.made.path} was "
+                "judged. Give the data that it was made of, or leave --held-out out."
             )
         parts = split(dataset, named, spec.diagnosis.block, spec.identification.needed_runs)
-        runs = list(parts.sealed)
+        runs = list(parts.held_out)
     found: dict[str, list[Run]] = {}
     for run in runs:
         found.setdefault(run.name, []).append(run)
     return found
 
 
-def _noticed(found: Score, model: Model, sealed: bool) -> list[Finding]:
+def _noticed(found: Score, model: Model, held_out: bool) -> list[Finding]:
     if found.made is None:
         text = (
             f"{found.model} does not tell how large its own errors were: no run can be out of what "
@@ -248,7 +248,7 @@ def _noticed(found: Score, model: Model, sealed: bool) -> list[Finding]:
         )
         return [Finding("no_allowance", "warning", text)]
     changing = [effect.title for effect in model.effects if effect.of_campaign]
-    if changing and not sealed:
+    if changing and not held_out:
         text = (
             f"{changing[0]}: other recordings have no place on the clock of the campaign that the "
             "model was made of; the first of each file is taken for its beginning"

@@ -120,7 +120,7 @@ def _traced(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Figur
     fit = identify(model, data)
     save_fit(folder / "fit.h5", model, fit)
     figures: dict[str, float | int | str | None] = {
-        "sealed_run": fit.sealed_run,
+        "held_out_run": fit.held_out_run,
         "parameters": len(fit.fit.names),
         "identified_error": fit.error.mean_relative_moving,
     }

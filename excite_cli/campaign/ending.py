@@ -6,7 +6,7 @@ from math import isfinite
 from excite_cli.campaign.records import Campaign
 from excite_cli.campaign.schedule import pace_of
 from excite_cli.diagnosis.records import Diagnosis
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import place_in_words
 
 # How much more of a joint's torque, or in N·m, may be left on the newest motion than on those that
@@ -18,19 +18,19 @@ _IN_VAIN = 3  # rounds that tried to tell a pair of effects apart
 
 def left_on_newest(found: Diagnosis) -> list[str]:
     """Joints whose torque the model misses more on the newest motion than where it was fitted."""
-    trained, sealed = found.trained, found.after
+    trained, held_out = found.trained, found.after
     if trained is None:
         return []
     said = []
     for joint in found.joint_names:
-        left, usual = sealed.relative_moving.get(joint), trained.relative_moving.get(joint)
+        left, usual = held_out.relative_moving.get(joint), trained.relative_moving.get(joint)
         if left is None or usual is None or not (isfinite(left) and isfinite(usual)):
             continue
         share = left / max(usual, _SMALL)
-        size = sealed.rms_moving.get(joint, 0.0) / max(trained.rms_moving.get(joint, 0.0), 1e-300)
+        size = held_out.rms_moving.get(joint, 0.0) / max(trained.rms_moving.get(joint, 0.0), 1e-300)
         if min(share, size) > _AS_GOOD:
             said.append(
-                f"{joint}: {left:.2%} of its torque is missed on {found.sealed_run}, "
+                f"{joint}: {left:.2%} of its torque is missed on {found.held_out_run}, "
                 f"{share:.1f} times as much as on the motions before"
             )
     return said
@@ -45,7 +45,7 @@ def still_open(found: Diagnosis, pairs: tuple[str, ...]) -> tuple[str, ...]:
         f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))}: the newest "
         "motion is predicted worse with it"
         for each in found.effects
-        if each.verdict is SealedVerdict.HARMFUL
+        if each.verdict is HeldOutVerdict.HARMFUL
         and min((r.relative_moving for r in each.removes.values()), default=0.0) < -_SMALL
     ]
     if not found.good:

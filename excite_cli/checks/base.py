@@ -66,6 +66,10 @@ class SetupCheck(ABC):
     def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
         """What to write in the config; nothing where no key says it."""
 
+    def has_effect(self, before: Setup, after: Setup) -> bool:
+        """Whether an effect of the model says the same as this mistake."""
+        return self.is_physical
+
     def trusted(self, names: Sequence[str], spec: Spec, joints: Sequence[int]) -> Settings:
         """What to write where the data are right as they are."""
         return key_of(self.name)

@@ -55,7 +55,7 @@ def foreign_runs(
             f"Join its channels anew, or leave this run out; measurement.trust: [{NAME}] takes it"
         )
         status: Status = "fault" if owner else "doubt"
-        found.append(Result(NAME, "foreign_torque", status, text, runs=name))
+        found.append(Result(NAME, "foreign_torque", status, text, runs=name, is_open=True))
     return found
 
 

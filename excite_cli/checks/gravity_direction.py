@@ -21,6 +21,7 @@ from excite_cli.robot.model import Array
 _ROUNDS = 6
 _SAME = np.radians(0.3)  # a direction nearer than this is the same
 _NEAR = np.radians(6.0)  # to a wall, a ceiling, or half way between
+_TILT = np.radians(5.0)  # effects are sought that far
 _LEANS = 30.0  # deg: more is no table
 _DIGITS = 4  # of angles [rad] that are written
 # Unit vectors along an axis, or half way between two.
@@ -73,6 +74,10 @@ class GravityDirection(SetupCheck):
             f"gravity pulls along ({along}) m/s² in the frame of the base, {angle:.3g}° from where "
             f"the config has it: the robot {hangs}"
         )
+
+    def has_effect(self, before: Setup, after: Setup) -> bool:
+        """A base that leans by a few degrees is one."""
+        return _angle(before.gravity, after.gravity) < _TILT
 
     def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
         """Roll, pitch, yaw of the base that turn gravity to where it is."""

@@ -76,8 +76,10 @@ def findings_of(
     prepared: Sequence[PreparedRun],
     processing: Processing,
     spec: Spec,
-) -> tuple[Finding, ...]:
+) -> tuple[tuple[Finding, ...], bool]:
     """What is to be known of runs that are fitted: motion, and what `look` doubts.
+
+    And whether a doubt is open, until which is settled no effect is confirmed.
 
     Raises
     ------
@@ -88,7 +90,8 @@ def findings_of(
     motion: tuple[Finding, ...] = ()
     if spec.measurement.filter.position == "auto":
         motion = check_motion(runs, processing, robot.joint_names)
-    return (*motion, *(each.finding for each in found if each.status != "ok"))
+    doubts = [each.finding for each in found if each.status != "ok"]
+    return (*motion, *doubts), any(each.is_open for each in found)
 
 
 def without_fault(found: Sequence[Result]) -> Sequence[Result]:
@@ -106,9 +109,9 @@ def without_fault(found: Sequence[Result]) -> Sequence[Result]:
 
 
 def check_dataset(
-    robot: Robot, dataset: Dataset, spec: Spec, sealed: str | None = None
+    robot: Robot, dataset: Dataset, spec: Spec, held_out: str | None = None
 ) -> tuple[Finding, ...]:
-    """As `findings_of`, for all runs but the sealed part, filtered as `spec` says.
+    """The findings of `findings_of`, for all runs but the held-out part, filtered as `spec` says.
 
     Raises
     ------
@@ -116,6 +119,6 @@ def check_dataset(
         As `findings_of`; or a run is too short for the filters.
     """
     needed = spec.identification.needed_runs
-    runs = split(dataset, sealed, spec.diagnosis.block, needed).training
+    runs = split(dataset, held_out, spec.diagnosis.block, needed).training
     processing = choose_processing(runs, spec.measurement.filter, spec.diagnosis.moving_speed)
-    return findings_of(robot, runs, prepare_all(runs, processing), processing, spec)
+    return findings_of(robot, runs, prepare_all(runs, processing), processing, spec)[0]

@@ -18,6 +18,7 @@ class Result:
     """Of the check `name`: its `status`, in which `joints` and `runs`, `evidence` in numbers.
 
     `settings`: what to write in the config, by the path of the key. `kind` is that of the finding.
+    `is_open`: until it is settled no effect is confirmed.
     """
 
     name: str
@@ -27,6 +28,7 @@ class Result:
     joints: tuple[str, ...] = ()
     runs: str = ""
     settings: Mapping[str, Any] = field(default_factory=dict)
+    is_open: bool = False
 
     @property
     def finding(self) -> Finding:

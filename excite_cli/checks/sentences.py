@@ -68,7 +68,8 @@ def _of_one_check(
     status: Status = "fault" if any(step.is_certain for step in steps) else "doubt"
     named = joints or np.flatnonzero(shown).tolist()
     named_joints = tuple(names[j] for j in named)
-    return Result(check.name, check.kind, status, text, named_joints, "", settings)
+    is_open = not all(step.check.has_effect(step.before, step.after.setup) for step in steps)
+    return Result(check.name, check.kind, status, text, named_joints, "", settings, is_open)
 
 
 def _share(left: Explained, shown: Mask) -> float:
@@ -84,7 +85,8 @@ def no_set_up(names: Sequence[str], left: Explained) -> Result:
         f"most of them: {min(left.left, 1.0):.0%} are left with the best. Are positions too "
         "coarse, torques another channel, or is it another robot's"
     )
-    return Result(BELONG, "foreign_torque", "doubt", text, tuple(np.array(names)[off].tolist()))
+    joints = tuple(np.array(names)[off].tolist())
+    return Result(BELONG, "foreign_torque", "doubt", text, joints, is_open=True)
 
 
 def unexplained(left: Explained, names: Sequence[str], declared: Sequence[bool]) -> list[Result]:
@@ -107,7 +109,7 @@ def unexplained(left: Explained, names: Sequence[str], declared: Sequence[bool])
         f"are, say so: {written(key_of(BELONG))}"
     )
     joints = tuple(names[j] for j in np.flatnonzero(foreign).tolist())
-    return [Result(BELONG, "foreign_torque", status, text, joints)]
+    return [Result(BELONG, "foreign_torque", status, text, joints, is_open=True)]
 
 
 def written(settings: Mapping[str, Any]) -> str:

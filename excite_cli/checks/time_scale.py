@@ -91,6 +91,10 @@ class TorqueLag(SetupCheck):
         word = "behind" if late > 0 else "before"
         return f"torques are {1e3 * abs(late):.3g} ms {word} the positions"
 
+    def has_effect(self, before: Setup, after: Setup) -> bool:
+        """The delay of a drive is one."""
+        return True
+
     def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
         """By how much torques are late."""
         late = spec.measurement.torque_lag + after.lag - before.lag

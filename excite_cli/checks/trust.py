@@ -25,7 +25,12 @@ def is_trusted(name: str, spec: Spec) -> bool:
 def but_trusted(found: Iterable[Result], spec: Spec) -> list[Result]:
     """Results, of which those of checks that are trusted are fine."""
     return [
-        replace(each, status="ok", evidence=f"trusted (measurement.trust): {each.evidence}")
+        replace(
+            each,
+            status="ok",
+            is_open=False,
+            evidence=f"trusted (measurement.trust): {each.evidence}",
+        )
         if each.status != "ok" and is_trusted(each.name, spec)
         else each
         for each in found

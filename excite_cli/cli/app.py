@@ -33,6 +33,14 @@ from excite_cli.cli.usage_errors import USAGE_ERROR, in_our_words
 from excite_cli.cli.verify_gradient import verify_gradient
 from excite_cli.cli.view import view
 
+_RENAMED = {"sealed": "held-out"}  # options of version 0.2, which scripts may still give
+
+
+def _of_today(word: str) -> str:
+    """The name that an option has today."""
+    return _RENAMED.get(word, word)
+
+
 app = typer.Typer(
     name="excite",
     cls=HelpfulGroup,
@@ -43,7 +51,11 @@ app = typer.Typer(
     add_completion=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    context_settings={
+        "help_option_names": ["-h", "--help"],
+        "max_content_width": 100,
+        "token_normalize_func": _of_today,
+    },
 )
 
 _COMMANDS: dict[str, Callable[..., None]] = {

@@ -21,13 +21,13 @@ def diagnose(
             "--output", "-o", help="File for the diagnosis (HDF5).", rich_help_panel=OUTPUT
         ),
     ] = None,
-    sealed: options.Sealed = None,
+    held_out: options.HeldOut = None,
     apply: Annotated[
         Path | None,
         typer.Option(
             "--apply",
             metavar="NEW.yaml",
-            help="Write the config with what was found, if the error on sealed data fell.",
+            help="Write the config with what was found, if the error on held-out data fell.",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
@@ -58,13 +58,13 @@ def diagnose(
 ) -> None:
     """Find what the declared model lacks: friction, springs, payloads, delays and more.
 
-    The declared model is fitted to all runs but the held-out (sealed) one; its residual is traced
+    The declared model is fitted to all runs but the held-out one; its residual is traced
     to named effects, with their size, certainty, and what these data cannot tell them from. The
-    sealed run is used once, for the error before and after, and for the verdict on every effect. A
-    single run is cut into blocks, every third sealed. --workers share the runs, with the same
+    held-out run is used once, for the error before and after, and for the verdict on every effect.
+    A single run is cut into blocks, every third held out. --workers share the runs, with the same
     numbers. Ctrl-C, or diagnosis.max_seconds, ends the search with the answer so far.
 
-    Exit status 1: effects were found, but the error on the sealed run did not fall.
+    Exit status 1: effects were found, but the error on the held-out run did not fall.
 
     Examples:
       excite diagnose ur10.yaml measured.h5 -o diagnosis.h5 --apply better.yaml
@@ -86,7 +86,7 @@ def diagnose(
         found = diagnose_data(
             load_case(config, overrides or ()),
             data,
-            sealed,
+            held_out,
             output=output,
             apply=apply,
             apply_unconfirmed=apply_unconfirmed,

@@ -38,7 +38,7 @@ def identify(
         Path | None,
         typer.Option("--parameters", help="Write all parameters (YAML).", rich_help_panel=OUTPUT),
     ] = None,
-    sealed: options.Sealed = None,
+    held_out: options.HeldOut = None,
     only: Annotated[
         Load | None,
         typer.Option("--only", help="Find what the robot carries, on top of --fit."),
@@ -63,15 +63,15 @@ def identify(
     """Find the parameters of the declared model, with their standard deviations.
 
     Base parameters and those of the declared effects are fitted to all runs but the held-out
-    (sealed) one, on which the errors are measured. A single run is cut into blocks, of which every
-    third is sealed. --workers share the runs, with the same numbers.
+    one, on which the errors are measured. A single run is cut into blocks, of which every third is
+    held out. --workers share the runs, with the same numbers.
 
     With --only payload, mass, centre and inertia of what the robot carries are found from all runs,
     while a fit of the robot alone is known as well as it says. Exit status 1: no body has them.
 
     Examples:
       excite identify ur10.yaml measured.h5 -o fit.h5
-      excite identify ur10.yaml measured.h5 --sealed motion_1 --urdf identified.urdf
+      excite identify ur10.yaml measured.h5 --held-out motion_1 --urdf new.urdf
       excite identify ur10.yaml loaded.h5 --only payload --fit fit.h5
     """
     from excite_cli.api.identifying import identification_answer, identify_load, load_answer
@@ -84,7 +84,8 @@ def identify(
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
     if only is not None:
-        given = {"-o": output, "--sealed": sealed, **{f"--{k}": each for k, each in models.items()}}
+        given = {"-o": output, "--held-out": held_out}
+        given |= {f"--{k}": each for k, each in models.items()}
         others = [name for name, each in given.items() if each is not None]
         if others:
             raise ConfigError(f"--only payload takes no {', '.join(others)}: leave it out.")
@@ -105,7 +106,7 @@ def identify(
         found = identify_data(
             load_case(config, overrides or ()),
             data,
-            sealed,
+            held_out,
             output=output,
             urdf=urdf,
             mjcf=mjcf,

@@ -13,9 +13,9 @@ Data = Annotated[
     list[Path],
     typer.Argument(help="Measured data: HDF5, CSV, MATLAB, parquet, bags.", show_default=False),
 ]
-Sealed = Annotated[
+HeldOut = Annotated[
     str | None,
-    typer.Option("--sealed", metavar="RUN", help="Run kept out of the fit. Default: the last one."),
+    typer.Option("--held-out", metavar="RUN", help="Run kept out of the fit. Default: the last."),
 ]
 MotionFile = Annotated[
     Path,

@@ -11,9 +11,9 @@ from excite_cli.cli.console import Terminal
 def replay(
     model: options.StoredModel,
     data: options.Data,
-    sealed: Annotated[
+    held_out: Annotated[
         bool,
-        typer.Option("--sealed", help="Of the model's own data, only what was sealed then."),
+        typer.Option("--held-out", help="Of the model's own data, only what was held out then."),
     ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -29,7 +29,7 @@ def replay(
     Exit status 1: the model deviates no less than the URDF.
 
     Examples:
-      excite replay diagnosis.h5 measured.h5 --sealed
+      excite replay diagnosis.h5 measured.h5 --held-out
     """
     from excite_cli.api.replaying import replay as replay_data
     from excite_cli.api.replaying import replay_answer
@@ -37,5 +37,5 @@ def replay(
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with single_threaded():
-        found = replay_data(model, data, sealed=sealed, tell=terminal.tell)
+        found = replay_data(model, data, held_out=held_out, tell=terminal.tell)
     terminal.show(replay_answer(found))

@@ -17,9 +17,9 @@ def score(
         Path | None,
         typer.Option("--output", "-o", help="File for the score (HDF5).", rich_help_panel=OUTPUT),
     ] = None,
-    sealed: Annotated[
+    held_out: Annotated[
         bool,
-        typer.Option("--sealed", help="Of the model's own data, only what was sealed then."),
+        typer.Option("--held-out", help="Of the model's own data, only what was held out then."),
     ] = False,
     limits: Annotated[
         Path | None,
@@ -55,7 +55,7 @@ def score(
 
     Examples:
       excite score diagnosis.h5 measured.h5 -o week.h5
-      excite score diagnosis.h5 measured.h5 --sealed
+      excite score diagnosis.h5 measured.h5 --held-out
     """
     from excite_cli.api.scoring import score as score_data
     from excite_cli.api.scoring import score_answer, thresholds
@@ -71,7 +71,7 @@ def score(
         found = score_data(
             model,
             data,
-            sealed=sealed,
+            held_out=held_out,
             output=output,
             overwrite=overwrite,
             workers=place,

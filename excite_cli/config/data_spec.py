@@ -254,7 +254,7 @@ class IdentificationSpec(Section):
 
     @property
     def needed_runs(self) -> tuple[str, ...]:
-        """Runs without which the fit lacks what is known: they are not sealed if others are."""
+        """Runs without which the fit lacks what is known: they are not held out if others are."""
         return self.known_payload.runs if self.known_payload else ()
 
 

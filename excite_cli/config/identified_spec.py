@@ -1,5 +1,7 @@
 """What a YAML file may say of numbers that were identified: the model that `excite score` plays."""
 
+from typing import ClassVar
+
 from pydantic import Field
 
 from excite_cli.config.section import Finite, Section
@@ -21,11 +23,13 @@ class IdentifiedEffectSpec(Section):
 class IdentifiedSpec(Section):
     """A model with its numbers, as `excite diagnose --apply` writes it; a fit looks at none."""
 
+    gone: ClassVar = {"sealed_run": ((None, ""), "is called held_out_run since version 0.3")}
+
     inertias: dict[str, Finite] = Field(
         description="ten parameters of every body about its joint's frame, as m[elbow]"
     )
     effects: tuple[IdentifiedEffectSpec, ...] = Field((), description="effects with their values")
-    sealed_run: str = Field("", description="the run whose errors these are")
+    held_out_run: str = Field("", description="the run whose errors these are")
     error: dict[str, dict[str, float | None]] = Field(
         default_factory=dict,
         description="errors when it was made, by figure (relative, relative_moving, rms, "

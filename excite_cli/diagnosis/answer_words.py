@@ -1,14 +1,14 @@
 """The answer in a few sentences: what the model misses, how much stays, and what to do next.
 
-Shares are of the fall of the error on sealed data, mean over the joints that move there: the parts
-of the effects (`error_parts`) add up to it.
+Shares are of the fall of the error on held-out data, mean over the joints that move there: the
+parts of the effects (`error_parts`) add up to it.
 """
 
 from collections.abc import Sequence
 from math import inf, isnan
 
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect, mean_of_known
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import (
     counted,
     covariate_in_words,
@@ -84,7 +84,7 @@ def _missing(found: Diagnosis) -> str:
         for each in found.named
         if _weighed(each)
     ]
-    doubtful = (SealedVerdict.NOT_CONFIRMED, SealedVerdict.HARMFUL, SealedVerdict.WEIGHED)
+    doubtful = (HeldOutVerdict.NOT_CONFIRMED, HeldOutVerdict.HARMFUL, HeldOutVerdict.WEIGHED)
     others = [each for each in found.named if not _rubs(each) and each.verdict not in doubtful]
     fall = found.fall if found.fall > 0.0 else inf
     worth = [each for each in others if each.takes_off >= _WORTH_SAYING * fall]
@@ -103,11 +103,11 @@ def _missing(found: Diagnosis) -> str:
 
 def _weighed(named: NamedEffect) -> bool:
     """Whether it rests on what was weighed, and no error need fall by it."""
-    return named.verdict is SealedVerdict.WEIGHED
+    return named.verdict is HeldOutVerdict.WEIGHED
 
 
 def _in_vain(found: Diagnosis) -> bool:
-    """Whether effects that should be in the sealed data, too, lower nothing where joints move."""
+    """Whether effects that should be in the held-out data, too, lower nothing where joints move."""
     told = any(each.effect.runs or _weighed(each) for each in found.effects)
     return found.fall < 0.0 and not told
 

@@ -40,11 +40,11 @@ class Played:
         return errors_on(self.robot, self.runs, predictions)
 
     def traces(
-        self, before: Sequence[Prediction], after: Sequence[Prediction], sealed: bool
+        self, before: Sequence[Prediction], after: Sequence[Prediction], held_out: bool
     ) -> tuple[TorqueTrace, ...]:
         """Torque over time, measured and by both predictions."""
         return tuple(
-            torque_trace(run, new.load, new.torque, old.torque, sealed)
+            torque_trace(run, new.load, new.torque, old.torque, held_out)
             for run, old, new in zip(self.runs, before, after, strict=True)
         )
 

@@ -14,6 +14,7 @@ from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.declared_model import places_of
 from excite_cli.diagnosis.doubt import explained
 from excite_cli.diagnosis.final_fit import FinalFit
+from excite_cli.diagnosis.held_out_verdict import Worth
 from excite_cli.diagnosis.records import (
     Approximation,
     EffectRecord,
@@ -22,7 +23,6 @@ from excite_cli.diagnosis.records import (
     by_joint,
 )
 from excite_cli.diagnosis.schur import SHARED
-from excite_cli.diagnosis.sealed_verdict import Worth
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.place import Place
 from excite_cli.effects.placing import told_on

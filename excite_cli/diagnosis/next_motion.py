@@ -17,7 +17,7 @@ from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.diagnosis.separation import DataColumns, separated
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.dynamics.uncertain_inertias import FitKnowledge
 from excite_cli.errors import FileError
 from excite_cli.excitation.discrimination import SEPARATED, divergences, motions_needed
@@ -185,7 +185,7 @@ def _alias_pairs(diagnosis: Diagnosis) -> list[tuple[EffectRecord, EffectRecord]
     return [
         (named.effect, alias)
         for named in diagnosis.effects
-        if named.verdict is not SealedVerdict.WEIGHED
+        if named.verdict is not HeldOutVerdict.WEIGHED
         for alias in named.aliases
     ]
 

@@ -8,7 +8,7 @@ from typing import Any
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.traces import Traces
-from excite_cli.diagnosis.verdict import SealedVerdict, Verdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict, Verdict
 from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.errors_of_torque import Errors
@@ -58,7 +58,7 @@ def mean_of_known(values: Iterable[float]) -> float:
 
 @dataclass(frozen=True)
 class Removed:
-    """By how much an effect lowers a joint's error on sealed data: relative, and RMS [N·m]."""
+    """By how much an effect lowers a joint's error on held-out data: relative, and RMS [N·m]."""
 
     relative: float
     relative_moving: float
@@ -74,10 +74,10 @@ class NamedEffect(Shown):
     `share_of_residual` of the energy of the residual before, on the rows it touches;
     `gain` by which the error on runs left out fell; `aliases` what the data cannot tell it from.
     If it is only an approximation, `approximates` says of what. `verdict` and `removes` (by joint)
-    tell the error on sealed data without it from that with it, all others in; `parts` (by joint) of
-    all effects add up to `before.relative_moving` − `after.relative_moving` (`error_parts`), with
-    kept inertias to `untouched` − `after` together with `inertia_parts`. Files of earlier versions
-    have none.
+    tell the error on held-out data without it from that with it, all others in; `parts` (by joint)
+    of all effects add up to `before.relative_moving` − `after.relative_moving` (`error_parts`),
+    with kept inertias to `untouched` − `after` together with `inertia_parts`. Files of earlier
+    versions have none.
     """
 
     effect: EffectRecord
@@ -88,13 +88,13 @@ class NamedEffect(Shown):
     aliases: tuple[EffectRecord, ...] = ()
     approximates: Approximation | None = None
     least_p: float = 0.0
-    verdict: SealedVerdict | None = None
+    verdict: HeldOutVerdict | None = None
     removes: dict[str, Removed] = field(default_factory=dict)
     parts: dict[str, float] = field(default_factory=dict)
 
     @property
     def takes_off(self) -> float:
-        """Its part of the fall of the mean relative error on sealed data; NaN if not known."""
+        """Its part of the fall of the mean relative error on held-out data; NaN if not known."""
         return mean_of_known(self.parts.values())
 
 
@@ -113,14 +113,14 @@ class Textbook:
 class ErrorPath:
     """Errors with the first 0, 1, … K effects in the order of the rounds; `effects` in this order.
 
-    `left_out` (K + 1): on training runs left out, as a share of the declared model's; `sealed`
+    `left_out` (K + 1): on training runs left out, as a share of the declared model's; `held_out`
     (K + 1): relative, where joints move, mean over them. `best` has the least of the former;
     `smallest` is the first number within one `standard_error` of it. `enough`: runs left out to
     rely on that.
     """
 
     left_out: tuple[float, ...]
-    sealed: tuple[float, ...]
+    held_out: tuple[float, ...]
     standard_error: float
     best: int
     smallest: int
@@ -143,7 +143,7 @@ class FrictionLine:
     coulomb: Value
     curved: bool
     kinds: tuple[str, ...] = ()
-    verdict: SealedVerdict | None = None
+    verdict: HeldOutVerdict | None = None
     removes: dict[str, Removed] = field(default_factory=dict)
     parts: dict[str, float] = field(default_factory=dict)
 
@@ -201,18 +201,18 @@ class LargeRest:
 
 @dataclass(frozen=True)
 class Assumption:
-    """An effect of single `runs` was taken to be `present` in what is sealed, or to be absent."""
+    """An effect of single `runs` was taken to be `present` in what is held out, or to be absent."""
 
     kind: str
     runs: tuple[str, ...]
-    sealed: tuple[str, ...]
+    held_out: tuple[str, ...]
     present: bool
     joints: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
-class SealedEnds:
-    """Errors on the ends of training `runs`, sealed since these carry `effects` of their own."""
+class HeldOutEnds:
+    """Errors on the ends of training `runs`, held-out since these carry `effects` of their own."""
 
     runs: tuple[str, ...]
     effects: tuple[EffectRecord, ...]
@@ -276,9 +276,9 @@ class Diagnosis(Shown):
 
     `effects`: all that were added to the declared model. `noise_floor` [N·m] (N): RMS per joint of
     what changes from period to period in training runs, filtered as for the errors; None if no
-    motion was repeated. `parts`: errors on what is sealed beside the sealed run. `traces` of the
-    training data, `sealed_traces` of the sealed ones; files of earlier versions have none.
-    `untouched`: errors on the sealed data of the URDF as given, with the friction of its
+    motion was repeated. `parts`: errors on what is held out beside the held-out run. `traces` of
+    the training data, `held_out_traces` of the held-out ones; files of earlier versions have none.
+    `untouched`: errors on the held-out data of the URDF as given, with the friction of its
     <dynamics>; None where it has no mass, or in earlier files. `textbook`: the model that any
     other must be better than; not in earlier files. `inertia_parts` (by joint): what the
     fit of kept inertias takes off, from that on; empty where they are free. `path`: the error
@@ -296,7 +296,7 @@ class Diagnosis(Shown):
     declared: tuple[EffectRecord, ...]
     effects: tuple[NamedEffect, ...]
     absorbed: tuple[Absorbed, ...]
-    sealed_run: str
+    held_out_run: str
     before: Errors
     after: Errors
     rounds: tuple[Round, ...]
@@ -310,9 +310,9 @@ class Diagnosis(Shown):
     seconds: float = 0.0
     noise_floor: dict[str, float] | None = None
     traces: Traces | None = None
-    sealed_traces: tuple[TorqueTrace, ...] = ()
+    held_out_traces: tuple[TorqueTrace, ...] = ()
     assumed: tuple[Assumption, ...] = ()
-    parts: tuple[SealedEnds, ...] = ()
+    parts: tuple[HeldOutEnds, ...] = ()
     untouched: Errors | None = None
     textbook: Textbook | None = None
     large_rests: tuple[LargeRest, ...] = ()
@@ -339,26 +339,26 @@ class Diagnosis(Shown):
 
     @property
     def fall(self) -> float:
-        """By how much the mean relative error on the sealed data fell, where joints move."""
+        """By how much the mean relative error on the held-out data fell, where joints move."""
         return self.begins.mean_relative_moving - self.after.mean_relative_moving
 
     @property
     def good(self) -> bool:
-        """Whether what was found predicts the sealed data better than the declared model does, and
-        no worse than the textbook's."""
+        """Whether what was found predicts the held-out data better than the declared model does,
+        and no worse than the textbook's."""
         return self.fell and not self.worse_than_textbook
 
     @property
     def fell(self) -> bool:
-        """Whether what was found, if anything, lowers the mean error on the sealed data.
+        """Whether what was found, if anything, lowers the mean error on the held-out data.
 
-        Where nothing of it is in the sealed run, that error need not fall, but must not rise; it is
-        on the sealed ends of the runs that carry it that the error falls. Nor need it fall by what
-        rests on what was weighed.
+        Where nothing of it is in the held-out run, that error need not fall, but must not rise; it
+        is on the held-out ends of the runs that carry it that the error falls. Nor need it fall by
+        what rests on what was weighed.
         """
         absent = {(each.kind, each.runs) for each in self.assumed if not each.present}
         if self.effects and all(
-            each.verdict is SealedVerdict.WEIGHED or (each.effect.kind, each.effect.runs) in absent
+            each.verdict is HeldOutVerdict.WEIGHED or (each.effect.kind, each.effect.runs) in absent
             for each in self.effects
         ):
             ends = all(_lower(part.before, part.after) for part in self.parts)
@@ -375,8 +375,8 @@ class Diagnosis(Shown):
 
     @property
     def harmful(self) -> tuple[NamedEffect, ...]:
-        """Effects without which the error on the sealed data is lower."""
-        return tuple(each for each in self.effects if each.verdict is SealedVerdict.HARMFUL)
+        """Effects without which the error on the held-out data is lower."""
+        return tuple(each for each in self.effects if each.verdict is HeldOutVerdict.HARMFUL)
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:

@@ -1,11 +1,11 @@
-"""Effects of single runs: what is assumed of the sealed run, and what they are worth elsewhere.
+"""Effects of single runs: what is assumed of the held-out run, and what they are worth elsewhere.
 
 Of two recordings neither says what is usual: by how much more friction, offset or gain there is in
 one of them is told, and the model has what suits both (`differences_told`).
 
-Any other such effect is not in the sealed run unless the configuration says so. So the ends of the
-training runs that carry one are sealed, too (`split.with_ends_sealed`), and the errors there are
-measured.
+Any other such effect is not in the held-out run unless the configuration says so. So the ends of
+the training runs that carry one are held out, too (`split.with_ends_held_out`), and the errors
+there are measured.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from excite_cli.diagnosis.before_after import Played
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.declared_model import Model, places_of
-from excite_cli.diagnosis.records import Assumption, SealedEnds
+from excite_cli.diagnosis.records import Assumption, HeldOutEnds
 from excite_cli.diagnosis.tracing import Traced, differences
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect
@@ -73,29 +73,30 @@ def differences_told(traced: Traced) -> tuple[Finding, ...]:
 
 
 def assumptions(effects: Sequence[Effect], parts: Split, model: Model) -> tuple[Assumption, ...]:
-    """What was assumed of the sealed run, where the states of runs do not say it.
+    """What was assumed of the held-out run, where the states of runs do not say it.
 
-    Of sealed blocks of the very recording that carries an effect there is nothing to assume.
+    Of held-out blocks of the very recording that carries an effect there is nothing to assume.
     """
     names = model.robot.joint_names
-    sealed = tuple(dict.fromkeys(run.id.key for run in parts.sealed))
+    held_out = tuple(dict.fromkeys(run.id.key for run in parts.held_out))
     found = []
     for effect in effects:
         stated = [run for run, states in model.states.items() if effect.kind in states]
-        declared = all(run.id.is_among(stated) for run in parts.sealed)
-        if effect.runs and not declared and not all(effect.active(run.id) for run in parts.sealed):
+        declared = all(run.id.is_among(stated) for run in parts.held_out)
+        active = all(effect.active(run.id) for run in parts.held_out)
+        if effect.runs and not declared and not active:
             joints = tuple(names[j] for j in effect.joints)
-            found.append(Assumption(effect.kind, effect.runs, sealed, False, joints))
+            found.append(Assumption(effect.kind, effect.runs, held_out, False, joints))
     return tuple(found)
 
 
-def on_sealed_ends(
+def on_held_out_ends(
     robot: Robot,
     models: tuple[IdentifiedModel, IdentifiedModel],
     ends: Sequence[Run],
     processing: Processing,
-) -> tuple[SealedEnds, ...]:
-    """Errors on the sealed ends, together for runs that carry the same effects."""
+) -> tuple[HeldOutEnds, ...]:
+    """Errors on the held-out ends, together for runs that carry the same effects."""
     single = [effect for effect in models[1].effects if effect.runs]
     alike: dict[tuple[bool, ...], list[Run]] = {}
     for run in ends:
@@ -106,7 +107,7 @@ def on_sealed_ends(
         played = Played(robot, prepare_all(runs, processing))
         before, after = (played.errors(played.predictions(model)) for model in models)
         found.append(
-            SealedEnds(
+            HeldOutEnds(
                 tuple(dict.fromkeys(run.id.key for run in runs)),
                 tuple(record_of(effect, robot.joint_names) for effect in own),
                 before,

@@ -36,6 +36,7 @@ _LENGTH = 1.5  # ℓ, in standard deviations of a quantity
 _RIDGES = (1.0, 0.1, 0.01)  # λ; k is one on its diagonal
 _SLOW = {"time", "run", "covariate"}
 _CLEARER = 0.15  # of what one quantity leaves, a second one must explain
+_DIGITS = 6  # of a share
 
 
 @dataclass(frozen=True)
@@ -76,9 +77,11 @@ class Rest:
 
     def structure(self) -> Structure:
         """How much is predictable, and the quantity or the pair of them that predicts most."""
-        single = max((share, of.code, (of,)) for of, share in self.shares.items())
+        # Of what predicts the same but for rounding (a load that is a multiple of an angle) one is
+        # taken by its name, on every processor.
+        single = max((round(share, _DIGITS), of.code, (of,)) for of, share in self.shares.items())
         pair = max(
-            (self._predicted(one * other, _RIDGES[1:2]), (a.code, b.code), (a, b))
+            (round(self._predicted(one * other, _RIDGES[1:2]), _DIGITS), _names(a, b), (a, b))
             for (a, one), (b, other) in combinations(self._paired(), 2)
             if not {a.quantity, b.quantity} <= _SLOW  # any series is a function of both
         )
@@ -117,6 +120,10 @@ class Rest:
         order = np.arange(counts.max())
         there = order < counts[:, None]
         return starts[:, None] + np.where(there, order, 0), there
+
+
+def _names(a: Covariate, b: Covariate) -> list[str]:
+    return sorted((a.code, b.code))
 
 
 class Quantities:

@@ -15,8 +15,8 @@ class Verdict(StrEnum):
     EXPLAINED = "another explains it"
 
 
-class SealedVerdict(StrEnum):
-    """Whether the error on sealed data is lower with an effect, or higher, beyond chance.
+class HeldOutVerdict(StrEnum):
+    """Whether the error on held-out data is lower with an effect, or higher, beyond chance.
 
     Or need not change: `WEIGHED`, where without the effect inertias that no scale would confirm
     predict as well.

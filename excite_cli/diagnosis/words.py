@@ -9,11 +9,11 @@ from excite_cli.diagnosis.records import (
     Assumption,
     Diagnosis,
     EffectRecord,
+    HeldOutEnds,
     LargeRest,
     NamedEffect,
-    SealedEnds,
 )
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.fit_words import with_deviation
@@ -63,7 +63,7 @@ def by_worth(
     least = SMALL_PART * max(found.fall, 0.0)
 
     def is_small(named: NamedEffect) -> bool:
-        told = named.verdict in (SealedVerdict.HARMFUL, SealedVerdict.WEIGHED)
+        told = named.verdict in (HeldOutVerdict.HARMFUL, HeldOutVerdict.WEIGHED)
         return not told and abs(named.takes_off) < least
 
     return [each for each in ranked if not is_small(each)], list(filter(is_small, ranked))
@@ -174,19 +174,19 @@ def assumption_in_words(assumed: Assumption) -> str:
     """What was assumed of an effect of single runs, and what to do if it is wrong."""
     there = "present" if assumed.present else "absent"
     at = f" of {assumed.joints[0]}" if len(assumed.joints) == 1 else ""
-    sealed = ", ".join(assumed.sealed)
+    held_out = ", ".join(assumed.held_out)
     some = assumed.runs if len(assumed.runs) < 4 else (assumed.runs[0], "…")
     told = ", ".join(
-        run if run == "…" else f"{run}: {{{assumed.kind}: a}}" for run in (*some, *assumed.sealed)
+        run if run == "…" else f"{run}: {{{assumed.kind}: a}}" for run in (*some, *assumed.held_out)
     )
     return (
-        f"{assumed.kind}{at} in {', '.join(assumed.runs)}: taken to be {there} in the sealed "
-        f"{sealed}. If it is there, declare one state for all of them: runs: {{{told}}}."
+        f"{assumed.kind}{at} in {', '.join(assumed.runs)}: taken to be {there} in the "
+        f"held-out {held_out}. If it is there, declare one state for all of them: runs: {{{told}}}."
     )
 
 
-def ends_in_words(part: SealedEnds) -> str:
-    """The errors on the sealed ends of runs that carry effects of their own."""
+def ends_in_words(part: HeldOutEnds) -> str:
+    """The errors on the held-out ends of runs that carry effects of their own."""
     kinds = ", ".join(dict.fromkeys(effect.kind for effect in part.effects))
     return (
         f"The ends of {', '.join(part.runs)}{f' (with {kinds})' if kinds else ''} took no part, "
@@ -195,8 +195,8 @@ def ends_in_words(part: SealedEnds) -> str:
     )
 
 
-def sealed_in_words(named: NamedEffect) -> str:
-    """`confirmed -4.78 pp`: verdict on sealed data, and by how much the error there changes.
+def held_out_in_words(named: NamedEffect) -> str:
+    """`confirmed -4.78 pp`: verdict on held-out data, and by how much the error there changes.
 
     Percentage points of the relative error where the joint moves, of the joint where it changes
     most; that joint is named where the effect is not on it alone.
@@ -222,18 +222,19 @@ def settled_in_words(found: Diagnosis) -> list[str]:
 
 
 def weighed_in_words(found: Diagnosis) -> list[str]:
-    """That sealed data are no test of what rests on what was weighed."""
+    """That held-out data are no test of what rests on what was weighed."""
     return [
         f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))} rests on "
         f"what was weighed ({KNOWN_MASS}, {KNOWN_LOAD}): other inertias would predict as well "
-        "without it, so that sealed data are no test of it."
+        "without it, so that held-out data are no test of it."
         for each in found.effects
-        if each.verdict is SealedVerdict.WEIGHED
+        if each.verdict is HeldOutVerdict.WEIGHED
     ]
 
 
 def no_gain_in_words(found: Diagnosis) -> str:
-    """That the error on sealed data did not fall with what was found, and by what; empty if it did.
+    """That the error on held-out data did not fall with what was found, and by what; empty if it
+    did.
 
     To be said before anything else.
     """
@@ -242,11 +243,11 @@ def no_gain_in_words(found: Diagnosis) -> str:
     if found.fell:
         return _textbook_is_better(found)
     text = (
-        f"The sealed error did not fall: {found.before.mean_relative:.2%} before, "
+        f"The held-out error did not fall: {found.before.mean_relative:.2%} before, "
         f"{found.after.mean_relative:.2%} after (mean over joints, all samples of "
-        f"{found.sealed_run})."
+        f"{found.held_out_run})."
     )
-    verdict = SealedVerdict.HARMFUL if found.harmful else SealedVerdict.NOT_CONFIRMED
+    verdict = HeldOutVerdict.HARMFUL if found.harmful else HeldOutVerdict.NOT_CONFIRMED
     what = "Harmful" if found.harmful else "None is harmful beyond doubt; not confirmed"
     guilty = [each.effect for each in found.effects if each.verdict is verdict]
     if guilty:
@@ -261,7 +262,7 @@ def _textbook_is_better(found: Diagnosis) -> str:
     assert found.textbook is not None
     kinds = dict.fromkeys(each.kind for each in found.textbook.effects)
     return (
-        f"The textbook's model predicts {found.sealed_run} better than what was found: "
+        f"The textbook's model predicts {found.held_out_run} better than what was found: "
         f"{found.textbook.error.mean_relative_moving:.2%} of the torque is left with "
         f"{', '.join(kinds) or 'nothing added'} on every joint, "
         f"{found.after.mean_relative_moving:.2%} with what was found (mean over joints, where they "
@@ -270,7 +271,7 @@ def _textbook_is_better(found: Diagnosis) -> str:
 
 
 def untouched_in_words(found: Diagnosis) -> str:
-    """What the URDF says of the sealed data by itself; empty where that is not known."""
+    """What the URDF says of the held-out data by itself; empty where that is not known."""
     if found.untouched is None:
         return ""
     return (

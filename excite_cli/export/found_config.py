@@ -40,7 +40,7 @@ def found_config(
         ]
     kept, after = found.effects, found.after.mean_relative_moving
     if smallest and found.path is not None:
-        kept, after = found.smallest, found.path.sealed[found.path.smallest]
+        kept, after = found.smallest, found.path.held_out[found.path.smallest]
     added = [named.effect for named in kept]
     if textbook and found.textbook is not None:
         added, after = list(found.textbook.effects), found.textbook.error.mean_relative_moving
@@ -54,7 +54,7 @@ def found_config(
     whence = "of the textbook's model" if textbook else "found by `excite diagnose`"
     comment = (
         f"{len(added)}{some} effects {whence}, added to the declared model.\n"
-        f"Mean relative error on {found.sealed_run}: {found.before.mean_relative_moving:.2%} "
+        f"Mean relative error on {found.held_out_run}: {found.before.mean_relative_moving:.2%} "
         f"before, {after:.2%} after (moving samples)."
     )
     return yaml_text(tree, comment)
@@ -67,7 +67,7 @@ def _identified(found: Diagnosis, records: list[EffectRecord]) -> dict[str, Any]
     return {
         "inertias": dict(zip(found.inertia_names, map(float, found.phi), strict=True)),
         "effects": [_of_effect(record) for record in records],
-        "sealed_run": found.sealed_run,
+        "held_out_run": found.held_out_run,
         "error": {
             name: {joint: _known(x) for joint, x in getattr(found.after, name).items()}
             for name in figures

@@ -86,7 +86,7 @@ def _differs_between_runs(kind: type[Effect]) -> bool:
 
 
 def check_left_to_fit(spec: Spec, parts: Split) -> None:
-    """Refuse effects, or a known payload, of sealed runs only: nothing would be fitted of them.
+    """Refuse effects, or a known payload, of held-out runs only: nothing would be fitted of them.
 
     Raises
     ------
@@ -100,9 +100,9 @@ def check_left_to_fit(spec: Spec, parts: Split) -> None:
     needed = spec.identification.needed_runs
     for where, what, names in [*declared, ("identification.known_payload", "the payload", needed)]:
         if names and not any(run.id.is_among(names) for run in parts.training):
-            others = [unit for unit in parts.units if unit not in (*names, parts.sealed_name)]
-            instead = f" Seal another run: --sealed '{others[-1]}'." if others else ""
+            others = [unit for unit in parts.units if unit not in (*names, parts.held_out_name)]
+            instead = f" Hold out another run: --held-out '{others[-1]}'." if others else ""
             raise ConfigError(
-                f"{where}.runs: '{', '.join(names)}' is sealed, so that nothing is left "
+                f"{where}.runs: '{', '.join(names)}' is held out, so that nothing is left "
                 f"to fit {what} on.{instead}"
             )

@@ -17,7 +17,7 @@ _BLOCK = 1.0  # s, longer than what noise of the filtered torque remembers
 
 @dataclass(frozen=True)
 class Errors:
-    """Of the torque on the sealed data: per joint, relative (RMS/RMS) and in N·m.
+    """Of the torque on the held-out data: per joint, relative (RMS/RMS) and in N·m.
 
     `relative_moving` and `rms_moving` are of the samples in which the joint moves, all else of all.
 
@@ -60,7 +60,7 @@ def torque_errors(
         raise FileError(
             f"the data to judge by leave {count.max():.0f} filtered samples at most to any joint; "
             f"{FEWEST} are needed. The others were masked (stale, saturated, missing), or the runs "
-            "are too short: record longer, or seal another run."
+            "are too short: record longer, or hold out another run."
         )
     relative = np.where(enough, _ratio(wrong, size), np.nan)
     relative_moving = np.where(moves, _ratio(wrong_moving, size_moving), np.nan)

@@ -19,6 +19,7 @@ from excite_cli.identification.hausman import (
     hausman_test,
     instrument_dataset,
 )
+from excite_cli.identification.held_out_copies import refuse_held_out_copies
 from excite_cli.identification.identified_model import errors_on
 from excite_cli.identification.implausible_links import implausible
 from excite_cli.identification.left_out import LeftOut
@@ -37,7 +38,6 @@ from excite_cli.identification.regression import (
     rebuilt,
     regression_on,
 )
-from excite_cli.identification.sealed_copies import refuse_sealed_copies
 from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_scale import assumed_scale, knowledge_of
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
@@ -49,14 +49,14 @@ from excite_cli.shown.record import Shown
 Tell = Callable[[str], None]
 # Parameters this many standard deviations below zero that cannot be negative are reported.
 _SURELY = 3.0
-# Share of a joint's torque on sealed data from which the declared model is doubted.
+# Share of a joint's torque on held-out data from which the declared model is doubted.
 _MUCH_LEFT = 0.1
 _TOLD = 6  # names in a sentence
 
 
 @dataclass(frozen=True, repr=False)
 class Identification(Shown):
-    """The fit, its errors on the sealed part and on the training part, and what was noticed.
+    """The fit, its errors on the held-out part and on the training part, and what was noticed.
 
     `noise_floor` [N·m] (N): RMS per joint of what changes from period to period in training runs;
     None if no motion was repeated. `traces`: torque over time, in `torque_units` per joint.
@@ -64,7 +64,7 @@ class Identification(Shown):
     """
 
     fit: Fit
-    sealed_run: str
+    held_out_run: str
     error: Errors
     training_error: Errors
     hausman: Hausman
@@ -81,15 +81,15 @@ def identify(
     base: BaseParameters,
     dataset: Dataset,
     spec: Spec,
-    sealed: str | None = None,
+    held_out: str | None = None,
     tell: Tell = lambda text: None,
 ) -> Identification:
-    """Fit the declared model of `spec` to all of `dataset` but the sealed part.
+    """Fit the declared model of `spec` to all of `dataset` but the held-out part.
 
     Raises
     ------
     ConfigError
-        An effect, its runs, a filter or the sealed run does not fit.
+        An effect, its runs, a filter or the held-out run does not fit.
     FileError
         A run is too short.
     """
@@ -98,11 +98,11 @@ def identify(
     check_declared_runs(spec, dataset)
 
     def cut(data: Dataset) -> Split:
-        return split(data, sealed, spec.diagnosis.block, spec.identification.needed_runs)
+        return split(data, held_out, spec.diagnosis.block, spec.identification.needed_runs)
 
     parts = cut(dataset)
     check_left_to_fit(spec, parts)
-    refuse_sealed_copies(parts)
+    refuse_held_out_copies(parts)
     processing = choose_processing(
         parts.training, spec.measurement.filter, spec.diagnosis.moving_speed
     )
@@ -113,8 +113,8 @@ def identify(
     require_motion(prepared, processing, robot.joint_names, unmeasured)
     tell("fit")
     found = fit(training, spec.identification, (known.rows, known.target))
-    tell("errors on the sealed part")
-    held_out = prepare_all(parts.sealed, processing, LeftOut.by(effects))
+    tell("errors on the held-out part")
+    kept = prepare_all(parts.held_out, processing, LeftOut.by(effects))
     if follows_model(training):
         training = rebuilt(training, found.phi, found.values[found.rank :])
     tell("the filter")
@@ -124,11 +124,11 @@ def identify(
     tell("closed-loop bias")
     hausman = _hausman(training, dataset, cut, processing, found)
     floor = noise_floor(parts.training, processing)
-    error, sealed_traces = judged(robot, found, held_out, sealed=True)
-    training_error, training_traces = judged(robot, found, prepared, sealed=False)
+    error, held_out_traces = judged(robot, found, kept, held_out=True)
+    training_error, training_traces = judged(robot, found, prepared, held_out=False)
     return Identification(
         fit=found,
-        sealed_run=parts.sealed_name,
+        held_out_run=parts.held_out_name,
         error=error,
         training_error=training_error,
         hausman=hausman,
@@ -146,18 +146,18 @@ def identify(
         ),
         noise_floor=floor.named(robot.joint_names) if floor else None,
         torque_units=torque_units(robot),
-        traces=(*training_traces, *sealed_traces),
+        traces=(*training_traces, *held_out_traces),
         recorded=recorded(dataset),
     )
 
 
 def judged(
-    robot: Robot, found: Fit, runs: Sequence[PreparedRun], sealed: bool
+    robot: Robot, found: Fit, runs: Sequence[PreparedRun], held_out: bool
 ) -> tuple[Errors, tuple[TorqueTrace, ...]]:
     """Errors of the fit's torque on runs, and this torque over time."""
     predicted = [found.model.predicted(robot, run) for run in runs]
     return errors_on(robot, runs, predicted), tuple(
-        torque_trace(run, each.load, each.torque, sealed=sealed)
+        torque_trace(run, each.load, each.torque, held_out=held_out)
         for run, each in zip(runs, predicted, strict=True)
     )
 
@@ -193,7 +193,7 @@ def _much_left(error: Errors) -> list[Finding]:
         return []
     worst = max(much, key=much.__getitem__)
     text = (
-        f"{much[worst]:.0%} of the torque of {worst} is left on sealed data ({len(much)} "
+        f"{much[worst]:.0%} of the torque of {worst} is left on held-out data ({len(much)} "
         f"joint{'s' * (len(much) > 1)} above {_MUCH_LEFT:.0%}): the declared model lacks "
         "something. `excite diagnose` looks for what"
     )

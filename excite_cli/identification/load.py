@@ -119,7 +119,7 @@ def identify_load(
     biased = filter_findings(
         dataset.runs, processing, spec.measurement.filter, lambda other: behind(other)[1], found
     )
-    without, with_load = (judged(robot, each, runs, sealed=False)[0] for each in (alone, found))
+    without, with_load = (judged(robot, each, runs, held_out=False)[0] for each in (alone, found))
     at = slice(len(found.values) - _WIDTH, None)
     own, spread = found.values[at], found.covariance[at, at]
     if not np.isfinite(spread).all():

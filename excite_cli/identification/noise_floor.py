@@ -113,7 +113,7 @@ def _sums_of(processing: Processing, group: Sequence[Run], tell: Tell) -> Array:
 
 
 def _put_together(parts: Sequence[Run]) -> Iterator[list[Run]]:
-    """The parts of runs, which have gaps where their sealed blocks are; of long ones, pieces."""
+    """The parts of runs, which have gaps where their held-out blocks are; of long ones, pieces."""
     group: list[Run] = []
     for part in parts:
         joins = group and part.part.block and group[-1].id == part.id

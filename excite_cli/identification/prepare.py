@@ -290,7 +290,7 @@ def require_motion(
     if not any(run.usable.any() for run in runs):
         raise FileError(
             f"no joint moves faster than {processing.moving_speed:g} rad/s (m/s) with a torque "
-            "that may be used, outside of the sealed part: nothing can be fitted. Record motion, "
+            "that may be used, outside of the held-out part: nothing can be fitted. Record motion, "
             "or lower diagnosis.moving_speed."
         )
     known = np.any([run.valid.any(axis=0) for run in runs], axis=0)
@@ -302,8 +302,8 @@ def require_motion(
     if missing:
         names = ", ".join(missing)
         raise FileError(
-            f"torque of {names}: no sample may be used outside of the sealed part, all are masked. "
-            "Do without (measurement.without_torque), or seal another run."
+            f"torque of {names}: no sample may be used outside of the held-out part, all are "
+            "masked. Do without (measurement.without_torque), or hold out another run."
         )
     if not any(np.ptp(run.tau_raw, axis=0).any() for run in runs):
         raise FileError(

@@ -1,10 +1,10 @@
-"""What is fitted and what is sealed: whole recordings, or blocks of a single one.
+"""What is fitted and what is held out: whole recordings, or blocks of a single one.
 
-A recording with gaps is sealed, or left out, with all its stretches; if there is no other, its
-stretches count as recordings. Blocks are cut before any filter runs, so that nothing of a sealed
+A recording with gaps is held out, or left out, with all its stretches; if there is no other, its
+stretches count as recordings. Blocks are cut before any filter runs, so that nothing of a held-out
 block leaks into its neighbours. Very long parts are cut once more: memory does not grow with them.
 
-Of runs with effects of their own the end may be sealed, too: only there it shows what such an
+Of runs with effects of their own the end may be held out, too: only there it shows what such an
 effect is worth on data that took no part.
 """
 
@@ -20,7 +20,7 @@ from excite_cli.measurement.campaign_clock import on_campaign_clock
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.run_identity import Part, RunId
 
-# A single run is cut into about this many blocks of one to two seconds; every third is sealed.
+# A single run is cut into about this many blocks of one to two seconds; every third is held out.
 _BLOCKS, _SHORTEST, _LONGEST = 9, 1.0, 2.0
 # Samples that a block has at least: the filters for slow recordings (cut off at a fifth of their
 # rate) take 21 at its borders, and 15 give the dozen averages that a part should have. Of 83
@@ -36,16 +36,16 @@ _MOST_FOLDS = 8
 
 @dataclass(frozen=True)
 class Split:
-    """Training and sealed parts, and the fold (left out together) of each training part.
+    """Training and held-out parts, and the fold (left out together) of each training part.
 
-    `units`: what can be sealed, in order: recordings, or the stretches of the only one.
-    `sealed_name` tells people what is sealed; `ends` are those of training runs that are sealed
-    beside it.
+    `units`: what can be held out, in order: recordings, or the stretches of the only one.
+    `held_out_name` tells people what is held out; `ends` are those of training runs that are held
+    out beside it.
     """
 
     training: tuple[Run, ...]
-    sealed: tuple[Run, ...]
-    sealed_name: str
+    held_out: tuple[Run, ...]
+    held_out_name: str
     folds: tuple[int, ...]
     units: tuple[str, ...]
     ends: tuple[Run, ...] = ()
@@ -56,21 +56,21 @@ class Split:
 
 
 def whole(dataset: Dataset) -> list[Run]:
-    """All runs with time from their recording's start, on the campaign's clock; nothing sealed."""
+    """All runs with time from their recording's start, on the campaign's clock; none held out."""
     return on_campaign_clock([_from_start(run) for run in dataset.runs])
 
 
 def split(
     dataset: Dataset,
-    sealed: str | None = None,
+    held_out: str | None = None,
     block: float | None = None,
     needed: Collection[str] = (),
 ) -> Split:
-    """Seal a recording (the last, unless `sealed` names one, or a stretch of one).
+    """Hold out a recording (the last, unless `held_out` names one, or a stretch of one).
 
     A single one without gaps is cut into blocks of time; so is each, where every joint is moved in
     a recording of its own. Time counts from a recording's start. Of those that are `needed` for the
-    fit, or alone move a joint, none is sealed, unless it is named or there is no other.
+    fit, or alone move a joint, none is held out, unless it is named or there is no other.
 
     Raises
     ------
@@ -78,9 +78,9 @@ def split(
         There is no run of that name, or a single run is too short to be cut.
     """
     runs = whole(dataset)
-    if sealed is not None and sealed not in dataset.names:
+    if held_out is not None and held_out not in dataset.names:
         raise ConfigError(
-            f"--sealed: there is no run '{sealed}'.{nearest(sealed, dataset.names)} "
+            f"--held-out: there is no run '{held_out}'.{nearest(held_out, dataset.names)} "
             f"Runs: {', '.join(dataset.names)}."
         )
     units = dataset.recordings
@@ -88,29 +88,29 @@ def split(
         units = tuple(dict.fromkeys(run.id.key for run in dataset.runs))
     if len(runs) == 1:
         return _blocks(runs[0], block)
-    if sealed is None or all(run.id.is_among((sealed,)) for run in runs):
+    if held_out is None or all(run.id.is_among((held_out,)) for run in runs):
         others = [unit for unit in units if unit not in needed] or list(units)
         free = [unit for unit in others if _is_shown_elsewhere(unit, runs)]
-        if not free and sealed is None and block is None:
+        if not free and held_out is None and block is None:
             return _blocks_of_each(runs, units)
-        sealed = (free or others)[-1]
-    training = [run for run in runs if not run.id.is_among((sealed,))]
-    kept = [run for run in runs if run.id.is_among((sealed,))]
+        held_out = (free or others)[-1]
+    training = [run for run in runs if not run.id.is_among((held_out,))]
+    kept = [run for run in runs if run.id.is_among((held_out,))]
     if not training:
         raise ConfigError(
-            f"all {len(runs)} runs are called '{sealed}': none is left to fit. Give each recording "
-            "a name of its own."
+            f"all {len(runs)} runs are called '{held_out}': none is left to fit. Give each "
+            "recording a name of its own."
         )
     if len(training) == 1:  # folds are still needed: halves of the only run
         run = training[0]
         middle = len(run.t) // 2
         training = [_block(run, 1, 0, middle), _block(run, 2, middle, len(run.t))]
     training, kept = _short(training), _short(kept)
-    return Split(tuple(training), tuple(kept), sealed, _folds(training), units)
+    return Split(tuple(training), tuple(kept), held_out, _folds(training), units)
 
 
-def with_ends_sealed(parts: Split, runs: Collection[str], processing: Processing) -> Split:
-    """The last third of each of these training `runs` sealed as well, where it is long enough.
+def with_ends_held_out(parts: Split, runs: Collection[str], processing: Processing) -> Split:
+    """The last third of each of these training `runs` held-out as well, where it is long enough.
 
     Between both parts lies the border that filters cut off.
     """
@@ -169,8 +169,8 @@ def _blocks(run: Run, block: float | None) -> Split:
     count = round(run.duration / length)
     if count < _EVERY:
         raise ConfigError(
-            f"run '{run.label}' lasts {run.duration:.3g} s: too short to seal a part of it. Give "
-            "at least two runs, or one of at least 3 s (diagnosis.block sets the blocks' length)."
+            f"run '{run.label}' lasts {run.duration:.3g} s: too short to hold out a part of it. "
+            "Give at least two runs, or one of at least 3 s (diagnosis.block: length of blocks)."
         )
     if count * _FEWEST > len(run.t):
         raise ConfigError(
@@ -179,17 +179,17 @@ def _blocks(run: Run, block: float | None) -> Split:
             "blocks, or leave this key out."
         )
     edges = [round(i * len(run.t) / count) for i in range(count + 1)]
-    training, sealed = [], []
+    training, held_out = [], []
     for first in range(0, count, _EVERY):
         last = min(first + _EVERY - 1, count)
         training.append(_block(run, last, edges[first], edges[last]))
         if last < count:
-            sealed.append(_block(run, last + 1, edges[last], edges[last + 1]))
-    blocks = "1 block" if len(sealed) == 1 else f"{len(sealed)} blocks"
+            held_out.append(_block(run, last + 1, edges[last], edges[last + 1]))
+    blocks = "1 block" if len(held_out) == 1 else f"{len(held_out)} blocks"
     share = f"{blocks} of {run.duration / count:.3g} s of {run.label}"
     # Few folds, each of stretches spread over the run.
     folds = tuple(i % min(len(training), 4) for i in range(len(training)))
-    return Split(tuple(training), tuple(sealed), share, folds, (run.id.key,))
+    return Split(tuple(training), tuple(held_out), share, folds, (run.id.key,))
 
 
 def _is_shown_elsewhere(unit: str, runs: Sequence[Run]) -> bool:
@@ -201,11 +201,11 @@ def _is_shown_elsewhere(unit: str, runs: Sequence[Run]) -> bool:
 
 
 def _blocks_of_each(runs: Sequence[Run], units: tuple[str, ...]) -> Split:
-    """Every third block of each run sealed."""
+    """Every third block of each run held out."""
     parts = [_blocks(run, None) for run in runs]
     return Split(
         tuple(run for part in parts for run in part.training),
-        tuple(run for part in parts for run in part.sealed),
+        tuple(run for part in parts for run in part.held_out),
         f"every third block of each of {len(units)} runs",
         tuple(fold for part in parts for fold in part.folds),
         units,

@@ -23,7 +23,7 @@ class StoredFit(Shown):
     config_folder: str
     fingerprint: str
     fit: Fit
-    sealed_run: str
+    held_out_run: str
     error: Errors
     training_error: Errors
     findings: tuple[Finding, ...]

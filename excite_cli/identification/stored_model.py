@@ -16,8 +16,8 @@ class StoredModel:
     """`model` of `robot` with what was known of it when it was made.
 
     `what` it is: "fit", "diagnosis", "config", or "urdf" for a config without numbers. `error` on
-    `sealed_run`, which no fit saw; `noise` of the filtered torque by joint, where known;
-    `processing`: the filters of both. `traces`: torque over time of training and sealed data.
+    `held_out_run`, which no fit saw; `noise` of the filtered torque by joint, where known;
+    `processing`: the filters of both. `traces`: torque over time of training and held-out data.
     `consistent`: the same of bodies that can be, where a fit has them.
     """
 
@@ -27,7 +27,7 @@ class StoredModel:
     folder: Path
     robot: Robot
     model: IdentifiedModel
-    sealed_run: str = ""
+    held_out_run: str = ""
     error: Errors | None = None
     noise: dict[str, float] | None = None
     processing: Processing | None = None

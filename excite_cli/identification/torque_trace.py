@@ -23,11 +23,11 @@ class TorqueTrace:
     `t` from the start of the run [s]; `q, v, a`; `load` rigid-body torque of the model; `measured`
     torque, NaN where it must not be used; `counted` where a fit may use it (the joint neither
     stands nor reverses); `predicted` torque of the model, `before` that of the model before effects
-    were added, if any were looked for. `sealed`: took no part in the fit.
+    were added, if any were looked for. `held_out`: took no part in the fit.
     """
 
     run: str
-    sealed: bool
+    held_out: bool
     t: Array
     q: Array
     v: Array
@@ -44,7 +44,7 @@ def torque_trace(
     load: Array,
     predicted: Array,
     before: Array | None = None,
-    sealed: bool = False,
+    held_out: bool = False,
     whole: bool = False,
 ) -> TorqueTrace:
     """The trace of a prepared run; `load`, `predicted`, `before` (T, n) at the working rate.
@@ -55,7 +55,7 @@ def torque_trace(
     motion = np.split(stacked[:, 1:], 3, axis=1)
     trace = TorqueTrace(
         run=run.run.key,
-        sealed=sealed,
+        held_out=held_out,
         t=stacked[:, 0],
         q=motion[0],
         v=motion[1],

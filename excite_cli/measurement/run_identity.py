@@ -39,8 +39,8 @@ class Origin:
 class Part:
     """Which part of its recording a run is, from `start` to `end` [s] after the recording's start.
 
-    `stretch` between two gaps and `block` of it, cut off for folds or sealing, count from 1; 0: not
-    cut. The end is None where the recording's own is meant.
+    `stretch` between two gaps and `block` of it, cut off for folds or holding out, count from 1; 0:
+    not cut. The end is None where the recording's own is meant.
     """
 
     stretch: int = 0

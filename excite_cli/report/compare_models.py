@@ -11,11 +11,11 @@ from excite_cli.report.page import Block, Section, Table
 
 
 def compare_fits(fits: Mapping[str, StoredFit]) -> Section:
-    """Errors of several fits on sealed data, what the data fix, and the differing keys."""
+    """Errors of several fits on held-out data, what the data fix, and the differing keys."""
     rows = tuple(
         (
             name,
-            stored.sealed_run,
+            stored.held_out_run,
             _percent(stored.training_error.mean_relative_moving),
             _percent(stored.error.mean_relative_moving),
             f"{int(np.sum(stored.fit.identifiable))} of {len(stored.fit.names)}",
@@ -23,7 +23,7 @@ def compare_fits(fits: Mapping[str, StoredFit]) -> Section:
         for name, stored in fits.items()
     )
     table = Table(
-        ("file", "sealed run", "error in training", "error on sealed data", "fixed by the data"),
+        ("file", "held-out run", "training error", "held-out error", "fixed by the data"),
         rows,
         title="Mean relative error of the torque where joints move",
         right=frozenset({2, 3, 4}),
@@ -34,11 +34,11 @@ def compare_fits(fits: Mapping[str, StoredFit]) -> Section:
 
 
 def compare_diagnoses(diagnoses: Mapping[str, Diagnosis]) -> Section:
-    """What several diagnoses found, their errors on sealed data and the differing keys."""
+    """What several diagnoses found, their errors on held-out data and the differing keys."""
     rows = tuple(
         (
             name,
-            diagnosis.sealed_run,
+            diagnosis.held_out_run,
             _percent(diagnosis.before.mean_relative_moving),
             _percent(diagnosis.after.mean_relative_moving),
             "; ".join(
@@ -50,9 +50,9 @@ def compare_diagnoses(diagnoses: Mapping[str, Diagnosis]) -> Section:
         for name, diagnosis in diagnoses.items()
     )
     errors = Table(
-        ("file", "sealed run", "error before", "error after", "found"),
+        ("file", "held-out run", "error before", "error after", "found"),
         rows,
-        title="Mean relative error of the torque where joints move, on sealed data",
+        title="Mean relative error of the torque where joints move, on held-out data",
         right=frozenset({2, 3}),
     )
     blocks: list[Block] = [errors, *_by_joint(diagnoses)]

@@ -24,13 +24,13 @@ _CARDS = 9  # of a figure
 def figures_of(found: Diagnosis) -> dict[str, Callable[[], "Figure"]]:
     """What draws each figure, by its name, in reading order; without samples the errors alone.
 
-    `before_RUN` and `after_RUN` are of runs that hold sealed data.
+    `before_RUN` and `after_RUN` are of runs that hold held-out data.
     """
     units = torque_units(found)
     figures: dict[str, Callable[[], Figure]] = {}
     training = found.traces.runs if found.traces is not None else ()
-    runs = dict.fromkeys(trace.run for trace in found.sealed_traces)
-    traces = [each for each in (*found.sealed_traces, *training) if each.run in runs]
+    runs = dict.fromkeys(trace.run for trace in found.held_out_traces)
+    traces = [each for each in (*found.held_out_traces, *training) if each.run in runs]
     alone = [replace(each, predicted=each.before, before=None)
              for each in traces if each.before is not None]  # fmt: skip
     for name, title, parts in (
@@ -44,7 +44,7 @@ def figures_of(found: Diagnosis) -> dict[str, Callable[[], "Figure"]]:
             for run, label in labels.items()
         }
     figures["errors"] = partial(
-        draw_errors, f"Errors on sealed data: {found.sealed_run}", ("before", "after"),
+        draw_errors, f"Errors on held-out data: {found.held_out_run}", ("before", "after"),
         (found.before, found.after), by_joint(found.joint_names, units), found.noise_floor,
     )  # fmt: skip
     if found.traces is not None:

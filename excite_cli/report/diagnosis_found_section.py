@@ -11,11 +11,11 @@ from excite_cli.diagnosis.words import (
     by_worth,
     counted,
     covariate_in_words,
+    held_out_in_words,
     joints_in_words,
     other_name_of,
     p_in_words,
     place_in_words,
-    sealed_in_words,
     settled_in_words,
     title_of,
     value_in_words,
@@ -23,7 +23,7 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.report.page import Block, Section, Table, Text
 
-_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "takes off", "gain", "sealed")
+_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "takes off", "gain", "held_out")
 
 
 def found_section(found: Diagnosis) -> Section:
@@ -40,10 +40,10 @@ def found_section(found: Diagnosis) -> Section:
                 title="What the declared model lacks",
                 right=frozenset({3, 4, 5}),
                 note=(
-                    "takes off: its part of the fall of the mean error on sealed data, averaged "
+                    "takes off: its part of the fall of the mean error on held-out data, averaged "
                     "over orders of joining, so that all rows add up to it; gain: by which the "
-                    "error on runs left out falls; sealed: whether the effect lowers the error on "
-                    "sealed data beside all others, and the change there in percentage points."
+                    "error on runs left out falls; held out: whether the effect lowers the error "
+                    "on held-out data beside all others, and the change there in percentage points."
                 ),
             )
         )
@@ -79,10 +79,11 @@ def verdict(found: Diagnosis) -> str:
     what = counted(len(found.named), "effect")
     what += f" and {approximations}" * bool(found.approximations)
     return (
-        f"With {what} the mean error of the torque on {found.sealed_run}, which took no part, goes "
-        f"from {found.before.mean_relative_moving:.2%} to {found.after.mean_relative_moving:.2%} "
-        f"where joints move (over all samples from {found.before.mean_relative:.2%} to "
-        f"{found.after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%})."
+        f"With {what} the mean error of the torque on {found.held_out_run}, which took no part, "
+        f"goes from {found.before.mean_relative_moving:.2%} to "
+        f"{found.after.mean_relative_moving:.2%} where joints move (over all samples from "
+        f"{found.before.mean_relative:.2%} to {found.after.mean_relative:.2%}, 95 % interval "
+        f"{low:.2%} to {high:.2%})."
     )
 
 
@@ -94,7 +95,7 @@ def _lead(found: Diagnosis) -> str:
     if not found.effects:
         return (
             f"With {declared} declared, the mean error of the torque on "
-            f"{found.sealed_run}, which took no part, is {found.after.mean_relative_moving:.2%} "
+            f"{found.held_out_run}, which took no part, is {found.after.mean_relative_moving:.2%} "
             "where joints move."
         )
     return f"Declared: {declared}. {verdict(found)}"
@@ -117,7 +118,7 @@ def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:
         p_in_words(named.p_value, named.least_p),
         _points(named.takes_off),
         f"{named.gain:.1%}",
-        sealed_in_words(named) or "–",
+        held_out_in_words(named) or "–",
         others or "–",
     )
 

@@ -31,11 +31,11 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
     names = [title_of(each.effect.kind) for each in diagnosis.named]
     kinds = ", ".join(dict.fromkeys(names[:3])) + (" …" if len(set(names)) > 3 else "")
     open_questions = sum(bool(each.aliases) for each in diagnosis.effects)
-    bad = KeyFigure("verdict", "the sealed error did not fall", no_gain_in_words(diagnosis))
+    bad = KeyFigure("verdict", "the held-out error did not fall", no_gain_in_words(diagnosis))
     return (
         *([] if diagnosis.good else [bad]),
         KeyFigure(
-            "error on sealed data, moving",
+            "error on held-out data, moving",
             f"{before.mean_relative_moving:.2%} → {after.mean_relative_moving:.2%}",
             f"all samples {after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}",
         ),
@@ -96,10 +96,10 @@ def _errors(diagnosis: Diagnosis) -> Section:
         diagnosis.after,
         by_joint(diagnosis.joint_names, torque_units(diagnosis)),
         diagnosis.noise_floor,
-        "On sealed data; raw: after, on the torque as recorded, without any filter.",
+        "On held-out data; raw: after, on the torque as recorded, without any filter.",
     )
     if diagnosis.skeleton is not None:
-        what = "Relative error that stays where the joint moves, on sealed data"
+        what = "Relative error that stays where the joint moves, on held-out data"
         robot = robot_chart(
             "Where it stays", diagnosis.skeleton, diagnosis.joint_names,
             diagnosis.after.relative_moving, what,
@@ -109,7 +109,7 @@ def _errors(diagnosis: Diagnosis) -> Section:
         blocks = (replace(charts, charts=(robot, *charts.charts)), *others)
     blocks = (*blocks, *(Text(ends_in_words(part)) for part in diagnosis.parts))
     lead = (
-        f"On {diagnosis.sealed_run}, which took no part in choosing or fitting. Before: the "
+        f"On {diagnosis.held_out_run}, which took no part in choosing or fitting. Before: the "
         "declared model, fitted to the same training data; after: with the effects that were "
         f"found. Mean over all samples after: {diagnosis.after.mean_relative:.2%}, 95 % interval "
         f"{low:.2%} to {high:.2%}. {untouched_in_words(diagnosis)}"
@@ -119,13 +119,13 @@ def _errors(diagnosis: Diagnosis) -> Section:
 
 def _in_time(diagnosis: Diagnosis) -> Section:
     training = diagnosis.traces.runs if diagnosis.traces is not None else ()
-    traces = (*diagnosis.sealed_traces, *training)
+    traces = (*diagnosis.held_out_traces, *training)
     lead = (
         ""
         if not traces
         else (
             "Filtered torque, as the fit sees it. Above what was measured and what the model with "
-            "all effects says, below what it and the declared model leave. Shaded: sealed."
+            "all effects says, below what it and the declared model leave. Shaded: held out."
         )
     )
     blocks = residuals_in_time(traces, diagnosis.joint_names, torque_units(diagnosis))
@@ -165,13 +165,13 @@ def _runs(diagnosis: Diagnosis) -> list[Table]:
         return []
     found = [each.effect for each in diagnosis.effects]
     every = (*diagnosis.declared, *found)
-    uses = (*((name, "training") for name in names), (diagnosis.sealed_run, "sealed"))
+    uses = (*((name, "training") for name in names), (diagnosis.held_out_run, "held_out"))
     rows = tuple(
         (name, use, ", ".join(_own(each) for each in every if _within(name, each.runs)) or "–")
         for name, use in uses
     )
     note = (
-        "Effects of single runs that are found are never looked for in the sealed one."
+        "Effects of single runs that are found are never looked for in the held-out one."
         if any(each.runs for each in found)
         else ""
     )

@@ -12,9 +12,9 @@ from excite_cli.diagnosis.words import (
     by_worth,
     counted,
     covariate_in_words,
+    held_out_in_words,
     p_in_words,
     place_in_words,
-    sealed_in_words,
     title_of,
     value_in_words,
 )
@@ -107,8 +107,8 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
         f"{named.share_of_residual:.2%} of the residual; "
         f"lowers the error on runs left out by {named.gain:.1%}."
     )
-    if told := sealed_in_words(named):
-        text += f" On sealed data: {told}."
+    if told := held_out_in_words(named):
+        text += f" On held-out data: {told}."
     everything = len(found.joint_names)
     if named.aliases:
         others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]

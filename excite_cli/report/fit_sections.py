@@ -26,7 +26,7 @@ def fit_figures(stored: StoredFit) -> tuple[KeyFigure, ...]:
     fixed = int(np.sum(fit.identifiable))
     return (
         KeyFigure(
-            "error on sealed data, moving",
+            "error on held-out data, moving",
             f"{error.mean_relative_moving:.2%}",
             f"all samples {error.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}",
         ),
@@ -51,18 +51,18 @@ def fit_sections(stored: StoredFit) -> tuple[Section, ...]:
 def _errors(stored: StoredFit) -> Section:
     low, high = stored.error.interval
     blocks = error_blocks(
-        ("training", "sealed"),
+        ("training", "held_out"),
         stored.training_error,
         stored.error,
         by_joint(stored.fit.joint_names, stored.torque_units),
         stored.noise_floor,
-        "raw: on sealed data, on the torque as recorded, without any filter.",
+        "raw: on held-out data, on the torque as recorded, without any filter.",
     )
     lead = (
-        f"Sealed: {stored.sealed_run}, which took no part in the fit. Mean relative error of the "
-        f"torque there {stored.error.mean_relative:.2%} (95 % interval {low:.2%} to {high:.2%}), "
-        f"{stored.error.mean_relative_moving:.2%} where joints move; on the training data "
-        f"{stored.training_error.mean_relative:.2%}."
+        f"Held-out: {stored.held_out_run}, which took no part in the fit. Mean relative error of "
+        f"the torque there {stored.error.mean_relative:.2%} (95 % interval {low:.2%} to "
+        f"{high:.2%}), {stored.error.mean_relative_moving:.2%} where joints move; on the training "
+        f"data {stored.training_error.mean_relative:.2%}."
     )
     return Section("fit-errors", "Error of the fit", blocks, lead)
 
@@ -136,14 +136,14 @@ def correlated_parameters(fit: Fit) -> tuple[Block, ...]:
 
 
 def time_section(stored: StoredFit) -> Section:
-    """Measured and predicted torque of all runs, the sealed ones first."""
+    """Measured and predicted torque of all runs, the held-out ones first."""
     units = stored.torque_units or ("N·m",) * len(stored.fit.joint_names)
     # What took no part comes first: it is the judge.
-    traces = sorted(stored.traces, key=lambda trace: not trace.sealed)
+    traces = sorted(stored.traces, key=lambda trace: not trace.held_out)
     blocks = residuals_in_time(traces, stored.fit.joint_names, units)
     lead = (
         "Filtered torque, as the fit sees it: above what was measured and what the model says, "
-        "below what it leaves. Shaded: sealed, took no part in the fit."
+        "below what it leaves. Shaded: held out, took no part in the fit."
         if traces
         else ""
     )

@@ -13,8 +13,8 @@ from excite_cli.report.style import (
     FORBIDDEN,
     GREEN,
     GREY,
+    HELD_OUT,
     PURPLE,
-    SEALED,
     VERMILION,
     WIDTH,
     matplotlib_part,
@@ -85,7 +85,7 @@ def _draw(figure: "Figure", grid: Any, plot: Plot, title: str) -> None:
         first = first or axes
         axes.tick_params(pad=2, labelbottom=number == len(plot.panels) - 1)
         for low, high in plot.shaded:
-            axes.axvspan(low, high, color=SEALED, linewidth=0, label="_")
+            axes.axvspan(low, high, color=HELD_OUT, linewidth=0, label="_")
         _draw_panel(axes, plot.x, panel)
         axes.set_ylabel(panel.axis, labelpad=2)
     assert first is not None

@@ -29,7 +29,7 @@ def error_blocks(
     ]
     blocks: list[Block] = [Charts(tuple(charts))]
     if not moving:
-        blocks.append(Text("No joint moves in the sealed data: there is no error while moving."))
+        blocks.append(Text("No joint moves in the held-out data: there is no error while moving."))
     above = above_the_floor(second, floor)
     if above:
         blocks.append(Text(above))

@@ -55,8 +55,8 @@ def plots_in_time(
 
 
 def _label(run: str, parts: Sequence[TorqueTrace]) -> str:
-    if all(part.sealed for part in parts):
-        return f"{run} (sealed: took no part in the fit)"
+    if all(part.held_out for part in parts):
+        return f"{run} (held out: took no part in the fit)"
     return run
 
 
@@ -85,7 +85,7 @@ def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: in
         ),
     )
     lower = Panel(f"left [{of_left}]", tuple(replace(each, y=small * each.y) for each in rest))
-    mixed = {part.sealed for part in parts} == {False, True}
+    mixed = {part.held_out for part in parts} == {False, True}
     return Plot(
         name,
         f"{words}.",
@@ -94,7 +94,7 @@ def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: in
         (upper, lower),
         link=f"time of {parts[0].run}",
         shaded=tuple(
-            (float(part.t[0]), float(part.t[-1])) for part in parts if mixed and part.sealed
+            (float(part.t[0]), float(part.t[-1])) for part in parts if mixed and part.held_out
         ),
     )
 

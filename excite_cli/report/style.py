@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # Okabe and Ito: told apart with every common form of colour blindness, and in grey print.
 BLUE, VERMILION, GREEN, GREY, PURPLE = "#0072B2", "#D55E00", "#009E73", "#767676", "#8A3F82"
-FORBIDDEN, SEALED = "#F3DCCB", "#EAEFF4"
+FORBIDDEN, HELD_OUT = "#F3DCCB", "#EAEFF4"
 
 WIDTH = 9.0  # [in]; shown 900 px wide, 9 pt text is 12 px high
 _DOTS_PER_INCH = 180

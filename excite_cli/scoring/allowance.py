@@ -1,6 +1,6 @@
 """What residual a model allows a joint: that of its own data, carried over to another motion.
 
-When it was made, its residual had the RMS r₀ beside torque of the RMS τ₀: on sealed data, or on
+When it was made, its residual had the RMS r₀ beside torque of the RMS τ₀: on held-out data, or on
 those that it was fitted to, where there is more of it. What a model lacks grows with the torque,
 and so does the noise of many sensors,
 
@@ -74,9 +74,8 @@ def allowance_of(stored: StoredModel) -> Allowance | None:
         return None
     slowest = slowest_known(stored.traces, stored.processing, len(names))
     blocks, torques = _own_blocks(stored, stored.traces, slowest)
-    held_out = [each for each in stored.traces if each.sealed]
-    sealed = _own_blocks(stored, held_out, slowest)
-    residual, torque = _known(*sealed, residual, torque)
+    apart = [each for each in stored.traces if each.held_out]
+    residual, torque = _known(*_own_blocks(stored, apart, slowest), residual, torque)
     trained, beside = _known(blocks, torques, np.zeros(len(names)), torque)
     larger = trained > residual
     residual, torque = np.where(larger, trained, residual), np.where(larger, beside, torque)

@@ -70,7 +70,7 @@ class Score(Shown):
     runs: tuple[ScoredRun, ...]
     error: Errors
     made: Errors | None
-    sealed_run: str = ""
+    held_out_run: str = ""
     noise: dict[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 

@@ -20,12 +20,12 @@ from excite_cli.diagnosis.records import (
     EffectRecord,
     ErrorPath,
     FrictionLine,
+    HeldOutEnds,
     Information,
     JointAlias,
     LargeRest,
     NamedEffect,
     Round,
-    SealedEnds,
     Textbook,
 )
 from excite_cli.identification.errors_of_torque import Errors
@@ -44,12 +44,16 @@ from excite_cli.store.trace_groups import (
     write_traces,
 )
 
-SCHEMA = 1
+SCHEMA = 2  # since 0.3, which says held-out for sealed
 CONTENT = "diagnosis"
 OWN = OwnFile(
-    "a diagnosis", "Diagnoses are written by `excite diagnose`.", SCHEMA, ("content", CONTENT)
+    "a diagnosis",
+    "Diagnoses are written by `excite diagnose`.",
+    SCHEMA,
+    ("content", CONTENT),
+    oldest=2,
 )
-_ATTRIBUTES = ("config", "config_folder", "sealed_run")
+_ATTRIBUTES = ("config", "config_folder", "held_out_run")
 _OF_BASE = ("base_values", "base_std")
 _RECORDS: dict[str, Any] = {
     "joint_names": tuple[str, ...],
@@ -68,7 +72,7 @@ _RECORDS: dict[str, Any] = {
 _LATER: dict[str, Any] = {
     "noise_floor": dict[str, float] | None,
     "assumed": tuple[Assumption, ...],
-    "parts": tuple[SealedEnds, ...],
+    "parts": tuple[HeldOutEnds, ...],
     "untouched": Errors | None,
     "textbook": Textbook | None,
     "large_rests": tuple[LargeRest, ...],
@@ -134,7 +138,7 @@ def _write(path: Path, diagnosis: Diagnosis) -> None:
         file["information"].attrs["rank"] = int(information.rank)
         if diagnosis.traces is not None:
             write_traces(file.create_group("traces"), diagnosis.traces)
-        write_torque_traces(file.create_group("sealed_traces"), diagnosis.sealed_traces)
+        write_torque_traces(file.create_group("held_out_traces"), diagnosis.held_out_traces)
 
 
 def _read(file: Any, path: Path) -> Diagnosis:
@@ -151,8 +155,8 @@ def _read(file: Any, path: Path) -> Diagnosis:
             fields[name] = _record(file, f"records/{name}", kind)
     # Files of earlier versions have no traces.
     fields["traces"] = read_traces(file["traces"], joints) if "traces" in file else None
-    if "sealed_traces" in file:
-        fields["sealed_traces"] = read_torque_traces(file["sealed_traces"], len(joints))
+    if "held_out_traces" in file:
+        fields["held_out_traces"] = read_torque_traces(file["held_out_traces"], len(joints))
     found = Diagnosis(
         fingerprint=checked.text(attributes, "robot_hash"),
         seconds=checked.number(attributes, "seconds"),

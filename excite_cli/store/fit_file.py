@@ -30,9 +30,11 @@ from excite_cli.store.own_file import PROGRAM, OwnFile, is_marked, opened
 from excite_cli.store.trace_groups import read_torque_traces, write_torque_traces
 from excite_cli.store.versions import versions
 
-SCHEMA = 1
+SCHEMA = 2  # since 0.3, which says held-out for sealed
 KIND = "fit"
-OWN = OwnFile("a fit", "Such files are written by `excite identify`.", SCHEMA, ("kind", KIND))
+OWN = OwnFile(
+    "a fit", "Such files are written by `excite identify`.", SCHEMA, ("kind", KIND), oldest=2
+)
 _ARRAYS = ("values", "std", "relative_std", "identifiable", "essential")
 
 
@@ -72,7 +74,7 @@ def write_fit(
         "robot_hash": fingerprint,
         "joint_names": list(found.fit.joint_names),
         "sources": list(sources),
-        "sealed_run": found.sealed_run,
+        "held_out_run": found.held_out_run,
         "error": json.dumps(found.error.as_data()),
         "training_error": json.dumps(found.training_error.as_data()),
         "processing": json.dumps(found.processing.as_data()),
@@ -159,7 +161,7 @@ def _read(file: Any, path: Path) -> StoredFit:
         config_folder=checked.text(attributes, "config_folder"),
         fingerprint=checked.text(attributes, "robot_hash"),
         fit=_read_fit(file, joints),
-        sealed_run=checked.text(attributes, "sealed_run"),
+        held_out_run=checked.text(attributes, "held_out_run"),
         error=checked.record(attributes["error"], Errors),
         training_error=checked.record(attributes["training_error"], Errors),
         findings=checked.record(attributes["findings"], tuple[Finding, ...]),

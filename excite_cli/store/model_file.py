@@ -67,7 +67,7 @@ def _of_fit(path: Path) -> StoredModel:
         raise _other_bodies(path)
     noise = stored.noise_floor or dict(zip(fit.joint_names, map(float, fit.noise), strict=True))
     return StoredModel(
-        path, "fit", spec, folder, robot, fit.model, stored.sealed_run, stored.error, noise,
+        path, "fit", spec, folder, robot, fit.model, stored.held_out_run, stored.error, noise,
         _processing(stored.processing), stored.traces, fit.best_model, stored.sources,
     )  # fmt: skip
 
@@ -82,8 +82,8 @@ def _of_diagnosis(path: Path) -> StoredModel:
     trained = () if found.traces is None else found.traces.runs
     return StoredModel(
         path, "diagnosis", spec, folder, robot, _model(found.phi, records, robot, path),
-        found.sealed_run, found.after, noise, _processing(found.processing),
-        (*trained, *found.sealed_traces),
+        found.held_out_run, found.after, noise, _processing(found.processing),
+        (*trained, *found.held_out_traces),
     )  # fmt: skip
 
 
@@ -166,7 +166,7 @@ def _of_numbers(
     ]  # fmt: skip
     phi = np.array([told.inertias[name] for name in names])
     return StoredModel(
-        path, "config", spec, folder, robot, _model(phi, records, robot, path), told.sealed_run,
+        path, "config", spec, folder, robot, _model(phi, records, robot, path), told.held_out_run,
         _errors(told), dict(told.noise), _processing(dict(told.processing)),
     )  # fmt: skip
 

@@ -15,6 +15,7 @@ from excite_cli.measurement.hdf5_attributes import attribute, require_plain
 from excite_cli.measurement.memory_limit import limited_memory
 
 PROGRAM = "excite"
+_MOTIONS = "motions"  # the content of files that have no marker of their own
 _LONGEST = 500  # characters of a library's message
 _MOST_OBJECTS = 200_000
 _ALWAYS, _PACKED = 2**27, 200  # bytes that any file may unpack to; times its size
@@ -22,12 +23,16 @@ _ALWAYS, _PACKED = 2**27, 200  # bytes that any file may unpack to; times its si
 
 @dataclass(frozen=True)
 class OwnFile:
-    """A kind of file: what it is, who writes it, its newest schema, the attribute that marks it."""
+    """A kind of file: what it is, who writes it, its newest schema, the attribute that marks it.
+
+    `oldest`: the first schema that can still be read.
+    """
 
     what: str
     written_by: str
     schema: int
     marker: tuple[str, str] | None = None
+    oldest: int = 1
 
 
 def is_marked(path: Path, own: OwnFile) -> bool:
@@ -123,6 +128,14 @@ def _check(attributes: Any, path: Path, own: OwnFile) -> None:
         raise FileError(f"{path} holds measured data, not {own.what}. {own.written_by}")
     if not ours:
         raise FileError(f"{path} is HDF5, but not {own.what} of this program. {own.written_by}")
+    content = str(attributes.get("content", _MOTIONS))
+    if own.marker is None and content != _MOTIONS:
+        raise FileError(f"{path} holds a {content}, not motions. {own.written_by}")
+    if int(attributes["schema"]) < own.oldest:
+        raise FileError(
+            f"{path} was written by an earlier version (schema {int(attributes['schema'])}; this "
+            f"one reads {own.oldest} to {own.schema}). Make it anew. {own.written_by}"
+        )
     if int(attributes["schema"]) > own.schema:
         raise FileError(
             f"{path} has schema {int(attributes['schema'])}; this version reads up to "

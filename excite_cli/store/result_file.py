@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.atomic import write_atomically
-from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Status
@@ -175,12 +174,6 @@ def is_result(path: Path) -> bool:
 
 def _read(file: Any, path: Path) -> Result:
     attributes = file.attrs
-    content = str(attributes.get("content", "motions"))
-    if content != "motions":
-        raise FileError(
-            f"{path} holds a {content}, not motions. Motions are written by `excite optimize` and "
-            "`excite compare-random`."
-        )
     config = checked.text(attributes, "config")
     joint_names = checked.names(attributes["joint_names"], "joint_names")
     trajectory = build_trajectory(checked.stored_spec(config, str(path)).trajectory)

@@ -21,7 +21,7 @@ def write_torque_traces(group: Any, traces: Sequence[TorqueTrace]) -> None:
     """One numbered group for every trace."""
     for number, trace in enumerate(traces):
         own = group.create_group(str(number))
-        own.attrs.update({"run": trace.run, "sealed": trace.sealed})
+        own.attrs.update({"run": trace.run, "held_out": trace.held_out})
         arrays = {name: getattr(trace, name) for name in ("t", *_TORQUE)}
         if trace.before is not None:
             arrays["before"] = trace.before
@@ -49,7 +49,7 @@ def _torque_trace(own: Any, joints: int) -> TorqueTrace:
     stored = "before" in own
     return TorqueTrace(
         run=checked.text(own.attrs, "run"),
-        sealed=checked.flag(own.attrs, "sealed"),
+        held_out=checked.flag(own.attrs, "held_out"),
         t=t,
         counted=checked.flags(own["counted"], shape),
         before=checked.array(own["before"], shape, finite=False) if stored else None,

@@ -97,8 +97,8 @@ def _data_in_words(found: Diagnosis) -> str:
     return (
         f"{p['samples']} samples at {p['rate']:.3g} Hz; positions cut off at "
         f"{'no frequency' if cut is None else f'{cut:.3g} Hz'}; joints stand still in up to "
-        f"{standing:.0%} of the samples, which are left out. {p['candidates']} candidates; sealed: "
-        f"{found.sealed_run}. Placebos exceed χ² by {p['inflation']:.2f}; tests allow for it."
+        f"{standing:.0%} of the samples, which are left out. {p['candidates']} candidates; held "
+        f"out: {found.held_out_run}. Null inflation {p['inflation']:.2f} (corrected)."
     )
 
 

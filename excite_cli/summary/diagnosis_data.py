@@ -4,7 +4,7 @@ from dataclasses import asdict
 from typing import Any
 
 from excite_cli.diagnosis.answer_words import answer_in_words, shares
-from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, SealedEnds
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord, HeldOutEnds, NamedEffect
 from excite_cli.diagnosis.words import approximation_in_words, no_gain_in_words
 
 
@@ -37,7 +37,7 @@ def _named(named: NamedEffect, runs: list[str]) -> dict[str, Any]:
     }
 
 
-def _ends(part: SealedEnds) -> dict[str, Any]:
+def _ends(part: HeldOutEnds) -> dict[str, Any]:
     return {
         "runs": list(part.runs),
         "effects": [_record(effect) for effect in part.effects],
@@ -97,8 +97,7 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             for each in found.large_rests
         ],
         "error": {
-            "held_out_run": found.sealed_run,
-            "sealed_run": found.sealed_run,
+            "held_out_run": found.held_out_run,
             "before": found.before.as_data(),
             "textbook": found.textbook.error.as_data() if found.textbook else None,
             "after": found.after.as_data(),

@@ -1,4 +1,4 @@
-"""Errors of every joint on sealed data: of the URDF, refitted, with effects; who took it off."""
+"""Errors of every joint on held-out data: of the URDF, refitted, with effects; who took it off."""
 
 from collections.abc import Iterator
 from math import isnan
@@ -42,7 +42,7 @@ def _moving(found: Diagnosis) -> Table:
     mean = ("mean", *(percent(each.mean_relative_moving) for each in errors.values()))
     mean += ("",) * (3 + len(floor) + len(off))
     return Table(
-        f"Error of the torque on data never used ({found.sealed_run}), where joints move",
+        f"Error of the torque on data never used ({found.held_out_run}), where joints move",
         ("joint", *errors, "RMS before", "RMS after", "unit", *floor, *off),
         (*rows, mean),
         left=("joint", "unit"),
@@ -157,7 +157,7 @@ def _all_samples(found: Diagnosis) -> Table:
     ]  # fmt: skip
     mean = ("mean", *(percent(each.mean_relative) for each in errors.values()), "", "", "")
     return Table(
-        f"The same over all samples ({found.sealed_run}), standing joints too",
+        f"The same over all samples ({found.held_out_run}), standing joints too",
         ("joint", *errors, "RMS before", "RMS after", "unit"),
         (*rows, mean),
         left=("joint", "unit"),

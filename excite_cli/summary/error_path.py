@@ -17,13 +17,13 @@ def path_parts(found: Diagnosis, verbose: bool) -> Parts:
 
 
 def smallest_in_words(path: ErrorPath) -> str:
-    """How many effects are enough, by what, and what that costs on sealed data."""
+    """How many effects are enough, by what, and what that costs on held-out data."""
     count, least = path.smallest, path.left_out[path.best]
     text = (
         f"{count} of the {len(path.effects)} effects are enough: on training data left out they "
         f"leave {path.left_out[count]:.1%} of the declared model's error, all of them "
-        f"{path.left_out[-1]:.1%}; the least is {least:.1%} ± {path.standard_error:.1%}. Sealed: "
-        f"{path.sealed[count]:.2%} with {count}, {path.sealed[-1]:.2%} with all. "
+        f"{path.left_out[-1]:.1%}; the least is {least:.1%} ± {path.standard_error:.1%}. Held-out: "
+        f"{path.held_out[count]:.2%} with {count}, {path.held_out[-1]:.2%} with all. "
         "--apply NEW.yaml --smallest writes these alone."
     )
     if not path.enough:
@@ -36,12 +36,12 @@ def _table(found: Diagnosis, path: ErrorPath) -> Table:
     names = ["none", *(what_and_where(found.effects[i].effect, everything) for i in path.effects)]
     marks = {path.best: "least", path.smallest: "smallest"}
     rows = tuple(
-        (str(k), name, f"{path.left_out[k]:.2%}", f"{path.sealed[k]:.2%}", marks.get(k, ""))
+        (str(k), name, f"{path.left_out[k]:.2%}", f"{path.held_out[k]:.2%}", marks.get(k, ""))
         for k, name in enumerate(names)
     )
     return Table(
-        "Error with the first effects (left out: of the declared model's; sealed: of the torque)",
-        ("effects", "with", "left out", "sealed", ""),
+        "Error with the first effects (left out: of the declared model's; held out: of the torque)",
+        ("effects", "with", "left out", "held_out", ""),
         rows,
         left=("with", ""),
         bold=(path.smallest,),

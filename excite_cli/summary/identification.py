@@ -38,7 +38,7 @@ def identification_parts(found: Identification) -> Parts:
     low, high = found.error.interval
     fit = found.fit
     sentences = [
-        f"Mean relative error on {found.sealed_run}: {found.error.mean_relative:.2%} "
+        f"Mean relative error on {found.held_out_run}: {found.error.mean_relative:.2%} "
         f"(95 % interval {low:.2%} to {high:.2%}), moving {found.error.mean_relative_moving:.2%}.",
         f"{fit.count} samples carry the information of {fit.samples:.0f} independent ones.",
         f"{found.hausman.sentence()[0].upper()}{found.hausman.sentence()[1:]}.",
@@ -72,7 +72,7 @@ def _parameter_table(fit: Fit) -> Table:
 
 
 def _error_table(found: Identification | StoredFit) -> Table:
-    """Errors per joint on the sealed part, and the training part's and the noise floor beside."""
+    """Errors per joint on the held-out part, and the training part's and the noise floor beside."""
     error, floor, joints = found.error, found.noise_floor, found.fit.joint_names
     units = found.torque_units or ("",) * len(joints)
     rows = tuple(
@@ -89,7 +89,7 @@ def _error_table(found: Identification | StoredFit) -> Table:
         for joint, unit in zip(joints, units, strict=True)
         if not isnan(error.rms[joint])  # its torque was not measured
     )
-    title = "Error of the torque on sealed data (raw: as recorded; training: where it was fitted)"
+    title = "Error of the torque on held-out data (raw: as recorded; training: where it was fitted)"
     names = ("joint", "moving", "all", "RMS", *floor_columns(floor), "raw RMS", "unit", "training")
     return Table(title, names, rows, left=("joint", "unit"))
 
@@ -121,7 +121,7 @@ def _data(found: Identification) -> dict[str, Any]:
             }
             for i, effect in enumerate(fit.effects)
         ],
-        "sealed_run": found.sealed_run,
+        "held_out_run": found.held_out_run,
         "error": found.error.as_data(),
         "training_error": found.training_error.as_data(),
         "noise_floor": found.noise_floor,
@@ -171,7 +171,7 @@ def _fit_in_words(fit: Fit) -> str:
 
 def _in_words(found: Identification | StoredFit) -> str:
     """The fit, and its error on data that it did not see."""
-    error = f"mean relative error {found.error.mean_relative:.2%} on {found.sealed_run}"
+    error = f"mean relative error {found.error.mean_relative:.2%} on {found.held_out_run}"
     return f"{_fit_in_words(found.fit)}; {error}"
 
 

@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord, JointAlias, NamedEffect
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import (
     SMALL_PART,
     approximation_in_words,
     by_worth,
+    held_out_in_words,
     other_name_of,
     p_in_words,
     place_in_words,
-    sealed_in_words,
     value_in_words,
     weighed_in_words,
 )
@@ -34,7 +34,7 @@ def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
     if small:
         listed = ", ".join(
             what_and_where(each.effect, everything)
-            + f" ({each.verdict})" * (each.verdict is SealedVerdict.NOT_CONFIRMED)
+            + f" ({each.verdict})" * (each.verdict is HeldOutVerdict.NOT_CONFIRMED)
             for each in small
         )
         parts.append(
@@ -66,16 +66,16 @@ def effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -
             "\n".join(value_in_words(name, value) for name, value in named.parameters.items()),
             *([p_in_words(named.p_value, named.least_p)] if verbose else []),
             points(named.takes_off),
-            sealed_in_words(named),
+            held_out_in_words(named),
         )
         for named in shown
     )
     return Table(
         "What the declared model lacks (takes off: its part of the fall of the mean error)",
-        ("effect", "where", _SIZE, *(["p"] if verbose else []), "takes off", "sealed"),
+        ("effect", "where", _SIZE, *(["p"] if verbose else []), "takes off", "held_out"),
         rows,
         left=("effect",),
-        words=("where", _SIZE, "sealed"),
+        words=("where", _SIZE, "held_out"),
     )
 
 
@@ -112,12 +112,12 @@ def approximation_parts(found: Diagnosis, verbose: bool) -> Parts:
     """
     own, everything = set() if verbose else friction_rows(found)[1], len(found.joint_names)
     every = [each for each in found.approximations if not _is_part(each, own)]
-    shown = [each for each in every if verbose or each.verdict is SealedVerdict.CONFIRMED]
+    shown = [each for each in every if verbose or each.verdict is HeldOutVerdict.CONFIRMED]
     parts: Parts = [_approximation_table(shown, everything)] if shown else []
     if others := [each for each in every if each not in shown]:
         listed = ", ".join(
             what_and_where(each.effect, everything)
-            + f" ({each.verdict})" * (each.verdict is SealedVerdict.HARMFUL)
+            + f" ({each.verdict})" * (each.verdict is HeldOutVerdict.HARMFUL)
             for each in others
         )
         parts.append(f"In the model, but not confirmed: {listed} (--verbose: sizes, and why not)")
@@ -131,15 +131,15 @@ def _approximation_table(shown: Sequence[NamedEffect], everything: int) -> Table
             place_in_words(each.effect, everything),
             "\n".join(value_in_words(name, value) for name, value in each.parameters.items()),
             points(each.takes_off),
-            sealed_in_words(each),
+            held_out_in_words(each),
             approximation_in_words(each.approximates) if each.approximates else "",
         )
         for each in shown
     )
     return Table(
         "Approximations: they come near something else that is there",
-        ("effect", "where", _SIZE, "takes off", "sealed", "stands for"),
+        ("effect", "where", _SIZE, "takes off", "held_out", "stands for"),
         rows,
         left=("effect",),
-        words=("where", _SIZE, "sealed", "stands for"),
+        words=("where", _SIZE, "held_out", "stands for"),
     )

@@ -10,9 +10,9 @@ from excite_cli.study.records import TABLE, CaseRecord, row_of
 
 # Shares that are reported in per cent; and columns that are words.
 _SHARES = ("identified_error", "before", "after")
-_WORDS = ("case", "log", "status", "proved", "sealed_run", "effects", "absorbed", "unexplained")
+_WORDS = ("case", "log", "status", "proved", "held_out_run", "effects", "absorbed", "unexplained")
 # Told by the name of the case already, or too much for a row.
-_LEFT_OUT = ("log", "sealed_run", "absorbed", "proved")
+_LEFT_OUT = ("log", "held_out_run", "absorbed", "proved")
 
 
 def study_table(records: Sequence[CaseRecord]) -> Table:

@@ -1,4 +1,4 @@
-"""A diagnosis that does not lower the sealed error is not built upon unasked."""
+"""A diagnosis that does not lower the held-out error is not built upon unasked."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +15,7 @@ from excite_cli.shown.note import Level, Note
 from excite_cli.summary.diagnosis_data import diagnosis_data
 from tests.diagnosis.synthetic_diagnosis import CONFIG, make_diagnosis, smoke_spec
 
-TOLD = "The sealed error did not fall: 10.00% before, 10.00% after"
+TOLD = "The held-out error did not fall: 10.00% before, 10.00% after"
 
 
 @pytest.fixture(scope="module")

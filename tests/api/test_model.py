@@ -103,7 +103,7 @@ def test_friction_is_the_part_that_follows_the_speed(robot: Robot) -> None:
 def test_a_fit_predicts_as_its_table_says(loop: Loop) -> None:
     model = Model.load(loop.fit)
     stored = read_fit(loop.fit)
-    (trace,) = [each for each in stored.traces if each.sealed]
+    (trace,) = [each for each in stored.traces if each.held_out]
     found = model.torque(trace.q, trace.v, trace.a)
     assert np.abs(found - trace.predicted).max() < 2e-2 * np.abs(trace.predicted).max()
     assert model.joint_names == stored.fit.joint_names

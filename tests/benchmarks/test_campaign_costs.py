@@ -41,5 +41,5 @@ def test_an_order_is_right_with_payload_and_friction() -> None:
     assert of("a b c loaded").right
     told = summary([good, of("a b c loaded", "c")])
     assert told[0].startswith("1 of 1 orders")
-    assert told[1].startswith("0 of 1 with it sealed")
+    assert told[1].startswith("0 of 1 with it held-out")
     assert told[2].startswith("2 of 2")

@@ -46,7 +46,7 @@ def test_names_of_parts_of_the_runs_are_right_together() -> None:
     ).right
 
 
-def test_a_sealed_run_that_is_loaded_may_be_named() -> None:
+def test_a_held_out_run_that_is_loaded_may_be_named() -> None:
     assert judged(plant("payload", "j3", runs="as"), named("payload", "j3", runs="a")).right
     assert judged(plant("payload", "j3", runs="as"), named("payload", "j3", runs="as")).right
 

@@ -70,7 +70,7 @@ def test_what_changes_between_runs_is_in_some_training_runs_only(group: str) -> 
         if group_of(SEED, index) != group:
             continue
         case = make_case(SEED, index)
-        trained = set(case.runs) - {case.sealed}
+        trained = set(case.runs) - {case.held_out}
         changed = case.plants[0].runs & trained
         assert changed
         assert changed < trained
@@ -121,7 +121,7 @@ def clean() -> tuple[Judged, Case]:
     small = replace(
         case,
         motions=case.motions[:3],
-        sealed=case.motions[2].name,
+        held_out=case.motions[2].name,
         settings=replace(case.settings, rate=200.0),
         instruments=replace(case.instruments, epochs=()),
     )

@@ -7,7 +7,7 @@ import pytest
 from excite_cli.campaign.ending import ended, left_on_newest, still_open
 from excite_cli.campaign.records import Asked, Campaign, Learned, PlayedMotion, Round
 from excite_cli.diagnosis.records import Diagnosis, Removed
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.identification.errors_of_torque import Errors
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 
@@ -45,8 +45,8 @@ def test_what_is_missed_on_the_newest_motion(
     found: Diagnosis, share: float, rms: float, open_: bool
 ) -> None:
     joints = found.joint_names
-    sealed = replace(found, after=errors(share, rms, joints))
-    assert [text.split(":")[0] for text in left_on_newest(sealed)] == list(joints) * open_
+    held_out = replace(found, after=errors(share, rms, joints))
+    assert [text.split(":")[0] for text in left_on_newest(held_out)] == list(joints) * open_
 
 
 def test_structure_that_is_left_is_open(found: Diagnosis) -> None:
@@ -64,7 +64,7 @@ def test_what_does_not_lower_the_error_is_open(found: Diagnosis) -> None:
 def test_a_name_that_does_harm_is_open(found: Diagnosis, worse: float, open_: bool) -> None:
     named = replace(
         found.effects[0],
-        verdict=SealedVerdict.HARMFUL,
+        verdict=HeldOutVerdict.HARMFUL,
         removes={"elbow": Removed(-worse, -worse, -0.1), "slide": Removed(0.1, 0.1, 1.0)},
     )
     told = still_open(replace(found, effects=(named,)), ())

@@ -33,7 +33,7 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="module")
 def sound(robot: Robot) -> Dataset:
-    """Three motions of an arm whose masses are 10 to 30 % off, with dry friction; one is sealed."""
+    """Three motions of an arm whose masses are 10 to 30 % off, with dry friction; one held out."""
     rubbing = [plant(kind_named("coulomb_friction"), (j,), x) for j, x in enumerate(FRICTION)]
     motions = [motion(robot, seed, f"run_{seed}") for seed in (1, 2, 3)]
     settings = replace(IDEAL, rate=200.0, torque_noise=0.01, inertia_error=0.2)

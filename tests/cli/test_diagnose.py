@@ -95,7 +95,7 @@ def test_json_is_as_promised(outcome: Outcome) -> None:
     for each in answer["unexplained"]:
         assert set(each) >= {"joint", "depends_on", "share_of_residual"}
     error = answer["error"]
-    assert error["sealed_run"] == "motion_2_take_2"
+    assert error["held_out_run"] == "motion_2_take_2"
     assert error["samples"] == error["after"]["samples"]
     for when in ("before", "after", "untouched"):
         assert set(error[when]) >= E_NAMES
@@ -144,7 +144,7 @@ def test_the_file_holds_the_same_diagnosis(outcome: Outcome) -> None:
         for name, value in record.parameters.items():
             assert value.value == told["parameters"][name]["value"]
     assert found.after.mean_relative == answer["error"]["after"]["mean_relative"]
-    assert found.sealed_run == answer["error"]["sealed_run"]
+    assert found.held_out_run == answer["error"]["held_out_run"]
     assert "smoke_arm.urdf" in found.config
     assert found.versions
     assert answer["output"] == {"diagnosis": str(outcome.file), "config": str(outcome.better)}
@@ -163,7 +163,7 @@ def test_the_smallest_model_is_written_alone(outcome: Outcome, tmp_path: Path) -
     assert [(e.kind, e.joints) for e in spec.effects] == [(first.kind, first.joints)]
     text = path.read_text()
     assert text.startswith("# 1 of 2 effects found by `excite diagnose`")
-    assert f"{found.path.sealed[1]:.2%} after" in text
+    assert f"{found.path.held_out[1]:.2%} after" in text
     save_config(path, case, one)
     whole = load_spec(path).effects
     assert whole is not None
@@ -195,7 +195,7 @@ def test_the_new_config_needs_nothing_more(outcome: Outcome, excite: Program) ->
 
 
 def test_people_get_tables(outcome: Outcome, excite: Program) -> None:
-    run = excite("diagnose", SMOKE, outcome.data, *QUICK, "--sealed", "motion_1_take_1")
+    run = excite("diagnose", SMOKE, outcome.data, *QUICK, "--held-out", "motion_1_take_1")
     assert run.returncode == 0, run.stderr
     for words in (
         "What the declared model lacks", "coulomb_friction", "N·m",
@@ -238,7 +238,7 @@ def test_overwrite_replaces(outcome: Outcome, excite: Program) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--sealed", "motion_9"), "there is no run 'motion_9'"),
+        (("--held-out", "motion_9"), "there is no run 'motion_9'"),
         (("--set", "diagnosis.kinds=[stiction]"), "there is no effect 'stiction'"),
         (("--set", "measurement.filter.position=150"), "beyond half the recorded rate"),
     ],
@@ -258,7 +258,7 @@ def test_bad_requests_get_one_message(
 def mended(
     tmp_path_factory: pytest.TempPathFactory, cache: Path, data: Path, two_motions: Run
 ) -> Path:
-    """The friction is gone when the last run is recorded, which will be sealed."""
+    """The friction is gone when the last run is recorded, which will be held out."""
     folder = tmp_path_factory.mktemp("mended")
     path = folder / "data.h5"
     later = folder / "later.h5"
@@ -272,7 +272,7 @@ def mended(
     return path
 
 
-def test_a_sealed_error_that_does_not_fall_is_a_bad_answer(mended: Path, excite: Program) -> None:
+def test_a_held_out_error_that_does_not_fall_is_a_bad_answer(mended: Path, excite: Program) -> None:
     """Exit status 1, said first, and nothing is written unasked."""
     better = excite.folder / "better.yaml"
     run = excite("diagnose", SMOKE, mended, *QUICK, "--apply", better, "-o", "found.h5", "--json")
@@ -281,7 +281,7 @@ def test_a_sealed_error_that_does_not_fall_is_a_bad_answer(mended: Path, excite:
     assert (next(iter(answer)), answer["good"]) == ("good", False)
     error = answer["error"]
     assert error["after"]["mean_relative"] > error["before"]["mean_relative"]
-    assert "The sealed error did not fall" in answer["reason"]
+    assert "The held-out error did not fall" in answer["reason"]
     harmful = {each["kind"] for each in answer["effects"] if each["verdict"] == "harmful"}
     assert "coulomb_friction" in harmful
     assert answer["output"] == {"diagnosis": "found.h5"}
@@ -296,7 +296,7 @@ def test_what_is_not_confirmed_is_written_where_that_is_asked_for(
     better = excite.folder / "better.yaml"
     run = excite("diagnose", SMOKE, mended, *QUICK, "--apply", better, "--apply-unconfirmed")
     assert run.returncode == 1, run.stderr
-    assert run.stdout.startswith("The sealed error did not fall: ")
+    assert run.stdout.startswith("The held-out error did not fall: ")
     spec = load_spec(better)
     assert spec.effects is not None
     assert ("coulomb_friction", "elbow") in {(e.kind, e.joints[0]) for e in spec.effects}
@@ -307,7 +307,7 @@ def test_what_is_not_confirmed_is_written_where_that_is_asked_for(
 
 
 @pytest.mark.parametrize("command", ["diagnose", "identify"])
-def test_copies_of_training_data_are_refused_as_sealed(
+def test_copies_of_training_data_are_refused_as_held_out(
     data: Path, excite: Program, command: str
 ) -> None:
     copy = excite.folder / "copy.h5"
@@ -356,7 +356,7 @@ def test_a_joint_without_torque_is_left_out_and_the_others_are_found(
     fitted = excite.answer("identify", SMOKE, path, *without)
     assert fitted["error"]["rms_raw"]["wrist_roll"] is None
     table = excite("identify", SMOKE, path, *without).stdout
-    assert "Error of the torque on sealed data" in table
+    assert "Error of the torque on held-out data" in table
     assert not [line for line in table.splitlines() if line.startswith("wrist_roll ")]
 
 
@@ -364,7 +364,7 @@ def test_help_has_an_example(excite: Program) -> None:
     run = excite("diagnose", "--help")
     assert run.returncode == 0
     assert "excite diagnose ur10.yaml measured.h5" in run.stdout
-    assert "--sealed" in run.stdout
+    assert "--held-out" in run.stdout
 
 
 @pytest.mark.parametrize("asked", [0, 1, 7])

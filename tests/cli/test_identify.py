@@ -55,7 +55,7 @@ def test_json_holds_what_scripts_rely_on(folder: Path, robot: Robot, excite: Pro
         "mean_relative", "mean_relative_moving", "relative", "relative_moving", "rms", "rms_raw",
     }  # fmt: skip
     assert set(error["relative"]) == set(robot.joint_names)
-    assert answer["sealed_run"] == "r3"
+    assert answer["held_out_run"] == "r3"
     assert 0 < error["mean_relative"] < 0.2
 
 
@@ -64,12 +64,12 @@ def test_every_output_is_written_and_can_be_used(
 ) -> None:
     outputs = {"-o": "fit.h5", "--urdf": "new.urdf", "--mjcf": "new.xml", "--parameters": "p.yaml"}
     words = [word for pair in outputs.items() for word in pair]
-    run = excite("identify", folder / CONFIG, folder / "data.h5", *words, "--sealed", "r1")
+    run = excite("identify", folder / CONFIG, folder / "data.h5", *words, "--held-out", "r1")
     assert run.returncode == 0, run.stderr
     assert "Error of the torque" in run.stdout
     assert "fixed by the data" in run.stdout
     with h5py.File(excite.folder / "fit.h5") as file:
-        assert file.attrs["sealed_run"] == "r1"
+        assert file.attrs["held_out_run"] == "r1"
     again = {"robot": {"urdf": str(excite.folder / "new.urdf")}}
     again["effects"] = yaml.safe_load((excite.folder / "p.yaml").read_text())["effects"]
     (excite.folder / "again.yaml").write_text(yaml.safe_dump(again))
@@ -94,7 +94,7 @@ def test_files_are_not_replaced_unless_said(folder: Path, excite: Program) -> No
 
 def test_bad_input_gives_one_message(folder: Path, excite: Program) -> None:
     cases = {
-        (folder / "data.h5", "--sealed", "r7"): "there is no run 'r7'",
+        (folder / "data.h5", "--held-out", "r7"): "there is no run 'r7'",
         (folder / "data.h5", "-o", "x.h5", "--urdf", "x.h5"): "both name x.h5",
     }
     for words, message in cases.items():

@@ -54,9 +54,9 @@ def days(tmp_path_factory: pytest.TempPathFactory, cache: Path, two_motions: Run
     )
 
 
-def test_the_sealed_part_has_the_error_of_the_table(days: Days) -> None:
+def test_the_held_out_part_has_the_error_of_the_table(days: Days) -> None:
     fit = days.program.answer("identify", SMOKE, days.first, *DECLARED)
-    found = days.program.answer("score", days.fit, days.first, "--sealed")
+    found = days.program.answer("score", days.fit, days.first, "--held-out")
     assert found["good"]
     assert found["error"]["relative_moving"] == pytest.approx(fit["error"]["relative_moving"])
     assert found["runs"][0]["relative"] == pytest.approx(fit["error"]["relative"])
@@ -123,7 +123,7 @@ def test_a_model_in_c_is_exported_from_a_fit(days: Days) -> None:
 
 
 def test_the_exported_model_moves_as_the_robot_did(days: Days) -> None:
-    ran = days.program("replay", days.fit, days.first, "--sealed", "--json")
+    ran = days.program("replay", days.fit, days.first, "--held-out", "--json")
     assert ran.returncode == 0, ran.stderr
     found = json.loads(ran.stdout)
     assert found["mean"]["after"] < 0.2 * found["mean"]["before"]
@@ -199,7 +199,7 @@ def test_workers_share_the_files_and_one_that_cannot_be_read_is_left_out(days: D
         (("score", "sound.h5", "sound.h5"), "sound.h5 holds no model. Give a fit"),
         (("score", "fit.h5", "sound.h5", "sound.h5"), "sound.h5"),
         (("score", "fit.h5", "sound.h5", "-o", "first.h5"), "first.h5 exists already"),
-        (("score", "fit.h5", "sound.h5", "--sealed"), "these data have no run"),
+        (("score", "fit.h5", "sound.h5", "--held-out"), "these data have no run"),
         (("compare", "fit.h5"), "there is one day only. Give two files or more"),
         (("compare", "fit.h5", "sound.h5"), "sound.h5 is no fit, diagnosis or score"),
         (("compare", "fit.h5", "none.h5"), "There is no file none.h5"),

@@ -23,7 +23,7 @@ from excite_cli.diagnosis.records import (
     Suspect,
 )
 from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
-from excite_cli.diagnosis.verdict import SealedVerdict, Verdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict, Verdict
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.base import Value
 from excite_cli.excitation.effect_columns import EffectColumns
@@ -106,12 +106,12 @@ def make_diagnosis(
                 0.4,
                 0.2,
                 tuple(rivals),
-                verdict=SealedVerdict.CONFIRMED,
+                verdict=HeldOutVerdict.CONFIRMED,
                 removes={"elbow": Removed(0.05, 0.06, 1.5), names[0]: Removed(-0.01, -0.01, -0.1)},
             ),
         ),
         absorbed=(Absorbed("armature", (names[0],), ("Izz[shoulder_yaw]",), 1e-5),),
-        sealed_run="run_3",
+        held_out_run="run_3",
         before=replace(errors, mean_relative=0.2),
         after=errors,
         rounds=(Round(1, dict.fromkeys(names, 1.0), (suspect,), "viscous friction named"),),
@@ -141,11 +141,11 @@ def make_diagnosis(
 def make_traces(
     joints: Sequence[str], samples: int = 240
 ) -> tuple[Traces, tuple[TorqueTrace, ...]]:
-    """Training and sealed traces: viscous friction of 2 N·m·s/rad on the elbow, found."""
+    """Training and held-out traces: viscous friction of 2 N·m·s/rad on the elbow, found."""
     n, elbow = len(joints), list(joints).index("elbow")
     noise = np.random.default_rng(3).normal(size=(samples, n))
 
-    def trace(run: str, sealed: bool) -> TorqueTrace:
+    def trace(run: str, held_out: bool) -> TorqueTrace:
         t = np.linspace(0.0, 6.0, samples)
         q = np.sin(t[:, None] + np.arange(n))
         v, load = np.cos(t[:, None] + np.arange(n)), 10.0 * q
@@ -155,10 +155,10 @@ def make_traces(
         measured[:5] = np.nan
         arrays = [single(x) for x in (t, q, v, -q, load, measured)]
         return TorqueTrace(
-            run, sealed, *arrays, np.abs(v) > 0.1, single(load + friction), single(load)
+            run, held_out, *arrays, np.abs(v) > 0.1, single(load + friction), single(load)
         )
 
-    first, second, sealed = trace("run_1", False), trace("run_2", False), trace("run_3", True)
+    first, second, held_out = trace("run_1", False), trace("run_2", False), trace("run_3", True)
     counted = first.counted[:, [elbow]] & np.isfinite(first.measured[:, [elbow]])
     x, own = first.v[:, [elbow]], 2.0 * first.v[:, [elbow]]
     partial = first.measured[:, [elbow]] - first.load[:, [elbow]]
@@ -176,4 +176,4 @@ def make_traces(
     )
     dependence = Dependence(tuple(joints), covariates, shares)
     units = ("N·m",) * n
-    return Traces(units, (first, second), (effect,), dependence), (sealed,)
+    return Traces(units, (first, second), (effect,), dependence), (held_out,)

@@ -14,7 +14,7 @@ from excite_cli.diagnosis.records import (
     FrictionLine,
     NamedEffect,
 )
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.effects.base import Value
 from excite_cli.measurement.dataset import Finding
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
@@ -33,7 +33,7 @@ def effect(
 ) -> NamedEffect:
     record = EffectRecord(kind, (joint,), {}, tuple(v.value for v in values.values()))
     return NamedEffect(
-        record, dict(values), 1e-9, 0.4, 0.2, verdict=SealedVerdict.CONFIRMED, parts=dict(parts)
+        record, dict(values), 1e-9, 0.4, 0.2, verdict=HeldOutVerdict.CONFIRMED, parts=dict(parts)
     )
 
 
@@ -127,7 +127,7 @@ def test_nothing_and_nothing_good(plain: Diagnosis) -> None:
     worse = found(
         plain, effect("spring", "elbow", SPRING, everywhere(plain, -0.1)), left=(0.7, 0.7)
     )
-    assert answer_in_words(worse).startswith("The sealed error did not fall: ")
+    assert answer_in_words(worse).startswith("The held-out error did not fall: ")
     assert shares(worse) == {}
 
 
@@ -156,7 +156,7 @@ def test_what_rests_on_a_weight_is_told_whatever_the_error_does(plain: Diagnosis
     offset = EffectRecord("torque_offset", ("slide",), {}, (1.0,))
     gain = replace(
         effect("torque_gain", "elbow", size, everywhere(plain, -1e-3)),
-        verdict=SealedVerdict.WEIGHED,
+        verdict=HeldOutVerdict.WEIGHED,
     )
     whole = found(plain, gain)
     lower = whole.after.mean_relative_moving - 1e-4

@@ -1,6 +1,6 @@
 """Robots that are not the same in every run, in MuJoCo: what changed is named, and by how much.
 
-Six short runs of the smoke arm, the last sealed; a few kinds are looked for, to be quick.
+Six short runs of the smoke arm, the last held out; a few kinds are looked for, to be quick.
 """
 
 from collections.abc import Sequence
@@ -128,7 +128,7 @@ def test_what_changed_is_told_with_both_values(changing: Diagnosis) -> None:
     assert len(told) == 2
 
 
-def test_ends_of_the_odd_runs_are_sealed_and_judged(changing: Diagnosis) -> None:
+def test_ends_of_the_odd_runs_are_held_out_and_judged(changing: Diagnosis) -> None:
     """And of no other run: a trend is in all of them."""
     assert [part.runs for part in changing.parts] == [("r2",), ("r3",)]
     assert [[e.kind for e in part.effects] for part in changing.parts] == [
@@ -145,13 +145,13 @@ def test_ends_of_the_odd_runs_are_sealed_and_judged(changing: Diagnosis) -> None
 def test_a_gain_from_some_run_on_is_that_of_these_runs(
     robot: Robot, base: BaseParameters, spec: Spec
 ) -> None:
-    """Of all their torque, friction included; what the sealed run has is not guessed but told."""
+    """Of all their torque, friction included; what the held-out run has is not guessed but told."""
     data = measured(robot, [planted("torque_gain", PITCH, 0.08, 4, 5, 6)])
     found = diagnose(robot, base, data, spec)
     assert what(found) == ALWAYS | {("torque_gain", "shoulder_pitch", ("r4", "r5"))}
     gain = named(found, "torque_gain", "r4", "r5").parameters["gain"]
     assert gain.value == pytest.approx(0.08, abs=0.003)
-    assert [(each.runs, each.sealed) for each in found.assumed] == [(("r4", "r5"), ("r6",))]
+    assert [(each.runs, each.held_out) for each in found.assumed] == [(("r4", "r5"), ("r6",))]
     states = {run: {"torque_gain": "new"} for run in ("r4", "r5", "r6")}
     told = diagnose(robot, base, data, spec.model_copy(update={"runs": states}))
     assert what(told) == ALWAYS | {("torque_gain", "shoulder_pitch", ("r4", "r5", "r6"))}

@@ -1,4 +1,4 @@
-"""Parts of the error on sealed data: they add up, and what is refined joins first."""
+"""Parts of the error on held-out data: they add up, and what is refined joins first."""
 
 from itertools import combinations
 from types import SimpleNamespace
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.sealed_errors import INERTIAS, SealedErrors, error_parts, error_path
+from excite_cli.diagnosis.held_out_errors import INERTIAS, HeldOutErrors, error_parts, error_path
 from excite_cli.robot.model import Array
 
 JOINTS = 2
@@ -75,7 +75,7 @@ def test_errors_are_those_of_the_fitted_columns() -> None:
     ]  # fmt: skip
     block = np.column_stack([rows, *lacks, tau])
     fit: Any = SimpleNamespace(who=(0, 1), parameters=lambda joined: np.array(fits[joined]))
-    errors = SealedErrors(fit, [block.T @ block, None])
+    errors = HeldOutErrors(fit, [block.T @ block, None])
 
     def relative(prediction: Array) -> float:
         return float(np.linalg.norm(tau - prediction) / np.linalg.norm(tau))
@@ -119,7 +119,7 @@ def test_the_smallest_model_is_within_one_standard_error_of_the_best() -> None:
     assert path.left_out == pytest.approx((1.0, far, near, 0.2, 0.71 / 3))
     assert (path.best, path.smallest, path.enough) == (3, 2, True)
     assert path.standard_error == pytest.approx(deviation)
-    assert len(path.sealed) == 5
+    assert len(path.held_out) == 5
 
 
 def test_runs_that_move_some_joints_only_count_for_those() -> None:

@@ -165,7 +165,7 @@ def test_friction_beside_it_is_that_at_the_reference(told: Diagnosis) -> None:
     )
 
 
-def test_with_the_column_the_sealed_error_is_that_of_noise_and_without_it_more(
+def test_with_the_column_the_held_out_error_is_that_of_noise_and_without_it_more(
     told: Diagnosis, untold: Diagnosis
 ) -> None:
     joint = "shoulder_pitch"

@@ -1,6 +1,6 @@
 """Friction that builds up over a distance, in MuJoCo: named, with its size and its distance.
 
-Four short runs of the smoke arm, the last sealed; dry friction alone is declared.
+Four short runs of the smoke arm, the last held out; dry friction alone is declared.
 """
 
 from collections.abc import Sequence

@@ -8,7 +8,7 @@ import pytest
 
 from excite_cli.diagnosis.next_motion import NextMotion, next_experiment, plan_after
 from excite_cli.diagnosis.records import EffectRecord
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import worst_margins
 from excite_cli.excitation.result import Result
@@ -66,7 +66,7 @@ def test_purpose_and_command_without_planning() -> None:
     assert next_experiment(make_diagnosis(rivals=()))["purpose"] == "excite"
     made = make_diagnosis()
     (named,) = made.effects
-    weighed = replace(made, effects=(replace(named, verdict=SealedVerdict.WEIGHED),))
+    weighed = replace(made, effects=(replace(named, verdict=HeldOutVerdict.WEIGHED),))
     assert next_experiment(weighed)["purpose"] == "excite"  # no motion tells it
 
 

@@ -20,7 +20,7 @@ from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue,
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.model import Robot, build_robot
 from tests.cli.program import SMOKE
-from tests.diagnosis.test_sealed import motion
+from tests.diagnosis.test_held_out import motion
 from tests.effects import own_package
 
 pytest.importorskip("mujoco")

@@ -1,6 +1,6 @@
 """Friction that changes over a turn, in MuJoCo: named with its size, and its mean with its own.
 
-Four short runs of the smoke arm, the last sealed; no effect is declared.
+Four short runs of the smoke arm, the last held out; no effect is declared.
 """
 
 import pytest

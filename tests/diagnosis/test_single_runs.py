@@ -1,4 +1,4 @@
-"""What is assumed of the sealed run, of effects that only some runs have."""
+"""What is assumed of the held-out run, of effects that only some runs have."""
 
 import re
 from dataclasses import replace
@@ -32,18 +32,18 @@ def model(**states: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("sealed", "declared", "told"),
+    ("held_out", "declared", "told"),
     [
         (run("other"), {}, True),
         (run("only", block=3), {}, False),  # a block of the recording that has it
         (run("other"), {"other": {"contact": "none"}}, False),
     ],
 )
-def test_of_a_sealed_run_that_is_not_among_its_runs_an_effect_is_taken_to_be_absent(
-    sealed: Run, declared: dict[str, Any], told: bool
+def test_of_a_held_out_run_that_is_not_among_its_runs_an_effect_is_taken_to_be_absent(
+    held_out: Run, declared: dict[str, Any], told: bool
 ) -> None:
     effect = kind_named("contact")((0, 1), {"start": 0.1, "end": 0.4}, ("only",))
-    parts = Split((run("only", block=1),), (sealed,), sealed.name, (0,), ("only",))
+    parts = Split((run("only", block=1),), (held_out,), held_out.name, (0,), ("only",))
     found = assumptions([effect], parts, model(**declared))
     assert [(each.kind, each.present) for each in found] == [("contact", False)] * told
 

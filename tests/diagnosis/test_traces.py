@@ -11,7 +11,7 @@ from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.robot.model import build_robot
 from tests.cli.program import SMOKE
-from tests.diagnosis.test_sealed import motion
+from tests.diagnosis.test_held_out import motion
 
 pytest.importorskip("mujoco")
 
@@ -39,19 +39,19 @@ def found() -> Diagnosis:
     return diagnose(robot, find_base_parameters(robot), data, spec)
 
 
-def test_sealed_traces_are_what_the_errors_say(found: Diagnosis) -> None:
-    (sealed,) = found.sealed_traces
-    assert (sealed.run, sealed.sealed) == ("motion_3", True)
-    assert sealed.before is not None
-    for errors, model in ((found.before, sealed.before), (found.after, sealed.predicted)):
-        left = sealed.measured - model
+def test_held_out_traces_are_what_the_errors_say(found: Diagnosis) -> None:
+    (held_out,) = found.held_out_traces
+    assert (held_out.run, held_out.held_out) == ("motion_3", True)
+    assert held_out.before is not None
+    for errors, model in ((found.before, held_out.before), (found.after, held_out.predicted)):
+        left = held_out.measured - model
         for j, name in enumerate(found.joint_names):
             assert errors.rms[name] == pytest.approx(np.sqrt(np.nanmean(left[:, j] ** 2)), rel=1e-3)
 
 
 def test_training_traces_show_what_effects_take_away(found: Diagnosis) -> None:
     assert found.traces is not None
-    assert [(t.run, t.sealed) for t in found.traces.runs] == [
+    assert [(t.run, t.held_out) for t in found.traces.runs] == [
         ("motion_1", False), ("motion_2", False),
     ]  # fmt: skip
     for trace in found.traces.runs:

@@ -53,7 +53,7 @@ def test_what_is_left_is_said_of_every_joint() -> None:
     assert tuple(left) == found.joint_names
     assert left["elbow"].startswith("12.3% of its torque is left where it moves. More than noise: ")
     assert "More than noise: 0.8" in left["elbow"]
-    assert left["slide"].startswith("it does not move in the sealed data")
+    assert left["slide"].startswith("it does not move in the held-out data")
     quiet = next(j for j in found.joint_names if j not in {"elbow", "slide"}
                  and j not in {each.joint for each in found.large_rests})  # fmt: skip
     assert left[quiet].endswith("was found in what is left of the training data.")
@@ -66,17 +66,17 @@ def test_warnings_and_several_answers_are_told() -> None:
     run = Run("run_1", t, np.zeros((101, 5)), np.zeros((101, 5)))
     command = Command(("excite", "diagnose", "a b.yaml"))
     answers = [Diagnosed("a log", command, found, "friction", {"errors": "x-1-errors.png"}),
-               Diagnosed("the same, sealed B", command, found, "nothing", {})]  # fmt: skip
+               Diagnosed("the same, held-out B", command, found, "nothing", {})]  # fmt: skip
     data = Dataset(found.joint_names, (run,))
     text = page({"robot": "An arm", "licence": "MIT", "units": "SI"}, data, answers)
     assert "# An arm" in text
     assert "- licence: MIT\n" in text
     assert "units" not in text
-    assert "| run_1 | 101 | 2 | 50 | sealed |" in text
+    assert "| run_1 | 101 | 2 | 50 | held out |" in text
     assert "- warning: speeds &lt;lag&gt; by 0.2 s\n" in text
     assert "$ excite diagnose 'a b.yaml'" in text
     assert "](x-1-errors.png)" in text
-    assert "\n## The same, sealed B\n" in text
+    assert "\n## The same, held-out B\n" in text
 
 
 def test_cells_cannot_break_a_table() -> None:

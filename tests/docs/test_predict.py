@@ -36,8 +36,8 @@ PAGE = ROOT / "docs" / "how-to" / "predict.md"
 PAN, LIFT, ELBOW, WRIST_1, WRIST_2, WRIST_3 = range(6)
 DECLARED = URDF.parent / "ur10_cb.yaml"
 SECONDS, RATE, RUNS, PAUSE = 6.0, 200.0, 3, 100.0
-SEALED = f"run_{RUNS}"
-LOADED = "run_1", SEALED
+HELD_OUT = f"run_{RUNS}"
+LOADED = "run_1", HELD_OUT
 OF_ALL = tuple(range(6))
 
 # Joints, shape, and values of every kind.

@@ -39,8 +39,9 @@ def test_the_next_motion_settles_what_the_first_left_open(
     assert f"separates what the data cannot: {named[0]} on elbow / " in run.stderr
 
     excite.answer("simulate", SMOKE, "next.h5", "-o", "second.h5", *ROBOT)
-    both = excite.answer("diagnose", SMOKE, "first.h5", "second.h5", "--sealed", "motion_1_take_3")
+    files = ("first.h5", "second.h5", "--held-out", "motion_1_take_3")
+    both = excite.answer("diagnose", SMOKE, *files)
     assert names(both["effects"]) == [TRUTH]
     assert both["effects"][0]["alias_set"] == []
     assert abs(both["effects"][0]["parameters"]["coefficient"]["value"] / SIZE - 1.0) < 0.15
-    assert both["error"]["sealed_run"] == "motion_1_take_3"
+    assert both["error"]["held_out_run"] == "motion_1_take_3"

@@ -28,7 +28,7 @@ from excite_cli.excitation.result import Result
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Robot
 from tests.cli.program import SMOKE
-from tests.diagnosis.test_sealed import motion
+from tests.diagnosis.test_held_out import motion
 
 pytest.importorskip("mujoco")
 

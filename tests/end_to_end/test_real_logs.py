@@ -142,23 +142,23 @@ class TestKr300:
 
     CAD = ("--set", "identification.inertias=cad")
 
-    @pytest.mark.parametrize("sealed", ["A", "C"])
-    def test_better_than_the_textbook(self, diagnosed: Any, sealed: str) -> None:
+    @pytest.mark.parametrize("held_out", ["A", "C"])
+    def test_better_than_the_textbook(self, diagnosed: Any, held_out: str) -> None:
         """Without a word on inertias: the spring is found all the same."""
-        error = diagnosed("kr300", "kr300.h5", "--sealed", sealed)["error"]
+        error = diagnosed("kr300", "kr300.h5", "--held-out", held_out)["error"]
         assert error["after"]["mean_relative_moving"] < 0.06
         textbook = error["textbook"]["mean_relative_moving"]
         assert error["after"]["mean_relative_moving"] < 1.02 * textbook
 
     def test_names(self, diagnosed: Any) -> None:
-        answer = diagnosed("kr300", "kr300.h5", "--sealed", "C")
+        answer = diagnosed("kr300", "kr300.h5", "--held-out", "C")
         assert len(named(answer, "viscous_friction")) == 6
         assert ("axis_3",) in named(answer, "armature")
         assert ("axis_2",) in named(answer, "spring")
 
-    @pytest.mark.parametrize("sealed", ["A", "B", "C"])
-    def test_kept_inertias(self, diagnosed: Any, sealed: str) -> None:
-        answer = diagnosed("kr300", "kr300.h5", "--sealed", sealed, *self.CAD)
+    @pytest.mark.parametrize("held_out", ["A", "B", "C"])
+    def test_kept_inertias(self, diagnosed: Any, held_out: str) -> None:
+        answer = diagnosed("kr300", "kr300.h5", "--held-out", held_out, *self.CAD)
         assert answer["error"]["after"]["relative_moving"]["axis_2"] < 0.07
         stiffness = named(answer, "spring")[("axis_2",)]["stiffness"]["value"]
         assert stiffness == pytest.approx(7000, rel=0.1)

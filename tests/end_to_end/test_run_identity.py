@@ -122,7 +122,7 @@ def test_an_offset_of_one_run_is_found_whatever_the_run_is_called(
         diagnose(robot, base, dataset, spec),
     ):
         assert declared_offset(found) == pytest.approx(OFFSET, abs=0.1)
-        assert found.sealed_run == names[2]
+        assert found.held_out_run == names[2]
 
 
 @pytest.mark.parametrize("cut", ["b", "abc"])
@@ -138,16 +138,16 @@ def test_an_offset_of_one_run_is_found_on_both_sides_of_a_gap(
     diagnosed = diagnose(robot, base, dataset, spec)
     for found in (fitted, diagnosed):
         assert declared_offset(found) == pytest.approx(OFFSET, abs=0.1)
-        assert found.sealed_run == "c"
+        assert found.held_out_run == "c"
     traces = fitted.traces
-    sealed = [trace.run for trace in traces if trace.sealed]
-    assert sealed == (["c/1", "c/2"] if "c" in cut else ["c"])
+    held_out = [trace.run for trace in traces if trace.held_out]
+    assert held_out == (["c/1", "c/2"] if "c" in cut else ["c"])
 
 
-def test_an_offset_of_the_sealed_run_counts_for_the_error(
+def test_an_offset_of_the_held_out_run_counts_for_the_error(
     robot: Robot, base: BaseParameters, recorded: Dataset
 ) -> None:
-    """With the offset declared, b and c are sealed in turn and predicted alike."""
+    """With the offset declared, b and c are held out in turn and predicted alike."""
     spec = spec_of(robot, "b", "c")
     offset = OFFSET * np.eye(robot.n)[1]
     both = replace(
@@ -156,8 +156,8 @@ def test_an_offset_of_the_sealed_run_counts_for_the_error(
             replace(run, tau=run.tau + offset) if run.name == "c" else run for run in recorded.runs
         ),
     )
-    error = identify(robot, base, both, spec, sealed="c").error
-    without = identify(robot, base, both, spec_of(robot, "b"), sealed="c").error
+    error = identify(robot, base, both, spec, held_out="c").error
+    without = identify(robot, base, both, spec_of(robot, "b"), held_out="c").error
     assert error.rms[robot.joint_names[1]] < 1.0 < without.rms[robot.joint_names[1]]
 
 
@@ -187,16 +187,16 @@ def test_a_run_that_is_not_in_the_data_is_named_with_the_nearest(
 
 
 @pytest.mark.parametrize("call", [identify, diagnose])
-def test_an_effect_of_the_sealed_run_alone_is_refused(
+def test_an_effect_of_the_held_out_run_alone_is_refused(
     call: object, robot: Robot, base: BaseParameters, recorded: Dataset
 ) -> None:
-    """Nothing would be fitted of it, and the error of the sealed run be all its own."""
+    """Nothing would be fitted of it, and the error of the held-out run be all its own."""
     assert callable(call)
     dataset = renamed(recorded, "slow", "empty", "take 6-12 s")
     with pytest.raises(ConfigError) as error:
         call(robot, base, dataset, spec_of(robot, "take 6-12 s"))
     assert str(error.value) == (
-        "effects[2].runs: 'take 6-12 s' is sealed, so that nothing is left to fit torque_offset on."
-        " Seal another run: --sealed 'empty'."
+        "effects[2].runs: 'take 6-12 s' is held out, so that nothing is left to fit torque_offset "
+        "on. Hold out another run: --held-out 'empty'."
     )
     call(robot, base, dataset, spec_of(robot, "take 6-12 s"), "empty")

@@ -101,7 +101,7 @@ def test_what_is_missing_has_its_name_and_size(
     for parameter, size in sizes.items():
         told = effect["parameters"][parameter]
         assert abs(told["value"] - size) < 3.0 * told["std"] + 0.02 * abs(size)
-    if kind != "payload":  # in a run that trains; the sealed one has none
+    if kind != "payload":  # in a run that trains; the held-out one has none
         before, after = (error(found, when) for when in ("before", "after"))
         assert after < (0.99 if kind == "wrench_gain" else 0.7) * before
 

@@ -62,7 +62,7 @@ def test_true_inertias_and_friction_lie_within_their_intervals(recovered: Recove
     )
 
 
-def test_the_error_on_the_sealed_run_is_the_noise(recovered: Recovered) -> None:
+def test_the_error_on_the_held_out_run_is_the_noise(recovered: Recovered) -> None:
     error = recovered.found.error
     assert error.mean_relative < 0.03
     for joint, raw in error.rms_raw.items():

@@ -167,7 +167,7 @@ def test_errors_on_other_runs_reach_the_noise(
 ) -> None:
     other = measured(robot, truth, friction, sized(friction), noise=0.3, memory=0.8, seeds=(8,))
     regression = regression_of(robot, other, friction)
-    error, _ = judged(robot, noisy, [run.prepared for run in regression.runs], sealed=True)
+    error, _ = judged(robot, noisy, [run.prepared for run in regression.runs], held_out=True)
     assert np.array(list(error.rms.values())) == pytest.approx(noisy.noise, rel=0.3)
     assert np.array(list(error.rms_raw.values())) == pytest.approx(0.3, rel=0.3)
 

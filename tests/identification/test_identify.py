@@ -45,19 +45,19 @@ def data(robot: Robot, truth: Array, effects: tuple[Effect, ...]) -> Dataset:
 
 
 def run(
-    robot: Robot, data: Dataset, spec: Spec = SPEC, sealed: str | None = None
+    robot: Robot, data: Dataset, spec: Spec = SPEC, held_out: str | None = None
 ) -> Identification:
-    return identify(robot, find_base_parameters(robot), data, spec, sealed)
+    return identify(robot, find_base_parameters(robot), data, spec, held_out)
 
 
-def test_the_last_run_is_sealed_unless_another_is_named(robot: Robot, data: Dataset) -> None:
-    assert run(robot, data).sealed_run == "r3"
-    assert run(robot, data, sealed="r1").sealed_run == "r1"
+def test_the_last_run_is_held_out_unless_another_is_named(robot: Robot, data: Dataset) -> None:
+    assert run(robot, data).held_out_run == "r3"
+    assert run(robot, data, held_out="r1").held_out_run == "r1"
     with pytest.raises(ConfigError, match=r"no run 'r9'.*r1, r2, r3"):
-        run(robot, data, sealed="r9")
+        run(robot, data, held_out="r9")
 
 
-def test_the_sealed_run_does_not_touch_the_fit(robot: Robot, data: Dataset) -> None:
+def test_the_held_out_run_does_not_touch_the_fit(robot: Robot, data: Dataset) -> None:
     last = data.runs[-1]
     spoiled = replace(last, tau=last.tau + 50.0, q=last.q)
     other = replace(data, runs=(*data.runs[:-1], spoiled))
@@ -69,7 +69,7 @@ def test_the_sealed_run_does_not_touch_the_fit(robot: Robot, data: Dataset) -> N
 
 def test_a_single_run_is_cut_into_blocks(robot: Robot, data: Dataset) -> None:
     found = run(robot, replace(data, runs=data.runs[:1]))
-    assert "blocks" in found.sealed_run
+    assert "blocks" in found.held_out_run
     assert found.fit.values[found.fit.rank :] == pytest.approx(VALUES, rel=0.15)
 
 

@@ -147,9 +147,9 @@ def test_gains_that_nobody_told_are_in_the_load(case: Case, runs: Dataset, loade
     assumed = case.spec.identification.model_copy(update={"gain_std": 0.1})
     spec = case.spec.model_copy(update={"effects": (*more, carries), "identification": assumed})
     loose = replace(case, spec=spec)
-    found = identify(loose, runs, sealed="r4")
+    found = identify(loose, runs, held_out="r4")
     stored = StoredFit(
-        "", "", case.robot.fingerprint(), found.fit, found.sealed_run, found.error,
+        "", "", case.robot.fingerprint(), found.fit, found.held_out_run, found.error,
         found.training_error, (), (), processing=found.processing.as_data(),
     )  # fmt: skip
     mass = identify_load(loose, loaded, stored).parameters["mass"]

@@ -157,10 +157,10 @@ def test_a_constant_drift_is_part_of_the_floor_to_the_digit() -> None:
 
 @pytest.mark.parametrize("others", [0, 1])
 def test_parts_of_a_run_say_what_the_run_says(others: int) -> None:
-    """Sealed blocks leave gaps; of two runs, one is halved."""
+    """Held-out blocks leave gaps; of two runs, one is halved."""
     run = waves(BROKEN, PERIODS * BROKEN, noise=1.0)
-    sealed = [replace(run, name=f"sealed_{k}") for k in range(others)]
-    parts = split(Dataset(("a", "b"), (run, *sealed)))
+    held_out = [replace(run, name=f"held_out_{k}") for k in range(others)]
+    parts = split(Dataset(("a", "b"), (run, *held_out)))
     assert len(parts.training) == (2 if others else 4)
     processing = processing_of(parts.training)
     found = noise_floor(parts.training, processing)

@@ -228,7 +228,7 @@ def test_a_run_too_short_is_refused_in_words() -> None:
 
 
 def test_a_run_too_slow_for_the_cutoff_is_refused_in_words() -> None:
-    """Cut-offs are chosen from the training runs; the sealed one may have another rate."""
+    """Cut-offs are chosen from the training runs; the held-out one may have another rate."""
     processing: Processing = choose_processing([recorded(500.0)], FilterSpec(position=30.0))
     with pytest.raises(FileError, match=r"run 'r' was recorded at 50 Hz: too slow .* 30 Hz"):
         prepare(recorded(50.0), processing)

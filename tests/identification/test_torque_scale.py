@@ -15,7 +15,7 @@ from excite_cli.config.data_spec import (
 from excite_cli.config.load import load_spec, parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named, scales
@@ -126,7 +126,7 @@ def test_a_diagnosis_finds_every_gain_by_it(robot: Robot, data: Dataset) -> None
         value = told[(name,)].parameters["gain"]
         assert value.value == pytest.approx(gain, abs=0.01)
         assert abs(value.value - gain) < 4.0 * value.std
-    assert {each.verdict for each in found.effects} == {SealedVerdict.WEIGHED}
+    assert {each.verdict for each in found.effects} == {HeldOutVerdict.WEIGHED}
     assert found.after.mean_relative < 0.4 * found.before.mean_relative
     assert found.path is not None
     assert found.path.smallest == robot.n  # none of them may be left away
@@ -198,15 +198,15 @@ def test_what_is_assumed_is_told() -> None:
     assert not assumed_scale(current, IdentificationSpec(total_mass=TotalMassSpec(mass=30.0)))
 
 
-def test_the_run_with_the_known_payload_is_fitted_not_sealed(robot: Robot, data: Dataset) -> None:
+def test_the_run_with_the_known_payload_is_fitted_not_held_out(robot: Robot, data: Dataset) -> None:
     last = replace(data, runs=tuple(data.runs[k] for k in (2, 0, 3, 1)))
     found = identified(robot, last, KNOWN)
-    assert found.sealed_run == "r4"
+    assert found.held_out_run == "r4"
     gain = found.fit.effect_values(index_of(found, "torque_gain"))
     assert gain == pytest.approx(GAINS[:1], abs=0.02)
     spec, base = spec_with(KNOWN), find_base_parameters(robot)
-    with pytest.raises(ConfigError, match=r"known_payload\.runs: 'r2' is sealed.*--sealed 'r4'"):
-        identify(robot, base, last, spec, sealed="r2")
+    with pytest.raises(ConfigError, match=r"known_payload\.runs: 'r2' is held out.*-out 'r4'"):
+        identify(robot, base, last, spec, held_out="r2")
 
 
 def test_errors(robot: Robot, data: Dataset) -> None:

@@ -32,8 +32,8 @@ def prepared() -> tuple[PreparedRun, np.ndarray]:
 
 def test_it_is_what_errors_are_counted_from(prepared: tuple[PreparedRun, np.ndarray]) -> None:
     run, load = prepared
-    trace = torque_trace(run, load, 2.0 * load, before=load, sealed=True)
-    assert (trace.run, trace.sealed) == ("A 0-5 s/2", True)
+    trace = torque_trace(run, load, 2.0 * load, before=load, held_out=True)
+    assert (trace.run, trace.held_out) == ("A 0-5 s/2", True)
     assert trace.predicted == pytest.approx(run.averaged_torque(2.0 * load), rel=1e-6, abs=1e-4)
     assert trace.before == pytest.approx(run.averaged_torque(load), rel=1e-6, abs=1e-4)
     assert trace.load == pytest.approx(trace.before)

@@ -13,12 +13,12 @@ from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 @pytest.fixture(scope="module")
 def diagnosis() -> Diagnosis:
     plain = make_diagnosis()
-    traces, sealed = make_traces(plain.joint_names)
-    return replace(plain, traces=traces, sealed_traces=sealed)
+    traces, held_out = make_traces(plain.joint_names)
+    return replace(plain, traces=traces, held_out_traces=held_out)
 
 
-def test_the_figures_are_of_runs_with_sealed_data(diagnosis: Diagnosis) -> None:
-    (run,) = {trace.run for trace in diagnosis.sealed_traces}
+def test_the_figures_are_of_runs_with_held_out_data(diagnosis: Diagnosis) -> None:
+    (run,) = {trace.run for trace in diagnosis.held_out_traces}
     names = list(figures_of(diagnosis))
     assert names == [f"before_{run}", f"after_{run}", "errors", "effects_1"]
 
@@ -30,11 +30,11 @@ def test_without_samples_there_are_the_errors_alone() -> None:
 def test_before_shows_the_declared_model_and_after_the_one_with_effects(
     diagnosis: Diagnosis,
 ) -> None:
-    (run,) = {trace.run for trace in diagnosis.sealed_traces}
-    trace, *others = diagnosis.sealed_traces
+    (run,) = {trace.run for trace in diagnosis.held_out_traces}
+    trace, *others = diagnosis.held_out_traces
     declared = trace.predicted + 3.0
     assert not others
-    figures = figures_of(replace(diagnosis, sealed_traces=(replace(trace, before=declared),)))
+    figures = figures_of(replace(diagnosis, held_out_traces=(replace(trace, before=declared),)))
     for name, model in (("before", declared), ("after", trace.predicted)):
         upper = figures[f"{name}_{run}"]().axes[0]
         lines = {str(line.get_label()): np.asarray(line.get_ydata()) for line in upper.lines}

@@ -16,7 +16,7 @@ from excite_cli.diagnosis.records import (
     JointAlias,
     NamedEffect,
 )
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words, title_of
 from excite_cli.effects.asymmetric_friction import AsymmetricFriction
 from excite_cli.effects.base import Value
@@ -53,12 +53,12 @@ def plain() -> Diagnosis:
 
 @pytest.fixture(scope="module")
 def diagnosis(plain: Diagnosis) -> Diagnosis:
-    traces, sealed = make_traces(plain.joint_names)
+    traces, held_out = make_traces(plain.joint_names)
     traces = replace(traces, runs=traces.runs[:1])
     rest = replace(
         plain.large_rests[0], depends_on=(Covariate("position", "elbow", Aspect.HISTORY),)
     )
-    return replace(plain, traces=traces, sealed_traces=sealed, large_rests=(rest,))
+    return replace(plain, traces=traces, held_out_traces=held_out, large_rests=(rest,))
 
 
 @pytest.fixture(scope="module")
@@ -186,19 +186,19 @@ def test_evidence_tells_of_another_name_of_the_same_torque(
     assert "no motion tells them apart" in told
 
 
-def test_residuals_tell_sealed_from_training(sections: dict[str, Section]) -> None:
+def test_residuals_tell_held_out_from_training(sections: dict[str, Section]) -> None:
     (choice,) = sections["diagnosis-time"].blocks
     assert isinstance(choice, Choice)
     labels = [label for label, _ in choice.options]
-    assert labels == ["run_3 (sealed: took no part in the fit)", "run_1"]
+    assert labels == ["run_3 (held out: took no part in the fit)", "run_1"]
     elbow = next(c for c in charts_of(sections["diagnosis-time"]) if c.title == "elbow")
     assert "the declared model without the effects found" in elbow.alternative
 
 
-def test_sealed_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
-    traces, (sealed,) = make_traces(diagnosis.joint_names)
+def test_held_out_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
+    traces, (held_out,) = make_traces(diagnosis.joint_names)
     first = replace(traces.runs[0], run="only")
-    later = replace(sealed, run="only", t=sealed.t + 6.5)
+    later = replace(held_out, run="only", t=held_out.t + 6.5)
     (cards,) = residuals_in_time((later, first), diagnosis.joint_names[:2], ("N·m", "N"))
     assert isinstance(cards, Charts)
     assert len(cards.charts) == 2
@@ -251,13 +251,13 @@ def test_effects_that_carry_less_than_a_hundredth_of_the_fall_are_folded(
     assert spring.folded == folded
 
 
-def test_verdicts_on_sealed_data_stand_in_the_table_and_on_the_card(
+def test_verdicts_on_held_out_data_stand_in_the_table_and_on_the_card(
     diagnosis: Diagnosis, sections: dict[str, Section]
 ) -> None:
     table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, Table))
-    assert table.rows[0][table.columns.index("sealed")] == "confirmed -6.00 pp"
+    assert table.rows[0][table.columns.index("held_out")] == "confirmed -6.00 pp"
     (chart,) = charts_of(sections["diagnosis-evidence"])
-    assert "On sealed data: confirmed -6.00 pp." in chart.caption
+    assert "On held-out data: confirmed -6.00 pp." in chart.caption
     assert found_section(diagnosis).lead.count("which took no part, goes from") == 1
 
 
@@ -266,7 +266,7 @@ def test_what_was_weighed_and_what_would_settle_the_absorbed_is_told(diagnosis: 
     (named, *_) = diagnosis.effects
     absorbed = (Absorbed("wrench_gain", ("elbow",), ("m[elbow]",), 0.0),)
     free = found_section(replace(diagnosis, absorbed=absorbed))
-    weighed = replace(named, verdict=SealedVerdict.WEIGHED)
+    weighed = replace(named, verdict=HeldOutVerdict.WEIGHED)
     told = found_section(replace(diagnosis, effects=(weighed,), absorbed=absorbed))
     notes = [
         [
@@ -279,7 +279,7 @@ def test_what_was_weighed_and_what_would_settle_the_absorbed_is_told(diagnosis: 
     ]
     assert ["identification.total_mass" in note for (note,) in notes] == [True, False]
     texts = [block.text for block in told.blocks if isinstance(block, Text)]
-    assert any("sealed data are no test of it" in text for text in texts)
+    assert any("held-out data are no test of it" in text for text in texts)
 
 
 def test_warnings_are_counted_on_top(diagnosis: Diagnosis) -> None:
@@ -294,7 +294,7 @@ def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Dia
     (named, *_) = diagnosis.effects
     of_one = replace(named, effect=replace(named.effect, runs=("b",)))
     processing = {**diagnosis.processing, "runs": ["a", "b"]}
-    found = replace(diagnosis, effects=(of_one,), processing=processing, sealed_run="c")
+    found = replace(diagnosis, effects=(of_one,), processing=processing, held_out_run="c")
     (runs,) = (
         block
         for block in diagnosis_sections(found)[-1].blocks
@@ -303,7 +303,7 @@ def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Dia
     assert runs.rows == (
         ("a", "training", "–"),
         ("b", "training", "viscous friction of elbow"),
-        ("c", "sealed", "–"),
+        ("c", "held_out", "–"),
     )
     parts = {**diagnosis.processing, "runs": ["a", "b/1"]}
     (runs,) = (
@@ -317,11 +317,11 @@ def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Dia
     assert not any(isinstance(each, Table) and each.title == "Runs" for each in blocks)
 
 
-def test_a_sealed_error_that_did_not_fall_is_told_first(diagnosis: Diagnosis) -> None:
+def test_a_held_out_error_that_did_not_fall_is_told_first(diagnosis: Diagnosis) -> None:
     after = replace(diagnosis.after, mean_relative=diagnosis.before.mean_relative)
     bad = replace(diagnosis, after=after)
     first = diagnosis_figures(bad)[0]
-    assert first.value == "the sealed error did not fall"
+    assert first.value == "the held-out error did not fall"
     page, fine = (page_of([Source("d", "d.h5", each)], silent) for each in (bad, diagnosis))
     (answer,) = page.answers
     assert (answer.kind, answer.text) == ("bad", first.remark)
@@ -345,7 +345,7 @@ def test_nothing_found(diagnosis: Diagnosis) -> None:
 
 
 def test_files_of_earlier_versions_get_sentences_and_names_are_escaped(plain: Diagnosis) -> None:
-    odd = replace(plain, sealed_run="<b>run</b>")
+    odd = replace(plain, held_out_run="<b>run</b>")
     sections = {each.anchor: each for each in diagnosis_sections(odd)}
     for anchor in ("diagnosis-time", "diagnosis-evidence"):
         (text,) = sections[anchor].blocks

@@ -43,7 +43,7 @@ def test_the_page_is_sound_and_says_what_matters(stored: StoredFit) -> None:
     stored = replace(stored, noise_floor=floor, traces=stored.traces[1:])
     text = Structure(render(Page("f", "", fit_figures(stored), fit_sections(stored)))).text
     assert f"{stored.error.mean_relative:.2%}" in text
-    assert "Sealed: r3" in text
+    assert "Held-out: r3" in text
     assert stored.closed_loop_bias[1:] in text
     for name in stored.fit.names:
         assert name in text
@@ -90,7 +90,7 @@ def test_strong_correlations_are_listed(stored: StoredFit) -> None:
 def test_runs_in_time_and_files_without(stored: StoredFit) -> None:
     (choice,) = time_section(stored).blocks
     assert isinstance(choice, Choice)
-    assert choice.options[0][0].startswith("r3 (sealed")
+    assert choice.options[0][0].startswith("r3 (held out")
     (text,) = time_section(replace(stored, traces=(), torque_units=())).blocks
     assert isinstance(text, Text)
     assert "earlier version" in text.text

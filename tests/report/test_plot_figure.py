@@ -35,7 +35,7 @@ def test_lines_hold_the_numbers_and_break_where_these_do() -> None:
     assert (upper.get_title(loc="left"), lower.get_xlabel()) == ("elbow", "time [s]")
 
 
-def test_sealed_spans_and_forbidden_values_are_shaded() -> None:
+def test_held_out_spans_and_forbidden_values_are_shaded() -> None:
     upper, lower = draw_plots("title", [two()], 1).axes
     spans = [patch.get_extents().transformed(upper.transData.inverted()) for patch in upper.patches]
     assert [np.round([each.x0, each.x1], 6).tolist() for each in spans] == [[1.0, 1.5]]

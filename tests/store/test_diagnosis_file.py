@@ -10,7 +10,7 @@ import pytest
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import Approximation, Diagnosis, JointAlias
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.errors import FileError
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis, write_diagnosis
 from excite_cli.store.result_file import is_result, read_result
@@ -122,7 +122,7 @@ def test_pairs_come_back_and_older_files_have_none(diagnosis: Diagnosis, path: P
 def test_verdicts_come_back_and_older_files_have_none(diagnosis: Diagnosis, path: Path) -> None:
     found = read_diagnosis(path).effects[0]
     assert (found.verdict, found.removes) == (
-        SealedVerdict.CONFIRMED,
+        HeldOutVerdict.CONFIRMED,
         diagnosis.effects[0].removes,
     )
     with h5py.File(path, "a") as file:
@@ -155,18 +155,19 @@ def test_verdicts_and_errors_of_joints_that_are_not_its_own_are_damage(
 
 
 def test_traces_come_back_and_older_files_have_none(diagnosis: Diagnosis, tmp_path: Path) -> None:
-    traces, sealed = make_traces(diagnosis.joint_names)
+    traces, held_out = make_traces(diagnosis.joint_names)
     long = tmp_path / "traces.h5"
-    write_diagnosis(long, replace(diagnosis, traces=traces, sealed_traces=sealed))
+    write_diagnosis(long, replace(diagnosis, traces=traces, held_out_traces=held_out))
     found = read_diagnosis(long)
     assert found.traces is not None
+    again = found.traces.runs + found.held_out_traces
     assert all(
         np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)
-        for a, b in zip(traces.runs + sealed, found.traces.runs + found.sealed_traces, strict=True)
+        for a, b in zip(traces.runs + held_out, again, strict=True)
         for name in ("t", "q", "v", "a", "load", "measured", "counted", "predicted", "before")
     )
-    assert [(t.run, t.sealed) for t in found.traces.runs] == [("run_1", False), ("run_2", False)]
-    assert [(t.run, t.sealed) for t in found.sealed_traces] == [("run_3", True)]
+    assert [(t.run, t.held_out) for t in found.traces.runs] == [("run_1", False), ("run_2", False)]
+    assert [(t.run, t.held_out) for t in found.held_out_traces] == [("run_3", True)]
     for name in ("part", "t", "x", "own", "partial"):
         expected, read = getattr(traces.effects[0], name), getattr(found.traces.effects[0], name)
         assert np.array_equal(expected, read, equal_nan=True), name
@@ -175,17 +176,17 @@ def test_traces_come_back_and_older_files_have_none(diagnosis: Diagnosis, tmp_pa
     assert same(traces.dependence, found.traces.dependence)
     assert traces.torque_units == found.traces.torque_units
     with h5py.File(long, "a") as file:
-        del file["traces"], file["sealed_traces"]
-    assert (read_diagnosis(long).traces, read_diagnosis(long).sealed_traces) == (None, ())
+        del file["traces"], file["held_out_traces"]
+    assert (read_diagnosis(long).traces, read_diagnosis(long).held_out_traces) == (None, ())
 
 
 @pytest.mark.parametrize(
     "name", ["traces/runs/0/q", "traces/effects/0/partial", "traces/dependence/shares"]
 )
 def test_damaged_traces(diagnosis: Diagnosis, tmp_path: Path, name: str) -> None:
-    traces, sealed = make_traces(diagnosis.joint_names)
+    traces, held_out = make_traces(diagnosis.joint_names)
     path = tmp_path / "traces.h5"
-    write_diagnosis(path, replace(diagnosis, traces=traces, sealed_traces=sealed))
+    write_diagnosis(path, replace(diagnosis, traces=traces, held_out_traces=held_out))
     with h5py.File(path, "a") as file:
         cut = file[name][:-1]
         del file[name]

@@ -45,7 +45,7 @@ def test_what_is_written_is_read(found: Identification, tmp_path: Path) -> None:
     assert stored.error == found.error
     assert stored.training_error == found.training_error
     assert stored.findings == found.findings
-    assert (stored.sealed_run, stored.config, stored.config_folder) == (
+    assert (stored.held_out_run, stored.config, stored.config_folder) == (
         "r3",
         PROBLEM,
         "/somewhere",
@@ -57,7 +57,7 @@ def test_traces_come_back_and_older_files_have_none(found: Identification, tmp_p
     path = tmp_path / "fit.h5"
     write_fit(path, found, PROBLEM, "/somewhere", "abc")
     stored = read_fit(path)
-    assert [(t.run, t.sealed) for t in stored.traces] == [
+    assert [(t.run, t.held_out) for t in stored.traces] == [
         ("r1", False),
         ("r2", False),
         ("r3", True),
@@ -99,8 +99,8 @@ def test_links_come_back_and_older_files_have_none(found: Identification, tmp_pa
 
 
 def test_the_traces_are_what_the_errors_say(found: Identification) -> None:
-    sealed = found.traces[-1]
-    left = sealed.measured - sealed.predicted
+    held_out = found.traces[-1]
+    left = held_out.measured - held_out.predicted
     for j, name in enumerate(found.fit.joint_names):
         rms = np.sqrt(np.nanmean(left[:, j] ** 2))
         assert found.error.rms[name] == pytest.approx(rms, rel=1e-3)

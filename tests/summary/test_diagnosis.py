@@ -12,11 +12,11 @@ from excite_cli.diagnosis.records import (
     Assumption,
     Diagnosis,
     EffectRecord,
+    HeldOutEnds,
     JointAlias,
     Removed,
-    SealedEnds,
 )
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.effects.base import Value
 from excite_cli.shown.table import Table
 from excite_cli.summary.diagnosis import diagnosis_answer
@@ -52,12 +52,12 @@ def test_an_approximation_has_a_table_of_its_own(doubted: Diagnosis) -> None:
 
 
 def test_approximations_that_are_not_confirmed_are_one_line(doubted: Diagnosis) -> None:
-    first = replace(doubted.effects[0], verdict=SealedVerdict.NOT_CONFIRMED)
+    first = replace(doubted.effects[0], verdict=HeldOutVerdict.NOT_CONFIRMED)
     found = replace(doubted, effects=(first, *doubted.effects[1:]))
     text = printed(found)
     assert "In the model, but not confirmed: viscous_friction on elbow (--verbose" in text
     assert "Approximations" not in text
-    harmful = replace(first, verdict=SealedVerdict.HARMFUL)
+    harmful = replace(first, verdict=HeldOutVerdict.HARMFUL)
     told = printed(replace(found, effects=(harmful, *found.effects[1:])))
     assert "viscous_friction on elbow (harmful) (--verbose" in told
     tables = [p for p in diagnosis_answer(found, "", {}, True).parts if isinstance(p, Table)]
@@ -149,17 +149,17 @@ def test_nothing_is_missing_only_where_nothing_large_is_left(doubted: Diagnosis)
 
 @pytest.fixture(scope="module")
 def bad() -> Diagnosis:
-    """What was found makes the sealed error larger; its one effect is harmful, and small."""
+    """What was found makes the held-out error larger; its one effect is harmful, and small."""
     found = make_diagnosis(rivals=())
     (named,) = found.effects
     harmful = replace(
         named,
         share_of_residual=1e-5,
         gain=0.01,
-        verdict=SealedVerdict.HARMFUL,
+        verdict=HeldOutVerdict.HARMFUL,
         removes={"elbow": Removed(-0.3, -0.4, -2.0), "slide": Removed(0.01, 0.02, 0.1)},
     )
-    other = replace(named, share_of_residual=1e-4, gain=0.01, verdict=SealedVerdict.NOT_CONFIRMED)
+    other = replace(named, share_of_residual=1e-4, gain=0.01, verdict=HeldOutVerdict.NOT_CONFIRMED)
     after = replace(found.after, mean_relative=0.435, samples=dict.fromkeys(found.joint_names, 80))
     return replace(
         found,
@@ -170,12 +170,12 @@ def bad() -> Diagnosis:
     )
 
 
-def test_a_sealed_error_that_did_not_fall_is_told_first(bad: Diagnosis) -> None:
+def test_a_held_out_error_that_did_not_fall_is_told_first(bad: Diagnosis) -> None:
     answer = diagnosis_answer(bad, "arm.yaml", {})
     assert not answer.good
     assert answer.parts[0] == (
-        "The sealed error did not fall: 9.20% before, 43.50% after (mean over joints, all samples "
-        "of run_3). Harmful: viscous_friction on elbow."
+        "The held-out error did not fall: 9.20% before, 43.50% after (mean over joints, all "
+        "samples of run_3). Harmful: viscous_friction on elbow."
     )
     assert list(answer.data)[:2] == ["good", "reason"]
     assert (answer.data["good"], answer.data["reason"]) == (False, answer.parts[0])
@@ -198,7 +198,7 @@ def test_nothing_missing_or_an_error_that_fell_is_a_good_answer(
     assert (answer.data["good"], answer.data["reason"]) == (True, "")
 
 
-def test_every_effect_shows_what_it_is_worth_on_sealed_data(
+def test_every_effect_shows_what_it_is_worth_on_held_out_data(
     bad: Diagnosis, doubted: Diagnosis
 ) -> None:
     """In percentage points where it is most; a harmful effect is never too small to be shown."""
@@ -234,10 +234,10 @@ def test_scripts_see_verdicts_and_the_untouched_urdf(bad: Diagnosis) -> None:
 
 
 def of_single_runs(found: Diagnosis, after: float, end: float) -> Diagnosis:
-    """A payload of run_1 alone: sealed error 20 % → `after`, of its sealed end 50 % → `end`."""
+    """A payload of run_1 alone: held-out error 20 % → `after`, of its held-out end 50 % → `end`."""
     effect = replace(found.effects[0].effect, kind="payload", runs=("run_1",))
     named = replace(found.effects[0], effect=effect, removes={})
-    part = SealedEnds(
+    part = HeldOutEnds(
         ("run_1",),
         (effect,),
         replace(found.before, mean_relative=0.5),
@@ -256,7 +256,7 @@ def of_single_runs(found: Diagnosis, after: float, end: float) -> Diagnosis:
     ("after", "end", "good"),
     [(0.2, 0.1, True), (0.203, 0.1, True), (0.25, 0.1, False), (0.2, 0.6, False)],
 )
-def test_what_is_not_in_the_sealed_run_is_judged_where_it_is(
+def test_what_is_not_in_the_held_out_run_is_judged_where_it_is(
     after: float, end: float, good: bool
 ) -> None:
     found = make_diagnosis()
@@ -273,7 +273,7 @@ def weighed() -> Diagnosis:
         found.effects[0],
         effect=EffectRecord("torque_gain", ("elbow",), {}, (0.04,)),
         parameters={"gain": Value(0.04, 0.001, "1")},
-        verdict=SealedVerdict.WEIGHED,
+        verdict=HeldOutVerdict.WEIGHED,
         parts=dict.fromkeys(found.joint_names, -1e-5),
     )
     return replace(found, effects=(gain,), before=found.after)
@@ -283,14 +283,14 @@ def test_what_rests_on_a_weight_is_good_though_the_error_is_what_it_was(weighed:
     assert weighed.good
     assert replace(weighed, before=replace(weighed.before, mean_relative=0.099)).good
     assert not replace(weighed, before=replace(weighed.before, mean_relative=0.08)).good
-    vain = replace(weighed.effects[0], verdict=SealedVerdict.NOT_CONFIRMED)
+    vain = replace(weighed.effects[0], verdict=HeldOutVerdict.NOT_CONFIRMED)
     for effects in ((vain,), (*weighed.effects, vain)):  # what else is named must lower it
         assert not replace(weighed, effects=effects).good
 
 
 def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -> None:
     (gain,) = weighed.effects
-    small = replace(gain, verdict=SealedVerdict.CONFIRMED)
+    small = replace(gain, verdict=HeldOutVerdict.CONFIRMED)
     begin = replace(weighed.before, mean_relative=0.5, mean_relative_moving=0.5)
     text = printed(replace(weighed, effects=(gain, small, small), before=begin))
     assert "2 small ones" in text
@@ -299,7 +299,7 @@ def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -
         "torque_gain on elbow rests on what was weighed (identification.total_mass, "
         "identification.known_payload): other inertias would predict as well without it"
     ) in text
-    assert text.count("sealed data are no test of it") == 1
+    assert text.count("held-out data are no test of it") == 1
 
 
 def test_what_inertias_take_up_is_told_with_what_settles_it(weighed: Diagnosis) -> None:

@@ -1,8 +1,8 @@
-"""The guard of the seal: what was fitted must not be judged on, whatever it is called.
+"""The guard of what is held out: what was fitted must not be judged on, whatever it is called.
 
 A recording that is given once more, under another name, cut, shifted or with other time stamps,
 holds the very same positions and torques to the last digit; two recordings of one motion do not,
-for their torque is noisy. So the sealed part is cut into windows of a few dozen samples, and each
+for their torque is noisy. So the held-out part is cut into windows of a few dozen samples, and each
 is looked for at every place of the training part, by a hash of its values.
 
 Where a robot stands, coarse encoders repeat themselves: samples that repeat the one before count
@@ -28,16 +28,16 @@ _MOST = 0.05  # share of the windows that may be found in training
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)
 
 
-def refuse_sealed_copies(parts: Split) -> None:
-    """See that the sealed part holds no samples of the training part.
+def refuse_held_out_copies(parts: Split) -> None:
+    """See that the held-out part holds no samples of the training part.
 
     Raises
     ------
     FileError
         More than a twentieth of it do.
     """
-    sealed = [_telling_windows(run) for run in parts.sealed]
-    wanted = np.unique(np.concatenate(sealed)) if sealed else np.zeros(0, np.uint64)
+    held_out = [_telling_windows(run) for run in parts.held_out]
+    wanted = np.unique(np.concatenate(held_out)) if held_out else np.zeros(0, np.uint64)
     if not len(wanted):
         return
     there = np.zeros(len(wanted), bool)
@@ -49,8 +49,8 @@ def refuse_sealed_copies(parts: Split) -> None:
         there |= own
     if there.mean() > _MOST:
         found = wanted[there]
-        copies = [np.count_nonzero(np.isin(own, found)) for own in sealed]
-        raise FileError(_told(parts.sealed[int(np.argmax(copies))], source, float(there.mean())))
+        copies = [np.count_nonzero(np.isin(own, found)) for own in held_out]
+        raise FileError(_told(parts.held_out[int(np.argmax(copies))], source, float(there.mean())))
 
 
 def _held(wanted: Hashes, run: Run, tell: Tell) -> NDArray[np.bool_]:
@@ -58,17 +58,17 @@ def _held(wanted: Hashes, run: Run, tell: Tell) -> NDArray[np.bool_]:
     return np.isin(wanted, _hashed(_changing(run)))
 
 
-def _told(sealed: Run, source: Run, share: float) -> str:
-    what = f"{share:.0%} of what is sealed is also in training"
-    if sealed.id == source.id:
+def _told(held_out: Run, source: Run, share: float) -> str:
+    what = f"{share:.0%} of what is held out is also in training"
+    if held_out.id == source.id:
         return (
-            f"Run '{sealed.id.key}'{_of([sealed])} repeats itself to the last digit: {what}, so "
-            "that the error there says nothing. Record anew, or give only one of the copies."
+            f"Run '{held_out.id.key}'{_of([held_out])} repeats itself to the last digit: {what}, "
+            "so that the error there says nothing. Record anew, or give only one of the copies."
         )
     return (
-        f"Runs '{sealed.id.key}' and '{source.id.key}'{_of([sealed, source])} hold the same "
+        f"Runs '{held_out.id.key}' and '{source.id.key}'{_of([held_out, source])} hold the same "
         f"samples to the last digit: {what}, so that the error there says nothing. Leave one of "
-        "them out, or seal another run with --sealed."
+        "them out, or hold out another run with --held-out."
     )
 
 

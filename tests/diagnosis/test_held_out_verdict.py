@@ -1,16 +1,16 @@
-"""The verdict on what an effect removes from the error on sealed data."""
+"""The verdict on what an effect removes from the error on held-out data."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.sealed_verdict import (
+from excite_cli.diagnosis.held_out_verdict import (
+    held_out_verdict,
     removed_in_draws,
     rises_on_one,
-    sealed_verdict,
 )
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.identified_model import Prediction
 from excite_cli.identification.prepare import PreparedRun
@@ -21,20 +21,20 @@ UNSURE = np.linspace(-0.002, 0.03, 1000)  # a sixteenth of the draws says the op
 
 
 @pytest.mark.parametrize(
-    ("sign", "verdict"), [(1.0, SealedVerdict.CONFIRMED), (-1.0, SealedVerdict.HARMFUL)]
+    ("sign", "verdict"), [(1.0, HeldOutVerdict.CONFIRMED), (-1.0, HeldOutVerdict.HARMFUL)]
 )
-def test_what_nearly_all_draws_say_is_the_verdict(sign: float, verdict: SealedVerdict) -> None:
-    assert sealed_verdict(sign * SURE, 0.02 * sign) is verdict
-    assert sealed_verdict(sign * UNSURE, 0.02 * sign) is SealedVerdict.NOT_CONFIRMED
+def test_what_nearly_all_draws_say_is_the_verdict(sign: float, verdict: HeldOutVerdict) -> None:
+    assert held_out_verdict(sign * SURE, 0.02 * sign) is verdict
+    assert held_out_verdict(sign * UNSURE, 0.02 * sign) is HeldOutVerdict.NOT_CONFIRMED
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_error_where_joints_stand_must_not_contradict(sign: float) -> None:
-    assert sealed_verdict(sign * SURE, -0.02 * sign) is SealedVerdict.NOT_CONFIRMED
+    assert held_out_verdict(sign * SURE, -0.02 * sign) is HeldOutVerdict.NOT_CONFIRMED
 
 
 def test_without_draws_nothing_is_confirmed() -> None:
-    assert sealed_verdict(np.zeros(0), 0.02) is SealedVerdict.NOT_CONFIRMED
+    assert held_out_verdict(np.zeros(0), 0.02) is HeldOutVerdict.NOT_CONFIRMED
 
 
 def recording(seconds: float, still: bool = False) -> tuple[PreparedRun, Prediction, Prediction]:

@@ -1,4 +1,4 @@
-"""Copies of training data in the sealed part are refused; whatever is measured anew is not."""
+"""Copies of training data in the held-out part are refused; whatever is measured anew is not."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.errors import FileError
-from excite_cli.identification.sealed_copies import refuse_sealed_copies
+from excite_cli.identification.held_out_copies import refuse_held_out_copies
 from excite_cli.identification.split import split
 from excite_cli.measurement.dataset import Array, Dataset, Run
 from excite_cli.measurement.run_identity import Origin
@@ -25,9 +25,9 @@ def recording(name: str, seed: int, joints: int = JOINTS, noise: float = 0.01) -
     return Run(name, t, np.sin(phase), tau, origin=Origin(f"{name}.h5"))
 
 
-def judged(*runs: Run, sealed: str | None = None) -> None:
+def judged(*runs: Run, held_out: str | None = None) -> None:
     names = tuple(f"joint_{j}" for j in range(runs[0].q.shape[1]))
-    refuse_sealed_copies(split(Dataset(names, runs), sealed))
+    refuse_held_out_copies(split(Dataset(names, runs), held_out))
 
 
 def coarse(run: Run, step: float) -> Run:
@@ -55,18 +55,18 @@ def test_copies_are_refused(copy: Run) -> None:
     with pytest.raises(FileError, match="Runs 'copy' and 'a'") as refused:
         judged(FIRST, SECOND, copy)
     assert "hold the same samples to the last digit" in str(refused.value)
-    assert "--sealed" in str(refused.value)
+    assert "--held-out" in str(refused.value)
 
 
 def test_the_message_says_which_files_and_how_much() -> None:
-    with pytest.raises(FileError, match=r"\(copy.h5, a.h5\).*100% of what is sealed"):
+    with pytest.raises(FileError, match=r"\(copy.h5, a.h5\).*100% of what is held out"):
         judged(FIRST, SECOND, LATER)
 
 
-def test_whatever_part_of_a_longer_run_is_sealed() -> None:
+def test_whatever_part_of_a_longer_run_is_held_out() -> None:
     """The copy is the longer one, and begins elsewhere."""
     with pytest.raises(FileError, match="'a' and 'copy'"):
-        judged(FIRST.cut(101, 900), SECOND, LATER, sealed="a")
+        judged(FIRST.cut(101, 900), SECOND, LATER, held_out="a")
 
 
 def jittering(run: Run, seed: int) -> Run:

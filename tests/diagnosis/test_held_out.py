@@ -1,4 +1,4 @@
-"""Nothing of the sealed part is used but for the errors: changed, it changes nothing else."""
+"""Nothing of the held-out part is used but for the errors: changed, it changes nothing else."""
 
 from dataclasses import fields, replace
 from typing import Any
@@ -10,7 +10,7 @@ from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Assumption, Diagnosis
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.effects.catalogue import kind_named
@@ -28,8 +28,8 @@ from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.fourier import FourierTrajectory
 
 SECONDS, RATE = 5.0, 200.0
-# What may differ: what is measured on the sealed part, and the time it took.
-FREE = {"before", "after", "textbook", "untouched", "sealed_traces", "seconds"}
+# What may differ: what is measured on the held-out part, and the time it took.
+FREE = {"before", "after", "textbook", "untouched", "held_out_traces", "seconds"}
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def friction() -> Planted:
 
 
 def differences(one: Diagnosis, other: Diagnosis) -> list[str]:
-    """Fields that are not the same, bit by bit; what is measured on sealed data is left out."""
+    """Fields that are not the same, bit by bit; what is measured on held-out data is left out."""
     one, other = unjudged(one), unjudged(other)
     return [
         field.name
@@ -88,7 +88,7 @@ def differences(one: Diagnosis, other: Diagnosis) -> list[str]:
 
 def unjudged(found: Diagnosis) -> Diagnosis:
     effects = tuple(replace(each, verdict=None, removes={}, parts={}) for each in found.effects)
-    path = found.path and replace(found.path, sealed=())
+    path = found.path and replace(found.path, held_out=())
     return replace(found, effects=effects, path=path)
 
 
@@ -123,7 +123,7 @@ def disturbed(run: Run, where: np.ndarray) -> Run:
 
 @pytest.fixture(scope="module")
 def baseline(robot: Robot, base: BaseParameters, spec: Spec, dataset: Dataset) -> Diagnosis:
-    """Of the data as they are, the last run sealed."""
+    """Of the data as they are, the last run held out."""
     return diagnose(robot, base, dataset, spec)
 
 
@@ -131,21 +131,21 @@ def everywhere(run: Run) -> np.ndarray:
     return np.ones(len(run.t), bool)
 
 
-def test_a_sealed_run_is_used_for_the_errors_only(
+def test_a_held_out_run_is_used_for_the_errors_only(
     robot: Robot, base: BaseParameters, spec: Spec, dataset: Dataset, baseline: Diagnosis
 ) -> None:
     changed = replace(
         dataset, runs=(*dataset.runs[:2], disturbed(dataset.runs[2], everywhere(dataset.runs[2])))
     )
     one, other = baseline, diagnose(robot, base, changed, spec)
-    assert one.sealed_run == "motion_3"
+    assert one.held_out_run == "motion_3"
     assert one.effects  # something was chosen and fitted
     assert set(differences(one, other)) == FREE
     assert other.after.mean_relative > 2 * one.after.mean_relative
 
 
 def with_friction(robot: Robot, base: BaseParameters, spec: Spec, still_there: bool) -> Diagnosis:
-    """Of three runs with dry friction; it may be gone when the last one is recorded, the sealed."""
+    """Of three runs with dry friction; it may be gone when the held-out one is recorded."""
     settings = SimulationSettings(rate=RATE, lead_in=0.5)
     first = simulate(robot, [motion(robot, i) for i in (1, 2)], settings, [friction()]).dataset
     effects = [friction()] if still_there else []
@@ -161,31 +161,31 @@ def lubricated(robot: Robot, base: BaseParameters, spec: Spec) -> Diagnosis:
     return with_friction(robot, base, spec, still_there=False)
 
 
-def test_what_is_there_is_confirmed_on_the_sealed_run(
+def test_what_is_there_is_confirmed_on_the_held_out_run(
     robot: Robot, base: BaseParameters, spec: Spec
 ) -> None:
     found = with_friction(robot, base, spec, still_there=True)
     (named,) = found.effects
     assert found.good
-    assert named.verdict is SealedVerdict.CONFIRMED
+    assert named.verdict is HeldOutVerdict.CONFIRMED
     assert named.removes["elbow"].rms > 0.1
     assert found.untouched is not None
     assert found.untouched.mean_relative > found.after.mean_relative
 
 
-def test_a_payload_that_the_sealed_run_is_wrongly_taken_to_be_without_is_harmful(
+def test_a_payload_that_the_held_out_run_is_wrongly_taken_to_be_without_is_harmful(
     baseline: Diagnosis,
 ) -> None:
-    """It was found in one run, is in the sealed one as well, and nobody has said so."""
+    """It was found in one run, is in the held-out one as well, and nobody has said so."""
     verdicts = {each.effect.kind: each.verdict for each in baseline.effects}
-    assert verdicts["payload"] is SealedVerdict.HARMFUL
+    assert verdicts["payload"] is HeldOutVerdict.HARMFUL
     assert not baseline.good
 
 
-def test_what_the_sealed_run_lacks_is_harmful(lubricated: Diagnosis) -> None:
+def test_what_the_held_out_run_lacks_is_harmful(lubricated: Diagnosis) -> None:
     (named,) = lubricated.effects
     assert (named.effect.kind, named.effect.joints) == ("coulomb_friction", ("elbow",))
-    assert named.verdict is SealedVerdict.HARMFUL
+    assert named.verdict is HeldOutVerdict.HARMFUL
     assert lubricated.harmful == (named,)
     assert not lubricated.good
 
@@ -203,8 +203,8 @@ def test_one_effect_removes_all_that_is_removed(lubricated: Diagnosis) -> None:
         )
 
 
-def test_what_is_assumed_of_the_sealed_run_is_told(baseline: Diagnosis) -> None:
-    """The payload is found in the second run; nobody said that the sealed one has it."""
+def test_what_is_assumed_of_the_held_out_run_is_told(baseline: Diagnosis) -> None:
+    """The payload is found in the second run; nobody said that the held-out one has it."""
     (payload,) = [each for each in baseline.effects if each.effect.kind == "payload"]
     assert payload.effect.runs == ("motion_2",)
     joints = payload.effect.joints
@@ -212,19 +212,19 @@ def test_what_is_assumed_of_the_sealed_run_is_told(baseline: Diagnosis) -> None:
     assert baseline.assumed == (assumed,)
     told = [each.text for each in baseline.findings if each.kind == "assumed"]
     assert told == [assumption_in_words(assumed)]
-    assert "payload of slide in motion_2: taken to be absent in the sealed motion_3." in told[0]
+    assert "payload of slide in motion_2: taken to be absent in the held-out motion_3." in told[0]
     assert "runs: {motion_2: {payload: a}, motion_3: {payload: a}}" in told[0]
     (friction,) = (replace(assumed, kind="coulomb_friction", joints=("elbow",)),)
     assert "coulomb_friction of elbow in motion_2:" in assumption_in_words(friction)
 
 
-def test_a_run_sealed_by_name_is_used_for_the_errors_only(
+def test_a_run_held_out_by_name_is_used_for_the_errors_only(
     robot: Robot, base: BaseParameters, spec: Spec, dataset: Dataset
 ) -> None:
     first = disturbed(dataset.runs[0], everywhere(dataset.runs[0]))
     changed = replace(dataset, runs=(first.cut(0, 700), *dataset.runs[1:]))
     one, other = (diagnose(robot, base, data, spec, "motion_1") for data in (dataset, changed))
-    assert one.sealed_run == "motion_1"
+    assert one.held_out_run == "motion_1"
     assert set(differences(one, other)) == FREE
 
 
@@ -242,19 +242,19 @@ def test_training_data_do_matter(
     )
 
 
-def test_sealed_blocks_of_a_single_run_are_used_for_the_errors_only(
+def test_held_out_blocks_of_a_single_run_are_used_for_the_errors_only(
     robot: Robot, base: BaseParameters, spec: Spec, dataset: Dataset
 ) -> None:
     run = joined(dataset.runs)
     whole = replace(dataset, runs=(run,))
-    sealed = np.zeros(len(run.t), bool)
-    for block in split(whole).sealed:
-        sealed |= (run.t >= block.t[0] - 1e-9) & (run.t <= block.t[-1] + 1e-9)
-    assert 0.2 < sealed.mean() < 0.4
-    changed = replace(dataset, runs=(disturbed(run, sealed),))
+    held_out = np.zeros(len(run.t), bool)
+    for block in split(whole).held_out:
+        held_out |= (run.t >= block.t[0] - 1e-9) & (run.t <= block.t[-1] + 1e-9)
+    assert 0.2 < held_out.mean() < 0.4
+    changed = replace(dataset, runs=(disturbed(run, held_out),))
     one, other = (diagnose(robot, base, data, spec) for data in (whole, changed))
     assert one.effects
-    assert one.noise_floor  # two periods, seen past the sealed blocks
+    assert one.noise_floor  # two periods, seen past the held-out blocks
     assert set(differences(one, other)) == FREE
     assert other.after.mean_relative > 1.5 * one.after.mean_relative
 

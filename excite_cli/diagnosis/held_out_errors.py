@@ -1,8 +1,8 @@
-"""Errors on sealed data of the model with any of the effects that were found, and their parts.
+"""Errors on held-out data of the model with any of the effects that were found, and their parts.
 
 The error of a joint where it moves is e(S) = RMS(τ − τ_S) / RMS(τ) of the model with the effects S,
 fitted anew to the training data. It is quadratic in the fitted parameters, so it needs no samples:
-Gram matrices of the sealed columns (at the final model) and torque. What these do not hold at the
+Gram matrices of the held-out columns (at the final model) and torque. What these do not hold at the
 ends, columns that look at the model's own torque, joins in equal steps; so e(∅) and e(all) are the
 errors that are reported, to rounding.
 
@@ -15,7 +15,7 @@ in which what an effect refines joins before it. In every order the steps add up
 and so do the parts.
 
 How many of the effects are worth their complexity is chosen by training data left out of the fit,
-never by the sealed ones: in the order in which the rounds of the diagnosis took them, the best
+never by the held-out ones: in the order in which the rounds of the diagnosis took them, the best
 number is that of the least error there, and the smallest model is the first within one standard
 error of it (Breiman et al. 1984), the standard deviation over the training runs divided by the root
 of their number.
@@ -44,21 +44,21 @@ _MODELS, _ORDERS = 1500, 100
 _FEWEST_RUNS = 3  # of which a standard error says something
 
 
-def sealed_errors(
+def held_out_errors(
     played: Played,
     traced: Traced,
     after: IdentifiedModel,
     first: Sequence[Prediction],
     last: Sequence[Prediction],
     from_urdf: bool,
-) -> "SealedErrors":
-    """Errors on the sealed runs `played`.
+) -> "HeldOutErrors":
+    """Errors on the held-out runs `played`.
 
     `first` are the predictions at the beginning of the way, `last` those of the model `after`.
     Where the first are the untouched URDF's (`from_urdf`), `INERTIAS` joins.
     """
     fit = _Fit(traced, from_urdf)
-    return SealedErrors(fit, _grams(played, fit, after, first, last))
+    return HeldOutErrors(fit, _grams(played, fit, after, first, last))
 
 
 class _Fit:
@@ -94,7 +94,7 @@ def _error(gram: Array | None, weights: Array) -> float:
     return float(np.sqrt(max(float(weights @ gram @ weights), 0.0) / gram[-1, -1]))
 
 
-class SealedErrors:
+class HeldOutErrors:
     """Errors of models with any of those `who` join: chosen candidates, and `INERTIAS` if kept.
 
     Of every joint a Gram matrix, or none. Its columns: those of all parameters, candidates in
@@ -122,7 +122,7 @@ def _grams(
     first: Sequence[Prediction],
     last: Sequence[Prediction],
 ) -> list[Array | None]:
-    """Per joint, of the sealed samples in motion; None where there are too few."""
+    """Per joint, of the held-out samples in motion; None where there are too few."""
     model = fit.traced.model
     solved = [fit.parameters(each) for each in ((), fit.who)]
     width = len(solved[0]) + len(solved) + 1
@@ -150,10 +150,10 @@ def _grams(
     ]
 
 
-def error_parts(traced: Traced, errors: SealedErrors) -> dict[int, Array]:
+def error_parts(traced: Traced, errors: HeldOutErrors) -> dict[int, Array]:
     """Per who joins, what it takes off the relative error of each joint (n,) where it moves.
 
-    `errors` of the sealed data. NaN for joints that hardly move there.
+    `errors` of the held-out data. NaN for joints that hardly move there.
     """
     parts = {i: np.zeros(errors.joints) for i in errors.who}
     orders = list(_orders(traced, errors.who))
@@ -181,7 +181,7 @@ def _orders(traced: Traced, who: Sequence[int]) -> Iterator[list[int]]:
         yield order
 
 
-def error_path(traced: Traced, order: Sequence[int], sealed: SealedErrors) -> ErrorPath | None:
+def error_path(traced: Traced, order: Sequence[int], held_out: HeldOutErrors) -> ErrorPath | None:
     """The error with none, one, two … of the candidates in `order`; None if there are none."""
     if not order:
         return None
@@ -194,10 +194,10 @@ def error_path(traced: Traced, order: Sequence[int], sealed: SealedErrors) -> Er
     folds = left_out.shape[1]
     error = float(left_out[best].std(ddof=1) / np.sqrt(folds)) if folds > 1 else 0.0
     smallest = int(np.flatnonzero(mean <= mean[best] + error)[0])
-    kept = (INERTIAS,) if INERTIAS in sealed.who else ()
-    on_sealed = [mean_of_known(sealed.of((*kept, *sorted(step)))) for step in steps]
+    kept = (INERTIAS,) if INERTIAS in held_out.who else ()
+    on_held_out = [mean_of_known(held_out.of((*kept, *sorted(step)))) for step in steps]
     return ErrorPath(
-        tuple(map(float, mean)), tuple(on_sealed), error, best, smallest, folds >= _FEWEST_RUNS
+        tuple(map(float, mean)), tuple(on_held_out), error, best, smallest, folds >= _FEWEST_RUNS
     )
 
 

@@ -3,11 +3,11 @@
 Without it, the model is fitted anew to the training data: so is what refines it left out, which
 would take its place. What the effect removes is the difference of the mean relative errors of the
 torque, where joints move: of one that stands the stiction may be any, and no model says it. Blocks
-of the sealed part are drawn with replacement, the same for both errors, and say whether it is above
-or below zero beyond chance. An effect of several joints is confirmed where it removes error from
-those, too, that are not the one from which it removes most, and adds it on none. What only weighing
-tells from the inertias is not judged by this error, unless it rises on a joint: inertias would take
-it up and predict as well. Nothing is chosen or fitted by this.
+of the held-out part are drawn with replacement, the same for both errors, and say whether it is
+above or below zero beyond chance. An effect of several joints is confirmed where it removes error
+from those, too, that are not the one from which it removes most, and adds it on none. What only
+weighing tells from the inertias is not judged by this error, unless it rises on a joint: inertias
+would take it up and predict as well. Nothing is chosen or fitted by this.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +20,7 @@ from excite_cli.diagnosis.before_after import Played, refitted
 from excite_cli.diagnosis.records import Removed
 from excite_cli.diagnosis.textbook import everyday
 from excite_cli.diagnosis.tracing import Traced
-from excite_cli.diagnosis.verdict import SealedVerdict
+from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.identification.errors_of_torque import Errors, block_sums, drawn_blocks
 from excite_cli.identification.identified_model import Prediction
 from excite_cli.identification.prepare import PreparedRun
@@ -38,18 +38,18 @@ Missed = Callable[[Sequence[int], Sequence[int], Sequence[int]], bool]
 class Worth:
     """The verdict on an effect, and by how much it lowers the error, per joint where it does."""
 
-    verdict: SealedVerdict
+    verdict: HeldOutVerdict
     removes: dict[str, Removed]
 
 
-def worth_on_sealed(
+def worth_on_held_out(
     held: Played,
     traced: Traced,
     with_all: Sequence[Prediction],
     sizes: Mapping[int, float],
     missed: Missed | None = None,
 ) -> dict[int, Worth]:
-    """Worth of every chosen candidate on the sealed runs `held`, beside all others.
+    """Worth of every chosen candidate on the held-out runs `held`, beside all others.
 
     `with_all`: what the model with all of them predicts there. `sizes` over two standard
     deviations: what may be zero is not confirmed. Nor is what not every robot has, unless training
@@ -63,15 +63,15 @@ def worth_on_sealed(
         worth, rises = worth_beside(held, traced, with_all, rest, joints)
         verdict = worth.verdict
         if traced.judge.told_by_weight(i, rest) and not rises:
-            verdict = SealedVerdict.WEIGHED
-        elif verdict is SealedVerdict.CONFIRMED:
+            verdict = HeldOutVerdict.WEIGHED
+        elif verdict is HeldOutVerdict.CONFIRMED:
             named = (
                 i in common
                 or missed is None
                 or missed(traced.chosen, rest, traced.candidates[i].rows)
             )
             if sizes[i] < 1.0 or not named:
-                verdict = SealedVerdict.NOT_CONFIRMED
+                verdict = HeldOutVerdict.NOT_CONFIRMED
         found[i] = replace(worth, verdict=verdict)
     return found
 
@@ -90,16 +90,16 @@ def worth_beside(
     without = held.predictions(refitted(traced, rest))
     errors_without, errors = held.errors(without), held.errors(with_all)
     lower = errors_without.mean_relative - errors.mean_relative
-    verdict = sealed_verdict(removed_in_draws(held.runs, without, with_all), lower)
+    verdict = held_out_verdict(removed_in_draws(held.runs, without, with_all), lower)
     on = [held.robot.joint_names[j] for j in joints]
     rises = rises_on_one(on, errors_without, errors)
-    if verdict is SealedVerdict.CONFIRMED and len(joints) > 1:
+    if verdict is HeldOutVerdict.CONFIRMED and len(joints) > 1:
         gains = [errors_without.relative[name] - errors.relative[name] for name in on]
         best = joints[int(np.argmax(np.nan_to_num(gains)))]
         others = removed_in_draws(held.runs, without, with_all, beside=best)
-        verdict = sealed_verdict(others, lower)
-    if verdict is SealedVerdict.CONFIRMED and rises:
-        verdict = SealedVerdict.NOT_CONFIRMED
+        verdict = held_out_verdict(others, lower)
+    if verdict is HeldOutVerdict.CONFIRMED and rises:
+        verdict = HeldOutVerdict.NOT_CONFIRMED
     return Worth(verdict, _removes(errors_without, errors)), rises
 
 
@@ -108,20 +108,20 @@ def rises_on_one(joints: Sequence[str], without: Errors, with_it: Errors) -> boo
     return any(with_it.relative[name] > rules.HIGHER * without.relative[name] for name in joints)
 
 
-def sealed_verdict(removed: Array, lower: float) -> SealedVerdict:
+def held_out_verdict(removed: Array, lower: float) -> HeldOutVerdict:
     """Judge an effect by what it removes in many draws of blocks (draws,), none if there are few.
 
     `lower`: by how much it lowers the mean error over all samples, also where joints stand; a
     verdict that this contradicts is not given.
     """
     if not len(removed):
-        return SealedVerdict.NOT_CONFIRMED
+        return HeldOutVerdict.NOT_CONFIRMED
     low, high = np.percentile(removed, [2.5, 97.5])
     if low > 0.0 and lower > 0.0:
-        return SealedVerdict.CONFIRMED
+        return HeldOutVerdict.CONFIRMED
     if high < 0.0 and lower < 0.0:
-        return SealedVerdict.HARMFUL
-    return SealedVerdict.NOT_CONFIRMED
+        return HeldOutVerdict.HARMFUL
+    return HeldOutVerdict.NOT_CONFIRMED
 
 
 def removed_in_draws(
