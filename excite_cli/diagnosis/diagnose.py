@@ -91,6 +91,11 @@ _OPEN = Finding(
 )
 
 
+def _is_doubt_of_the_setup(finding: Finding) -> bool:
+    """Whether what was seen in the files asks for another config, but for recorded speeds."""
+    return finding.severity == "warning" and bool({*finding.settings} - {"measurement.channels"})
+
+
 def _never(chosen: Sequence[int], rest: Sequence[int], rows: Sequence[int]) -> bool:
     """No data left out miss what a wrong set-up may stand for."""
     return False
@@ -169,6 +174,7 @@ def diagnose(
     held = Played(robot, [*kept, *prepare_all(parts.ends, processing)])
     with_all = held.predictions(models[1])
     missed = compared.missed if compared else None
+    is_open = is_open or any(map(_is_doubt_of_the_setup, dataset.findings))
     if is_open:
         missed = _never
     worth = worth_on_held_out(held, traced, with_all, over_error(traced, final), missed)
