@@ -24,6 +24,7 @@ from excite_cli.checks.time_scale import Clock, TorqueLag
 from excite_cli.checks.tool import Tool
 from excite_cli.checks.torque_unit import TorqueUnit
 from excite_cli.checks.trust import is_trusted
+from excite_cli.checks.within_limits import beyond_limits
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.dataset import Mask
 from excite_cli.robot.model import Array
@@ -171,13 +172,18 @@ def _gain(one: Explained, other: Explained) -> Array:
 def _candidates(
     fit: TextbookFit, rough: TextbookFit, spec: Spec, setup: Setup, explained: Explained
 ) -> Iterator[_Candidate]:
-    names = fit.robot.joint_names
+    names, beyond = fit.robot.joint_names, beyond_limits(fit.robot, rough.samples, setup)
     for check in CHECKS:
         if is_trusted(check.name, spec):
             continue
         settled = {j for j, name in enumerate(names) if check.is_declared(name, spec)}
         every = check.alternatives(fit, setup, explained)
-        some = [each for each in every if settled.isdisjoint(each.joints)]
+        some = [
+            each
+            for each in every
+            if settled.isdisjoint(each.joints)
+            and not (beyond_limits(fit.robot, rough.samples, each.setup) & ~beyond).any()
+        ]
         if len(some) > _CANDIDATES:
             some = _best_of_each(some, [rough(each.setup).loss for each in some])[:_CANDIDATES]
         for each in some:
