@@ -31,7 +31,7 @@ def test_beyond_by_a_tenth_of_the_range_but_for_whole_turns(robot: Robot) -> Non
     assert not beyond_limits(robot, at(robot, q), declared).any()
     q[:, 2] += 2 * np.pi
     assert not beyond_limits(robot, at(robot, q), declared).any()
-    q[1, 2] += np.pi
+    q[1, 2] += 1.5 * np.pi
     assert beyond_limits(robot, at(robot, q), declared).tolist() == [
         False,
         False,
